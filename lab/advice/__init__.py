@@ -1,0 +1,1 @@
+"""Who advises the learner, and when it asks."""

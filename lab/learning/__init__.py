@@ -1,0 +1,1 @@
+"""How a table is learned: update rules, action selection and the one session."""

@@ -1,0 +1,298 @@
+"""Small deterministic decision problems in tables, their builders and their exact solutions."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Gt, Le, Lt
+from numpy.typing import ArrayLike, NDArray
+
+from lab.errors import BadInput, WorkFailed
+
+MAX_COVERAGE_CELLS = 12
+MAX_SWEEPS = 100_000
+COVERAGE_LABELS = ("up", "down", "left", "right")
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Rewards:
+    """What entering a goal, entering an obstacle and any other step are worth (thesis, sections 8.3 and 9.7)."""
+
+    goal: Annotated[float, Gt(0)] = 1.5
+    collision: Annotated[float, Lt(0)] = -1.0
+    step: Annotated[float, Le(0), Ge(-1000)] = -0.1
+
+
+class NoPath(BadInput):
+    """No path joins start and goal.
+
+    `enclosing` holds the index tuples of the blocked cells that wall in the smaller of the two regions; `around` says whether
+    that is the one of the goal or the one of the start.
+    """
+
+    def __init__(self, message: str, enclosing: tuple[tuple[int, ...], ...], around: Literal["goal", "start"]):
+        super().__init__(message)
+        self.enclosing = enclosing
+        self.around = around
+
+
+@dataclass(frozen=True, eq=False)
+class TabularMDP:
+    """A deterministic problem: which state and reward each action leads to.
+
+    successor (S, A) int32, reward (S, A) float64, terminal (S,) bool, goal (S,) bool (a subset of terminal), start a state.
+    `shape` is the grid's shape, () when the states are no grid; states are numbered in C order (`ravel_multi_index`).
+    `coverage_shape` is (rows, columns) of a coverage problem (see `coverage`), else ().
+    The arrays are copied and made read-only. Raises BadInput when they do not fit together.
+    """
+
+    successor: IntArray
+    reward: FloatArray
+    terminal: BoolArray
+    goal: BoolArray
+    start: int
+    action_labels: tuple[str, ...]
+    shape: tuple[int, ...] = ()
+    coverage_shape: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, dtype in (
+            ("successor", np.int32),
+            ("reward", np.float64),
+            ("terminal", np.bool_),
+            ("goal", np.bool_),
+        ):
+            array = np.array(getattr(self, name), dtype=dtype, order="C")
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        reason = self._what_does_not_fit()
+        if reason:
+            raise BadInput(f"decision problem: {reason}")
+
+    def _what_does_not_fit(self) -> str | None:
+        if self.successor.ndim != 2 or 0 in self.successor.shape:
+            return f"successor has shape {self.successor.shape}, allowed (states, actions), none of them 0"
+        states, actions = self.successor.shape
+        if self.reward.shape != (states, actions) or self.terminal.shape != (states,) or self.goal.shape != (states,):
+            return f"reward, terminal and goal must have shapes ({states}, {actions}), ({states},) and ({states},)"
+        if len(self.action_labels) != actions:
+            return f"{len(self.action_labels)} action labels for {actions} actions"
+        if self.successor.min() < 0 or self.successor.max() >= states:
+            return f"successor names a state outside 0..{states - 1}"
+        if not np.isfinite(self.reward).all():
+            return "a reward is not finite"
+        if bool((self.goal & ~self.terminal).any()):
+            return "a goal state is not terminal"
+        if not 0 <= self.start < states:
+            return f"start {self.start} is outside 0..{states - 1}"
+        if self.shape and int(np.prod(self.shape)) != states:
+            return f"shape {self.shape} does not hold {states} states"
+        return None
+
+    @property
+    def n_states(self) -> int:
+        """The number of states S."""
+        return int(self.successor.shape[0])
+
+    @property
+    def n_actions(self) -> int:
+        """The number of actions A."""
+        return int(self.successor.shape[1])
+
+    @cached_property
+    def signature(self) -> str:
+        """The first 16 hex digits of a SHA-256 over all that defines the problem: equal problems, equal signatures."""
+        head = (self.start, self.action_labels, self.shape, self.coverage_shape, self.successor.shape)
+        digest = hashlib.sha256(repr(head).encode())
+        for array, code in ((self.successor, "<i4"), (self.reward, "<f8"), (self.terminal, "?"), (self.goal, "?")):
+            digest.update(array.astype(code, order="C").tobytes())
+        return digest.hexdigest()[:16]
+
+    def state_cell(self, state: int) -> tuple[int, ...]:
+        """The grid cell of a state (of the head in a coverage problem); () when the states are no grid."""
+        if self.coverage_shape:
+            cells = int(np.prod(self.coverage_shape))
+            return tuple(int(i) for i in np.unravel_index(state >> cells, self.coverage_shape))
+        if not self.shape:
+            return ()
+        return tuple(int(i) for i in np.unravel_index(state, self.shape))
+
+    def covered(self, state: int) -> BoolArray:
+        """Which cells are covered in a state of a coverage problem; (rows, columns) bool, empty for other problems."""
+        cells = int(np.prod(self.coverage_shape)) if self.coverage_shape else 0
+        return np.array([state >> i & 1 for i in range(cells)], bool).reshape(self.coverage_shape or (0,))
+
+    def state_label(self, state: int) -> str:
+        """A state in words: "(3, 4)" on a grid, "(0, 1) covered 4 of 9" in a coverage problem, else its number."""
+        if not 0 <= state < self.n_states:
+            raise BadInput(f"state {state} is outside 0..{self.n_states - 1}")
+        if self.coverage_shape:
+            covered = self.covered(state)
+            return f"{self.state_cell(state)} covered {int(covered.sum())} of {covered.size}"
+        return str(self.state_cell(state)) if self.shape else str(state)
+
+
+def _neighbours(shape: tuple[int, ...]) -> IntArray:
+    """The cell each move leads to, staying at the border; (cells, 2 * axes) int32: -axis0, +axis0, -axis1, ..."""
+    cells = np.indices(shape).reshape(len(shape), -1)
+    columns = []
+    for axis, length in enumerate(shape):
+        for move in (-1, 1):
+            moved = cells.copy()
+            moved[axis] = np.clip(cells[axis] + move, 0, length - 1)
+            columns.append(np.ravel_multi_index(tuple(moved), shape))
+    return np.stack(columns, axis=1).astype(np.int32)
+
+
+def _distances(successor: IntArray, closed: BoolArray, source: int) -> IntArray:
+    """Moves from source to each state, -1 where unreachable; closed states are reached but not left; (S,) int32."""
+    distance = np.full(len(successor), -1, np.int32)
+    frontier = np.array([source])
+    steps = 0
+    while frontier.size:
+        distance[frontier] = steps
+        steps += 1
+        reached = np.unique(successor[frontier[~closed[frontier]]])
+        frontier = reached[distance[reached] < 0]
+    return distance
+
+
+def grid(
+    shape: Sequence[int],
+    blocked: ArrayLike,
+    start: Sequence[int],
+    goal: Sequence[int],
+    rewards: Rewards | None = None,
+    action_labels: Sequence[str] | None = None,
+) -> TabularMDP:
+    """A grid of any dimension with obstacles, one start and one goal.
+
+    blocked: bool array of `shape`. Actions: -axis0, +axis0, -axis1, ...; their labels default to these words. Entering a blocked
+    cell costs `collision` and ends the episode, entering the goal gives `goal` and ends it; a move out of the grid stays
+    where it is and costs `step`.
+    Raises BadInput (start or goal outside, blocked or the same) and NoPath. Source: thesis, sections 8.3 and 9.7.
+    """
+    shape = tuple(int(n) for n in shape)
+    if not shape or min(shape) < 1:
+        raise BadInput(f"grid shape {shape}: each axis needs at least one cell")
+    rewards = rewards or Rewards()
+    wall = np.asarray(blocked, dtype=bool)
+    if wall.shape != shape:
+        raise BadInput(f"blocked cells have shape {wall.shape}, the grid has {shape}")
+    labels = tuple(action_labels or (f"{sign}axis{axis}" for axis in range(len(shape)) for sign in "-+"))
+    closed = wall.ravel()
+    first, last = _free_cell("start", start, wall), _free_cell("goal", goal, wall)
+    if first == last:
+        raise BadInput(f"start and goal are the same cell {tuple(goal)}")
+    moves = _neighbours(shape)
+    _require_path(moves, wall, first, last)
+    goals = np.zeros(closed.size, bool)
+    goals[last] = True
+    terminal = closed | goals
+    reward = np.where(closed[moves], rewards.collision, np.where(goals[moves], rewards.goal, rewards.step))
+    reward[terminal] = 0.0
+    successor = np.where(terminal[:, None], np.arange(closed.size)[:, None], moves).astype(np.int32)
+    return TabularMDP(successor, reward, terminal, goals, first, labels, shape)
+
+
+def _free_cell(name: str, cell: Sequence[int], wall: BoolArray) -> int:
+    index = tuple(int(i) for i in cell)
+    if len(index) != wall.ndim or any(not 0 <= i < n for i, n in zip(index, wall.shape, strict=True)):
+        raise BadInput(f"{name} {index} is outside the grid: allowed {' x '.join(f'0..{n - 1}' for n in wall.shape)}")
+    if wall[index]:
+        raise BadInput(f"{name} {index} is blocked by an obstacle")
+    return int(np.ravel_multi_index(index, wall.shape))
+
+
+def _require_path(moves: IntArray, wall: BoolArray, start: int, goal: int) -> None:
+    """Raises NoPath, naming the obstacles around the smaller of the two regions that start and goal lie in."""
+    closed = wall.ravel()
+    from_goal = _distances(moves, closed, goal) >= 0
+    if from_goal[start]:
+        return
+    from_start = _distances(moves, closed, start) >= 0
+    around: Literal["goal", "start"] = (
+        "goal" if (from_goal & ~closed).sum() <= (from_start & ~closed).sum() else "start"
+    )
+    walls = np.flatnonzero((from_goal if around == "goal" else from_start) & closed)
+    cells = tuple(tuple(int(i) for i in np.unravel_index(w, wall.shape)) for w in walls)
+    shown = ", ".join(str(c) for c in cells[:8]) + (f" and {len(cells) - 8} more" if len(cells) > 8 else "")
+    ends = [tuple(int(i) for i in np.unravel_index(s, wall.shape)) for s in (start, goal)]
+    raise NoPath(f"no path from {ends[0]} to {ends[1]}: the {around} is enclosed by {shown}", cells, around)
+
+
+def coverage(shape: Sequence[int], rewards: Rewards | None = None, start: Sequence[int] = (0, 0)) -> TabularMDP:
+    """Covering every cell of a small board with a moving head: the butter sub-task.
+
+    state = head cell * 2**cells + mask, bit i of the mask = cell i (C order) is covered; actions up, down, left, right (axis 0
+    down, axis 1 right); a move out of the board stays. The start has its own cell covered; a goal has all covered.
+    3 x 3 has 4608 states and takes 8 moves. Raises BadInput for a board of 1 or more than 12 cells or a start outside it.
+    """
+    shape = tuple(int(n) for n in shape)
+    cells = int(np.prod(shape))
+    if len(shape) != 2 or min(shape) < 1 or not 2 <= cells <= MAX_COVERAGE_CELLS:
+        raise BadInput(f"coverage board {shape}: allowed are 2 axes and 2..{MAX_COVERAGE_CELLS} cells")
+    rewards = rewards or Rewards()
+    head = _free_cell("start", start, np.zeros(shape, bool))
+    masks = np.arange(1 << cells)
+    heads = _neighbours(shape)[:, None, :]  # (cells, 1, A)
+    after = masks[None, :, None] | (1 << heads)  # (cells, masks, A)
+    successor = ((heads << cells) | after).reshape(-1, 4)
+    goals = np.tile(masks == masks[-1], cells)
+    reward = np.where(goals[successor], rewards.goal, rewards.step)
+    reward[goals] = 0.0
+    successor = np.where(goals[:, None], np.arange(goals.size)[:, None], successor).astype(np.int32)
+    first = (head << cells) | (1 << head)
+    return TabularMDP(successor, reward, goals, goals, first, COVERAGE_LABELS, (), shape)
+
+
+def optimal_values(mdp: TabularMDP, discount: float) -> FloatArray:
+    """The optimal action values by value iteration; (S, A) float64, 0 in terminal states.
+
+    Raises WorkFailed when the values do not settle (a discount of 1 where some states never end).
+    """
+    onward = discount * ~mdp.terminal[mdp.successor]
+    q: FloatArray = np.where(mdp.terminal[:, None], 0.0, mdp.reward)
+    for _ in range(MAX_SWEEPS):
+        values = q.max(axis=1)
+        updated: FloatArray = mdp.reward + onward * values[mdp.successor]
+        updated[mdp.terminal] = 0.0
+        change = float(np.abs(updated - q).max())
+        q = updated
+        if change < 1e-12:
+            return q
+    raise WorkFailed(f"value iteration with discount {discount} did not settle in {MAX_SWEEPS} sweeps")
+
+
+def shortest_steps(mdp: TabularMDP) -> int:
+    """The fewest moves from the start to a goal that enter no other terminal state (breadth first). Raises NoPath."""
+    distance = _distances(mdp.successor, mdp.terminal, mdp.start)[mdp.goal]
+    if not (distance >= 0).any():
+        raise NoPath(f"no goal can be reached from {mdp.state_label(mdp.start)}", (), "goal")
+    return int(distance[distance >= 0].min())
+
+
+def greedy_path(q: FloatArray, mdp: TabularMDP, max_steps: int) -> tuple[list[int], list[int], bool]:
+    """Follows the best action of each state from the start (ties: the lowest index).
+
+    Returns the states (one more than actions), the actions and whether a goal was reached. It stops at a terminal state, after
+    max_steps, or at a state seen before, since from there it would only go round.
+    """
+    states: list[int] = [mdp.start]
+    actions: list[int] = []
+    seen = {mdp.start}
+    while not mdp.terminal[states[-1]] and len(actions) < max_steps:
+        action = int(np.argmax(q[states[-1]]))
+        actions.append(action)
+        states.append(int(mdp.successor[states[-1], action]))
+        if states[-1] in seen:
+            break
+        seen.add(states[-1])
+    return states, actions, bool(mdp.goal[states[-1]])
