@@ -1,0 +1,34 @@
+"""The lab's errors: exit codes, one line, the nearest name."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lab.errors import BadInput, LabError, WorkFailed, unknown
+
+
+@pytest.mark.parametrize(("kind", "code"), [(BadInput, 2), (WorkFailed, 1), (LabError, 1)])
+def test_each_error_carries_its_exit_code(kind: type[LabError], code: int) -> None:
+    assert kind("why").exit_code == code
+    assert issubclass(kind, LabError)
+
+
+def test_unknown_names_the_value_its_origin_the_nearest_and_all_known() -> None:
+    error = unknown("advisor", "exprt", ["novice", "expert"], "--advisor")
+    assert isinstance(error, BadInput)
+    assert str(error) == "unknown advisor 'exprt' (--advisor): did you mean 'expert'? known: expert, novice"
+
+
+def test_nothing_near_gives_no_hint() -> None:
+    assert str(unknown("gate", "zzz", ["ccrl"], "--gate")) == "unknown gate 'zzz' (--gate): known: ccrl"
+
+
+PRINTABLE = st.text(st.characters(exclude_categories=("C", "Z")), min_size=1)
+
+
+@given(PRINTABLE, st.lists(PRINTABLE, unique=True))
+def test_any_value_is_reported_in_one_line_with_all_that_is_known(value: str, known: list[str]) -> None:
+    message = str(unknown("task", value, known, "TASK"))
+    assert len(message.splitlines()) == 1
+    assert f"'{value}' (TASK)" in message
+    assert message.endswith(f"known: {', '.join(sorted(known))}")
