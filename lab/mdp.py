@@ -33,8 +33,8 @@ class Rewards:
 class NoPath(BadInput):
     """No path joins start and goal.
 
-    `enclosing` holds the index tuples of the blocked cells that wall in the smaller of the two regions; `around` says whether
-    that is the one of the goal or the one of the start.
+    `enclosing` holds the index tuples of the blocked cells that wall in the smaller of the two regions; `around`
+    says whether that is the one of the goal or the one of the start.
     """
 
     def __init__(self, message: str, enclosing: tuple[tuple[int, ...], ...], around: Literal["goal", "start"]):
@@ -47,10 +47,10 @@ class NoPath(BadInput):
 class TabularMDP:
     """A deterministic problem: which state and reward each action leads to.
 
-    successor (S, A) int32, reward (S, A) float64, terminal (S,) bool, goal (S,) bool (a subset of terminal), start a state.
-    `shape` is the grid's shape, () when the states are no grid; states are numbered in C order (`ravel_multi_index`).
-    `coverage_shape` is (rows, columns) of a coverage problem (see `coverage`), else ().
-    The arrays are copied and made read-only. Raises BadInput when they do not fit together.
+    successor (S, A) int32, reward (S, A) float64, terminal (S,) bool, goal (S,) bool (a subset of terminal), start
+    a state. `shape` is the grid's shape, () when the states are no grid; states are numbered in C order
+    (`ravel_multi_index`). `coverage_shape` is (rows, columns) of a coverage problem (see `coverage`), else (). The
+    arrays are copied and made read-only. Raises BadInput when they do not fit together.
     """
 
     successor: IntArray
@@ -92,6 +92,8 @@ class TabularMDP:
             return "a goal state is not terminal"
         if not 0 <= self.start < states:
             return f"start {self.start} is outside 0..{states - 1}"
+        if self.terminal[self.start]:
+            return f"start {self.start} is a terminal state"
         if self.shape and int(np.prod(self.shape)) != states:
             return f"shape {self.shape} does not hold {states} states"
         return None
@@ -174,9 +176,9 @@ def grid(
 ) -> TabularMDP:
     """A grid of any dimension with obstacles, one start and one goal.
 
-    blocked: bool array of `shape`. Actions: -axis0, +axis0, -axis1, ...; their labels default to these words. Entering a blocked
-    cell costs `collision` and ends the episode, entering the goal gives `goal` and ends it; a move out of the grid stays
-    where it is and costs `step`.
+    blocked: bool array of `shape`. Actions: -axis0, +axis0, -axis1, ...; their labels default to these words.
+    Entering a blocked cell costs `collision` and ends the episode, entering the goal gives `goal` and ends it; a
+    move out of the grid stays where it is and costs `step`.
     Raises BadInput (start or goal outside, blocked or the same) and NoPath. Source: thesis, sections 8.3 and 9.7.
     """
     shape = tuple(int(n) for n in shape)
@@ -231,9 +233,10 @@ def _require_path(moves: IntArray, wall: BoolArray, start: int, goal: int) -> No
 def coverage(shape: Sequence[int], rewards: Rewards | None = None, start: Sequence[int] = (0, 0)) -> TabularMDP:
     """Covering every cell of a small board with a moving head: the butter sub-task.
 
-    state = head cell * 2**cells + mask, bit i of the mask = cell i (C order) is covered; actions up, down, left, right (axis 0
-    down, axis 1 right); a move out of the board stays. The start has its own cell covered; a goal has all covered.
-    3 x 3 has 4608 states and takes 8 moves. Raises BadInput for a board of 1 or more than 12 cells or a start outside it.
+    state = head cell * 2**cells + mask, bit i of the mask = cell i (C order) is covered; actions up, down, left,
+    right (axis 0 down, axis 1 right); a move out of the board stays. The start has its own cell covered; a goal has
+    all covered. 3 x 3 has 4608 states and takes 8 moves. Raises BadInput for a board of 1 or more than 12 cells or
+    a start outside it.
     """
     shape = tuple(int(n) for n in shape)
     cells = int(np.prod(shape))
@@ -282,8 +285,8 @@ def shortest_steps(mdp: TabularMDP) -> int:
 def greedy_path(q: FloatArray, mdp: TabularMDP, max_steps: int) -> tuple[list[int], list[int], bool]:
     """Follows the best action of each state from the start (ties: the lowest index).
 
-    Returns the states (one more than actions), the actions and whether a goal was reached. It stops at a terminal state, after
-    max_steps, or at a state seen before, since from there it would only go round.
+    Returns the states (one more than actions), the actions and whether a goal was reached. It stops at a terminal
+    state, after max_steps, or at a state seen before, since from there it would only go round.
     """
     states: list[int] = [mdp.start]
     actions: list[int] = []

@@ -38,8 +38,9 @@ def _words(limit: Gt | Ge | Le) -> str:
 class LearnerSettings:
     """How a learner learns; the defaults are those of the thesis (sections 8.3 and 9.8).
 
-    learner: a name in UPDATES; alpha: learning rate; discount: gamma; trace: lambda of Q(lambda); beta: the softmax temperature in
-    episode n is n**-beta; episodes: session length N; max_steps: moves after which an episode is broken off.
+    learner: a name in UPDATES; alpha: learning rate; discount: gamma; trace: lambda of Q(lambda); beta: the softmax
+    temperature in episode n is n**-beta; episodes: session length N; max_steps: moves after which an episode is
+    broken off.
     Raises BadInput for a value outside its range.
     """
 
@@ -59,9 +60,10 @@ class LearnerSettings:
 class GateSettings:
     """When a learner asks for advice and when it stops; the defaults are those of the thesis (chapter 6, section 9.3).
 
-    gate: a name in GATES; lambda_threshold: Lambda, the improvement rate below which advice is requested; omega: Omega, the
-    misleads that are tolerated; first_episode: X, the first episode that may ask; window: K, the episodes in a moving average;
-    psi: Psi, the width below which the action values of a state leave the learner unsure (introspection).
+    gate: a name in GATES; lambda_threshold: Lambda, the improvement rate below which advice is requested; omega:
+    Omega, the misleads that are tolerated; first_episode: X, the first episode that may ask; window: K, the
+    episodes in a moving average; psi: Psi, the width below which the action values of a state leave the learner
+    unsure (introspection).
     Raises BadInput for a value outside its range.
     """
 

@@ -1,0 +1,135 @@
+"""A learned policy with all that is needed to trust, reuse and explain it."""
+
+import platform
+import re
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from math import prod
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from lab.errors import BadInput
+from lab.mdp import FloatArray, TabularMDP
+
+if TYPE_CHECKING:
+    from lab.learning.session import CountArray, SessionResult
+    from lab.learning.settings import GateSettings, LearnerSettings
+
+MAX_NAME_LENGTH = 100
+_SIGNATURE = re.compile(r"[0-9a-f]{16}")
+
+
+@dataclass(frozen=True, eq=False)
+class Policy:
+    """One learned table with its provenance.
+
+    q (S, A) float64 and visits (S, A) int64; action_labels, shape, start and signature are those of the problem it
+    was learned in (`TabularMDP`); learner and gate: the settings by name; curve: steps of each episode, a failed
+    one as max_steps + 1; guided: which of them had advice; helped_steps, requests, optimal_steps, final_steps,
+    solved: see `SessionResult`; created: ISO 8601 in UTC; versions by package. Raises BadInput when these do not
+    fit together.
+    """
+
+    name: str
+    subtask: str
+    task: str
+    q: FloatArray
+    visits: "CountArray"
+    action_labels: tuple[str, ...]
+    shape: tuple[int, ...]
+    start: int
+    signature: str
+    learner: dict[str, Any]
+    gate: dict[str, Any]
+    advisor: str
+    seed: int
+    curve: list[int]
+    guided: list[bool]
+    helped_steps: int
+    requests: int
+    optimal_steps: int
+    final_steps: int | None
+    solved: bool
+    created: str
+    versions: dict[str, str]
+
+    def __post_init__(self) -> None:
+        reason = self._what_does_not_fit()
+        if reason:
+            raise BadInput(f"policy '{str(self.name)[:MAX_NAME_LENGTH]}': {reason}")
+
+    def _what_does_not_fit(self) -> str | None:
+        if not self.name.strip() or len(self.name) > MAX_NAME_LENGTH or not self.name.isprintable():
+            return f"its name must have 1 to {MAX_NAME_LENGTH} printable characters"
+        if self.q.ndim != 2 or 0 in self.q.shape:
+            return f"table q has shape {self.q.shape}, allowed (states, actions)"
+        if self.q.dtype != np.float64 or self.visits.dtype != np.int64:
+            return f"q is {self.q.dtype} and visits {self.visits.dtype}, allowed float64 and int64"
+        states, actions = self.q.shape
+        if self.visits.shape != self.q.shape:
+            return f"visits have shape {self.visits.shape}, q has {self.q.shape}"
+        if not np.isfinite(self.q).all():
+            return f"{int((~np.isfinite(self.q)).sum())} values of q are not finite"
+        if self.visits.min() < 0:
+            return "a visit count is negative"
+        if len(self.action_labels) != actions:
+            return f"{len(self.action_labels)} action labels for {actions} actions"
+        if self.shape and prod(self.shape) != states:
+            return f"shape {self.shape} does not hold {states} states"
+        if not 0 <= self.start < states:
+            return f"start {self.start} is outside 0..{states - 1}"
+        if not _SIGNATURE.fullmatch(self.signature):
+            return f"signature '{self.signature[:40]}' is not 16 hex digits"
+        if len(self.curve) != len(self.guided):
+            return f"{len(self.curve)} episodes in the curve, {len(self.guided)} in guided"
+        return None
+
+    @classmethod
+    def of(
+        cls,
+        result: "SessionResult",
+        mdp: TabularMDP,
+        *,
+        name: str,
+        subtask: str,
+        task: str,
+        learner: "LearnerSettings",
+        gate: "GateSettings",
+        advisor: str,
+        seed: int,
+    ) -> Self:
+        """The policy that a session learned in a problem, stamped with the time and the versions of now."""
+        return cls(
+            name=name,
+            subtask=subtask,
+            task=task,
+            q=result.q,
+            visits=result.visits,
+            action_labels=mdp.action_labels,
+            shape=mdp.shape,
+            start=mdp.start,
+            signature=mdp.signature,
+            learner=asdict(learner),
+            gate=asdict(gate),
+            advisor=advisor,
+            seed=seed,
+            curve=result.steps.tolist(),
+            guided=result.guided.tolist(),
+            helped_steps=result.helped_steps,
+            requests=result.requests,
+            optimal_steps=result.optimal_steps,
+            final_steps=result.final_steps,
+            solved=result.solved,
+            created=datetime.now(UTC).isoformat(timespec="microseconds"),
+            versions=_versions(),
+        )
+
+
+def _versions() -> dict[str, str]:
+    try:
+        lab = version("teaching-lab")
+    except PackageNotFoundError:  # run from a source folder
+        lab = "unknown"
+    return {"teaching-lab": lab, "python": platform.python_version(), "numpy": np.__version__}
