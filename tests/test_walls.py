@@ -1,0 +1,271 @@
+"""The house's walls, read from the source alone: who may import whom, and what no module does.
+
+Every import counts: inside functions, relative, under TYPE_CHECKING. `LAYERS` lists the rooms from the ground up; a
+module imports only its own room and the rooms below it. A new module belongs to the longest prefix that it starts with.
+"""
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+LAYERS: tuple[tuple[str, ...], ...] = (
+    ("lab.errors",),
+    ("lab.data",),
+    ("lab.vision", "lab.view.frames", "lab.mdp", "lab.sequencing", "lab.learning.settings"),
+    ("lab.learning.updates", "lab.learning.selection", "lab.learning.kernels"),
+    ("lab.advice",),
+    ("lab.learning",),
+    ("lab.policy",),
+    ("lab.toolbox",),
+    ("lab.taskfile",),
+    ("lab.sim",),
+    ("lab.skills",),
+    ("lab.composer",),
+    ("lab.view",),
+    ("lab.studies", "lab.gym"),
+    ("lab.cli",),
+)
+ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
+    "pybullet": {"lab.sim.world"},
+    "pybullet_data": {"lab.sim.world"},
+    "pybullet_utils": {"lab.sim.world"},
+    "meshcat": {"lab.view.meshcat"},
+    "cv2": {"lab.vision", "lab.sim.camera"},
+    "PIL": {"lab.vision", "lab.sim.camera"},
+} | {library: set() for library in ("random", "pickle", "dill", "cloudpickle", "joblib", "shelve", "marshal")}
+NEVER = {  # room -> rooms that it never imports, whatever the layers say
+    "lab.mdp": ("lab.sim", "lab.view", "lab.cli"),
+    "lab.learning": ("lab.sim", "lab.view", "lab.cli"),
+    "lab.advice": ("lab.sim", "lab.view", "lab.cli"),
+    "lab.sequencing": ("lab.sim", "lab.view", "lab.cli"),
+    "lab.sim": ("lab.learning", "lab.sequencing"),
+}
+HEAVY = ("numpy", "pydantic", "scipy", "trimesh", "matplotlib", "numba", "meshcat", "cv2", "pybullet", "safetensors")
+GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
+
+
+@dataclass(frozen=True)
+class Import:
+    """One imported module, and whether loading the importer loads it (module level, outside TYPE_CHECKING)."""
+
+    target: str
+    line: int
+    at_load: bool
+
+
+def within(module: str, room: str) -> bool:
+    """Whether `module` is `room` or inside it."""
+    return module == room or module.startswith(f"{room}.")
+
+
+def layer(module: str) -> tuple[int, str]:
+    """The layer and the room of a module: the longest listed prefix."""
+    rooms = [(len(room), number, room) for number, rooms in enumerate(LAYERS) for room in rooms if within(module, room)]
+    assert rooms, f"{module} has no room: give it a row in LAYERS (tests/test_walls.py), as low as it can stand"
+    _, number, room = max(rooms)
+    return number, room
+
+
+def imports(tree: ast.Module, module: str, is_package: bool, known: frozenset[str]) -> list[Import]:
+    """All imports of a module, absolute; `from package import name` is the submodule where there is one."""
+    lazy = {
+        id(inner)
+        for outer in ast.walk(tree)
+        if isinstance(outer, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) or _is_type_checking(outer)
+        for inner in ast.walk(outer)
+    }
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            targets = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                parents = module.split(".")[: len(module.split(".")) - node.level + is_package]
+                base = ".".join([*parents, base] if base else parents)
+            names = [f"{base}.{alias.name}" for alias in node.names]
+            targets = [name if name in known else base for name in names]
+        else:
+            continue
+        found += [Import(target, node.lineno, id(node) not in lazy) for target in targets]
+    return found
+
+
+def _is_type_checking(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
+
+
+def import_faults(module: str, found: list[Import]) -> Iterator[str]:
+    """What is wrong with a module's imports, one line each."""
+    for item in found:
+        top, place = item.target.partition(".")[0], f"{module}:{item.line} imports {item.target}"
+        if module not in ALONE.get(top, {module}):
+            yield f"{place}: allowed in {sorted(ALONE[top]) or 'no module'}"
+        if top != "lab" or item.target == "lab":
+            continue
+        for room, banned in NEVER.items():
+            if within(module, room) and any(within(item.target, other) for other in banned):
+                yield f"{place}: {room} never does"
+        (own_layer, own_room), (layer_there, room_there) = layer(module), layer(item.target)
+        if own_room != room_there and layer_there >= own_layer:
+            yield f"{place}: runs back up, {room_there} does not stand below {own_room}"
+
+
+def code_faults(module: str, tree: ast.Module) -> Iterator[str]:
+    """Prints outside the CLI, global random state, pickled files and imports by string, one line each."""
+    for node in ast.walk(tree):
+        text = ast.unparse(node) if isinstance(node, ast.Attribute | ast.Call | ast.ImportFrom) else ""
+        line = f"{module}:{getattr(node, 'lineno', 0)}"
+        if isinstance(node, ast.Call):
+            called = ast.unparse(node.func)
+            if called in ("print", "pprint", "rich.print") and module != "lab.cli":
+                yield f"{line} prints: only the CLI does"
+            if called in ("__import__", "import_module", "importlib.import_module"):
+                yield f"{line} imports by a string, which no wall can see"
+            if any(word.arg == "allow_pickle" and ast.unparse(word.value) != "False" for word in node.keywords):
+                yield f"{line} allows pickles"
+        elif isinstance(node, ast.Attribute):
+            if text.startswith(("np.random.", "numpy.random.")) and text.split(".")[2] not in GENERATORS:
+                yield f"{line} uses {text}: randomness is a Generator argument"
+        elif isinstance(node, ast.ImportFrom) and node.module == "numpy.random":
+            for name in {alias.name for alias in node.names} - GENERATORS:
+                yield f"{line} imports numpy.random.{name}: randomness is a Generator argument"
+
+
+def cycle(graph: dict[str, set[str]]) -> list[str]:
+    """One import cycle of the graph as a closed walk, or []."""
+    done: set[str] = set()
+
+    def walk(module: str, path: list[str]) -> list[str]:
+        if module in path:
+            return [*path[path.index(module) :], module]
+        if module in done:
+            return []
+        for target in sorted(graph.get(module, ())):
+            if found := walk(target, [*path, module]):
+                return found
+        done.add(module)
+        return []
+
+    return next((found for module in sorted(graph) if (found := walk(module, []))), [])
+
+
+def loads(module: str, item: Import) -> Iterator[str]:
+    """The modules that an import runs: its target and the packages above it, but not those above the importer."""
+    parts = item.target.split(".")
+    for depth in range(1, len(parts) + 1):
+        name = ".".join(parts[:depth])
+        if name == item.target or not within(module, name):
+            yield name
+
+
+@cache
+def house() -> dict[str, tuple[ast.Module, list[Import]]]:
+    """Every module of the package: its tree and its imports."""
+    paths = {}
+    for path in sorted((ROOT / "lab").rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        paths[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    trees = {name: ast.parse(path.read_text(encoding="utf-8"), str(path)) for name, path in paths.items()}
+    known = frozenset(paths)
+    return {name: (tree, imports(tree, name, paths[name].name == "__init__.py", known)) for name, tree in trees.items()}
+
+
+MODULES = sorted(house())
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_a_module_keeps_the_walls(module: str) -> None:
+    tree, found = house()[module]
+    assert not [*import_faults(module, found), *code_faults(module, tree)]
+
+
+def test_no_import_runs_in_a_circle() -> None:
+    graph = {name: {to for item in found for to in loads(name, item)} for name, (_, found) in house().items()}
+    assert cycle(graph) == []
+
+
+def test_the_package_itself_imports_nothing() -> None:
+    assert house()["lab"][1] == []
+
+
+def test_starting_the_command_loads_nothing_heavy() -> None:
+    """From lab.cli along module-level imports no heavy library is reached, or `lab --help` takes seconds."""
+    pending, seen = ["lab.cli"], set[str]()
+    while pending:
+        module = pending.pop()
+        if module in seen or module not in house():
+            continue
+        seen.add(module)
+        for item in house()[module][1]:
+            if item.at_load:
+                assert item.target.partition(".")[0] not in HEAVY, f"{module}:{item.line} imports {item.target}"
+                pending.extend(loads(module, item))
+
+
+def faults(module: str, source: str) -> list[str]:
+    """The faults of a module with this source, in a house of a few known modules."""
+    tree = ast.parse(source)
+    known = frozenset({"lab.sim.world", "lab.view.meshcat", "lab.learning.session", "lab.cli", "lab.vision"})
+    return [*import_faults(module, imports(tree, module, False, known)), *code_faults(module, tree)]
+
+
+@pytest.mark.parametrize(
+    ("module", "source", "fault"),
+    [
+        ("lab.sim.robot", "import pybullet", "allowed in ['lab.sim.world']"),
+        ("lab.sim.robot", "def f():\n    import pybullet as p", "lab.sim.robot:2 imports pybullet"),
+        ("lab.view.plots", "from meshcat.geometry import Box", "allowed in ['lab.view.meshcat']"),
+        ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.sim.camera', 'lab.vision']"),
+        ("lab.view.plots", "from PIL import Image", "allowed in ['lab.sim.camera', 'lab.vision']"),
+        ("lab.mdp", "import random", "allowed in no module"),
+        ("lab.toolbox", "import pickle", "allowed in no module"),
+        ("lab.mdp", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import lab.sim.world", "never does"),
+        ("lab.mdp", "from lab.sim import world", "imports lab.sim.world: lab.mdp never does"),
+        ("lab.learning.session", "from ..view import meshcat", "imports lab.view.meshcat: lab.learning never does"),
+        ("lab.advice.gates", "from lab import cli", "imports lab.cli: lab.advice never does"),
+        ("lab.advice.gates", "from lab.learning.session import x", "runs back up"),
+        ("lab.sim.robot", "from ..learning import session", "imports lab.learning.session: lab.sim never does"),
+        ("lab.sim.world", "from lab.sequencing.cell import Cell", "lab.sim never does"),
+        ("lab.composer", "from .cli import main", "runs back up"),
+        ("lab.vision", "from lab.sim.world import World", "runs back up"),
+        ("lab.mdp", "print('x')", "prints"),
+        ("lab.mdp", "import numpy as np\nx = np.random.rand()", "uses np.random.rand"),
+        ("lab.mdp", "from numpy.random import shuffle, default_rng", "imports numpy.random.shuffle"),
+        ("lab.toolbox", "np.load(path, allow_pickle=True)", "allows pickles"),
+        ("lab.skills.grasp", "import_module('pybullet')", "no wall can see"),
+    ],
+)
+def test_a_broken_wall_is_seen(module: str, source: str, fault: str) -> None:
+    assert any(fault in line for line in faults(module, source)), faults(module, source)
+
+
+@pytest.mark.parametrize(
+    ("module", "source"),
+    [
+        ("lab.sim.world", "import pybullet"),
+        ("lab.sim.camera", "import cv2"),
+        ("lab.cli", "print('x')\nfrom lab.view import meshcat"),
+        ("lab.view.terminal", "console.print('x')"),
+        ("lab.learning.session", "from lab.advice.gates import GATES\nfrom .settings import GateSettings"),
+        ("lab.sim.world", "from lab.view.frames import Frame"),
+        ("lab.mdp", "import numpy as np\ndef f(rng: np.random.Generator): return np.random.default_rng(1)"),
+    ],
+)
+def test_what_is_allowed_passes(module: str, source: str) -> None:
+    assert faults(module, source) == []
+
+
+def test_a_cycle_is_found() -> None:
+    assert cycle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
+    assert cycle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
+
+
+def test_a_module_without_a_room_is_refused() -> None:
+    with pytest.raises(AssertionError, match=r"lab\.attic has no room"):
+        layer("lab.attic")
