@@ -1,0 +1,187 @@
+"""The proven optimum of a cell: best-first search over its decision states, with alike toasts merged."""
+
+import heapq
+import math
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from operator import le
+from typing import NamedTuple
+
+from lab.sequencing.cell import Cell
+from lab.sequencing.events import simulate
+from lab.sequencing.rivals import fifo
+
+# Times are searched as whole nanoseconds: equal states then compare equal, whatever the order of additions was.
+TICKS_PER_S = 1e9
+MAX_EXPANDED = 1_000_000
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The best sequence known, and what is proven: no sequence is shorter than `bound_s`.
+
+    `proven`: the sequence is optimal (to a nanosecond a move) and `bound_s` is its makespan. `expanded`: states opened.
+    """
+
+    makespan_s: float
+    sequence: tuple[int, ...]
+    proven: bool
+    bound_s: float
+    expanded: int
+
+
+class _State(NamedTuple):
+    """Between two moves, in ticks: toasts per station, robot's station, when the toasts of each machine are finished.
+
+    Which toast stands where is left out: they are alike, and at each station the one that came first goes first.
+    """
+
+    now: int
+    counts: tuple[int, ...]
+    robot: int
+    finish: tuple[tuple[int, ...], ...]  # by station, ascending, never before `now`
+    left: int = 0
+    parent: "_State | None" = None
+
+
+def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
+    """The shortest makespan of the cell and a sequence that reaches it, toasts numbered first in, first out.
+
+    States are opened in the order of time so far + a bound on what the robot still has to do, so the first complete one
+    is optimal. After `max_expanded` states it gives up: the FIFO sequence, `proven` False and the bound reached so far.
+    Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
+    states that are otherwise alike is the thesis's branch and bound, App. IV.
+    """
+    search = _Search(cell)
+    # Of equally promising states the newest comes first, hence the falling serial number.
+    heap = [(search.bound(search.start), 0, search.start)]
+    fronts: dict[tuple[tuple[int, ...], int], list[tuple[int, ...]]] = {}
+    expanded = serial = bound = 0
+    while heap:
+        bound, _, state = heapq.heappop(heap)
+        if state.parent is not None and _times(state) not in fronts[state.counts, state.robot]:
+            continue  # overtaken since it was queued
+        if state.counts[cell.last] == cell.toasts:
+            sequence = _sequence(cell, state)
+            makespan_s = simulate(cell, sequence).makespan_s
+            return Optimum(makespan_s, sequence, True, makespan_s, expanded)
+        if expanded >= max_expanded:
+            break
+        expanded += 1
+        for successor in search.successors(state):
+            if _enters(fronts.setdefault((successor.counts, successor.robot), []), _times(successor)):
+                serial -= 1
+                heapq.heappush(heap, (successor.now + search.bound(successor), serial, successor))
+    fallback = fifo(cell)
+    return Optimum(fallback.makespan_s, fallback.sequence, False, bound / TICKS_PER_S, expanded)
+
+
+class _Search:
+    """The cell in whole ticks, the moves from a state, and the bound."""
+
+    def __init__(self, cell: Cell) -> None:
+        self.cell = cell
+        self.empty = [_ticks(row) for row in cell.empty_s.tolist()]
+        self.loaded = [_ticks(row) for row in cell.loaded_s.tolist()]
+        self.processing = [round(station.processing_s * TICKS_PER_S) for station in cell.stations]
+        self.is_machine = [station.kind == "machine" for station in cell.stations]
+        self.origins = [place for place, ahead in enumerate(cell.ahead) if ahead is not None]
+        for place in range(len(cell.stations)):
+            self.empty[place][place] = 0
+        counts = tuple(cell.counts(cell.start_locations()))
+        self.start = _State(0, counts, cell.index(cell.robot_start), ((),) * len(counts))
+        self.approach = [0] * len(counts)
+        self.rest = [0] * len(counts)
+        self._measure_rest()
+
+    def successors(self, state: _State) -> Iterator[_State]:
+        """The states after each possible move: one a station, since its toasts are alike."""
+        for origin in self.origins:
+            target = self.cell.target(state.counts, origin) if state.counts[origin] else None
+            if target is None:
+                continue
+            finish = list(state.finish)
+            now = state.now + self.empty[state.robot][origin]
+            if self.is_machine[origin]:
+                now = max(now, finish[origin][0])
+                finish[origin] = finish[origin][1:]
+            now += self.loaded[origin][target]
+            if self.is_machine[target]:
+                finish[target] = (*finish[target], now + self.processing[target])
+            counts = list(state.counts)
+            counts[origin] -= 1
+            counts[target] += 1
+            # A toast that finished earlier is ready now: forgetting since when lets more states be equal.
+            ready = tuple(tuple(max(tick, now) for tick in ticks) if ticks else () for ticks in finish)
+            yield _State(now, tuple(counts), target, ready, origin, state)
+
+    def bound(self, state: _State) -> int:
+        """Ticks that the robot still needs at least, if it never waited and always came from nearby."""
+        ahead = sum(count * rest for count, rest in zip(state.counts, self.rest, strict=True))
+        return ahead - (self.approach[state.robot] if state.counts[state.robot] else 0)
+
+    def _measure_rest(self) -> None:
+        """`rest`: least robot ticks to bring a toast from a station to the end; `approach`: of these, to get to it.
+
+        The robot gets to a toast from another station, or it stayed there, having dropped one. With room for only one
+        that is the toast itself, which has to be processed first; and a toast dropped in a buffer cannot go on at once.
+        """
+        cell = self.cell
+        choices = {origin: _targets(cell, origin) for origin in self.origins}
+        drops = {target for targets in choices.values() for target in targets}
+        for origin in sorted(self.origins, key=lambda place: -_stage_number(cell, place)):
+            ways = [self.empty[drop][origin] for drop in drops if drop != origin]
+            if origin in drops and cell.stations[origin].kind != "buffer":
+                ways.append(self.processing[origin] if cell.capacities[origin] == 1 else 0)
+            # None is a trip that no sequence needs.
+            self.approach[origin] = min((way for way in ways if way >= 0), default=0)
+            carries = [self.loaded[origin][target] + self.rest[target] for target in choices[origin]]
+            self.rest[origin] = self.approach[origin] + min(carries)
+
+
+def _ticks(row: list[float]) -> list[int]:
+    """Seconds to ticks; -1 for NaN, a move that is never made."""
+    return [-1 if math.isnan(seconds) else round(seconds * TICKS_PER_S) for seconds in row]
+
+
+def _targets(cell: Cell, origin: int) -> list[int]:
+    return [target for target in (cell.ahead[origin], cell.fallback[origin]) if target is not None]
+
+
+def _stage_number(cell: Cell, place: int) -> float:
+    """Position on the route; a buffer lies half a stage before its station."""
+    name = cell.names[place]
+    stages = [stage.station for stage in cell.route]
+    buffers = [stage.buffer for stage in cell.route]
+    return stages.index(name) if name in stages else buffers.index(name) - 0.5
+
+
+def _times(state: _State) -> tuple[int, ...]:
+    """Now and all finishing times: of two states with equal counts and robot, one that is nowhere later is no worse."""
+    return state.now, *(tick for ticks in state.finish for tick in ticks)
+
+
+def _enters(front: list[tuple[int, ...]], times: tuple[int, ...]) -> bool:
+    """Put `times` into the front unless one there is no later anywhere; those that it beats leave."""
+    if any(all(map(le, other, times)) for other in front):
+        return False
+    front[:] = [other for other in front if not all(map(le, times, other))]
+    front.append(times)
+    return True
+
+
+def _sequence(cell: Cell, state: _State) -> tuple[int, ...]:
+    """The toasts moved on the way to `state`, each station first in, first out."""
+    moves: list[tuple[int, int]] = []
+    while state.parent is not None:
+        moves.append((state.left, state.robot))
+        state = state.parent
+    queues: list[deque[int]] = [deque() for _ in cell.stations]
+    queues[cell.first].extend(range(1, cell.toasts + 1))
+    sequence = []
+    for origin, target in reversed(moves):
+        toast = queues[origin].popleft()
+        queues[target].append(toast)
+        sequence.append(toast)
+    return tuple(sequence)
