@@ -26,6 +26,7 @@ class EpisodeEnded:
     guided: bool
     helped_steps: int
     improvement_rate: float | None
+    reached: bool
 
 
 @dataclass(frozen=True)
@@ -168,7 +169,8 @@ class _Session:
         self.guided.append(helped > 0)
         self.improved = improvement(self.steps, self.gate_settings.window)
         self.gate.judges(self.steps, helped > 0)
-        self.tell(EpisodeEnded(episode, steps, helped > 0, helped, self.improved.rate if self.improved else None))
+        rate = self.improved.rate if self.improved else None
+        self.tell(EpisodeEnded(episode, steps, helped > 0, helped, rate, steps <= self.settings.max_steps))
         if self.gate.rejected and self.rejected_at is None:
             self.rejected_at = episode
             before = self.steps[-1 - self.gate_settings.window : -1]
@@ -180,7 +182,8 @@ class _Session:
         successor, reward, discount, visits = self.successor, self.reward, self.discount, self.visits
         learn, lookahead, max_steps = self.update.learn, self.update.lookahead, self.settings.max_steps
         self.update.begin()
-        state = self.mdp.start
+        starts = self.mdp.starts
+        state = starts[int(self.draw() * len(starts))] if starts else self.mdp.start
         action = choose(state, 1)
         for step in range(1, max_steps + 1):
             visits[state][action] += 1
@@ -242,9 +245,14 @@ class _Session:
             rejected_at_episode=self.rejected_at,
             optimal_steps=self.optimal_steps,
             final_steps=final_steps,
-            solved=final_steps == self.optimal_steps,
+            solved=final_steps == self.optimal_steps and unreached(q, self.mdp) == (),
             interrupted=interrupted,
         )
+
+
+def unreached(q: FloatArray, mdp: TabularMDP) -> tuple[int, ...]:
+    """The states among the problem's several `starts` from which the greedy path does not reach the goal."""
+    return tuple(start for start in mdp.starts if not greedy_path(q, mdp, mdp.n_states, start)[2])
 
 
 def _start_values(mdp: TabularMDP, q0: FloatArray | None) -> FloatArray:
