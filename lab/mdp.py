@@ -49,8 +49,10 @@ class TabularMDP:
 
     successor (S, A) int32, reward (S, A) float64, terminal (S,) bool, goal (S,) bool (a subset of terminal), start
     a state. `shape` is the grid's shape, () when the states are no grid; states are numbered in C order
-    (`ravel_multi_index`). `coverage_shape` is (rows, columns) of a coverage problem (see `coverage`), else (). The
-    arrays are copied and made read-only. Raises BadInput when they do not fit together.
+    (`ravel_multi_index`). `coverage_shape` is (rows, columns) of a coverage problem (see `coverage`), else ().
+    Where `starts` is not empty, each episode begins in one of these states, drawn at random; `start` is then the
+    one that `shortest_steps` speaks of. The arrays are copied and made read-only. Raises BadInput when they do not
+    fit together.
     """
 
     successor: IntArray
@@ -61,6 +63,7 @@ class TabularMDP:
     action_labels: tuple[str, ...]
     shape: tuple[int, ...] = ()
     coverage_shape: tuple[int, ...] = ()
+    starts: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         for name, dtype in (
@@ -94,6 +97,9 @@ class TabularMDP:
             return f"start {self.start} is outside 0..{states - 1}"
         if self.terminal[self.start]:
             return f"start {self.start} is a terminal state"
+        for state in self.starts:
+            if not 0 <= state < states or self.terminal[state]:
+                return f"start {state} is terminal or outside 0..{states - 1}"
         if self.shape and int(np.prod(self.shape)) != states:
             return f"shape {self.shape} does not hold {states} states"
         return None
@@ -111,7 +117,7 @@ class TabularMDP:
     @cached_property
     def signature(self) -> str:
         """The first 16 hex digits of a SHA-256 over all that defines the problem: equal problems, equal signatures."""
-        head = (self.start, self.action_labels, self.shape, self.coverage_shape, self.successor.shape)
+        head = (self.start, self.starts, self.action_labels, self.shape, self.coverage_shape, self.successor.shape)
         digest = hashlib.sha256(repr(head).encode())
         for array, code in ((self.successor, "<i4"), (self.reward, "<f8"), (self.terminal, "?"), (self.goal, "?")):
             digest.update(array.astype(code, order="C").tobytes())
@@ -282,15 +288,17 @@ def shortest_steps(mdp: TabularMDP) -> int:
     return int(distance[distance >= 0].min())
 
 
-def greedy_path(q: FloatArray, mdp: TabularMDP, max_steps: int) -> tuple[list[int], list[int], bool]:
-    """Follows the best action of each state from the start (ties: the lowest index).
+def greedy_path(
+    q: FloatArray, mdp: TabularMDP, max_steps: int, start: int | None = None
+) -> tuple[list[int], list[int], bool]:
+    """Follows the best action of each state from `start`, by default the problem's (ties: the lowest index).
 
     Returns the states (one more than actions), the actions and whether a goal was reached. It stops at a terminal
     state, after max_steps, or at a state seen before, since from there it would only go round.
     """
-    states: list[int] = [mdp.start]
+    states: list[int] = [mdp.start if start is None else start]
     actions: list[int] = []
-    seen = {mdp.start}
+    seen = set(states)
     while not mdp.terminal[states[-1]] and len(actions) < max_steps:
         action = int(np.argmax(q[states[-1]]))
         actions.append(action)

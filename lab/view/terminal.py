@@ -111,7 +111,7 @@ class TeachingPrompt:
                 self._say(f"Episode {event.episode} {outcome}; moves advised: {event.helped_steps}.")
             case AdviceRejected():
                 self._say(
-                    f"The learner takes no more advice: misled in {event.misleads} episodes, it tolerates {event.omega}."
+                    f"The learner takes no more advice: misled in {event.misleads} episodes, tolerates {event.omega}."
                     f" Episode {event.episode} counted {event.steps} steps, those before it {event.mean_before:.1f}.",
                     "bold red",
                 )
