@@ -16,7 +16,8 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors",),
     ("lab.data",),
-    ("lab.vision", "lab.view.frames", "lab.mdp", "lab.sequencing", "lab.learning.settings"),
+    ("lab.overhead", "lab.view.frames", "lab.mdp", "lab.sequencing", "lab.learning.settings"),
+    ("lab.vision",),
     ("lab.learning.updates", "lab.learning.selection", "lab.learning.kernels"),
     ("lab.advice",),
     ("lab.learning",),
