@@ -70,7 +70,8 @@ class SessionResult:
     (episodes,) bool: at least one advised step; requests: episodes in which the learner asked; helped_steps:
     advised steps that were carried out; misleads and rejected_at_episode: see lab/advice/gates.py; final_steps:
     moves of the greedy path from the start, None if it does not reach the goal; solved: final_steps ==
-    optimal_steps; interrupted: stopped by Ctrl-C, only finished episodes count.
+    optimal_steps, and the greedy path reaches the goal from each of the problem's `starts`; interrupted: stopped by
+    Ctrl-C, only finished episodes count.
     """
 
     q: FloatArray

@@ -1,0 +1,124 @@
+"""When gates open, ask, stop and reject: step counts worked out by hand; good and bad advisors at each gate."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from lab.advice.advisors import make_advisor
+from lab.advice.gates import GATES, Gate, improvement
+from lab.learning.session import SessionResult, run_session
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.mdp import grid
+
+LIMIT = 200
+FAILED = LIMIT + 1
+SETTINGS = GateSettings(first_episode=5, window=2, omega=1, lambda_threshold=0.05, psi=0.5)
+
+
+def gate(name: str, settings: GateSettings = SETTINGS, episodes: int = 100) -> Gate:
+    return GATES[name](settings, episodes, LIMIT)
+
+
+def opened(one: Gate, steps: Sequence[int]) -> list[int]:
+    """The episodes that open when these are the results; no episode is judged."""
+    return [episode for episode in range(1, len(steps) + 2) if one.opens(episode, steps[: episode - 1])]
+
+
+def test_improvement_by_hand() -> None:
+    assert improvement([8, 8, 6], 2) is None
+    found = improvement([99, 8, 8, 6, 4], 2)
+    assert found is not None
+    assert (found.rate, found.current_mean, found.previous_mean) == (0.375, 5.0, 8.0)
+
+
+@pytest.mark.parametrize("name", ["ccrl", "combined"])
+def test_ccrl_asks_while_the_ratio_of_the_means_exceeds_one_minus_lambda(name: str) -> None:
+    # before episode 5 the means are 100 and 96 (ratio .96 > .95), before 6: 98 and 93 (.949), before 7: 96 and 96
+    assert opened(gate(name), [100, 100, 96, 96, 90, 102]) == [5, 7]
+
+
+def test_ccrl_waits_for_episode_x_and_for_two_windows() -> None:
+    flat = [FAILED] * 12
+    assert opened(gate("ccrl", GateSettings(first_episode=8, window=2)), flat) == [8, 9, 10, 11, 12, 13]
+    assert opened(gate("ccrl", GateSettings(first_episode=1, window=5)), flat) == [11, 12, 13]
+
+
+def test_ccrl_leaves_the_last_episode_to_the_learner() -> None:
+    assert opened(gate("ccrl", episodes=8), [FAILED] * 7) == [5, 6, 7]
+
+
+def test_ccrl_stops_after_more_than_2k_equal_results() -> None:
+    # the result before episode 5 is remembered, those before 6..10 equal it: the fifth is more than 2K = 4
+    one = gate("ccrl")
+    assert opened(one, [20] * 14) == [5, 6, 7, 8, 9]
+    assert one.converged
+    assert not one.opens(20, [*[20] * 14, 100, 100])  # for good
+
+
+def test_ccrl_never_calls_failure_convergence() -> None:
+    one = gate("ccrl")
+    assert opened(one, [FAILED] * 14) == list(range(5, 16))
+    assert not one.converged
+
+
+@pytest.mark.parametrize("name", ["ccrl", "combined"])
+def test_a_helped_episode_that_is_not_better_is_a_mislead(name: str) -> None:
+    one = gate(name)
+    one.judges([10, 10, 9], helped=True)
+    assert one.misleads == 0
+    one.judges([10, 10, 10], helped=True)  # equal is not better
+    assert (one.misleads, one.rejected) == (1, False)
+    one.judges([10, 10, 11], helped=False)
+    assert (one.misleads, one.rejected) == (1, False)
+    one.judges([10, 20, 16], helped=True)
+    assert (one.misleads, one.rejected) == (2, True)
+    assert not one.opens(50, [FAILED] * 49)
+
+
+@pytest.mark.parametrize("name", ["ia", "combined"])
+def test_introspection_asks_where_the_values_lie_close(name: str) -> None:
+    one = gate(name)
+    assert one.asks([0.0, 0.0, 0.0])
+    assert one.asks([0.0, 0.4])
+    assert not one.asks([0.0, 0.5])
+    assert not gate(name, GateSettings(psi=0.0)).asks([0.0, 0.0])
+
+
+def test_introspection_begins_at_episode_x_and_never_rejects() -> None:
+    one = gate("ia")
+    assert [episode for episode in range(1, 8) if one.opens(episode, [])] == [5, 6, 7]
+    one.judges([1, 1, 9], helped=True)
+    assert not one.rejected
+
+
+def test_always_and_never() -> None:
+    assert opened(gate("always"), [20] * 3) == [1, 2, 3, 4]
+    assert gate("always").asks([0.0, 9.0])
+    assert opened(gate("never"), [FAILED] * 20) == []
+
+
+def taught(name: str, advisor: str, seed: int) -> SessionResult:
+    blocked = np.zeros((6, 6), bool)
+    blocked[1:5, 2] = blocked[2, 4] = True
+    mdp = grid((6, 6), blocked, (2, 0), (3, 5))
+    settings = GateSettings(name, first_episode=10, window=3, omega=2)
+    adviser = make_advisor(advisor, mdp, 0.99, np.random.default_rng([seed, 1]))
+    return run_session(mdp, LearnerSettings("q", episodes=80), settings, adviser, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("name", GATES)
+def test_experts_and_novices_at_every_gate(name: str) -> None:
+    experts, novices = ([taught(name, advisor, seed) for seed in range(6)] for advisor in ("expert", "novice"))
+    helped = sum(result.helped_steps for result in experts)
+    assert (helped > 0) == (name != "never")
+    if name in ("ccrl", "combined"):
+        assert sum(result.rejected_at_episode is not None for result in novices) >= 4
+        assert all(result.misleads <= 3 for result in novices)
+        assert all(not result.guided[-1] for result in experts)
+    else:
+        assert all(result.rejected_at_episode is None and result.misleads == 0 for result in novices)
+    if name != "never":
+        assert all(result.solved for result in experts)
+        late = [np.mean([result.steps[9:40] for result in results]) for results in (experts, novices)]
+        assert late[0] < late[1]

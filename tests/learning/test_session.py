@@ -1,0 +1,264 @@
+"""The one session: what every learner must do, what is reported, and how it ends early."""
+
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lab.advice.advisors import ADVISORS, AdviceRequest, AdvisorLeft, make_advisor
+from lab.advice.gates import GATES
+from lab.errors import BadInput
+from lab.learning.session import (
+    AdviceEnded,
+    AdviceRejected,
+    AdviceRequested,
+    EpisodeEnded,
+    Event,
+    SessionResult,
+    run_session,
+)
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.updates import UPDATES
+from lab.mdp import Rewards, TabularMDP, coverage, greedy_path, grid
+
+EARLY = GateSettings(first_episode=5, window=2)
+SHORT = LearnerSettings(episodes=60, max_steps=30)
+
+
+def board(size: int) -> TabularMDP:
+    """A square board with obstacles beside the diagonal; 3 x 3: one in the middle."""
+    blocked = np.zeros((size, size), bool)
+    blocked[1, 1] = blocked[size - 2, 1] = True
+    return grid((size, size), blocked, (0, 0), (size - 1, size - 1), action_labels=("up", "down", "left", "right"))
+
+
+def corridor(length: int) -> TabularMDP:
+    return grid((length,), np.zeros(length, bool), (0,), (length - 1,), action_labels=("left", "right"))
+
+
+def session(
+    mdp: TabularMDP, advisor: str = "expert", seed: int = 0, **changes: Any
+) -> tuple[SessionResult, list[Event]]:
+    learner = replace(SHORT, **{k: v for k, v in changes.items() if hasattr(SHORT, k)})
+    gate = replace(EARLY, **{k: v for k, v in changes.items() if hasattr(EARLY, k)})
+    events: list[Event] = []
+    adviser = make_advisor(advisor, mdp, learner.discount, np.random.default_rng([seed, 1]))
+    result = run_session(mdp, learner, gate, adviser, np.random.default_rng(seed), on_event=events.append)
+    return result, events
+
+
+class Scripted:
+    """Answers with what a function of the request says, and remembers the requests."""
+
+    def __init__(self, answer: Any):
+        self.answer, self.requests = answer, list[AdviceRequest]()
+
+    def advise(self, request: AdviceRequest) -> int | None:
+        self.requests.append(request)
+        answer: int | None = self.answer(request)
+        return answer
+
+
+@pytest.mark.parametrize("size", [3, 4])
+@pytest.mark.parametrize("learner", UPDATES)
+def test_every_learner_solves_small_boards_with_an_expert(learner: str, size: int) -> None:
+    for seed in range(3):
+        result, _ = session(board(size), seed=seed, learner=learner, episodes=100)
+        assert result.solved
+        assert result.final_steps == result.optimal_steps == 2 * (size - 1)
+        assert result.helped_steps > 0
+
+
+@pytest.mark.parametrize("learner", UPDATES)
+@pytest.mark.parametrize("gate", GATES)
+def test_results_fit_together_and_repeat(learner: str, gate: str) -> None:
+    mdp = board(4)
+    (result, events), (again, events_again) = (session(mdp, "limited", 5, learner=learner, gate=gate) for _ in range(2))
+    for name, value in asdict(result).items():
+        np.testing.assert_array_equal(value, getattr(again, name))
+    assert events == events_again
+    assert result.q.shape == result.visits.shape == mdp.successor.shape
+    assert (result.q.dtype.name, result.visits.dtype.name, result.steps.dtype.name) == ("float64", "int64", "int64")
+    assert np.isfinite(result.q).all()
+    assert not result.q[mdp.terminal].any()
+    assert not result.visits[mdp.terminal].any()
+    ended = [event for event in events if isinstance(event, EpisodeEnded)]
+    assert [event.episode for event in ended] == list(range(1, 61))
+    assert [event.steps for event in ended] == result.steps.tolist()
+    assert [event.guided for event in ended] == result.guided.tolist()
+    assert sum(event.helped_steps for event in ended) == result.helped_steps
+    assert [event.reached for event in ended] == (result.steps <= 30).tolist()
+    assert result.requests == sum(isinstance(event, AdviceRequested) for event in events)
+    reached = result.steps[result.steps <= 30]
+    assert result.visits.sum() >= reached.sum()  # failed episodes walked too
+    path = greedy_path(result.q, mdp, 30)
+    assert result.final_steps == (len(path[1]) if path[2] else None)
+
+
+@pytest.mark.parametrize("advisor", [name for name in ADVISORS if name != "terminal"])
+def test_every_simulated_advisor_can_help(advisor: str) -> None:
+    result, _ = session(board(3), advisor, gate="always", episodes=20)
+    assert (result.helped_steps > 0) == (advisor != "none")
+    assert result.helped_steps in (0, result.visits.sum())
+
+
+def test_another_seed_gives_another_session() -> None:
+    assert session(board(4), seed=1)[0].steps.tolist() != session(board(4), seed=2)[0].steps.tolist()
+
+
+def test_a_failed_episode_counts_one_more_than_the_limit() -> None:
+    walls = grid(
+        (1, 3), np.array([[True, False, False]]), (0, 1), (0, 2), action_labels=("up", "down", "left", "right")
+    )
+    into_the_wall, to_the_goal, still = (Scripted(lambda request, a=action: a) for action in (2, 3, 0))
+    always = GateSettings(gate="always")
+    few = LearnerSettings(episodes=2, max_steps=4)
+    for advisor, expected in ((into_the_wall, [5, 5]), (to_the_goal, [1, 1]), (still, [5, 5])):
+        result = run_session(walls, few, always, advisor, np.random.default_rng(0))
+        assert result.steps.tolist() == expected
+    assert result.helped_steps == len(still.requests) == 8  # nobody is asked for a move that is never made
+
+
+@pytest.mark.parametrize("learner", UPDATES)
+def test_advice_is_learned_as_if_it_were_the_learners_own(learner: str) -> None:
+    # alpha 1, gamma 1: cell 1 learns 1.5; cell 0 learns -.1 + 1.5 an episode later, with traces of lambda 1 at once
+    settings = LearnerSettings(learner, alpha=1.0, discount=1.0, trace=1.0, episodes=2)
+    right = Scripted(lambda request: 1)
+    result = run_session(corridor(3), settings, GateSettings("always"), right, np.random.default_rng(0))
+    np.testing.assert_allclose(result.q, [[0.0, 1.4], [0.0, 1.5], [0.0, 0.0]], atol=1e-12)
+    assert result.visits.tolist() == [[0, 2], [0, 2], [0, 0]]
+    once = run_session(
+        corridor(3), replace(settings, episodes=1), GateSettings("always"), right, np.random.default_rng(0)
+    )
+    np.testing.assert_allclose(once.q[0, 1], 1.4 if learner == "q-lambda" else -0.1, atol=1e-12)
+
+
+def test_the_request_shows_where_the_learner_is() -> None:
+    right = Scripted(lambda request: 1)
+    settings = LearnerSettings(episodes=3)
+    gate = GateSettings("always", window=1)
+    run_session(corridor(4), settings, gate, right, np.random.default_rng(0))
+    first, last = right.requests[0], right.requests[-1]
+    assert [(r.episode, r.step, r.state) for r in right.requests[:4]] == [(1, 1, 0), (1, 2, 1), (1, 3, 2), (2, 1, 0)]
+    assert (first.improvement_rate, first.current_mean, first.previous_mean) == (None, None, None)
+    assert (last.improvement_rate, last.current_mean, last.previous_mean) == (0.0, 3.0, 3.0)
+    assert all(request.learner_action in (0, 1) for request in right.requests)
+    assert np.shape(first.q) == (4, 2)
+
+
+def test_no_answer_leaves_the_step_to_the_learner() -> None:
+    shy = Scripted(lambda request: None)
+    alone, _ = session(board(3), "none", gate="always", learner="q")
+    result = run_session(
+        board(3), replace(SHORT, learner="q"), replace(EARLY, gate="always"), shy, np.random.default_rng(0)
+    )
+    np.testing.assert_array_equal(result.q, alone.q)
+    assert (result.helped_steps, bool(result.guided.any()), result.requests, alone.requests) == (0, False, 60, 0)
+
+
+def test_an_advisor_that_leaves_is_not_asked_again() -> None:
+    def leave(request: AdviceRequest) -> int:
+        if request.episode == 2 and request.step == 2:
+            raise AdvisorLeft
+        return 1
+
+    events: list[Event] = []
+    advisor = Scripted(leave)
+    result = run_session(
+        corridor(4), SHORT, GateSettings("always"), advisor, np.random.default_rng(0), on_event=events.append
+    )
+    assert (result.helped_steps, len(advisor.requests), len(result.steps)) == (4, 5, 60)
+    assert [event for event in events if isinstance(event, AdviceEnded)] == [AdviceEnded(2, "advisor left")]
+    assert result.guided[:3].tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize("learner", UPDATES)
+def test_an_interruption_loses_nothing(learner: str) -> None:
+    def interrupt(request: AdviceRequest) -> int:
+        if request.episode == 3 and request.step == 2:
+            raise KeyboardInterrupt
+        return 1
+
+    result = run_session(
+        corridor(4),
+        replace(SHORT, learner=learner),
+        GateSettings("always"),
+        Scripted(interrupt),
+        np.random.default_rng(0),
+    )
+    assert (result.interrupted, result.steps.tolist(), result.guided.tolist()) == (True, [3, 3], [True, True])
+    assert result.visits[:, 1].tolist() == [3, 2, 2, 0]  # the step under way counts too
+    assert result.q[2, 1] > 1.0
+
+
+def test_an_interruption_while_reporting_keeps_the_episode() -> None:
+    def interrupt(event: Event) -> None:
+        if event.episode == 4:
+            raise KeyboardInterrupt
+
+    result = run_session(corridor(4), SHORT, GateSettings("never"), None, np.random.default_rng(0), on_event=interrupt)
+    assert (result.interrupted, len(result.steps), len(result.guided)) == (True, 4, 4)
+
+
+def test_a_misleading_advisor_is_rejected_with_the_numbers() -> None:
+    events: list[Event] = []
+    back = Scripted(lambda request: 0)
+    gate = GateSettings(first_episode=5, window=2, omega=1, lambda_threshold=1.0)
+    result = run_session(corridor(4), SHORT, gate, back, np.random.default_rng(0), on_event=events.append)
+    rejections = [event for event in events if isinstance(event, AdviceRejected)]
+    mean = (result.steps[3] + result.steps[4]) / 2
+    assert rejections == [AdviceRejected(6, 2, 1, 31, mean)]
+    assert (result.rejected_at_episode, result.misleads, result.requests, result.helped_steps) == (6, 2, 2, 60)
+    assert not result.guided[6:].any()
+
+
+def test_equal_results_end_the_requests() -> None:
+    result, events = session(corridor(4), gate="ccrl", lambda_threshold=1.0)
+    ended = [event for event in events if isinstance(event, AdviceEnded)]
+    assert [event.reason for event in ended] == ["converged"]
+    assert not result.guided[ended[0].episode - 1 :].any()
+
+
+def test_start_values_are_used_and_checked() -> None:
+    mdp = corridor(3)
+    known = np.array([[0.0, 1.4], [0.0, 1.5], [9.0, 9.0]])
+    settings = LearnerSettings(episodes=1, beta=0.0)
+    result = run_session(mdp, settings, GateSettings("never"), None, np.random.default_rng(0), q0=known)
+    assert result.solved
+    assert not result.q[2].any()  # a terminal state is worth nothing more
+    for bad in (np.zeros((2, 2)), np.full((3, 2), np.nan)):
+        with pytest.raises(BadInput, match="start values"):
+            run_session(mdp, settings, GateSettings(), None, np.random.default_rng(0), q0=bad)
+
+
+def test_unknown_names_and_actions() -> None:
+    rng = np.random.default_rng(0)
+    with pytest.raises(BadInput, match=r"unknown learner 'q-lamda'.*did you mean 'q-lambda'"):
+        run_session(corridor(3), LearnerSettings("q-lamda"), GateSettings(), None, rng)
+    with pytest.raises(BadInput, match=r"unknown gate 'crl'.*did you mean 'ccrl'"):
+        run_session(corridor(3), LearnerSettings(), GateSettings("crl"), None, rng)
+    with pytest.raises(BadInput, match="advisor named action 2: allowed 0"):
+        run_session(corridor(3), LearnerSettings(), GateSettings("always"), Scripted(lambda request: 2), rng)
+
+
+def test_episodes_begin_at_each_of_several_starts() -> None:
+    mdp = replace(board(4), starts=(0, 3, 12))
+    starts: set[int] = set()
+
+    def note(request: AdviceRequest) -> None:
+        if request.step == 1:
+            starts.add(request.state)
+
+    result = run_session(mdp, SHORT, GateSettings("always"), Scripted(note), np.random.default_rng(0))
+    assert starts == {0, 3, 12}
+    assert result.solved == (
+        result.final_steps == 6 and all(greedy_path(result.q, mdp, 99, start)[2] for start in mdp.starts)
+    )
+
+
+def test_the_butter_board_is_covered_in_the_fewest_moves() -> None:
+    mdp = coverage((3, 3), Rewards())
+    advisor = make_advisor("expert", mdp, 0.99, np.random.default_rng(1))
+    result = run_session(mdp, LearnerSettings(), GateSettings(), advisor, np.random.default_rng(0))
+    assert (result.solved, result.final_steps) == (True, 8)

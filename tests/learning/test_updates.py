@@ -1,0 +1,94 @@
+"""Update rules on tables of two or three states, redone by hand."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lab.learning.settings import LearnerSettings
+from lab.learning.updates import UPDATES, Table, is_greedy, q_target, sarsa_target
+
+HALF = LearnerSettings(alpha=0.5, discount=0.5, trace=0.5)
+Step = tuple[int, int, float, float, int, int]  # s_tm1, a_tm1, r_t, discount_t, s_t, a_t
+
+
+def learned(name: str, steps: list[Step], q: Table, settings: LearnerSettings = HALF) -> Table:
+    table = [list(row) for row in q]
+    update = UPDATES[name](table, settings)
+    update.begin()
+    for step in steps:
+        update.learn(*step)
+    return table
+
+
+def test_targets_by_hand() -> None:
+    assert q_target(-1.0, 0.5, [2.0, 4.0]) == 1.0
+    assert sarsa_target(-1.0, 0.5, [2.0, 4.0], 0) == 0.0
+    assert q_target(1.5, 0.0, [9.0]) == sarsa_target(1.5, 0.0, [9.0], 0) == 1.5
+    assert is_greedy([1.0, 1.0], 1)
+    assert not is_greedy([1.0, 0.0], 1)
+
+
+@pytest.mark.parametrize(("name", "expected"), [("q", 1.5), ("sarsa", 1.0), ("q-lambda", 1.5)])
+def test_one_step_by_hand(name: str, expected: float) -> None:
+    # Q(0,0) = 1; r = 0, gamma = .5, next values (2, 4), next action 0:
+    # q and q-lambda: 1 + .5 (0 + .5*4 - 1) = 1.5; sarsa: 1 + .5 (0 + .5*2 - 1) = 1
+    assert learned(name, [(0, 0, 0.0, 0.5, 1, 0)], [[1.0, 0.0], [2.0, 4.0]]) == [[expected, 0.0], [2.0, 4.0]]
+
+
+@pytest.mark.parametrize("name", UPDATES)
+def test_a_terminal_step_learns_the_reward_alone(name: str) -> None:
+    assert learned(name, [(0, 1, 2.0, 0.0, 1, 0)], [[0.0, 0.0], [7.0, 7.0]])[0] == [0.0, 1.0]
+
+
+WALK: list[Step] = [(0, 1, -1.0, 0.5, 1, 1), (1, 1, 2.0, 0.0, 2, 0)]
+
+
+def test_q_lambda_carries_the_goal_back() -> None:
+    # step 1: delta -1, Q(0,1) = -.5, e(0,1) decays to .25; step 2: delta 2, Q(1,1) = 1, Q(0,1) = -.5 + .5*2*.25
+    assert learned("q-lambda", WALK, [[0.0, 0.0]] * 3) == [[0.0, -0.25], [0.0, 1.0], [0.0, 0.0]]
+
+
+def test_q_lambda_cuts_the_trace_at_a_move_that_is_not_greedy() -> None:
+    # step 1: delta = -1 + .5*1 = -.5, Q(0,1) = -.25; action 1 is not the best of state 1, so step 2 moves Q(1,1) alone
+    assert learned("q-lambda", WALK, [[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]) == [[0.0, -0.25], [1.0, 1.0], [0.0, 0.0]]
+
+
+def test_q_lambda_accumulates_on_a_second_visit() -> None:
+    # delta -1: Q = -.5, e = .25; then delta = -1 + 0 + .5 = -.5, e = 1.25: Q = -.5 - .5*.5*1.25
+    stay: Step = (0, 0, -1.0, 0.5, 0, 0)
+    assert learned("q-lambda", [stay, stay], [[0.0, 0.0]]) == [[-0.8125, 0.0]]
+
+
+def test_q_lambda_forgets_between_episodes() -> None:
+    table = [[0.0, 0.0] for _ in range(3)]
+    update = UPDATES["q-lambda"](table, HALF)
+    update.begin()
+    update.learn(*WALK[0])
+    update.begin()
+    update.learn(*WALK[1])
+    assert table == [[0.0, -0.5], [0.0, 1.0], [0.0, 0.0]]
+
+
+states, actions, discounts = st.integers(0, 3), st.integers(0, 1), st.sampled_from([0.9, 0.9, 0.9, 0.0])
+walks = st.lists(st.tuples(states, actions, st.floats(-1, 1), discounts, states, actions), max_size=40)
+
+
+@given(walks)
+def test_q_lambda_without_trace_is_q_learning(steps: list[Step]) -> None:
+    settings = LearnerSettings(alpha=0.7, discount=0.9, trace=0.0)
+    start = [[0.0, 0.0]] * 4
+    assert learned("q-lambda", steps, start, settings) == learned("q", steps, start, settings)
+
+
+@given(walks)
+def test_q_lambda_equals_the_printed_algorithm(steps: list[Step]) -> None:
+    settings = LearnerSettings(alpha=0.4, discount=0.9, trace=0.8)
+    q, e = np.zeros((4, 2)), np.zeros((4, 2))
+    for s, a, r, discount, s_next, a_next in steps:
+        follow = discount > 0 and q[s_next, a_next] == q[s_next].max()
+        delta = r + discount * q[s_next].max() - q[s, a]
+        e[s, a] += 1.0
+        q += settings.alpha * delta * e
+        e = settings.discount * settings.trace * e if follow else np.zeros_like(e)
+    np.testing.assert_allclose(learned("q-lambda", steps, [[0.0, 0.0]] * 4, settings), q, atol=1e-4)
