@@ -1,0 +1,306 @@
+"""Sequence + skills -> motions: chains the learned skills in physics, measures their durations, notices failures."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from lab.crew import Crew, Durations
+from lab.errors import WorkFailed
+from lab.recorder import Recorder, Viewer
+from lab.sequencing.cell import Cell
+from lab.sequencing.events import Move, Schedule
+from lab.sim.scene import Layout, Scene, Spot, spots
+from lab.sim.world import TIME_STEP, World
+from lab.skills import Butter, Grasp, Insert, Place, Skill
+from lab.skills.skill import UPRIGHT, Bench, Status
+from lab.skills.surveys import Surveys
+from lab.view.frames import Recording
+
+MAX_TRIES = 3  # a failed step is tried again from the state reached, at most twice
+DELIVERED_M = 0.02  # a slice this near to its spot has been delivered
+_SETTLE_STEPS = 60
+
+
+class Line:
+    """A scene with the crew at work in it: one clock, the robot's skill and the machines' processes side by side."""
+
+    def __init__(
+        self, world: World, crew: Crew, layout: Layout, toasts: int, *, film: bool = False, viewer: Viewer | None = None
+    ) -> None:
+        """Build the scene and let it settle; `film` keeps frames, `viewer` sees them live."""
+        self.world, self.crew = world, crew
+        self.scene = Scene(world, crew.task, toasts, layout)
+        self.bench = Bench(self.scene)
+        self.machines: dict[str, Skill] = {}
+        self.on_tick: Callable[[], None] | None = None
+        for _ in range(_SETTLE_STEPS):
+            world.step()
+        self.recorder = Recorder(world, toasts, viewer) if film or viewer else None
+        self._zero = world.steps
+
+    @property
+    def now_s(self) -> float:
+        """Seconds since the line was ready."""
+        return (self.world.steps - self._zero) * TIME_STEP
+
+    def restart_clock(self) -> None:
+        """Let the line's time begin now."""
+        self._zero = self.world.steps
+
+    def tick(self) -> None:
+        """One physics step, with every running machine."""
+        for machine in self.machines.values():
+            machine.step()
+        self.world.step()
+        if self.on_tick is not None:
+            self.on_tick()
+        if self.recorder is not None:
+            self.recorder.step()
+
+    def run(self, skill: Skill) -> Status:
+        """Carry one skill out to its end."""
+        skill.start(self.bench, self.crew.policies[skill.name])
+        while skill.step() is Status.RUNNING:
+            self.tick()
+        return skill.status
+
+    def at(self, place: str, surveys: Surveys) -> None:
+        """Put the arm above a station, to begin there."""
+        self.scene.robot.stand(surveys.approach(place))
+        self.scene.robot.open_at_once()
+        for _ in range(_SETTLE_STEPS // 4):
+            self.tick()
+
+
+def measure(crew: Crew, surveys: Surveys, on_move: Callable[[str, float], None] | None = None) -> Durations:
+    """Carry every needed move out once in simulation and time it [s]; WorkFailed when one does not succeed."""
+    tell = on_move or (lambda name, seconds: None)
+    empty: dict[tuple[str, str], float] = {}
+    loaded: dict[tuple[str, str], float] = {}
+    process: dict[str, float] = {}
+    steps = 0
+    for origin, target in crew.moves.loaded:
+        with World() as world:
+            line = Line(world, crew, surveys.layout, 0)
+            line.scene.add_slice("slice 1", spots(crew.task.station(origin))[0])
+            line.at(origin, surveys)
+            start = line.now_s
+            for skill in crew.leg(origin, target):
+                _timed(line, _aimed(skill, "slice 1", None))
+            loaded[origin, target] = line.now_s - start
+            tell(f"{origin} > {target}, loaded", loaded[origin, target])
+            if crew.task.station(target).process == "butter" and target not in process:
+                start = line.now_s
+                _timed(line, _aimed(crew.skills[Butter(target).name], "slice 1", None))
+                process[target] = line.now_s - start
+                tell(f"butter at {target}", process[target])
+            steps += world.steps
+    with World() as world:
+        line = Line(world, crew, surveys.layout, 0)
+        for origin, target in crew.moves.empty:
+            line.at(origin, surveys)
+            start = line.now_s
+            _timed(line, crew.empty(origin, target))
+            empty[origin, target] = line.now_s - start
+            tell(f"{origin} > {target}, empty", empty[origin, target])
+        steps += world.steps
+    return Durations(empty, loaded, process, steps * TIME_STEP)
+
+
+def _timed(line: Line, skill: Skill) -> None:
+    if line.run(skill) is not Status.SUCCESS:
+        raise WorkFailed(f"measuring '{skill.name}': {skill.reason}")
+
+
+def _aimed(skill: Skill, name: str, spot: Spot | None) -> Skill:
+    """Tell a skill which slice it is about, and where to set it down."""
+    if isinstance(skill, Grasp):
+        return skill.take(name)
+    if isinstance(skill, Butter):
+        return skill.on(name)
+    if isinstance(skill, Place):
+        skill.spot = spot
+    return skill
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A run in physics: the measured schedule, which toasts were delivered, retries, and why it stopped (None: it did not)."""
+
+    schedule: Schedule
+    delivered: tuple[int, ...]
+    dropped: tuple[int, ...]
+    retries: tuple[str, ...]
+    failure: str | None
+    sim_s: float
+    camera_deviations_m: tuple[float, ...]
+
+
+class _Stopped(Exception):
+    """A step failed too often; the text says which toast, where and why."""
+
+
+@dataclass
+class Production:
+    """One sequence being carried out on a line: where toasts are, which spots are taken, when machines are done."""
+
+    line: Line
+    cell: Cell
+    surveys: Surveys
+    on_move: Callable[[Move], None] | None = None
+    on_retry: Callable[[str], None] | None = None
+    moves: list[Move] = field(default_factory=list)
+    retries: list[str] = field(default_factory=list)
+    deviations_m: list[float] = field(default_factory=list)
+    ready_s: dict[str, float] = field(default_factory=dict)
+    toast_in: dict[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        cell, crew = self.cell, self.line.crew
+        self.locations = list(cell.start_locations())
+        self.place = cell.robot_start
+        self.spot_of: dict[int, Spot] = dict(enumerate(spots(crew.task.station(cell.names[cell.first])), start=1))
+
+    def carry_out(self, sequence: Sequence[int]) -> str | None:
+        """Carry the whole sequence out; None, or which toast could not be brought on, where and why."""
+        try:
+            for toast in sequence:
+                self._bring_on(toast)
+            return None
+        except _Stopped as stopped:
+            return str(stopped)
+
+    def done(self) -> list[int]:
+        """The toasts that reached the last station."""
+        return [toast for toast, at in enumerate(self.locations, start=1) if at == self.cell.last]
+
+    def _bring_on(self, toast: int) -> None:
+        """One decision: go to the toast, wait for its machine, carry it one stage on, start the machine there."""
+        line, cell, names = self.line, self.cell, self.cell.names
+        at = self.locations[toast - 1]
+        to = cell.destination(self.locations, toast)
+        if to is None:
+            raise _Stopped(f"toast {toast} at '{names[at]}' has nowhere to go")
+        origin, target, start, leave_s = names[at], names[to], self.place, line.now_s
+        if start != origin:
+            self._try(toast, origin, [line.crew.empty(start, origin)])
+        reach_s = line.now_s
+        self._await(toast, origin)
+        pick_s = line.now_s
+        spot = self._free_spot(target, to)
+        self._try(toast, target, [_aimed(skill, _slice(toast), spot) for skill in line.crew.leg(origin, target)])
+        self.locations[toast - 1], self.place, self.spot_of[toast] = to, target, spot
+        self.moves.append(Move(toast, start, origin, target, leave_s, reach_s, pick_s, line.now_s))
+        self._start_machine(toast, target)
+        if self.on_move is not None:
+            self.on_move(self.moves[-1])
+
+    def _free_spot(self, station: str, number: int) -> Spot:
+        taken = [self.spot_of[t] for t, at in enumerate(self.locations, start=1) if at == number]
+        return next(spot for spot in spots(self.line.crew.task.station(station)) if spot not in taken)
+
+    def _try(self, toast: int, where: str, skills: Sequence[Skill]) -> None:
+        """Carry skills out one after the other; a failed one is tried again from the state reached, at most twice."""
+        for skill in skills:
+            for attempt in range(1, MAX_TRIES + 1):
+                if attempt > 1:
+                    self._pick_up_again(skill)
+                if self.line.run(skill) is Status.SUCCESS:
+                    break
+                self._note(f"toast {toast} at '{where}', '{skill.name}', try {attempt}: {skill.reason}")
+                if attempt == MAX_TRIES:
+                    raise _Stopped(f"toast {toast} at '{where}': {skill.reason} (tried {MAX_TRIES} times)")
+            if isinstance(skill, Insert):
+                self.deviations_m += skill.deviations_m
+
+    def _pick_up_again(self, skill: Skill) -> None:
+        """Before setting down is tried again: take the slice from where it was let go, if it is not in the gripper."""
+        line = self.line
+        station = skill.station if isinstance(skill, Place | Insert) else ""
+        again = line.crew.skills.get(Grasp(station).name)
+        if line.bench.held is None and isinstance(again, Grasp) and line.bench.taken is not None:
+            line.run(again.take(line.bench.taken))
+
+    def _note(self, text: str) -> None:
+        self.retries.append(text)
+        if self.on_retry is not None:
+            self.on_retry(text)
+
+    def _await(self, toast: int, station: str) -> None:
+        """Wait at a machine until it is done with its toast; a learned process that failed is tried again."""
+        machine = self.line.machines.get(station)
+        tries = 1
+        while self.line.now_s < self.ready_s.get(station, 0.0) or (machine and machine.status is Status.RUNNING):
+            self.line.tick()
+            if machine and machine.status is Status.FAILURE:
+                self._note(f"toast {toast} at '{station}', try {tries}: {machine.reason}")
+                if tries == MAX_TRIES:
+                    raise _Stopped(f"toast {toast} at '{station}': {machine.reason} (tried {MAX_TRIES} times)")
+                tries += 1
+                machine.start(self.line.bench, self.line.crew.policies[machine.name])
+
+    def _start_machine(self, toast: int, station: str) -> None:
+        task = self.line.crew.task
+        place = task.station(station)
+        if place.process == "butter":
+            butter = self.line.crew.skills[Butter(station).name]
+            _aimed(butter, _slice(toast), None)
+            butter.start(self.line.bench, self.line.crew.policies[butter.name])
+            self.line.machines[station] = butter
+        elif place.kind == "machine":
+            self.ready_s[station] = self.line.now_s + (place.processing_s or 0.0)
+            self.toast_in[station] = toast
+
+    def watch(self) -> None:
+        """After each physics step: let the recorder show what machines have done to their toasts."""
+        recorder = self.line.recorder
+        if recorder is None:
+            return
+        for station, ready in self.ready_s.items():
+            toast = self.toast_in.get(station)
+            if toast is not None and self.line.now_s >= ready:
+                recorder.toast(self.toast_in.pop(station))
+        for machine in self.line.machines.values():
+            if isinstance(machine, Butter) and machine.status is Status.RUNNING:
+                for cell in machine.covered:
+                    recorder.butter(_number(machine.slice), cell)
+
+
+def _slice(toast: int) -> str:
+    return f"slice {toast}"
+
+
+def _number(name: str) -> int:
+    return int(name.rpartition(" ")[2])
+
+
+def carry_out(
+    crew: Crew,
+    surveys: Surveys,
+    layout: Layout,
+    cell: Cell,
+    sequence: Sequence[int],
+    *,
+    viewer: Viewer | None = None,
+    on_move: Callable[[Move], None] | None = None,
+    on_retry: Callable[[str], None] | None = None,
+) -> tuple[Outcome, Recording]:
+    """Carry `sequence` (toasts from 1, one entry a move) out in physics, from slices on the first station to the end.
+
+    A toast is delivered when its slice stands on the last station at the end; dropped when it is nowhere upright.
+    """
+    with World() as world:
+        line = Line(world, crew, layout, cell.toasts, film=True, viewer=viewer)
+        line.at(cell.robot_start, surveys)
+        line.restart_clock()
+        work = Production(line, cell, surveys, on_move, on_retry)
+        line.on_tick = work.watch
+        failure = work.carry_out(sequence)
+        line.recorder.take()  # type: ignore[union-attr]
+        delivered = tuple(t for t in work.done() if line.bench.stands(_slice(t), work.spot_of[t].grasp(), DELIVERED_M))
+        fallen = (t for t in range(1, cell.toasts + 1) if t not in delivered and line.bench.held != _slice(t))
+        dropped = tuple(t for t in fallen if line.bench.upright(_slice(t)) < UPRIGHT)
+        schedule = Schedule.from_moves(cell, work.moves)
+        outcome = Outcome(
+            schedule, delivered, dropped, tuple(work.retries), failure, line.now_s, tuple(work.deviations_m)
+        )
+        return outcome, line.recorder.recording  # type: ignore[union-attr]

@@ -1,0 +1,30 @@
+"""What the lab says when something is wrong: one line, the bad value, where it came from, what is allowed."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class LabError(Exception):
+    """Any failure the lab explains in one line; `exit_code` is what a command ends with."""
+
+    exit_code = 1
+
+
+class BadInput(LabError):
+    """The input is wrong: nothing was tried, nothing was written (exit 2)."""
+
+    exit_code = 2
+
+
+class WorkFailed(LabError):
+    """The work was tried and failed (exit 1)."""
+
+    exit_code = 1
+
+
+def unknown(kind: str, value: object, known: Iterable[str], where: str) -> BadInput:
+    """The error for a name that no table holds: shows it, where it came from, the nearest and all known names."""
+    names = sorted(known)
+    near = get_close_matches(str(value), names, n=1)
+    hint = f" did you mean '{near[0]}'?" if near else ""
+    return BadInput(f"unknown {kind} '{value}' ({where}):{hint} known: {', '.join(names)}")

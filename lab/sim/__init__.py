@@ -1,0 +1,1 @@
+"""PyBullet, and nothing but PyBullet: the cell in physics."""

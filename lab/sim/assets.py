@@ -1,0 +1,342 @@
+"""The meshes and URDFs of the cell, made with trimesh from the parameters below; `write(folder)` regenerates `assets/`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import pi
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from lab.sim import kinematics as arm
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+Vector = tuple[float, float, float]
+Color = tuple[float, float, float, float]
+
+SLICE = (0.12, 0.015, 0.12)  # [m] width, thickness, height
+SLICE_KG = 0.040
+TOASTER = (0.20, 0.13, 0.10)  # [m] body, along and across the slot, up
+TOASTER_SLOT = (0.132, 0.023)  # [m] length and width of the slot
+TOASTER_FLOOR = 0.015  # [m] the slot's bottom above the table
+APPLIER_FLOOR = 0.02  # [m] what a slice stands on in the butter applier
+APPLIER_LIP = 0.012  # [m] how high the lips beside the slice rise above that floor
+NOZZLE_OUT = -0.115  # [m] the nozzle's plane beside the slice, along its thickness
+FINGER = (0.075, 0.012, 0.030)  # [m] length, thickness, width
+FINGER_OPEN = 0.022  # [m] each finger's pad from the middle when open
+MARKER_OUT, MARKER_UP = 0.13, 0.165  # [m] the gripper's marker beside the tool's axis and above the tips
+MARKER_RADIUS = 0.017
+
+WHITE, GRAPHITE, BLUE = (0.93, 0.93, 0.95, 1.0), (0.22, 0.23, 0.26, 1.0), (0.16, 0.30, 0.55, 1.0)
+STEEL, RUBBER, CRUST, CRUMB = (
+    (0.72, 0.73, 0.76, 1.0),
+    (0.12, 0.12, 0.12, 1.0),
+    (0.62, 0.42, 0.22, 1.0),
+    (0.93, 0.83, 0.64, 1.0),
+)
+MARKER_MAGENTA, MARKER_CYAN, MARKER_GREEN = (0.95, 0.0, 0.95, 1.0), (0.0, 0.85, 0.85, 1.0), (0.0, 0.80, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A visible and, unless `ghost`, solid piece of a link: a mesh, or a box or cylinder of `size` [m] at `at` [m]."""
+
+    color: Color
+    size: tuple[float, ...] = ()
+    at: Vector = (0.0, 0.0, 0.0)
+    mesh: "Trimesh | None" = None
+    ghost: bool = False
+    hidden: bool = False
+
+
+@dataclass(frozen=True)
+class Link:
+    """One link: its parts and mass [kg], and the joint that carries it (None for the root)."""
+
+    name: str
+    mass: float
+    parts: Sequence[Part]
+    joint: "Joint | None" = None
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint at `at` [m] on `parent`, turning about or sliding along `axis` within [lower, upper] [rad or m]."""
+
+    name: str
+    kind: str
+    parent: str
+    at: Vector
+    axis: Vector = (0.0, 0.0, 1.0)
+    limits: tuple[float, float] = (0.0, 0.0)
+    speed: float = 1.0
+    effort: float = 1000.0
+
+
+@dataclass
+class Model:
+    """A URDF to be: its name and links, root first."""
+
+    name: str
+    links: list[Link] = field(default_factory=list)
+
+
+def _cylinder(radius: float, length: float, at: Vector = (0, 0, 0), along: str = "z") -> "Trimesh":
+    import trimesh
+
+    mesh = trimesh.creation.cylinder(radius=radius, height=length, sections=40)
+    if along != "z":
+        turn: Vector = (0, 1, 0) if along == "x" else (1, 0, 0)
+        mesh.apply_transform(trimesh.transformations.rotation_matrix(pi / 2, turn))
+    mesh.apply_translation(at)
+    return mesh
+
+
+def _hull(*meshes: "Trimesh") -> "Trimesh":
+    import trimesh
+
+    return trimesh.util.concatenate(list(meshes)).convex_hull
+
+
+def _join(*meshes: "Trimesh") -> "Trimesh":
+    import trimesh
+
+    return trimesh.util.concatenate(list(meshes))
+
+
+def _box(size: Vector, at: Vector = (0, 0, 0)) -> "Trimesh":
+    import trimesh
+
+    mesh = trimesh.creation.box(extents=size)
+    mesh.apply_translation(at)
+    return mesh
+
+
+def _turning(number: int, parent: str, at: Vector, axis: Vector) -> Joint:
+    limits = (float(arm.LOWER[number]), float(arm.UPPER[number]))
+    return Joint(arm.JOINTS[number], "revolute", parent, at, axis, limits, float(arm.SPEED[number]))
+
+
+def robot() -> Model:
+    """The six-axis arm with its two-finger gripper (an approximate model of the UP6 class, see kinematics)."""
+    shoulder, elbow = (arm.SHOULDER_OUT, 0.0, 0.20), (0.0, 0.0, arm.UPPER_ARM)
+    forearm_root, half = 0.20, arm.FOREARM
+    base = _join(
+        _hull(_cylinder(0.19, 0.02, (0, 0, 0.01)), _cylinder(0.15, 0.02, (0, 0, 0.06))),
+        _cylinder(0.13, 0.19, (0, 0, 0.155)),
+    )
+    turret = _join(
+        _cylinder(0.145, 0.06, (0, 0, 0.03)),
+        _hull(_cylinder(0.12, 0.05, (0, 0, 0.06)), _cylinder(0.10, 0.18, shoulder, "y")),
+    )
+    upper = _join(
+        _hull(_cylinder(0.085, 0.11, (0, 0, 0), "y"), _cylinder(0.065, 0.10, elbow, "y")),
+        _cylinder(0.055, 0.17, elbow, "y"),
+    )
+    fore = _hull(_cylinder(0.085, 0.12, (0, 0, 0.06), "y"), _cylinder(0.07, 0.14, (0.10, 0, arm.ELBOW_UP), "x"))
+    roll = _hull(
+        _cylinder(0.062, 0.02, (0.0, 0, 0), "x"), _cylinder(0.045, 0.02, (half - forearm_root - 0.04, 0, 0), "x")
+    )
+    wrist = _join(_cylinder(0.047, 0.085, (0, 0, 0), "y"), _cylinder(0.034, 0.075, (0.0375, 0, 0), "x"))
+    tip_to_pad = arm.TOOL - FINGER[0]
+    palm = _join(
+        _cylinder(0.032, 0.02, (0.01, 0, 0), "x"),
+        _box((0.05, 0.10, 0.05), (0.045, 0, 0)),
+        _box((0.026, 0.085, 0.034), (0.083, 0, 0)),
+    )
+    marker_x = arm.TOOL - MARKER_UP
+    bar = (0.008, 0.018, MARKER_OUT - MARKER_RADIUS)
+    links = [
+        Link("base", 40.0, [Part(GRAPHITE, mesh=base)]),
+        Link("turret", 30.0, [Part(BLUE, mesh=turret)], _turning(0, "base", (0, 0, 0.25), (0, 0, 1))),
+        Link("upper_arm", 18.0, [Part(WHITE, mesh=upper)], _turning(1, "turret", shoulder, (0, 1, 0))),
+        Link("forearm", 12.0, [Part(BLUE, mesh=fore)], _turning(2, "upper_arm", elbow, (0, 1, 0))),
+        Link("roll", 5.0, [Part(WHITE, mesh=roll)], _turning(3, "forearm", (forearm_root, 0, arm.ELBOW_UP), (1, 0, 0))),
+        Link("wrist", 2.0, [Part(GRAPHITE, mesh=wrist)], _turning(4, "roll", (half - forearm_root, 0, 0), (0, 1, 0))),
+        Link(
+            "tool",
+            1.2,
+            [
+                Part(GRAPHITE, mesh=palm),
+                Part(STEEL, bar, (marker_x + 0.006, 0, bar[2] / 2), ghost=True),
+                Part(MARKER_MAGENTA, mesh=_cylinder(MARKER_RADIUS, 0.004, (marker_x, 0, MARKER_OUT), "x"), ghost=True),
+            ],
+            _turning(5, "wrist", (arm.FLANGE, 0, 0), (1, 0, 0)),
+        ),
+    ]
+    for name, side in (("finger_left", 1.0), ("finger_right", -1.0)):
+        pad = Part(STEEL, FINGER, (FINGER[0] / 2, side * FINGER[1] / 2, 0))
+        rubber = Part(RUBBER, (0.03, 0.0016, 0.028), (FINGER[0] - 0.016, side * 0.0008, 0), ghost=True)
+        joint = Joint(
+            name, "prismatic", "tool", (tip_to_pad, 0, 0), (0, side, 0), (0.0, FINGER_OPEN + 0.008), 0.2, 200.0
+        )
+        links.append(Link(name, 0.08, [pad, rubber], joint))
+    return Model("robot", links)
+
+
+def toaster() -> Model:
+    """A toaster with a real slot: floor, two walls and two ends around it, as separate boxes, for a mesh would be filled."""
+    (length, width, height), (slot_length, slot_width) = TOASTER, TOASTER_SLOT
+    wall, end, up = (width - slot_width) / 2, (length - slot_length) / 2, height - TOASTER_FLOOR
+    parts = [Part(STEEL, (length, width, TOASTER_FLOOR), (0, 0, TOASTER_FLOOR / 2))]
+    for side in (1.0, -1.0):
+        parts.append(Part(STEEL, (length, wall, up), (0, side * (slot_width + wall) / 2, TOASTER_FLOOR + up / 2)))
+        parts.append(Part(STEEL, (end, slot_width, up), (side * (slot_length + end) / 2, 0, TOASTER_FLOOR + up / 2)))
+    parts.append(Part(GRAPHITE, (length + 0.006, width + 0.006, 0.012), (0, 0, 0.006), ghost=True))
+    parts.append(Part(GRAPHITE, (0.014, 0.030, 0.010), (length / 2 + 0.007, 0.02, 0.066), ghost=True))
+    return Model("toaster", [Link("toaster", 2.0, parts)])
+
+
+def applier() -> Model:
+    """The butter applier: a groove with a low back rest that a slice stands in, and a head that slides across and up."""
+    groove, lip = SLICE[1] + 0.005, 0.012
+    span = SLICE[0] + 0.06
+    parts = [
+        Part(STEEL, (span, 0.34, APPLIER_FLOOR), (0, -0.07, APPLIER_FLOOR / 2)),
+        Part(STEEL, (SLICE[0], lip, 0.05), (0, (groove + lip) / 2, APPLIER_FLOOR + 0.025)),
+        Part(STEEL, (SLICE[0], lip, APPLIER_LIP), (0, -(groove + lip) / 2, APPLIER_FLOOR + APPLIER_LIP / 2)),
+        Part(GRAPHITE, (span, 0.03, 0.02), (0, NOZZLE_OUT - 0.06, APPLIER_FLOOR + 0.01), ghost=True),
+    ]
+    slide_x = Joint(
+        "head_x", "prismatic", "applier", (0, NOZZLE_OUT - 0.06, APPLIER_FLOOR), (1, 0, 0), (-0.06, 0.06), 0.5
+    )
+    slide_z = Joint("head_z", "prismatic", "column", (0, 0.03, 0), (0, 0, 1), (0.0, 0.14), 0.5)
+    column = [Part(WHITE, (0.03, 0.022, 0.16), (0, 0, 0.08))]
+    head = [Part(BLUE, (0.04, 0.03, 0.034), (0, 0, 0)), Part(STEEL, (0.012, 0.018, 0.012), (0, 0.024, 0), ghost=True)]
+    return Model(
+        "applier", [Link("applier", 3.0, parts), Link("column", 0.4, column, slide_x), Link("head", 0.2, head, slide_z)]
+    )
+
+
+def bread() -> Model:
+    """A slice of bread that stands: solid as a box, seen as a loaf's profile with a crust."""
+    width, thick, height = SLICE
+
+    def profile(shrink: float, depth: float) -> "Trimesh":
+        w, top, bottom = width / 2 - shrink, height / 2 - shrink, -height / 2 + shrink
+        side, round_ = top - 0.034, 0.030
+        cap = [(w - round_ + round_ * np.cos(t), top - round_ + round_ * np.sin(t)) for t in np.linspace(0, pi / 2, 8)]
+        outline = [(w * 0.97, bottom), (w * 0.97, side), *cap]
+        outline += [(-x, z) for x, z in outline]
+        import trimesh
+
+        return trimesh.Trimesh([(x, y, z) for x, z in outline for y in (-depth / 2, depth / 2)]).convex_hull
+
+    solid = Part(CRUST, SLICE, hidden=True)
+    return Model(
+        "slice",
+        [
+            Link(
+                "slice",
+                SLICE_KG,
+                [
+                    solid,
+                    Part(CRUST, mesh=profile(0.0, thick), ghost=True),
+                    Part(CRUMB, mesh=profile(0.007, thick + 0.0008), ghost=True),
+                ],
+            )
+        ],
+    )
+
+
+MODELS = {"robot": robot, "toaster": toaster, "applier": applier, "slice": bread}
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return " ".join(f"{round(float(v), 6) + 0.0:g}" for v in values)
+
+
+def _geometry(parent: Xml.Element, part: Part, mesh_file: str) -> None:
+    Xml.SubElement(parent, "origin", xyz=_numbers(part.at), rpy="0 0 0")
+    shape = Xml.SubElement(parent, "geometry")
+    if part.mesh is not None:
+        Xml.SubElement(shape, "mesh", filename=mesh_file)
+    else:
+        Xml.SubElement(shape, "box", size=_numbers(part.size))
+
+
+def _solid(part: Part) -> "Trimesh":
+    size = part.size
+    return part.mesh if part.mesh is not None else _box((size[0], size[1], size[2]), part.at)
+
+
+def _inertial(element: Xml.Element, link: Link) -> None:
+    """Mass and inertia of the link's solid parts taken as one homogeneous body."""
+    body = _join(*[_solid(part) for part in link.parts if not part.ghost])
+    tensor = body.moment_inertia / body.volume * link.mass
+    inertial = Xml.SubElement(element, "inertial")
+    Xml.SubElement(inertial, "origin", xyz=_numbers(body.center_mass), rpy="0 0 0")
+    Xml.SubElement(inertial, "mass", value=_numbers([link.mass]))
+    names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    Xml.SubElement(
+        inertial, "inertia", {name: f"{round(float(tensor[at]), 9) + 0.0:.9g}" for name, at in names.items()}
+    )
+
+
+def _joint(root: Xml.Element, link: Link, joint: Joint) -> None:
+    element = Xml.SubElement(root, "joint", name=joint.name, type=joint.kind)
+    Xml.SubElement(element, "parent", link=joint.parent)
+    Xml.SubElement(element, "child", link=link.name)
+    Xml.SubElement(element, "origin", xyz=_numbers(joint.at), rpy="0 0 0")
+    Xml.SubElement(element, "axis", xyz=_numbers(joint.axis))
+    low, high = joint.limits
+    Xml.SubElement(
+        element,
+        "limit",
+        lower=_numbers([low]),
+        upper=_numbers([high]),
+        effort=_numbers([joint.effort]),
+        velocity=_numbers([joint.speed]),
+    )
+
+
+def urdf(model: Model) -> tuple[str, dict[str, str]]:
+    """The URDF text of `model`, and the OBJ text of each mesh it names by file name."""
+    root = Xml.Element("robot", name=model.name)
+    meshes: dict[str, str] = {}
+    for link in model.links:
+        element = Xml.SubElement(root, "link", name=link.name)
+        _inertial(element, link)
+        for number, part in enumerate(link.parts):
+            mesh_file = f"{model.name}_{link.name}_{number}.obj"
+            if part.mesh is not None:
+                meshes[mesh_file] = obj(part.mesh)
+            if not part.hidden:
+                visual = Xml.SubElement(element, "visual")
+                _geometry(visual, part, mesh_file)
+                material = Xml.SubElement(visual, "material", name=f"{link.name}_{number}")
+                Xml.SubElement(material, "color", rgba=_numbers(part.color))
+            if not part.ghost:
+                _geometry(Xml.SubElement(element, "collision"), part, mesh_file)
+        if link.joint is not None:
+            _joint(root, link, link.joint)
+    Xml.indent(root)
+    return '<?xml version="1.0"?>\n' + Xml.tostring(root, encoding="unicode") + "\n", meshes
+
+
+def obj(mesh: "Trimesh") -> str:
+    """`mesh` as OBJ text with a normal per face, rounded to micrometres so that every machine writes the same file."""
+    lines = [f"v {_numbers(vertex)}" for vertex in mesh.vertices]
+    normals = {tuple(np.round(normal, 3) + 0.0): None for normal in mesh.face_normals}
+    index = {normal: number for number, normal in enumerate(normals, start=1)}
+    lines += [f"vn {_numbers(normal)}" for normal in normals]
+    for face, normal in zip(mesh.faces, mesh.face_normals, strict=True):
+        at = index[tuple(np.round(normal, 3) + 0.0)]
+        lines.append("f " + " ".join(f"{corner + 1}//{at}" for corner in face))
+    return "\n".join(lines) + "\n"
+
+
+def write(folder: Path) -> list[Path]:
+    """Write every model's URDF and meshes into `folder`; returns the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for make in MODELS.values():
+        model = make()
+        text, meshes = urdf(model)
+        for name, content in {f"{model.name}.urdf": text, **meshes}.items():
+            (folder / name).write_text(content)
+            written.append(folder / name)
+    return written

@@ -1,0 +1,58 @@
+"""Images: an overhead camera's picture of the world, and which pixel a point of the world falls on."""
+
+from dataclasses import dataclass
+from math import tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.sim.world import World
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera at `eye` looking at `target` [m] with `up` towards the picture's upper edge; square pixels."""
+
+    eye: tuple[float, float, float]
+    target: tuple[float, float, float]
+    up: tuple[float, float, float]
+    field_of_view_rad: float
+    width: int
+    height: int
+
+    @classmethod
+    def overhead(cls, position: tuple[float, float, float], field_of_view_rad: float, pixels: int) -> "Camera":
+        """Straight down from `position` [m]: the picture's right is the world's x, its top the world's y."""
+        return cls(position, (position[0], position[1], 0.0), (0.0, 1.0, 0.0), field_of_view_rad, pixels, pixels)
+
+    def view_matrix(self) -> Array:
+        """World to camera, (4, 4), OpenGL's convention: the camera looks along its -z."""
+        eye, target, up = (np.array(v, dtype=float) for v in (self.eye, self.target, self.up))
+        back = (eye - target) / np.linalg.norm(eye - target)
+        right = np.cross(up, back)
+        right /= np.linalg.norm(right)
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.stack([right, np.cross(back, right), back])
+        matrix[:3, 3] = -matrix[:3, :3] @ eye
+        return matrix
+
+    def projection_matrix(self, near: float = 0.05, far: float = 8.0) -> Array:
+        """Camera to clip space, (4, 4), OpenGL's convention."""
+        scale = 1.0 / tan(self.field_of_view_rad / 2.0)
+        matrix = np.zeros((4, 4))
+        matrix[0, 0], matrix[1, 1] = scale * self.height / self.width, scale
+        matrix[2, 2], matrix[2, 3] = (far + near) / (near - far), 2.0 * far * near / (near - far)
+        matrix[3, 2] = -1.0
+        return matrix
+
+    def pixel_from_world(self) -> Array:
+        """(3, 4): homogeneous pixel (x, y, w) of a homogeneous world point [m]; TinyRenderer's offset of one row included."""
+        clip = self.projection_matrix() @ self.view_matrix()
+        x, y, w = clip[0], clip[1], clip[3]
+        return np.stack([(x + w) / 2.0 * self.width, (w - y) / 2.0 * self.height - w, w])
+
+    def picture(self, world: World) -> NDArray[np.uint8]:
+        """What the camera sees: (height, width, 3) uint8 RGB."""
+        return world.render(self.view_matrix(), self.projection_matrix(), self.width, self.height)

@@ -1,0 +1,206 @@
+"""A task's cell in physics: table, stations, machines, slices, cubes and markers, where the seed puts them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import ceil, cos, hypot, sin
+
+import numpy as np
+
+from lab.data import assets_folder
+from lab.errors import BadInput
+from lab.sim import assets, kinematics
+from lab.sim.kinematics import ToolPose
+from lab.sim.robot import Robot
+from lab.sim.world import World
+from lab.taskfile import Obstacle, Station, Task
+
+SLAB = 0.012  # [m] plates and buffers are slabs this thick
+GRASP_DEPTH = 0.03  # [m] how far the fingers reach below a slice's top
+COLUMN_M, ROW_M = 0.14, 0.055  # [m] between spots, along and across the slices
+COLUMNS = 4  # of a plate
+WOOD, TABLE_RGBA, PLATE_RGBA, BUFFER_RGBA = (
+    (0.72, 0.53, 0.33, 1.0),
+    (0.86, 0.85, 0.83, 1.0),
+    (0.97, 0.97, 0.98, 1.0),
+    (0.55, 0.57, 0.6, 1.0),
+)
+MARKER_ABOVE = 0.002  # [m] a marker's centre above what it lies on
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Where one slice stands: the middle of its foot at x, y, z [m], turned by yaw [rad]."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+
+    def grasp(self) -> ToolPose:
+        """The tool pose that holds a slice standing here."""
+        return ToolPose(self.x, self.y, self.z + assets.SLICE[2] - GRASP_DEPTH, self.yaw)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the seed decides: obstacle centres, and how far each slice stands off its spot (x, y [m], yaw [rad])."""
+
+    obstacles: tuple[tuple[float, float], ...]
+    slices: tuple[tuple[float, float, float], ...]
+
+
+def draw_layout(task: Task, toasts: int, rng: np.random.Generator) -> Layout:
+    """A layout drawn uniformly within the areas that the task gives its obstacles and slices."""
+    places = []
+    for obstacle in task.obstacles:
+        dx, dy = rng.uniform(-1, 1, 2) * obstacle.area
+        places.append((obstacle.position_m[0] + float(dx), obstacle.position_m[1] + float(dy)))
+    offsets = [tuple(map(float, rng.uniform(-1, 1, 3) * task.slices.area)) for _ in range(toasts)]
+    return Layout(tuple(places), tuple(offsets))  # type: ignore[arg-type]
+
+
+def is_applier(station: Station) -> bool:
+    """Whether the station is the butter applier (its process is learned) rather than the toaster."""
+    return station.process == "butter"
+
+
+def floor(station: Station) -> float:
+    """How high a slice's foot is above the table at this station [m]."""
+    if station.kind != "machine":
+        return SLAB
+    return assets.APPLIER_FLOOR if is_applier(station) else assets.TOASTER_FLOOR
+
+
+def spots(station: Station) -> list[Spot]:
+    """The places for slices at a station, the middle ones first; as many as its capacity."""
+    x, y, yaw = station.pose
+    if station.kind == "machine":
+        offsets: list[tuple[float, float]] = [(0.0, 0.0)] * station.capacity
+    else:
+        columns = min(COLUMNS, station.capacity) if station.kind == "storage" else 1
+        rows = ceil(station.capacity / columns)
+        grid = product(range(columns), range(rows))
+        offsets = [((c - (columns - 1) / 2) * COLUMN_M, (r - (rows - 1) // 2) * ROW_M) for c, r in grid]
+        offsets.sort(key=lambda at: (round(hypot(*at), 6), at))
+    c, s, z = cos(yaw), sin(yaw), floor(station)
+    return [Spot(x + c * dx - s * dy, y + s * dx + c * dy, z, yaw) for dx, dy in offsets[: station.capacity]]
+
+
+def used_spots(station: Station, toasts: int) -> list[Spot]:
+    """The spots that so many toasts can ever need, and one more row's worth for a plate."""
+    return spots(station)[: max(toasts, 4)]
+
+
+class Scene:
+    """The cell of `task` with `toasts` slices, laid out as `layout` says. Slices are named 'slice 1'..., obstacles by name."""
+
+    def __init__(self, world: World, task: Task, toasts: int, layout: Layout) -> None:
+        self.world, self.task, self.toasts, self.layout = world, task, toasts, layout
+        robot = task.robot
+        self.solid: list[str] = []  # what the arm must not touch
+        world.box("table", (2.2, 2.9, 0.04), (0.35, 0.0, -0.02), TABLE_RGBA)
+        self.robot = Robot(world, robot.speed_m_s, robot.acceleration_m_s2, robot.grip_force_n)
+        for station in task.stations:
+            self._build_station(station)
+        for obstacle, place in zip(task.obstacles, layout.obstacles, strict=True):
+            self._build_obstacle(obstacle, place)
+        start = next(stage.station for stage in task.route)
+        for number, (spot, off) in enumerate(zip(spots(task.station(start)), layout.slices, strict=False), start=1):
+            self.add_slice(f"slice {number}", spot, off)
+
+    def _build_station(self, station: Station) -> None:
+        x, y, yaw = station.pose
+        if station.kind == "machine":
+            model = "applier" if is_applier(station) else "toaster"
+            self.world.load(station.name, assets_folder() / f"{model}.urdf", (x, y, 0.0), yaw)
+            self.world.friction(station.name, 0.5)
+            if model == "toaster":
+                at = marker_of_toaster(station)
+                self.world.disc(f"{station.name} marker", assets.MARKER_RADIUS, 0.004, at, assets.MARKER_CYAN)
+        else:
+            self._build_slab(station)
+        self.solid.append(station.name)
+
+    def _build_slab(self, station: Station) -> None:
+        feet = used_spots(station, self.toasts)
+        yaw = station.pose[2]
+        c, s = cos(yaw), sin(yaw)
+        along = [c * (f.x - station.pose[0]) + s * (f.y - station.pose[1]) for f in feet]
+        across = [-s * (f.x - station.pose[0]) + c * (f.y - station.pose[1]) for f in feet]
+        middle = ((max(along) + min(along)) / 2, (max(across) + min(across)) / 2)
+        size = (max(along) - min(along) + 0.18, max(across) - min(across) + 0.10, SLAB)
+        x = station.pose[0] + c * middle[0] - s * middle[1]
+        y = station.pose[1] + s * middle[0] + c * middle[1]
+        rgba = PLATE_RGBA if station.kind == "storage" else BUFFER_RGBA
+        self.world.box(station.name, size, (x, y, SLAB / 2), rgba, yaw=yaw)
+        self.world.friction(station.name, 0.8)
+
+    def _build_obstacle(self, obstacle: Obstacle, place: tuple[float, float]) -> None:
+        edge = obstacle.edge_m
+        self.world.box(obstacle.name, (edge, edge, edge * obstacle.cubes), (*place, edge * obstacle.cubes / 2), WOOD)
+        self.solid.append(obstacle.name)
+        if self.in_camera_grid(place):
+            at = (*place, edge * obstacle.cubes + MARKER_ABOVE)
+            self.world.disc(f"{obstacle.name} marker", assets.MARKER_RADIUS, 0.004, at, assets.MARKER_GREEN)
+
+    def add_slice(self, name: str, spot: Spot, off: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+        """Stand a slice called `name` on `spot`, `off` it by x, y [m] and yaw [rad]."""
+        c, s = cos(spot.yaw), sin(spot.yaw)
+        x, y, yaw = spot.x + c * off[0] - s * off[1], spot.y + s * off[0] + c * off[1], spot.yaw + off[2]
+        height = assets.SLICE[2]
+        self.world.load(name, assets_folder() / "slice.urdf", (x, y, spot.z + height / 2 + 0.0005), yaw, fixed=False)
+        self.world.mass(name, self.task.slices.mass_kg)
+        self.world.friction(name, self.task.slices.friction, spinning=0.001)
+
+    def in_camera_grid(self, place: Sequence[float]) -> bool:
+        """Whether a point (x, y) [m] lies in the grid that the camera looks at."""
+        grid = self.task.insert
+        steps = [(p - o) / grid.cell_m for p, o in zip(place, grid.origin_m, strict=False)]
+        return all(0 <= step < count for step, count in zip(steps, grid.shape, strict=True))
+
+    def approach(self, station: Station) -> ToolPose:
+        """Where transfers to and from a station end: above its middle, at the lowest level of the workspace grid."""
+        x, y, yaw = station.pose
+        return ToolPose(x, y, self.travel_height(), yaw)
+
+    def travel_height(self) -> float:
+        """The lowest height [m] of the finger tips on a transfer."""
+        grid = self.task.workspace
+        return grid.lower_m[2] + grid.cell_m[2] / 2
+
+
+def marker_of_toaster(station: Station) -> tuple[float, float, float]:
+    """Where the toaster's marker is [m]: on its body, beside the slot's middle."""
+    x, y, yaw = station.pose
+    c, s = cos(yaw), sin(yaw)
+    off = marker_offset_of_toaster()
+    return (x + c * off[0] - s * off[1], y + s * off[0] + c * off[1], assets.TOASTER[2] + MARKER_ABOVE)
+
+
+def marker_offset_of_toaster() -> tuple[float, float]:
+    """The toaster's marker off its slot's middle, along and across the slot [m]."""
+    return (0.0, (assets.TOASTER[1] + assets.TOASTER_SLOT[1]) / 4)
+
+
+def check_scene(task: Task) -> None:
+    """BadInput when a station's spots are out of the arm's reach, or slices would be swept by loaded transfers."""
+    low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
+    size = assets.SLICE
+    highest = max(floor(s) for s in task.stations) + size[2]
+    if low - (size[2] - GRASP_DEPTH) < highest + 0.01:
+        raise BadInput(
+            f"workspace.lower_m: the lowest tool height {low:.3f} m would sweep a carried slice through standing ones"
+        )
+    for station in task.stations:
+        for spot in spots(station):
+            pose = spot.grasp()
+            for at in (pose, ToolPose(pose.x, pose.y, low, pose.yaw)):
+                if kinematics.inverse(at) is None or hypot(at.x, at.y) < NEAREST_M:
+                    raise BadInput(
+                        f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m is {hypot(at.x, at.y):.2f} m "
+                        f"from the robot at ({at.z:.2f} m up); the arm reaches {NEAREST_M:.2f} to about 1.2 m"
+                    )
+
+
+NEAREST_M = 0.36  # [m] nearer to its own axis than this the arm would touch itself

@@ -1,0 +1,317 @@
+"""One PyBullet world: bodies by name, metres, radians, seconds. The only module that imports pybullet."""
+
+import ctypes
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import WorkFailed
+from lab.sim import urdf
+from lab.view.frames import Body, Frame, Shape
+
+TIME_STEP = 1.0 / 240.0  # [s]
+
+Array = NDArray[np.float64]
+Position = Sequence[float]
+NO_TURN = (0.0, 0.0, 0.0, 1.0)
+
+
+@dataclass
+class _Entry:
+    """A body in the world: its number, whether it can move, link numbers and joint numbers by name, how it looks."""
+
+    number: int
+    moves: bool
+    pose: tuple[Position, Position]
+    links: dict[str, int] = field(default_factory=dict)
+    joints: dict[str, int] = field(default_factory=dict)
+    looks: dict[str, tuple[Shape, ...]] = field(default_factory=dict)
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Keep PyBullet's banner and warnings, which go straight to the file descriptors, off the terminal."""
+    libc = ctypes.CDLL(None)
+    kept = [os.dup(number) for number in (1, 2)]
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        libc.fflush(None)
+        for number in (1, 2):
+            os.dup2(nowhere, number)
+        yield
+    finally:
+        libc.fflush(None)
+        for number, copy in zip((1, 2), kept, strict=True):
+            os.dup2(copy, number)
+            os.close(copy)
+        os.close(nowhere)
+
+
+class World:
+    """A PyBullet client without a window; use it as a context manager. Same calls, same result, bit for bit."""
+
+    def __init__(self) -> None:
+        with _silence():
+            import pybullet
+
+            self._p: Any = pybullet
+            self._client = pybullet.connect(pybullet.DIRECT)
+        if self._client < 0:
+            raise WorkFailed("PyBullet gave no physics client")
+        self._bodies: dict[str, _Entry] = {}
+        self._names: dict[int, str] = {}
+        self.steps = 0
+        self._call("setGravity", 0, 0, -9.81)
+        self._call(
+            "setPhysicsEngineParameter",
+            fixedTimeStep=TIME_STEP,
+            numSolverIterations=60,
+            deterministicOverlappingPairs=1,
+        )
+
+    def _call(self, name: str, *args: Any, **kwargs: Any) -> Any:
+        return getattr(self._p, name)(*args, physicsClientId=self._client, **kwargs)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the client; a closed world stays closed."""
+        if self._client >= 0:
+            self._call("disconnect")
+            self._client = -1
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since the world began [s]."""
+        return self.steps * TIME_STEP
+
+    def step(self) -> None:
+        """Advance the physics by TIME_STEP [s]."""
+        self._call("stepSimulation")
+        self.steps += 1
+
+    # ---- bodies -------------------------------------------------------------------------------------------------
+
+    def load(
+        self, name: str, path: Path, position: Position = (0, 0, 0), yaw: float = 0.0, *, fixed: bool = True
+    ) -> None:
+        """Load a URDF, after validating it, as body `name` at `position` [m], turned by `yaw` [rad]."""
+        urdf.validate(path)
+        turn = self._p.getQuaternionFromEuler([0, 0, yaw])
+        with _silence():
+            flags = self._p.URDF_USE_INERTIA_FROM_FILE
+            number = self._call("loadURDF", str(path), list(position), turn, useFixedBase=fixed, flags=flags)
+        entry = _Entry(number, not fixed, (tuple(position), tuple(turn)))
+        for joint in range(self._call("getNumJoints", number)):
+            info = self._call("getJointInfo", number, joint)
+            entry.joints[info[1].decode()] = joint
+            entry.links[info[12].decode()] = joint
+        entry.looks = _looks(path)
+        self._add(name, entry)
+
+    def box(
+        self,
+        name: str,
+        size: Position,
+        position: Position,
+        rgba: Sequence[float],
+        *,
+        yaw: float = 0.0,
+        solid: bool = True,
+    ) -> None:
+        """A box that never moves: `size` and centre `position` [m]; not `solid`: only seen."""
+        half = [s / 2 for s in size]
+        turn = tuple(self._p.getQuaternionFromEuler([0, 0, yaw]))
+        shape = self._call("createCollisionShape", self._p.GEOM_BOX, halfExtents=half) if solid else -1
+        visual = self._call("createVisualShape", self._p.GEOM_BOX, halfExtents=half, rgbaColor=list(rgba))
+        self._fixed(name, shape, visual, position, turn, Shape("box", tuple(size), None, tuple(rgba)))
+
+    def disc(self, name: str, radius: float, height: float, position: Position, rgba: Sequence[float]) -> None:
+        """A flat round marker: only seen; `position` [m] is its centre."""
+        visual = self._call(
+            "createVisualShape", self._p.GEOM_CYLINDER, radius=radius, length=height, rgbaColor=list(rgba)
+        )
+        self._fixed(name, -1, visual, position, NO_TURN, Shape("cylinder", (radius, height), None, tuple(rgba)))
+
+    def _fixed(self, name: str, shape: int, visual: int, position: Position, turn: Position, look: Shape) -> None:
+        number = self._call("createMultiBody", 0, shape, visual, list(position), list(turn))
+        self._add(name, _Entry(number, False, (tuple(position), tuple(turn)), looks={"": (look,)}))
+
+    def _add(self, name: str, entry: _Entry) -> None:
+        self._bodies[name] = entry
+        self._names[entry.number] = name
+
+    def friction(self, name: str, lateral: float, *, links: Sequence[str] | None = None, spinning: float = 0.0) -> None:
+        """Set the Coulomb friction of a body (or of some of its links); `spinning` resists turning about the contact [m]."""
+        entry = self._bodies[name]
+        for link in [-1, *entry.links.values()] if links is None else [entry.links[one] for one in links]:
+            self._call("changeDynamics", entry.number, link, lateralFriction=lateral, spinningFriction=spinning)
+
+    def mass(self, name: str, mass_kg: float) -> None:
+        """Give a one-link body another mass [kg]; its inertia is scaled alike."""
+        number = self._bodies[name].number
+        info = self._call("getDynamicsInfo", number, -1)
+        inertia = [value * mass_kg / info[0] for value in info[2]]
+        self._call("changeDynamics", number, -1, mass=mass_kg, localInertiaDiagonal=inertia)
+
+    def put(self, name: str, position: Position, quaternion: Position = NO_TURN) -> None:
+        """Set a body down somewhere while the scene is built or surveyed: `position` [m], `quaternion` xyzw."""
+        if not np.isfinite([*position, *quaternion]).all():
+            raise WorkFailed(f"body '{name}' cannot be put at {list(position)}: not finite")
+        self._call("resetBasePositionAndOrientation", self._bodies[name].number, list(position), list(quaternion))
+
+    def pose(self, name: str, link: str = "") -> tuple[Array, Array]:
+        """Position (3,) [m] and quaternion (4,) xyzw of a body's or a link's frame in the world."""
+        entry = self._bodies[name]
+        if link and link in entry.links:
+            state = self._call("getLinkState", entry.number, entry.links[link], computeForwardKinematics=1)
+            return np.array(state[4]), np.array(state[5])
+        position, turn = self._call("getBasePositionAndOrientation", entry.number) if entry.moves else entry.pose
+        return np.array(position), np.array(turn)
+
+    def speed(self, name: str) -> float:
+        """How fast a body's centre moves [m/s]."""
+        linear, _ = self._call("getBaseVelocity", self._bodies[name].number)
+        return float(np.linalg.norm(linear))
+
+    # ---- joints -------------------------------------------------------------------------------------------------
+
+    def joints(self, name: str, names: Sequence[str]) -> Array:
+        """Joint positions [rad or m], shape (n,)."""
+        entry = self._bodies[name]
+        states = self._call("getJointStates", entry.number, [entry.joints[joint] for joint in names])
+        return np.array([state[0] for state in states])
+
+    def set_joints(self, name: str, names: Sequence[str], positions: Sequence[float] | Array) -> None:
+        """Put joints at `positions` at once, without physics: for building and surveying a scene."""
+        entry = self._bodies[name]
+        for joint, value in zip(names, positions, strict=True):
+            self._call("resetJointState", entry.number, entry.joints[joint], float(value))
+
+    def drive(
+        self,
+        name: str,
+        names: Sequence[str],
+        positions: Sequence[float] | Array,
+        velocities: Sequence[float] | Array | None = None,
+        *,
+        force: float = 2000.0,
+    ) -> None:
+        """Set the position motors' targets [rad or m], with velocities fed forward; `force` [Nm or N] is the most they use."""
+        if not np.isfinite(positions).all():
+            raise WorkFailed(f"joint targets of '{name}' are not finite: {list(positions)}")
+        entry = self._bodies[name]
+        self._call(
+            "setJointMotorControlArray",
+            entry.number,
+            [entry.joints[joint] for joint in names],
+            self._p.POSITION_CONTROL,
+            targetPositions=[float(v) for v in positions],
+            targetVelocities=[0.0] * len(names) if velocities is None else [float(v) for v in velocities],
+            forces=[force] * len(names),
+            positionGains=[0.3] * len(names),
+            velocityGains=[1.0] * len(names),
+        )
+
+    def gear(self, name: str, link_a: str, link_b: str) -> None:
+        """Couple two sliding links so that they move as one (a two-finger gripper drifts without it)."""
+        entry = self._bodies[name]
+        first, second = entry.links[link_a], entry.links[link_b]
+        axis, zero = [1, 0, 0], [0, 0, 0]
+        gear = self._call(
+            "createConstraint", entry.number, first, entry.number, second, self._p.JOINT_GEAR, axis, zero, zero
+        )
+        self._call("changeConstraint", gear, gearRatio=-1, erp=0.1, maxForce=100)
+
+    # ---- questions ----------------------------------------------------------------------------------------------
+
+    def touching(self, one: str, other: str, link: str = "") -> bool:
+        """Whether two bodies touched in the last step (`link`: that link of the first)."""
+        first, second = self._bodies[one], self._bodies[other]
+        chosen = {"linkIndexA": first.links[link]} if link else {}
+        return bool(self._call("getContactPoints", first.number, second.number, **chosen))
+
+    def nearest(self, one: str, other: str, within: float) -> float:
+        """Distance [m] between two bodies where they are now, `within` when they are farther apart than that."""
+        first, second = self._bodies[one].number, self._bodies[other].number
+        points = self._call("getClosestPoints", first, second, within)
+        return min((float(point[8]) for point in points), default=within)
+
+    def ray(self, start: Position, end: Position) -> tuple[str, Array] | None:
+        """The first body that the ray from `start` to `end` [m] meets, and where, or None."""
+        number, _, _, where, _ = self._call("rayTest", list(start), list(end))[0]
+        return (self._names[number], np.array(where)) if number in self._names else None
+
+    def render(self, view: Array, projection: Array, width: int, height: int) -> NDArray[np.uint8]:
+        """The picture (height, width, 3) uint8 RGB through OpenGL-style `view` and `projection` matrices, each (4, 4)."""
+        _, _, pixels, _, _ = self._call(
+            "getCameraImage",
+            width,
+            height,
+            list(view.T.ravel()),
+            list(projection.T.ravel()),
+            shadow=0,
+            renderer=self._p.ER_TINY_RENDERER,
+            lightDirection=[0.3, -0.4, 1.0],
+        )
+        return np.asarray(pixels, dtype=np.uint8).reshape(height, width, 4)[:, :, :3]
+
+    # ---- what a viewer sees -------------------------------------------------------------------------------------
+
+    def bodies(self) -> tuple[Body, ...]:
+        """How everything looks: one viewer body a link, named `body` or `body link`."""
+        return tuple(
+            Body(_label(name, link), shapes)
+            for name, entry in self._bodies.items()
+            for link, shapes in entry.looks.items()
+            if shapes
+        )
+
+    def frame(self) -> Frame:
+        """Where everything is now."""
+        poses = {}
+        for name, entry in self._bodies.items():
+            for link, shapes in entry.looks.items():
+                if shapes:
+                    position, turn = self.pose(name, link)
+                    poses[_label(name, link)] = (*map(float, position), *map(float, turn))
+        return Frame(self.time_s, poses)
+
+
+def _label(name: str, link: str) -> str:
+    return f"{name} {link}" if link else name
+
+
+def _looks(path: Path) -> dict[str, tuple[Shape, ...]]:
+    """The visuals of each link in a URDF of this lab: boxes and meshes with a colour; the root link is ''."""
+    root = Xml.parse(path).getroot()
+    children = {joint.find("child").get("link") for joint in root.iter("joint")}  # type: ignore[union-attr]
+    looks = {}
+    for link in root.iter("link"):
+        shapes = []
+        for visual in link.iter("visual"):
+            origin, color = visual.find("origin"), visual.find("material/color")
+            at = _floats(origin.get("xyz", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
+            rgba = _floats(color.get("rgba", "1 1 1 1")) if color is not None else (0.8, 0.8, 0.8, 1.0)
+            mesh, box = visual.find("geometry/mesh"), visual.find("geometry/box")
+            if mesh is not None:
+                shapes.append(Shape("mesh", (), path.parent / mesh.get("filename", ""), rgba, at))
+            elif box is not None:
+                shapes.append(Shape("box", _floats(box.get("size", "")), None, rgba, at))
+        looks[link.get("name", "") if link.get("name") in children else ""] = tuple(shapes)
+    return looks
+
+
+def _floats(text: str) -> tuple[float, ...]:
+    return tuple(float(word) for word in text.split())

@@ -1,0 +1,10 @@
+"""The sub-tasks: one file a skill, all with the same life."""
+
+from lab.skills.butter import Butter
+from lab.skills.grasp import Grasp
+from lab.skills.insert import Insert
+from lab.skills.place import Place
+from lab.skills.skill import Skill
+from lab.skills.transfer import Transfer
+
+SKILLS: dict[str, type[Skill]] = {skill.subtask: skill for skill in (Transfer, Grasp, Insert, Butter, Place)}

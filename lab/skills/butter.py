@@ -1,0 +1,100 @@
+"""Butter: the applier's head covers the slice, cell by cell of 3 x 3, by the shortest learned path."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from lab.mdp import coverage
+from lab.sim import assets
+from lab.sim.world import TIME_STEP, Array
+from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path
+from lab.skills.surveys import Surveys
+
+if TYPE_CHECKING:
+    from lab.policy import Policy
+
+SHAPE = (3, 3)  # rows from the top, columns along the slice's width
+CELL_M = assets.SLICE[0] / 3
+JOINTS = ("head_x", "head_z")
+REST = (0.0, 0.0)  # where the head waits, low, out of the gripper's way
+_RAY_M = 0.2
+
+
+class Butter(Skill):
+    """Butter the slice that stands in the applier; `covered` are the cells that the nozzle's ray has met, in order."""
+
+    subtask: ClassVar[str] = "butter"
+
+    def __init__(self, station: str) -> None:
+        super().__init__(f"butter at {station}")
+        self.station = station
+        self.covered: list[tuple[int, int]] = []
+
+    def setup(self, surveys: Surveys) -> Problem:
+        """Which cell the head is at and which are covered: the shortest complete coverage."""
+        self.surveys = surveys
+        mdp = coverage(SHAPE, surveys.task.subtask("butter").rewards)
+        self.problem = Problem(self.name, self.subtask, mdp)
+        return self.problem
+
+    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+        """Move the head along the learned cells, stay on each, note where the nozzle's ray meets the slice, and go to rest."""
+        mdp = self.problem.mdp
+        station = self.surveys.task.station(self.station)
+        cells = [mdp.state_cell(state) for state in learned_path(policy, mdp, mdp.start)]
+        self.covered = []
+        for cell in cells:
+            yield from self._slide(bench, _joints(cell), station.head_speed_m_s)
+            for _ in range(round(station.dwell_s / TIME_STEP)):
+                yield
+            met = self._met(bench)
+            if met is not None and met not in self.covered:
+                self.covered.append(met)
+        yield from self._slide(bench, REST, station.head_speed_m_s)  # so that every slice takes the same time
+        missed = sorted(set(np.ndindex(*SHAPE)) - set(self.covered))
+        if missed:
+            raise SkillFailed(f"the butter missed {len(missed)} of 9 cells of {self.slice}: {missed}")
+
+    def on(self, name: str) -> "Butter":
+        """The same skill, told which slice stands in the applier."""
+        self.slice = name
+        return self
+
+    def _slide(self, bench: Bench, target: tuple[float, float], speed: float) -> Iterator[None]:
+        world = bench.scene.world
+        here = world.joints(self.station, JOINTS)
+        way = np.array(target) - here
+        steps = max(1, int(np.ceil(np.linalg.norm(way) / speed / TIME_STEP)))
+        for step in range(1, steps + 1):
+            world.drive(self.station, JOINTS, here + way * step / steps, way / steps / TIME_STEP, force=300.0)
+            yield
+        world.drive(self.station, JOINTS, target, force=300.0)
+
+    def _met(self, bench: Bench) -> tuple[int, int] | None:
+        """The cell of the slice that the nozzle's ray meets, in the slice's own frame."""
+        world = bench.scene.world
+        nozzle, _ = world.pose(self.station, "head")
+        yaw = self.surveys.task.station(self.station).pose[2]
+        ahead = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+        hit = world.ray(nozzle + 0.035 * ahead, nozzle + _RAY_M * ahead)
+        if hit is None or hit[0] != self.slice:
+            return None
+        centre, turn = world.pose(self.slice)
+        local = _unrotated(hit[1] - centre, turn)
+        row = int((assets.SLICE[2] / 2 - local[2]) // CELL_M)
+        column = int((local[0] + assets.SLICE[0] / 2) // CELL_M)
+        return (row, column) if 0 <= row < SHAPE[0] and 0 <= column < SHAPE[1] else None
+
+
+def _joints(cell: tuple[int, ...]) -> tuple[float, float]:
+    """The head's joints over a cell [m]: across from the middle, and up from the applier's floor."""
+    row, column = cell
+    return ((column - 1) * CELL_M, (SHAPE[0] - 1 - row + 0.5) * CELL_M)
+
+
+def _unrotated(vector: Array, turn: Array) -> Array:
+    """`vector` (3,) in the frame that the quaternion `turn` (4,) xyzw describes."""
+    axis, w = -turn[:3], turn[3]
+    twice = 2.0 * np.cross(axis, vector)
+    return np.asarray(vector + w * twice + np.cross(axis, twice))

@@ -1,0 +1,93 @@
+"""Grasp: the gripper comes to a slice, aligns itself, closes, and lifts the slice."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from lab.mdp import NoPath, TabularMDP, grid
+from lab.sim.kinematics import ToolPose
+from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
+from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
+
+if TYPE_CHECKING:
+    from lab.policy import Policy
+
+ACTIONS = ("left", "right", "back", "forward", "down", "up", "turn right", "turn left")
+GOAL = (2, 2, 0, 2)
+_SLOW = 0.6
+_BLEND_M = 0.008
+
+
+class Grasp(Skill):
+    """Take a slice at one station: the table holds the tool's pose relative to the slice (x, y, z, yaw)."""
+
+    subtask: ClassVar[str] = "grasp"
+
+    def __init__(self, station: str) -> None:
+        super().__init__(f"grasp at {station}")
+        self.station = station
+
+    def setup(self, surveys: Surveys) -> Problem:
+        """The poses around a slice with slices beside it; episodes begin anywhere above it."""
+        self.surveys = surveys
+        survey = surveys.around(self.station, False)
+        try:
+            mdp = grid(
+                survey.causes.shape, survey.blocked, _top(0, 0, 0), GOAL, surveys.task.subtask("grasp").rewards, ACTIONS
+            )
+        except NoPath as error:
+            raise no_way(self.name, error, survey.names(error.enclosing)) from None
+        self.problem = Problem(self.name, self.subtask, from_above(mdp))
+        return self.problem
+
+    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+        """Open, go above the slice where the grid is entered, follow the learned cells, close, lift, and see that it came along."""
+        robot, mdp, name = bench.scene.robot, self.problem.mdp, self.slice
+        if robot.closed:
+            yield from robot.release()
+        goal = bench.slice_pose(name)
+        entry = entry_cell(goal, robot.tool())
+        cells = [mdp.state_cell(s) for s in learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))]
+        poses = [near_pose(goal, cell) for cell in cells]
+        high = max(robot.tool().z, poses[0].z)
+        yield from robot.follow([ToolPose(poses[0].x, poses[0].y, high, poses[0].yaw)], slow=_SLOW)
+        yield from robot.follow(poses, blend=_BLEND_M, slow=_SLOW)
+        yield from robot.grip()
+        bench.held = bench.taken = name
+        lifted = self.surveys.approach(self.station)
+        yield from robot.follow([ToolPose(goal.x, goal.y, lifted.z, goal.yaw)], slow=_SLOW)
+        yield from robot.follow([lifted], slow=_SLOW)
+        if not bench.holds(name):
+            bench.held = None
+            raise SkillFailed(f"{name} is not in the gripper after grasping at '{self.station}'")
+
+    def take(self, name: str) -> "Grasp":
+        """The same skill, told which slice to take."""
+        self.slice = name
+        return self
+
+
+def _top(x: int, y: int, yaw: int) -> tuple[int, int, int, int]:
+    return (x, y, NEAR_SHAPE[2] - 1, yaw)
+
+
+def from_above(mdp: TabularMDP) -> TabularMDP:
+    """The same problem with episodes that begin in any free cell of the highest level."""
+    from dataclasses import replace
+
+    levels = np.indices(mdp.shape)[2].ravel()
+    starts = np.flatnonzero((levels == NEAR_SHAPE[2] - 1) & ~mdp.terminal)
+    return replace(mdp, starts=tuple(int(s) for s in starts))
+
+
+def entry_cell(goal: ToolPose, tool: ToolPose) -> tuple[int, int, int, int]:
+    """The cell of the highest level that is nearest to where the tool is, seen from the slice."""
+    c, s = np.cos(goal.yaw), np.sin(goal.yaw)
+    dx, dy = tool.x - goal.x, tool.y - goal.y
+    along, across = c * dx + s * dy, -s * dx + c * dy
+    turn = (tool.yaw - goal.yaw + np.pi / 2) % np.pi - np.pi / 2
+    x = int(np.clip(round(along / NEAR_STEP_M[0]) + 2, 0, NEAR_SHAPE[0] - 1))
+    y = int(np.clip(round(across / NEAR_STEP_M[1]) + 2, 0, NEAR_SHAPE[1] - 1))
+    yaw = int(np.clip(round(turn / NEAR_YAW_STEP) + NEAR_YAWS // 2, 0, NEAR_YAWS - 1))
+    return _top(x, y, yaw)

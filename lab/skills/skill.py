@@ -1,0 +1,138 @@
+"""What all skills share: one life (setup, start, step, stop, status), the problem they learn, the bench they work at."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from math import atan2, hypot
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from lab.errors import BadInput, WorkFailed
+from lab.mdp import NoPath, TabularMDP, greedy_path
+from lab.sim import assets
+from lab.sim.kinematics import ToolPose
+from lab.sim.robot import NAME as ROBOT
+from lab.sim.scene import GRASP_DEPTH, Scene
+
+if TYPE_CHECKING:
+    from lab.policy import Policy
+    from lab.skills.surveys import Surveys
+
+LOST_M = 0.03  # [m] a slice farther than this from where the fingers hold it is not held
+UPRIGHT = 0.97  # cosine of the largest tilt of a slice that stands
+
+
+class Status(Enum):
+    """Where a skill is in its life."""
+
+    IDLE = "idle"
+    RUNNING = "running"
+    SUCCESS = "success"
+    FAILURE = "failure"
+
+
+class SkillFailed(Exception):
+    """A skill noticed that it did not do what it is for; the text says why."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What one skill has to learn: its name, the sub-task, the table's problem."""
+
+    name: str
+    subtask: str
+    mdp: TabularMDP
+
+
+@dataclass
+class Bench:
+    """The cell in which skills are carried out; the slice that the robot holds, and the one that it took last."""
+
+    scene: Scene
+    held: str | None = None
+    taken: str | None = None
+
+    def slice_pose(self, name: str) -> ToolPose:
+        """The tool pose that would hold the slice where it is now, its yaw within a quarter turn of the world's x axis."""
+        position, turn = self.scene.world.pose(name)
+        yaw = 2.0 * atan2(float(turn[2]), float(turn[3]))
+        half = (yaw + np.pi / 2) % np.pi - np.pi / 2
+        z = float(position[2]) + assets.SLICE[2] / 2 - GRASP_DEPTH
+        return ToolPose(float(position[0]), float(position[1]), z, float(half))
+
+    def upright(self, name: str) -> float:
+        """Cosine of a slice's tilt: 1 when it stands."""
+        x, y, _, _ = self.scene.world.pose(name)[1]
+        return float(1.0 - 2.0 * (x * x + y * y))
+
+    def holds(self, name: str) -> bool:
+        """Whether both fingers touch the slice and it is where they hold it."""
+        world = self.scene.world
+        touched = all(world.touching(ROBOT, name, finger) for finger in ("finger_left", "finger_right"))
+        tool, at = self.scene.robot.tool(), self.slice_pose(name)
+        return touched and hypot(tool.x - at.x, tool.y - at.y, tool.z - at.z) < LOST_M
+
+    def stands(self, name: str, foot: ToolPose, within: float) -> bool:
+        """Whether the slice stands upright within `within` [m] of where `foot` as a grasp pose would hold it."""
+        at = self.slice_pose(name)
+        near = hypot(at.x - foot.x, at.y - foot.y) < within and abs(at.z - foot.z) < 0.006
+        return near and self.upright(name) > UPRIGHT
+
+
+class Skill:
+    """One sub-task at one place: it surveys its problem, and carries out a learned policy one physics step at a time."""
+
+    subtask: ClassVar[str]
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.status = Status.IDLE
+        self.reason = ""
+        self._motion: Iterator[None] | None = None
+
+    def setup(self, surveys: "Surveys") -> Problem:
+        """Survey the scene and state the problem to learn. BadInput when it has no solution, naming what is in the way."""
+        raise NotImplementedError
+
+    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+        """Carry the policy out: each `next` sets what one physics step needs; raises SkillFailed."""
+        raise NotImplementedError
+
+    def start(self, bench: Bench, policy: "Policy") -> None:
+        """Begin to carry `policy` out from the state the bench is in."""
+        self._motion = self.motion(bench, policy)
+        self.status, self.reason = Status.RUNNING, ""
+
+    def step(self) -> Status:
+        """Set what the next physics step needs; the caller then steps the world."""
+        if self.status is not Status.RUNNING or self._motion is None:
+            return self.status
+        try:
+            next(self._motion)
+        except StopIteration:
+            self.status = Status.SUCCESS
+        except (SkillFailed, WorkFailed) as failure:
+            self.status, self.reason = Status.FAILURE, str(failure)
+        return self.status
+
+    def stop(self) -> None:
+        """Break off; the skill can be started again."""
+        self._motion, self.status = None, Status.IDLE
+
+
+def learned_path(policy: "Policy", mdp: TabularMDP, start: int) -> list[int]:
+    """The states that the policy's greedy actions visit from `start` to the goal; SkillFailed when they do not reach it."""
+    if mdp.goal[start]:
+        return [start]
+    states, _, reached = greedy_path(policy.q, mdp, mdp.n_states, start)
+    if not reached:
+        raise SkillFailed(f"policy '{policy.name}' does not reach its goal from {mdp.state_label(start)}")
+    return states
+
+
+def no_way(what: str, error: NoPath, names: Sequence[str]) -> BadInput:
+    """The error for a goal that no path reaches: says what encloses it."""
+    return BadInput(
+        f"{what}: no path reaches the goal; the {error.around} is enclosed by: {', '.join(names) or 'the border'}"
+    )

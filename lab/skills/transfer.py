@@ -1,0 +1,61 @@
+"""Transfer: the tool's way through the workspace between two approaches, with or without a slice in the fingers."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, ClassVar
+
+from lab.mdp import NoPath, grid
+from lab.sim.kinematics import ToolPose
+from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
+from lab.skills.surveys import INSERT_START, Surveys
+
+if TYPE_CHECKING:
+    from lab.policy import Policy
+
+ACTIONS = ("back", "forward", "right", "left", "down", "up")  # -x, +x, -y, +y, -z, +z
+_BLEND_M = 0.10
+
+
+class Transfer(Skill):
+    """From one approach to another; a place is a station or the start of the insert grid."""
+
+    subtask: ClassVar[str] = "transfer"
+
+    def __init__(self, origin: str, target: str, *, loaded: bool) -> None:
+        super().__init__(f"transfer {origin} to {target}{' with slice' if loaded else ''}")
+        self.origin, self.target, self.loaded = origin, target, loaded
+
+    def setup(self, surveys: Surveys) -> Problem:
+        """The workspace as a 3D grid: cells that are out of reach or too near to something are blocked."""
+        self.surveys = surveys
+        survey = surveys.workspace(self.loaded)
+        start, goal = surveys.dock(self.origin, self.loaded), surveys.dock(self.target, self.loaded)
+        try:
+            mdp = grid(
+                survey.causes.shape, survey.blocked, start, goal, surveys.task.subtask("transfer").rewards, ACTIONS
+            )
+        except NoPath as error:
+            raise no_way(self.name, error, survey.names(error.enclosing)) from None
+        self.problem = Problem(self.name, self.subtask, mdp)
+        return self.problem
+
+    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+        """Along the learned cells from where the tool is, then to the target's approach."""
+        mdp = self.problem.mdp
+        cells = [mdp.state_cell(state) for state in learned_path(policy, mdp, mdp.start)]
+        poses = [self.surveys.cell_pose(cell) for cell in cells]
+        end = self.surveys.approach(self.target)
+        robot = bench.scene.robot
+        yield from robot.follow(
+            [_still(robot.tool(), poses[0]), *poses, ToolPose(end.x, end.y, end.z, 0.0)], blend=_BLEND_M
+        )
+        if end.yaw:
+            yield from robot.follow([end])
+        if self.target == INSERT_START:
+            yield from robot.follow([ToolPose(end.x, end.y, self.surveys.task.insert.height_m, 0.0)])
+        if self.loaded and (bench.held is None or not bench.holds(bench.held)):
+            raise SkillFailed(f"the slice is not in the gripper on the way to '{self.target}'")
+
+
+def _still(tool: ToolPose, first: ToolPose) -> ToolPose:
+    """Where the tool is, already at the path's yaw: it turns on the spot, not on the way."""
+    return ToolPose(tool.x, tool.y, tool.z, first.yaw)
