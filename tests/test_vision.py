@@ -162,6 +162,13 @@ def test_noise_on_black_is_no_marker() -> None:
     assert find_markers(noise, plain_view((SIDE, SIDE), (12, 12))) == ((), 0)
 
 
+def test_a_pale_disc_is_no_marker() -> None:
+    image = plain(("gripper", 11, 0), ("toaster", 2, 9))
+    cv2.circle(image, (100, 100), 7, (170, 230, 170), -1)
+    grid = see(image)
+    assert (grid.obstacles, grid.ignored) == ((), 0)
+
+
 def test_what_is_not_round_or_too_large_is_passed_over_and_counted() -> None:
     image = plain(("gripper", 11, 0), ("toaster", 2, 9))
     image[30:34, 20:60] = MARKERS["obstacle"].rgb  # a bar

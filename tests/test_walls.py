@@ -29,7 +29,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.teaching", "lab.crew"),
     ("lab.composer",),
     ("lab.view",),
-    ("lab.studies", "lab.gym"),
+    ("lab.run", "lab.studies", "lab.gym"),
     ("lab.cli",),
 )
 ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
