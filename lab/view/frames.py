@@ -1,6 +1,7 @@
 """Plain records of what is to be seen: bodies made of shapes, and where the bodies are at a time.
 
-Knows no simulator and no viewer: the simulator fills these, `lab/view/meshcat.py` shows them. Metres, seconds, quaternions xyzw.
+Knows no simulator and no viewer: the simulator fills these, `lab/view/meshcat.py` shows them. Metres, seconds,
+quaternions xyzw.
 """
 
 import math
@@ -25,8 +26,9 @@ SIZES: dict[str, int] = {"box": 3, "cylinder": 2, "sphere": 1, "mesh": 3}
 class Shape:
     """One visible piece of a body, placed in the body's frame.
 
-    `size` [m]: box (x, y, z) full edges; cylinder (radius, length) along z; sphere (radius,); mesh: scale (x, y, z), unitless,
-    () for 1. `mesh`: an OBJ or STL file, for kind "mesh" only. `rgba` within 0..1. Raises BadInput for anything else.
+    `size` [m]: box (x, y, z) full edges; cylinder (radius, length) along z; sphere (radius,); mesh: scale (x, y, z),
+    unitless, () for 1. `mesh`: an OBJ or STL file, for kind "mesh" only. `rgba` within 0..1. Raises BadInput for
+    anything else.
     """
 
     kind: Kind
@@ -53,22 +55,22 @@ class Shape:
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body by its unique name (one name, no '/'), made of shapes that move together."""
+    """A rigid body by its unique name (one step of a path: not empty, no "/"), made of shapes that move together."""
 
     name: str
     shapes: tuple[Shape, ...]
 
     def __post_init__(self) -> None:
-        if not self.name or "/" in self.name or "." in self.name:
-            raise BadInput(f"Body name '{self.name}': must not be empty nor hold '/' or '.'")
+        if not self.name or "/" in self.name:
+            raise BadInput(f"Body name '{self.name}': must not be empty nor hold a '/'")
 
 
 @dataclass(frozen=True)
 class Frame:
     """Where bodies are at `time_s`: name -> (x, y, z, qx, qy, qz, qw) of the body's frame in the world [m].
 
-    A body left out stays where it was. `colors` (name -> rgba of all its shapes) and `visible` (name -> shown) work the same
-    way: only what changes has to be named; a body starts in its shapes' colours, and visible.
+    A body left out stays where it was. `colors` (name -> rgba of all its shapes) and `visible` (name -> shown) work the
+    same way: only what changes has to be named; a body starts in its shapes' colours, and visible.
     Raises BadInput when a pose is not finite or its quaternion is not of length 1 (within 1e-3).
     """
 
@@ -88,8 +90,8 @@ class Frame:
 class Camera:
     """Where the page looks from and to, in the world [m], z up."""
 
-    eye: Vector = (2.1, -2.3, 1.75)
-    target: Vector = (0.0, 0.0, 0.25)
+    eye: Vector = (2.7, -2.2, 1.95)
+    target: Vector = (0.2, 0.0, 0.3)
 
 
 @dataclass

@@ -1,0 +1,205 @@
+"""The cell in meshcat's viewer: a live page on this computer, and a replay in one HTML file that needs no network.
+
+Of meshcat the viewer itself is used, its script for browsers; scene and frames reach it as plain JSON (page.js),
+because meshcat's own server listens on every interface and packs every transform by itself.
+"""
+
+import html
+import json
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from getpass import getuser
+from importlib.util import find_spec
+from pathlib import Path
+from socket import gethostname
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from lab.errors import BadInput, WorkFailed, unknown
+from lab.view.frames import Body, Camera, Frame, Recording
+
+if TYPE_CHECKING:
+    from lab.view.keyframes import Motion, Track
+    from lab.view.server import Server
+
+HERE = Path(__file__).parent
+RULES = "default-src 'none'; img-src data: blob:; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
+OFFLINE = f'<meta http-equiv="Content-Security-Policy" content="{RULES}">'
+
+
+class LiveView:
+    """A page on 127.0.0.1 that shows what happens while it happens; a context manager.
+
+    `port` 0 takes any free one. Entering raises BadInput for a port it cannot have. Nothing that a page does reaches
+    the run: a slow page skips frames, what it sends is dropped, and leaving the context never waits longer than about
+    3 s.
+    """
+
+    def __init__(self, port: int = 0, title: str = "Teaching lab, live") -> None:
+        self._wanted, self._title = port, title
+        self._server: Server | None = None
+        self._shown: dict[str, tuple[float, ...] | None] = {}
+
+    def __enter__(self) -> Self:
+        from lab.view.server import Server
+
+        script = viewer_script()
+        link = f'<script src="{script.name}"></script>'
+        self._server = Server(self._wanted, _page(self._title, {}, viewer=link), script)
+        self._server.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def port(self) -> int:
+        """The port that it listens on."""
+        return self._running().port
+
+    @property
+    def url(self) -> str:
+        """The page's address on this computer."""
+        return f"http://127.0.0.1:{self.port}/"
+
+    @property
+    def hint(self) -> str:
+        """The command that makes `url` work on another computer, one line."""
+        try:
+            user = getuser()
+        except (KeyError, OSError):  # an account without a name, as in some containers
+            user = "user"
+        return f"ssh -L {self.port}:127.0.0.1:{self.port} {user}@{gethostname()}"
+
+    def show(self, bodies: Sequence[Body], camera: Camera | None = None) -> None:
+        """Show these bodies, at the origin until a frame places them; replaces what was shown.
+
+        Raises BadInput for a mesh that cannot be read and for two bodies of one name.
+        """
+        from lab.view.scene import describe
+        from lab.view.server import News
+
+        scene = describe(bodies, camera or Camera())
+        self._shown = {body.name: None for body in bodies}
+        self._running().send(News(scene=scene))
+
+    def update(self, frame: Frame) -> None:
+        """Show a frame: what moved since the last one goes out as one message.
+
+        Returns at once; after `close` it does nothing. Raises BadInput when it names a body that was not shown.
+        """
+        from lab.view.server import News
+
+        for name in (*frame.poses, *frame.colors, *frame.visible):
+            if name not in self._shown:
+                raise unknown("body", name, self._shown, f"frame at {frame.time_s} s")
+        if self._server is None:
+            return
+        poses = {name: tuple(round(float(value), 6) for value in pose) for name, pose in frame.poses.items()}
+        moved = {name: pose for name, pose in poses.items() if pose != self._shown[name]}
+        self._shown.update(moved)
+        colors = {name: tuple(float(part) for part in rgba) for name, rgba in frame.colors.items()}
+        visible = {name: bool(shown) for name, shown in frame.visible.items()}
+        self._server.send(News(None, float(frame.time_s), moved, colors, visible))
+
+    def wait_for_page(self, timeout_s: float) -> bool:
+        """Whether a browser has the page open, waiting for one up to `timeout_s` [s]."""
+        return self._running().connected.wait(timeout_s)
+
+    def close(self) -> None:
+        """Stop serving; open pages keep the last picture. Safe to call again."""
+        if self._server is not None:
+            self._server.stop()
+            self._server = None
+
+    def _running(self) -> "Server":
+        if self._server is None:
+            raise WorkFailed("live view: not running (use it as a context manager: with LiveView() as view)")
+        return self._server
+
+
+def replay_html(recording: Recording, path: Path, speed: float = 8.0, title: str = "Teaching lab") -> Path:
+    """Write the recording as one HTML file that plays from disk without a network, over and over.
+
+    `speed` is how many times faster than real time. Returns `path`, written whole or not at all; its folder is made
+    when it is missing. Raises BadInput for a speed that is not above 0, a recording that contradicts itself, an
+    unreadable mesh and a path that cannot be written.
+    """
+    from lab.view.keyframes import motions
+    from lab.view.scene import describe
+
+    if not (math.isfinite(speed) and speed > 0):
+        raise BadInput(f"replay speed {speed}: must be finite and above 0 (1 is real time)")
+    recording.check()
+    scene = describe(recording.bodies, recording.camera)
+    tracks = motions(recording)
+    for body in scene["bodies"]:
+        body["motion"] = _motion(tracks[body["name"]])
+    start_s = recording.frames[0].time_s if recording.frames else 0.0
+    data = {"scene": scene, "speed": speed, "start_s": start_s, "duration_s": recording.duration_s}
+    script = viewer_script()
+    viewer = f"<script>{script.read_text(encoding='utf-8')}</script>"
+    notice = script.with_name(f"{script.name}.LICENSE.txt")
+    licences = notice.read_text(encoding="utf-8") if notice.is_file() else ""
+    text = _page(title, data, viewer=viewer, policy=OFFLINE, licences=licences)
+    _write(Path(path), text)
+    return Path(path)
+
+
+def _motion(motion: "Motion") -> dict[str, Any]:
+    from lab.view.scene import pack
+
+    def packed(track: "Track | None") -> dict[str, str] | None:
+        return None if track is None else {"times": pack(track.times_s), "values": pack(track.values)}
+
+    return {
+        "start": [round(value, 6) for value in motion.start],
+        "position": packed(motion.position),
+        "quaternion": packed(motion.quaternion),
+        "colors": motion.colors,
+        "visible": motion.visible,
+    }
+
+
+def viewer_script() -> Path:
+    """meshcat's viewer for browsers, found without importing meshcat. Raises WorkFailed when it is not installed."""
+    spec = find_spec("meshcat")
+    for folder in (spec.submodule_search_locations or []) if spec else []:
+        script = Path(folder) / "viewer" / "dist" / "main.min.js"
+        if script.is_file():
+            return script
+    raise WorkFailed(
+        "meshcat's viewer (viewer/dist/main.min.js) is not installed: reinstall the package 'meshcat' (0.3.2 or later)"
+    )
+
+
+def _page(title: str, data: Mapping[str, Any], *, viewer: str, policy: str = "", licences: str = "") -> str:
+    """page.html with its places filled; the title is text, and data cannot end the script element that holds it."""
+    parts = {
+        "title": html.escape(title),
+        "data": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
+        "viewer": viewer,
+        "policy": policy,
+        "licences": f"<!-- meshcat, (c) 2018 Robin Deits, MIT licence, with:\n{licences.replace('--', '- -')}\n-->"
+        if licences
+        else "",
+        "script": (HERE / "page.js").read_text(encoding="utf-8"),
+    }
+    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], (HERE / "page.html").read_text(encoding="utf-8"))
+
+
+def _write(path: Path, text: str) -> None:
+    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            beside.write_text(text, encoding="utf-8")
+            os.replace(beside, path)
+        finally:
+            beside.unlink(missing_ok=True)
+    except OSError as reason:
+        raise BadInput(f"cannot write the replay '{path}': {reason.strerror or reason}") from None

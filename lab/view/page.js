@@ -1,0 +1,229 @@
+// The lab's scene in meshcat's viewer, live (frames from a websocket) or as a replay (tracks in the page itself).
+// Scene tree: /lab/<body> carries the body's pose, /lab/<body>/<shape number> a shape's place in the body. Metres, z up.
+"use strict";
+
+const data = JSON.parse(document.getElementById("lab-data").textContent);
+const THREE = MeshCat.THREE;
+const LAB = "lab";
+var viewer; // a global by this name, as on meshcat's own pages
+let floorPending = true;
+
+function note(text) {
+  document.getElementById("note").textContent = text;
+}
+
+function unpack(text, Kind) {
+  return new Kind(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
+}
+
+// three.js works in the scene's frame with y up; ours has z up
+function upright([x, y, z]) {
+  return [x, z, -y];
+}
+
+function linear([r, g, b]) {
+  return new THREE.Color(r, g, b).convertSRGBToLinear();
+}
+
+function add(path, object, position) {
+  viewer.set_object(path, object);
+  if (position) object.position.set(...position);
+  return object;
+}
+
+function furnish() {
+  for (const name of Object.keys(viewer.scene_tree.find(["Lights"]).children)) {
+    viewer.set_property(["Lights", name], "visible", false);
+  }
+  for (const name of ["Grid", "Axes", "Background"]) viewer.set_property([name], "visible", false);
+  viewer.renderer.outputEncoding = THREE.sRGBEncoding;
+  add(["Lights", "Sky"], new THREE.HemisphereLight(0xffffff, 0xcfc8bd, 0.5), [0, 0, 1]);
+  add(["Lights", "Window"], new THREE.DirectionalLight(0xdfe9ff, 0.16), [-2, 3, 2]);
+  const lamp = add(["Lights", "Lamp"], new THREE.DirectionalLight(0xfff4e6, 0.56), [2.2, -1.6, 4]);
+  lamp.castShadow = true;
+  lamp.shadow.mapSize.set(2048, 2048);
+  lamp.shadow.radius = 4;
+  lamp.shadow.normalBias = 0.01;
+  Object.assign(lamp.shadow.camera, { left: -2.4, right: 2.4, top: 2.4, bottom: -2.4, near: 0.5, far: 9 });
+}
+
+// A floor that shows shadows and faint lines only, under the lowest thing
+function layFloor() {
+  const box = new THREE.Box3().setFromObject(viewer.scene_tree.find([LAB]).object);
+  if (box.isEmpty()) return;
+  const shade = new THREE.Mesh(new THREE.PlaneGeometry(40, 40), new THREE.ShadowMaterial({ opacity: 0.2 }));
+  shade.receiveShadow = true;
+  add(["Floor", "shade"], shade, [0, 0, box.min.y - 0.002]);
+  const lines = new THREE.GridHelper(12, 24, 0x9aa7b2, 0x9aa7b2).rotateX(Math.PI / 2);
+  Object.assign(lines.material, { transparent: true, opacity: 0.3 });
+  add(["Floor", "lines"], lines, [0, 0, box.min.y - 0.001]);
+  floorPending = false;
+}
+
+function lookFrom(camera) {
+  viewer.camera.fov = 38;
+  viewer.camera.position.set(...upright(camera.eye));
+  viewer.controls.target.set(...upright(camera.target));
+  viewer.controls.update();
+}
+
+function geometryOf(spec) {
+  if (spec.kind === "box") return new THREE.BoxGeometry(...spec.size);
+  if (spec.kind === "sphere") return new THREE.SphereGeometry(spec.size[0], 48, 32);
+  if (spec.kind === "cylinder") {
+    const [radius, length] = spec.size; // three.js lays cylinders along y, ours stand along z
+    return new THREE.CylinderGeometry(radius, radius, length, 48).rotateX(Math.PI / 2);
+  }
+  const mesh = new THREE.BufferGeometry();
+  mesh.setAttribute("position", new THREE.BufferAttribute(unpack(spec.positions, Float32Array), 3));
+  mesh.setIndex(new THREE.BufferAttribute(unpack(spec.faces, Uint32Array), 1));
+  mesh.setAttribute("normal", new THREE.BufferAttribute(unpack(spec.normals, Float32Array), 3));
+  return mesh;
+}
+
+function meshOf(geometry, shape) {
+  const mesh = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({ roughness: 0.62, metalness: 0.05 }));
+  mesh.scale.set(...shape.scale);
+  mesh.receiveShadow = true;
+  paint(mesh, shape.rgba);
+  return mesh;
+}
+
+function paint(mesh, rgba) {
+  mesh.material.color.copy(linear(rgba));
+  mesh.material.opacity = rgba[3];
+  mesh.material.transparent = rgba[3] < 1;
+  mesh.material.depthWrite = rgba[3] === 1;
+  mesh.castShadow = rgba[3] > 0.5;
+}
+
+function place(path, pose) {
+  const object = viewer.scene_tree.find(path).object;
+  object.position.fromArray(pose);
+  object.quaternion.fromArray(pose, 3);
+}
+
+function showScene(scene) {
+  if (viewer.scene_tree.children[LAB]) viewer.delete_path([LAB]);
+  const geometries = scene.geometries.map(geometryOf);
+  for (const body of scene.bodies) {
+    viewer.scene_tree.find([LAB, body.name]);
+    body.shapes.forEach((shape, number) => {
+      viewer.set_object([LAB, body.name, String(number)], meshOf(geometries[shape.geometry], shape));
+      place([LAB, body.name, String(number)], shape.pose);
+    });
+  }
+  lookFrom(scene.camera);
+  floorPending = true;
+  viewer.set_dirty();
+}
+
+function showFrame(frame) {
+  for (const [name, pose] of Object.entries(frame.poses)) place([LAB, name], pose);
+  for (const [name, rgba] of Object.entries(frame.colors)) {
+    viewer.scene_tree.find([LAB, name]).object.traverse((object) => object.isMesh && paint(object, rgba));
+  }
+  for (const [name, visible] of Object.entries(frame.visible)) viewer.set_property([LAB, name], "visible", visible);
+  if (floorPending && Object.keys(frame.poses).length) layFloor();
+  viewer.set_dirty();
+}
+
+function follow() {
+  const socket = new WebSocket(new URL("frames", location.href.replace(/^http/, "ws")));
+  note("waiting for the first frame");
+  socket.onmessage = (event) => {
+    const { scene, frame } = JSON.parse(event.data);
+    if (scene) showScene(scene);
+    showFrame(frame);
+    if (frame.time_s !== null) note(`${frame.time_s.toFixed(1)} s`);
+  };
+  socket.onclose = () => note("the run has ended: this is its last picture");
+}
+
+function smoothTrack(name, type, { times, values }) {
+  return { name, type, times: unpack(times, Float32Array), values: unpack(values, Float32Array) };
+}
+
+// Steps [[time, value], ...] hold until the next; before the first, what the body had from the beginning
+function stepTrack(name, type, steps, before, values) {
+  const all = steps[0][0] > 0 ? [[0, before], ...steps] : steps;
+  const times = all.map(([time]) => time);
+  return { name, type, times, values: all.flatMap(([, value]) => values(value)), interpolation: THREE.InterpolateDiscrete };
+}
+
+function colorTracks(mesh, shape, steps) {
+  const rgba = [shape.rgba, ...steps.map(([, value]) => value)];
+  if (rgba.some((color) => color[3] < 1)) Object.assign(mesh.material, { transparent: true, depthWrite: false });
+  return [
+    stepTrack(".material.color", "color", steps, shape.rgba, (value) => linear(value).toArray()),
+    stepTrack(".material.opacity", "number", steps, shape.rgba, (value) => [value[3]]),
+  ];
+}
+
+function animationsOf(bodies, duration) {
+  const animations = [];
+  const animate = (path, tracks) => tracks.length && animations.push({ path, clip: { name: path.join("/"), duration, tracks } });
+  for (const { name, shapes, motion } of bodies) {
+    const tracks = [];
+    if (motion.position) tracks.push(smoothTrack(".position", "vector3", motion.position));
+    if (motion.quaternion) tracks.push(smoothTrack(".quaternion", "quaternion", motion.quaternion));
+    if (motion.visible.length) tracks.push(stepTrack(".visible", "bool", motion.visible, true, (value) => [value]));
+    animate([LAB, name], tracks);
+    if (!motion.colors.length) continue;
+    shapes.forEach((shape, number) => {
+      const path = [LAB, name, String(number), "<object>"];
+      animate(path, colorTracks(viewer.scene_tree.find(path).object, shape, motion.colors));
+    });
+  }
+  return animations;
+}
+
+function replay({ scene, speed, start_s, duration_s }) {
+  const poses = Object.fromEntries(scene.bodies.map(({ name, motion }) => [name, motion.start]));
+  showScene(scene);
+  showFrame({ poses, colors: {}, visible: {} });
+  const rest = 2 * speed; // the last picture stays for two seconds before the replay begins again
+  const animations = animationsOf(scene.bodies, duration_s + rest);
+  if (!animations.length) return;
+  const animator = viewer.animator;
+  animator.load(animations, { play: false, repetitions: Infinity });
+  animator.mixer.timeScale = speed;
+  for (const action of animator.actions) action.play(); // so that the first picture is the first frame
+  animator.mixer.update(0);
+  steer(animator, start_s, duration_s);
+  // the clock starts after the first picture is drawn, or slow machines would miss the beginning
+  requestAnimationFrame(() => requestAnimationFrame(() => animator.play()));
+}
+
+function steer(animator, start_s, duration_s) {
+  const [bar, play, seek] = ["player", "play", "seek"].map((id) => document.getElementById(id));
+  bar.hidden = false;
+  seek.max = duration_s;
+  play.onclick = () => (animator.playing ? animator.pause() : animator.play());
+  seek.oninput = () => {
+    animator.seek(Number(seek.value));
+    animator.display_progress(Number(seek.value));
+  };
+  const show = () => {
+    const time = Math.min(animator.time, duration_s);
+    note(`${(start_s + time).toFixed(1)} s, ${animator.mixer.timeScale} × real time`);
+    seek.value = time;
+    play.textContent = animator.playing ? "Pause" : "Play";
+    requestAnimationFrame(show);
+  };
+  show();
+}
+
+function begin() {
+  try {
+    viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+  } catch (reason) {
+    note(`this page needs WebGL: ${reason.message}`);
+    return;
+  }
+  furnish();
+  if (data.scene) replay(data);
+  else follow();
+}
+
+begin();
