@@ -1,0 +1,196 @@
+"""Pictures of what happened, as PNG files: Gantt chart, learning curves, value map, sequencing episodes."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lab.errors import BadInput
+from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, SKY, picture_file, seconds
+from lab.view.gantt import gantt
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from lab.overhead import View
+
+__all__ = ["Curve", "cell_corners", "gantt", "learning_curves", "sequence_plot", "value_map"]
+
+
+class Curve(Protocol):
+    """What `learning_curves` reads of a policy: steps of each episode, which were guided, and the fewest possible."""
+
+    @property
+    def subtask(self) -> str: ...
+    @property
+    def curve(self) -> Sequence[int]: ...
+    @property
+    def guided(self) -> Sequence[bool]: ...
+    @property
+    def optimal_steps(self) -> int: ...
+
+
+def learning_curves(policies: Mapping[str, Curve], path: Path) -> None:
+    """Steps of each episode, one small plot a policy: guided episodes marked, the fewest possible steps as a line.
+
+    Raises BadInput without policies. Source: the curves of thesis ch. 8 and 9.
+    """
+    if not policies:
+        raise BadInput("learning curves: there is no policy to show")
+    columns = min(3, len(policies))
+    lines = -(-len(policies) // columns)
+    with picture_file(path, max(5.0, 1.2 + 3.4 * columns), 0.9 + 2.3 * lines) as figure:
+        grid = figure.subplots(lines, columns, squeeze=False).ravel()
+        for axes in grid[len(policies) :]:
+            axes.remove()
+        for axes, (name, policy) in zip(grid, policies.items(), strict=False):
+            _draw_curve(axes, policy)
+            axes.set_title(name if policy.subtask in name else f"{name} ({policy.subtask})")
+        handles = list(grid[0].get_lines())
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+
+
+def value_map(
+    values: ArrayLike,
+    picture: NDArray[np.uint8] | None,
+    path: Path,
+    *,
+    corners: ArrayLike | None = None,
+    route: Sequence[tuple[int, int]] = (),
+    blocked: ArrayLike | None = None,
+    start: tuple[int, int] | None = None,
+    goal: tuple[int, int] | None = None,
+    title: str = "What each cell is worth",
+) -> None:
+    """Values (rows, columns) of grid cells, such as max_a Q, half-transparent over a picture (H, W, 3) RGB, or alone.
+
+    `corners` (rows + 1, columns + 1, 2): pixel (x, y) of the grid lines' crossings, see `cell_corners`; without: row
+    down, column right. `route`: cells of the greedy path; `blocked` (rows, columns) bool. The goal has no
+    value, an episode ends there. Raises BadInput when the shapes do not fit.
+    """
+    table = np.array(values, dtype=np.float64)
+    if table.ndim != 2:
+        raise BadInput(f"value map: values have shape {table.shape}; a grid of cells is needed")
+    rows, columns = table.shape
+    if corners is None:
+        corners = np.stack(np.meshgrid(np.arange(columns + 1) - 0.5, np.arange(rows + 1) - 0.5), axis=-1)
+    crossings = np.asarray(corners, dtype=np.float64)
+    walls = np.zeros(table.shape, dtype=np.bool_) if blocked is None else np.asarray(blocked, dtype=np.bool_)
+    if crossings.shape != (rows + 1, columns + 1, 2) or walls.shape != table.shape:
+        raise BadInput(
+            f"value map: corners {crossings.shape} and blocked {walls.shape} do not fit values {table.shape}"
+        )
+    across, down = crossings[..., 0], crossings[..., 1]
+    tall = np.ptp(down) / np.ptp(across) if picture is None else picture.shape[0] / picture.shape[1]
+    hidden = walls | ~np.isfinite(table)
+    if goal is not None:
+        hidden[goal] = True
+    with picture_file(path, 6.8, 1.0 + 5.5 * tall) as figure:
+        axes = figure.add_subplot()
+        if picture is not None:
+            axes.imshow(_muted(picture))
+        shown = np.ma.masked_where(hidden, table)
+        tint = axes.pcolormesh(across, down, shown, cmap="viridis", alpha=0.5, edgecolors="#FFFFFF60", linewidth=0.4)
+        figure.colorbar(tint, ax=axes, shrink=0.9, label="value of the best action, max Q")
+        _draw_places(axes, (crossings[:-1, :-1] + crossings[1:, 1:]) / 2, crossings, walls, route, start, goal)
+        axes.set_aspect("equal")
+        if picture is None:
+            axes.set(ylim=(down.max(), down.min()), xlabel="column", ylabel="row")
+        else:
+            axes.set_axis_off()
+        axes.set_title(title)
+        if axes.get_legend_handles_labels()[0]:
+            figure.legend(loc="outside lower center", ncols=4)
+
+
+def cell_corners(view: "View", height_m: float = 0.0) -> NDArray[np.float64]:
+    """Pixels (rows + 1, columns + 1, 2) of the crossings of an overhead view's grid lines at a height [m]."""
+    along_x, along_y = (
+        start + view.cell_m * np.arange(count + 1) for start, count in zip(view.origin_m, view.shape, strict=True)
+    )
+    x, y = np.meshgrid(along_x, along_y, indexing="ij")
+    return view.pixel(np.stack([x, y, np.full_like(x, height_m)], axis=-1))
+
+
+def sequence_plot(episode_makespans_s: Sequence[float], optimal_s: float | None, path: Path) -> None:
+    """Makespan [s] of each sequencing episode, the best so far, and the proven optimum; BadInput without episodes.
+
+    Source: thesis fig. 7.3.
+    """
+    if not len(episode_makespans_s):
+        raise BadInput("sequencing plot: there are no episodes")
+    from matplotlib.ticker import MaxNLocator
+
+    episodes = np.arange(1, len(episode_makespans_s) + 1)
+    best_s = np.minimum.accumulate(np.asarray(episode_makespans_s, dtype=np.float64))
+    with picture_file(path, 7, 3.8) as figure:
+        axes = figure.add_subplot()
+        axes.plot(episodes, episode_makespans_s, ".", color=GREY, markersize=4, label="each episode")
+        label = f"best so far: {seconds(best_s[-1])}"
+        axes.step(episodes, best_s, where="post", color=BLUE, linewidth=1.8, marker="o", markevery=[-1], label=label)
+        if optimal_s is not None:
+            label = f"optimum: {seconds(optimal_s)}"
+            axes.axhline(optimal_s, color=RED, linestyle="--", linewidth=1.4, label=label)
+        axes.set(xlabel="episode", ylabel="makespan [s]", title="Sequences tried")
+        axes.set_xlim(0, 1.02 * max(2, len(episodes)))
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.grid()
+        figure.legend(loc="outside lower center", ncols=3)
+
+
+def _draw_curve(axes: "Axes", policy: Curve) -> None:
+    """One policy's small plot; its lines come in the order of the legend."""
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator, ScalarFormatter
+
+    episodes, steps = np.arange(1, len(policy.curve) + 1), np.asarray(policy.curve)
+    guided = np.asarray(policy.guided, dtype=np.bool_)
+    axes.plot(episodes, steps, color=BLUE, linewidth=0.9, label="steps")
+    axes.plot(episodes[guided], steps[guided], "o", color=ORANGE, markersize=3.5, label="guided episodes")
+    axes.axhline(policy.optimal_steps, color=RED, linestyle="--", linewidth=1.2, label="fewest possible")
+    axes.set(xlabel="episode", ylabel="steps", xlim=(0, 1.02 * max(2, len(episodes))))
+    if max(policy.curve, default=0) > 4 * max(1, policy.optimal_steps):
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter(ScalarFormatter())
+        axes.yaxis.set_minor_locator(NullLocator())
+    else:
+        axes.set_ylim(0, 1.15 * max(2, policy.optimal_steps, *policy.curve))
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.grid()
+
+
+def _draw_places(
+    axes: "Axes",
+    middles: NDArray[np.float64],
+    crossings: NDArray[np.float64],
+    walls: NDArray[np.bool_],
+    route: Sequence[tuple[int, int]],
+    start: tuple[int, int] | None,
+    goal: tuple[int, int] | None,
+) -> None:
+    """Blocked cells, the greedy path, start and goal on a value map."""
+    from matplotlib.collections import PolyCollection
+
+    outlines = [crossings[[i, i, i + 1, i + 1], [j, j + 1, j + 1, j]] for i, j in np.argwhere(walls)]
+    if outlines:
+        hatched = PolyCollection(outlines, facecolor="#00000055", edgecolor="white", hatch="xxx", label="blocked")
+        axes.add_collection(hatched)
+    if len(route):
+        rows, columns = np.asarray(route).T
+        x, y = middles[rows, columns].T
+        axes.plot(x, y, color="white", linewidth=4.5, solid_capstyle="round")
+        axes.plot(x, y, color=INK, linewidth=2, marker=".", markersize=6, label="greedy path")
+    for cell, marker, size, colour, name in ((start, "o", 11, SKY, "start"), (goal, "*", 18, ORANGE, "goal")):
+        if cell is not None:
+            look: dict[str, Any] = {"markersize": size, "color": colour, "markeredgecolor": INK, "linestyle": "none"}
+            axes.plot(*middles[cell], marker=marker, label=name, **look)
+
+
+def _muted(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The picture (H, W, 3) paler and with less colour of its own, so that a tint on it still reads."""
+    grey = picture.mean(axis=2, keepdims=True)
+    muted: NDArray[np.uint8] = (90 + 0.65 * (0.45 * picture + 0.55 * grey)).clip(0, 255).astype(np.uint8)
+    return muted
