@@ -24,6 +24,7 @@ MAX_FILE_BYTES = 1 << 30
 MAX_SLUG_LENGTH = 60
 Paths = list[Path]
 Summaries = list[dict[str, Any]]
+Words = list[str]
 Report = list[tuple[Path, bool, str]]  # path, whether it is sound, what is wrong
 
 _TENSORS = {"q": "F64", "visits": "I64"}
@@ -43,7 +44,7 @@ def default_folder() -> Path:
 def slug(name: str) -> str:
     """A file stem for any name: plain lower-case ones stay, others are cleaned and get a hash that keeps them apart."""
     plain = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:MAX_SLUG_LENGTH]
-    if plain == name:
+    if plain and plain == name:
         return plain
     return f"{plain or 'policy'}-{hashlib.sha256(name.encode('utf-8', 'replace')).hexdigest()[:10]}"
 
@@ -75,7 +76,21 @@ class Toolbox:
             for _, policy in self._sound()
             if policy.subtask == subtask and policy.signature == signature and name in (None, policy.name)
         ]
-        return max(fitting, key=lambda policy: (policy.solved, policy.created), default=None)
+        return max(fitting, key=_worth, default=None)
+
+    def index(self) -> tuple[dict[tuple[str, str], Policy], Words]:
+        """What `find` would give, for every (sub-task, signature) at once; and what is wrong with each damaged file."""
+        found: dict[tuple[str, str], Policy] = {}
+        damaged = []
+        for path in self._files(SUFFIX):
+            try:
+                policy = _decode(path)
+            except BadInput as error:
+                damaged.append(str(error))
+                continue
+            key = (policy.subtask, policy.signature)
+            found[key] = max(found.get(key, policy), policy, key=_worth)
+        return found, damaged
 
     def list(self) -> Summaries:
         """What is stored, in file order: the metadata of each sound policy without curve and settings."""
@@ -154,6 +169,10 @@ class Toolbox:
         if name not in named:
             raise unknown("policy", name, named, f"toolbox {self.folder}")
         return named[name]
+
+
+def _worth(policy: Policy) -> tuple[bool, str]:
+    return policy.solved, policy.created
 
 
 def _refused(verb: str, path: Path, error: OSError) -> BadInput | WorkFailed:

@@ -111,8 +111,8 @@ class TeachingPrompt:
                 self._say(f"Episode {event.episode} {outcome}; moves advised: {event.helped_steps}.")
             case AdviceRejected():
                 self._say(
-                    f"The learner takes no more advice: misled in {event.misleads} episodes, tolerates {event.omega}."
-                    f" Episode {event.episode} counted {event.steps} steps, those before it {event.mean_before:.1f}.",
+                    f"The learner takes no more advice (episodes misled: {event.misleads}, tolerated: {event.omega}). "
+                    f"Episode {event.episode} counted {event.steps} steps, those before it {event.mean_before:.1f}.",
                     "bold red",
                 )
             case AdviceEnded(reason="converged"):
@@ -278,8 +278,11 @@ def terminal_reader(console: Console, keys: "Input | None" = None, screen: "Outp
     """Line editing with history; an arrow key on an empty line answers at once."""
     from prompt_toolkit import PromptSession
     from prompt_toolkit.output import create_output
+    from prompt_toolkit.output.vt100 import Vt100_Output
 
     output = screen or create_output(stdout=cast(TextIO, console.file))
+    if isinstance(output, Vt100_Output):
+        output.enable_cpr = False  # one line needs no cursor position, and a slow link would answer too late
     session: PromptSession[str] = PromptSession(input=keys, output=output, key_bindings=_arrow_keys())
     return lambda prompt: session.prompt(prompt)
 
