@@ -52,9 +52,8 @@ def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
     import cv2
 
     _check(image)
-    smooth = cv2.medianBlur(np.ascontiguousarray(image), 3)
-    hsv = cv2.cvtColor(smooth, cv2.COLOR_RGB2HSV)
-    colourful = smooth.max(axis=2) - smooth.min(axis=2) >= CHROMA
+    hsv = cv2.cvtColor(image, cv2.COLOR_RGB2HSV)
+    colourful = image.max(axis=2) - image.min(axis=2) >= CHROMA
     markers, ignored = [], 0
     for kind, hue in MARKERS.items():
         low, high = (hue.hue - hue.tolerance, SATURATION, 0), (hue.hue + hue.tolerance, 255, 255)

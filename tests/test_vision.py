@@ -162,6 +162,26 @@ def test_noise_on_black_is_no_marker() -> None:
     assert find_markers(noise, plain_view((SIDE, SIDE), (12, 12))) == ((), 0)
 
 
+def test_specks_and_dead_pixels_are_no_markers() -> None:
+    matrix, rng = camera(), np.random.default_rng(0)
+    image = paint(table(), matrix, LAYOUT)
+    image[100:103, 30:33] = MARKERS["obstacle"].rgb
+    dead = rng.random((SIDE, SIDE)) < 0.03
+    image[dead] = rng.integers(0, 256, (dead.sum(), 3), dtype=np.uint8)
+    grid = see(image, overhead(matrix))
+    assert (grid.start, grid.goal, grid.obstacles) == ((1, 1), (9, 10), ((4, 3), (5, 7)))
+    assert grid.ignored == 0
+
+
+def test_a_highlight_on_the_edge_does_not_shift_a_marker() -> None:
+    image = plain(("gripper", 11, 0), ("toaster", 2, 9), side=480, radius=15)
+    whole = locate(image, plain_view((480, 480), (12, 12)), "toaster")
+    x, y = map(round, whole.pixel)
+    cv2.line(image, (x + 6, y), (x + 20, y), (255, 255, 255), 5)
+    bitten = locate(image, plain_view((480, 480), (12, 12)), "toaster")
+    assert np.hypot(*np.subtract(whole.pixel, bitten.pixel)) < 0.3
+
+
 def test_a_pale_disc_is_no_marker() -> None:
     image = plain(("gripper", 11, 0), ("toaster", 2, 9))
     cv2.circle(image, (100, 100), 7, (170, 230, 170), -1)
@@ -172,10 +192,11 @@ def test_a_pale_disc_is_no_marker() -> None:
 def test_what_is_not_round_or_too_large_is_passed_over_and_counted() -> None:
     image = plain(("gripper", 11, 0), ("toaster", 2, 9))
     image[30:34, 20:60] = MARKERS["obstacle"].rgb  # a bar
+    image[100:120, 100:120] = MARKERS["obstacle"].rgb  # a square
     cv2.circle(image, (180, 180), 30, MARKERS["obstacle"].rgb, -1)
     grid = see(image)
     assert grid.obstacles == ()
-    assert grid.ignored == 2
+    assert grid.ignored == 3
 
 
 @pytest.mark.parametrize(
