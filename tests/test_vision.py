@@ -106,8 +106,8 @@ def test_the_simulators_own_renderer_is_read_exactly() -> None:
     with World() as world:
         world.box("table", (1.0, 1.0, 0.02), (0.3, 0.3, -0.01), (0.86, 0.85, 0.83, 1.0))
         for number, (kind, x, y) in enumerate(LAYOUT):
-            rgba = (*(value / 255 for value in MARKERS[kind].rgb), 1.0)
-            world.disc(f"marker {number}", 0.3 * CELL, 0.004, (x, y, HEIGHTS[kind]), rgba)
+            red, green, blue = (value / 255 for value in MARKERS[kind].rgb)
+            world.disc(f"marker {number}", 0.3 * CELL, 0.004, (x, y, HEIGHTS[kind]), (red, green, blue, 1.0))
         image = look.picture(world)
     grid = see(image, View(look.pixel_from_world(), (0.0, 0.0), CELL, (12, 12), heights))
     assert (grid.start, grid.goal, grid.obstacles) == ((1, 1), (9, 10), ((4, 3), (5, 7)))
