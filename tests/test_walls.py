@@ -27,9 +27,10 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.sim",),
     ("lab.skills", "lab.recorder"),
     ("lab.teaching", "lab.crew"),
-    ("lab.composer",),
+    ("lab.composer", "lab.listener"),
     ("lab.view",),
     ("lab.run", "lab.studies", "lab.gym"),
+    ("lab.lesson",),
     ("lab.cli",),
 )
 ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
