@@ -14,12 +14,12 @@ import numpy as np
 from lab.composer import Outcome, carry_out, measure
 from lab.crew import Crew, Durations, cell_of
 from lab.errors import BadInput, unknown
-from lab.learning.session import Event
+from lab.listener import Listener
 from lab.policy import Policy
 from lab.recorder import Viewer
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell import Cell
-from lab.sequencing.events import EpisodeSequenced, Move, SequenceResult, simulate
+from lab.sequencing.events import EpisodeSequenced, SequenceResult, simulate
 from lab.sequencing.exact import Optimum, optimum
 from lab.sequencing.srl import srl
 from lab.sim.scene import Layout, draw_layout
@@ -29,34 +29,6 @@ from lab.skills.surveys import Surveys
 from lab.taskfile import Task, check_toasts
 from lab.teaching import Lesson, Teacher
 from lab.view.frames import Recording
-
-
-class Listener:
-    """Who hears how a run goes on; the base hears nothing."""
-
-    def phase(self, name: str, parts: int) -> None:
-        """A phase with so many parts begins."""
-
-    def skipped(self, what: str) -> None:
-        """A damaged policy file was not read."""
-
-    def lesson(self, name: str, lesson: Lesson) -> None:
-        """A skill was found or learned."""
-
-    def learning(self, name: str, event: Event) -> None:
-        """Something happened in a session."""
-
-    def measured(self, name: str, seconds: float) -> None:
-        """A move was timed."""
-
-    def sequenced(self, best: SequenceResult, proven: Optimum) -> None:
-        """An order was found."""
-
-    def moved(self, move: Move) -> None:
-        """A toast was brought on."""
-
-    def retried(self, text: str) -> None:
-        """A step failed and is tried again."""
 
 
 @dataclass
@@ -282,8 +254,7 @@ def check_out(out: Path) -> None:
 def _write_files(prepared: Prepared, taught: Taught, report: Report, out: Path, began: float) -> None:
     """The pictures, the replay and the two JSON files."""
     from lab.view.meshcat import replay_html
-    from lab.view.gantt import gantt
-    from lab.view.plots import learning_curves
+    from lab.view.plots import gantt, learning_curves
 
     out.mkdir(parents=True, exist_ok=True)
     files = {
@@ -300,7 +271,7 @@ def _write_files(prepared: Prepared, taught: Taught, report: Report, out: Path, 
     else:
         del files["gantt"]
     distinct = {lesson.policy.name: (name, lesson.policy) for name, lesson in reversed(taught.lessons.items())}
-    learning_curves({name: policy for name, policy in reversed(distinct.values())}, files["learning_curves"])
+    learning_curves(dict(reversed(distinct.values())), files["learning_curves"])
     if not draw_value_map(prepared, taught.lessons, files["value_map"]):
         del files["value_map"]
     title = f"{prepared.task.title or prepared.task.name}: {prepared.toasts} toasts"

@@ -14,6 +14,7 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import Rewards
 
 MAX_TOASTS = 50
+RESERVED = ("robot", "table", "insert")  # names of other things in the cell
 SUBTASKS = ("transfer", "grasp", "insert", "butter", "place")
 NEAREST_STATIONS_M = 0.16  # two stations nearer than this overlap: a slice is 0.12 m wide
 
@@ -172,6 +173,12 @@ class Task(Record):
             twice = {n for n in names if names.count(n) > 1}
             if twice:
                 raise ValueError(f"{label} '{min(twice)}' stands twice in the file")
+        for name in [o.name for o in self.obstacles]:
+            if name in stations or name in RESERVED or name.startswith(("slice ", "toasted ", "butter ")):
+                raise ValueError(f"obstacle '{name}' has the name of something else in the cell: choose another")
+        for name in stations:
+            if name in RESERVED or name.startswith(("slice ", "toast ", "butter ")):
+                raise ValueError(f"station '{name}' has the name of something else in the cell: choose another")
         for stage in self.route:
             for name in filter(None, (stage.station, stage.buffer)):
                 if name not in stations:
@@ -188,9 +195,8 @@ class Task(Record):
         for one, other in combinations(self.stations, 2):
             apart = hypot(one.pose[0] - other.pose[0], one.pose[1] - other.pose[1])
             if apart < NEAREST_STATIONS_M:
-                raise ValueError(
-                    f"stations '{one.name}' and '{other.name}' overlap: {apart:.3f} m apart, at least {NEAREST_STATIONS_M} m needed"
-                )
+                both = f"stations '{one.name}' and '{other.name}'"
+                raise ValueError(f"{both} overlap: {apart:.3f} m apart, at least {NEAREST_STATIONS_M} m needed")
         return self
 
     @model_validator(mode="after")

@@ -58,6 +58,16 @@ class Toolbox:
     def __init__(self, folder: Path | str | None = None):
         self.folder = Path(folder) if folder is not None else default_folder()
 
+    def check(self) -> None:
+        """Raises BadInput unless policies can be saved here; makes nothing."""
+        place = self.folder
+        while not place.exists() and place != place.parent:
+            place = place.parent
+        if not place.is_dir():
+            raise BadInput(f"toolbox {self.folder}: '{place}' is a file, a folder is needed")
+        if not os.access(place, os.R_OK | os.W_OK | os.X_OK):
+            raise BadInput(f"toolbox {self.folder}: '{place}' cannot be written")
+
     def save(self, policy: Policy) -> Path:
         """Writes a policy, replacing one of the same name; at no time is there half a file."""
         return _write_whole(self._path(policy.name), _encode(policy))

@@ -1,6 +1,6 @@
 """The meshes and URDFs of the cell, made with trimesh from the parameters below; `write(folder)` regenerates `assets/`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import pi
 from pathlib import Path
@@ -87,30 +87,31 @@ class Model:
 def _cylinder(radius: float, length: float, at: Vector = (0, 0, 0), along: str = "z") -> "Trimesh":
     import trimesh
 
-    mesh = trimesh.creation.cylinder(radius=radius, height=length, sections=40)
+    mesh: Trimesh = trimesh.creation.cylinder(radius=radius, height=length, sections=40)
     if along != "z":
         turn: Vector = (0, 1, 0) if along == "x" else (1, 0, 0)
-        mesh.apply_transform(trimesh.transformations.rotation_matrix(pi / 2, turn))
+        mesh.apply_transform(trimesh.transformations.rotation_matrix(pi / 2, turn))  # type: ignore[no-untyped-call]
     mesh.apply_translation(at)
     return mesh
-
-
-def _hull(*meshes: "Trimesh") -> "Trimesh":
-    import trimesh
-
-    return trimesh.util.concatenate(list(meshes)).convex_hull
 
 
 def _join(*meshes: "Trimesh") -> "Trimesh":
     import trimesh
 
-    return trimesh.util.concatenate(list(meshes))
+    joined = trimesh.util.concatenate(list(meshes))
+    assert isinstance(joined, trimesh.Trimesh)
+    return joined
+
+
+def _hull(*meshes: "Trimesh") -> "Trimesh":
+    hull: Trimesh = _join(*meshes).convex_hull
+    return hull
 
 
 def _box(size: Vector, at: Vector = (0, 0, 0)) -> "Trimesh":
     import trimesh
 
-    mesh = trimesh.creation.box(extents=size)
+    mesh: Trimesh = trimesh.creation.box(extents=size)
     mesh.apply_translation(at)
     return mesh
 
@@ -223,7 +224,7 @@ def bread() -> Model:
         outline += [(-x, z) for x, z in outline]
         import trimesh
 
-        return trimesh.Trimesh([(x, y, z) for x, z in outline for y in (-depth / 2, depth / 2)]).convex_hull
+        return _hull(trimesh.Trimesh([(x, y, z) for x, z in outline for y in (-depth / 2, depth / 2)]))
 
     solid = Part(CRUST, SLICE, hidden=True)
     return Model(
@@ -245,7 +246,7 @@ def bread() -> Model:
 MODELS = {"robot": robot, "toaster": toaster, "applier": applier, "slice": bread}
 
 
-def _numbers(values: Sequence[float]) -> str:
+def _numbers(values: Iterable[float]) -> str:
     return " ".join(f"{round(float(v), 6) + 0.0:g}" for v in values)
 
 

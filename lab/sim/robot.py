@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import atan2, pi
 
 import numpy as np
@@ -60,7 +61,7 @@ def plan(
 def _sampled(poses: Sequence[ToolPose]) -> Array:
     corners = np.array([[p.x, p.y, p.z, p.yaw] for p in poses])
     rows = [corners[:1]]
-    for start, end in zip(corners[:-1], corners[1:], strict=True):
+    for start, end in pairwise(corners):
         count = max(1, int(np.ceil(_lengths(np.array([start, end]))[0] / _SAMPLE)))
         rows.append(start + (end - start) * (np.arange(1, count + 1) / count)[:, None])
     return np.concatenate(rows)
@@ -93,11 +94,8 @@ def _trapezoid(length: float, speed: float, acceleration: float) -> Array:
     total = 2.0 * speeding + cruising
     t = np.minimum(np.arange(1, int(np.ceil(total / TIME_STEP)) + 1) * TIME_STEP, total)
     left = np.maximum(total - t, 0.0)
-    return np.where(
-        t < speeding,
-        acceleration * t**2 / 2.0,
-        np.where(left < speeding, length - acceleration * left**2 / 2.0, ramp + top * (t - speeding)),
-    )
+    slowing = np.where(left < speeding, length - acceleration * left**2 / 2.0, ramp + top * (t - speeding))
+    return np.asarray(np.where(t < speeding, acceleration * t**2 / 2.0, slowing))
 
 
 def _joints(point: Array) -> Array:

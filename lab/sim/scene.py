@@ -198,8 +198,8 @@ def check_scene(task: Task) -> None:
             for at in (pose, ToolPose(pose.x, pose.y, low, pose.yaw)):
                 if kinematics.inverse(at) is None or hypot(at.x, at.y) < NEAREST_M:
                     raise BadInput(
-                        f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m is {hypot(at.x, at.y):.2f} m "
-                        f"from the robot at ({at.z:.2f} m up); the arm reaches {NEAREST_M:.2f} to about 1.2 m"
+                        f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m is "
+                        f"{hypot(at.x, at.y):.2f} m from the robot; the arm reaches {NEAREST_M:.2f} to about 1.2 m"
                     )
 
 

@@ -6,6 +6,7 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from lab.errors import BadInput
+from lab.view.frames import Shape
 
 _MAX_BYTES = 20_000_000
 
@@ -33,6 +34,33 @@ def validate(path: Path) -> None:
         _check_joint(path, joint, links)
     for mesh in root.iter("mesh"):
         _check_mesh(path, mesh.get("filename", ""))
+
+
+def looks(path: Path) -> dict[str, tuple[Shape, ...]]:
+    """The visuals of each link of a valid URDF of this lab: boxes and meshes, with their colours; the root link is ''."""
+    root = Xml.parse(path).getroot()
+    children = {child.get("link") for child in root.iterfind("joint/child")}
+    found = {}
+    for link in root.iter("link"):
+        name = link.get("name", "")
+        shapes = (_shape(path, visual) for visual in link.iter("visual"))
+        found[name if name in children else ""] = tuple(shape for shape in shapes if shape is not None)
+    return found
+
+
+def _shape(path: Path, visual: Xml.Element) -> Shape | None:
+    origin, color = visual.find("origin"), visual.find("material/color")
+    x, y, z = _floats(origin, "xyz", "0 0 0")
+    r, g, b, alpha = _floats(color, "rgba", "0.8 0.8 0.8 1")
+    mesh, box = visual.find("geometry/mesh"), visual.find("geometry/box")
+    if mesh is not None:
+        return Shape("mesh", (), path.parent / mesh.get("filename", ""), (r, g, b, alpha), (x, y, z))
+    return None if box is None else Shape("box", _floats(box, "size", ""), None, (r, g, b, alpha), (x, y, z))
+
+
+def _floats(element: Xml.Element | None, name: str, default: str) -> tuple[float, ...]:
+    text = default if element is None else element.get(name, default)
+    return tuple(float(word) for word in text.split())
 
 
 def _value(path: Path, what: str, text: str | None) -> float:

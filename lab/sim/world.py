@@ -7,19 +7,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
-from xml.etree import ElementTree as Xml
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import WorkFailed
 from lab.sim import urdf
-from lab.view.frames import Body, Frame, Shape
+from lab.view.frames import Body, Frame, Pose, Rgba, Shape
 
 TIME_STEP = 1.0 / 240.0  # [s]
 
 Array = NDArray[np.float64]
-Position = Sequence[float]
+Position = Sequence[float] | Array
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -117,7 +116,7 @@ class World:
             info = self._call("getJointInfo", number, joint)
             entry.joints[info[1].decode()] = joint
             entry.links[info[12].decode()] = joint
-        entry.looks = _looks(path)
+        entry.looks = urdf.looks(path)
         self._add(name, entry)
 
     def box(
@@ -125,7 +124,7 @@ class World:
         name: str,
         size: Position,
         position: Position,
-        rgba: Sequence[float],
+        rgba: Rgba,
         *,
         yaw: float = 0.0,
         solid: bool = True,
@@ -135,14 +134,14 @@ class World:
         turn = tuple(self._p.getQuaternionFromEuler([0, 0, yaw]))
         shape = self._call("createCollisionShape", self._p.GEOM_BOX, halfExtents=half) if solid else -1
         visual = self._call("createVisualShape", self._p.GEOM_BOX, halfExtents=half, rgbaColor=list(rgba))
-        self._fixed(name, shape, visual, position, turn, Shape("box", tuple(size), None, tuple(rgba)))
+        self._fixed(name, shape, visual, position, turn, Shape("box", tuple(size), None, rgba))
 
-    def disc(self, name: str, radius: float, height: float, position: Position, rgba: Sequence[float]) -> None:
+    def disc(self, name: str, radius: float, height: float, position: Position, rgba: Rgba) -> None:
         """A flat round marker: only seen; `position` [m] is its centre."""
         visual = self._call(
             "createVisualShape", self._p.GEOM_CYLINDER, radius=radius, length=height, rgbaColor=list(rgba)
         )
-        self._fixed(name, -1, visual, position, NO_TURN, Shape("cylinder", (radius, height), None, tuple(rgba)))
+        self._fixed(name, -1, visual, position, NO_TURN, Shape("cylinder", (radius, height), None, rgba))
 
     def _fixed(self, name: str, shape: int, visual: int, position: Position, turn: Position, look: Shape) -> None:
         number = self._call("createMultiBody", 0, shape, visual, list(position), list(turn))
@@ -280,38 +279,15 @@ class World:
 
     def frame(self) -> Frame:
         """Where everything is now."""
-        poses = {}
+        poses: dict[str, Pose] = {}
         for name, entry in self._bodies.items():
             for link, shapes in entry.looks.items():
                 if shapes:
                     position, turn = self.pose(name, link)
-                    poses[_label(name, link)] = (*map(float, position), *map(float, turn))
+                    x, y, z, i, j, k, w = (float(value) for value in (*position, *turn))
+                    poses[_label(name, link)] = (x, y, z, i, j, k, w)
         return Frame(self.time_s, poses)
 
 
 def _label(name: str, link: str) -> str:
     return f"{name} {link}" if link else name
-
-
-def _looks(path: Path) -> dict[str, tuple[Shape, ...]]:
-    """The visuals of each link in a URDF of this lab: boxes and meshes with a colour; the root link is ''."""
-    root = Xml.parse(path).getroot()
-    children = {joint.find("child").get("link") for joint in root.iter("joint")}  # type: ignore[union-attr]
-    looks = {}
-    for link in root.iter("link"):
-        shapes = []
-        for visual in link.iter("visual"):
-            origin, color = visual.find("origin"), visual.find("material/color")
-            at = _floats(origin.get("xyz", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
-            rgba = _floats(color.get("rgba", "1 1 1 1")) if color is not None else (0.8, 0.8, 0.8, 1.0)
-            mesh, box = visual.find("geometry/mesh"), visual.find("geometry/box")
-            if mesh is not None:
-                shapes.append(Shape("mesh", (), path.parent / mesh.get("filename", ""), rgba, at))
-            elif box is not None:
-                shapes.append(Shape("box", _floats(box.get("size", "")), None, rgba, at))
-        looks[link.get("name", "") if link.get("name") in children else ""] = tuple(shapes)
-    return looks
-
-
-def _floats(text: str) -> tuple[float, ...]:
-    return tuple(float(word) for word in text.split())

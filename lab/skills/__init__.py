@@ -8,3 +8,5 @@ from lab.skills.skill import Skill
 from lab.skills.transfer import Transfer
 
 SKILLS: dict[str, type[Skill]] = {skill.subtask: skill for skill in (Transfer, Grasp, Insert, Butter, Place)}
+
+__all__ = ["SKILLS", "Butter", "Grasp", "Insert", "Place", "Skill", "Transfer"]

@@ -42,7 +42,7 @@ class Grasp(Skill):
         return self.problem
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
-        """Open, go above the slice where the grid is entered, follow the learned cells, close, lift, and see that it came along."""
+        """Open, go above the slice, follow the learned cells down, close, lift, and see that the slice came along."""
         robot, mdp, name = bench.scene.robot, self.problem.mdp, self.slice
         if robot.closed:
             yield from robot.release()

@@ -59,11 +59,12 @@ class Insert(Skill):
         self.problem = Problem(self.name, self.subtask, mdp)
         return self.problem
 
-    def _blocked(self, task: Task) -> tuple[NDArray[np.bool_], dict[tuple[int, int], str]]:
+    def _blocked(self, task: Task) -> tuple[NDArray[np.bool_], dict[tuple[int, ...], str]]:
         """Cells whose middle is so near to a seen cube that the carried slice would touch it, and which cubes those are."""
         view = self.seen.view
         half = (assets.SLICE[0] / 2 + CLEARANCE_M, assets.SLICE[1] / 2 + CLEARANCE_M)
-        blocked, names = np.zeros(task.insert.shape, bool), {}
+        blocked = np.zeros(task.insert.shape, bool)
+        names: dict[tuple[int, ...], str] = {}
         places = dict(zip((o.name for o in task.obstacles), self.surveys.layout.obstacles, strict=True))
         for marker in self.seen.markers:
             if marker.kind != "obstacle":

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
+from lab.overhead import View
 from lab.sim import assets
 from lab.sim.camera import Camera
 from lab.sim.kinematics import ToolPose
@@ -24,7 +25,6 @@ from lab.sim.scene import (
 from lab.sim.survey import Survey, Surveyor
 from lab.sim.world import World
 from lab.taskfile import Station, Task
-from lab.overhead import View
 
 Cell = tuple[int, ...]
 

@@ -36,18 +36,25 @@ STYLE: dict[str, Any] = {
 }
 
 
+def check_png(path: Path) -> None:
+    """Raise BadInput unless `path` ends in .png and its folder is there."""
+    if path.suffix.lower() != ".png":
+        raise BadInput(f"picture '{path}': plots are written as .png")
+    if not path.parent.is_dir():
+        raise BadInput(f"picture '{path}': there is no folder '{path.parent}'")
+
+
 @contextmanager
 def picture_file(path: Path, width_inch: float, height_inch: float) -> Iterator["Figure"]:
     """A figure in the lab's style, written to `path` when the block ends well.
 
-    Raises BadInput when the path does not end in .png or cannot be written.
+    Raises BadInput as `check_png` does, and when the path cannot be written.
     """
     import matplotlib.style
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    if path.suffix.lower() != ".png":
-        raise BadInput(f"picture '{path}': plots are written as .png")
+    check_png(path)
     with matplotlib.style.context(STYLE, after_reset=True):
         figure = Figure(figsize=(width_inch, height_inch), layout="constrained")
         FigureCanvasAgg(figure)

@@ -1,0 +1,342 @@
+"""The command line: parse, call one function, render. The only module that prints. Contract: see the README."""
+
+import json
+import sys
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from lab.errors import BadInput, LabError
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+    from lab.teaching import Teacher
+    from lab.view.progress import RunProgress
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help="Teach a robot.")
+toolbox_app = typer.Typer(no_args_is_help=True, help="The policies that were learned.")
+task_app = typer.Typer(no_args_is_help=True, help="Task files.")
+app.add_typer(toolbox_app, name="toolbox")
+app.add_typer(task_app, name="task")
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Where all chance comes from.")]
+ToolboxFolder = Annotated[
+    Path | None,
+    typer.Option("--toolbox", envvar="LAB_TOOLBOX", help="Where policies are kept; default: your data folder."),
+]
+AdvisorName = Annotated[
+    str, typer.Option("--advisor", help="Who advises: expert, moderate, limited, novice, tau=X, terminal, none.")
+]
+Toasts = Annotated[int, typer.Option("--toasts", "-n", help="How many slices, 1 to 50.")]
+
+
+def command(group: typer.Typer, name: str, example: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Register a command whose errors end it with one line and the exit code of the contract."""
+
+    def register(function: Callable[..., None]) -> Callable[..., None]:
+        @wraps(function)
+        def guarded(*args: Any, **kwargs: Any) -> None:
+            try:
+                function(*args, **kwargs)
+            except LabError as error:
+                _end(str(error), error.exit_code)
+            except KeyboardInterrupt as stopped:
+                _end(str(stopped) or "stopped by Ctrl-C; what was learned is kept", 130)
+            except BrokenPipeError:
+                _end("", 1)
+
+        group.command(name, epilog=f"Example: {example}")(guarded)
+        return guarded
+
+    return register
+
+
+def _end(message: str, code: int) -> NoReturn:
+    if message:
+        sys.stderr.write(f"lab: {' '.join(message.split())}\n")
+    raise typer.Exit(code)
+
+
+def _console() -> "Console":
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False)
+
+
+def _show(document: dict[str, Any], as_json: bool, render: Callable[[dict[str, Any]], "RenderableType"]) -> None:
+    if as_json:
+        print(json.dumps(document, allow_nan=False))
+        return
+    from rich.console import Console
+
+    Console(highlight=False).print(render(document), soft_wrap=True)
+
+
+def _teacher(toolbox: Path | None, advisor: str, seed: int, progress: "RunProgress") -> "Teacher":
+    """The teacher that the options describe; a person is asked on the terminal, with the progress bar out of the way."""
+    from lab.advice.advisors import AdviceRequest, check_advisor
+    from lab.learning.session import Event
+    from lab.teaching import Teacher
+    from lab.toolbox import Toolbox
+    from lab.view.terminal import TeachingPrompt
+
+    check_advisor(advisor, "--advisor")
+    prompt = TeachingPrompt(progress.console) if advisor == "terminal" else None
+
+    def ask(request: AdviceRequest) -> int | None:
+        assert prompt is not None
+        with progress.paused():
+            return prompt(request)
+
+    def on_event(name: str, event: Event) -> None:
+        progress.learning(name, event)
+        if prompt is not None:
+            prompt.on_event(event)
+
+    return Teacher(Toolbox(toolbox), advisor, seed, ask if prompt else None, on_event)
+
+
+@command(app, "run", "lab run toast --toasts 3")
+def run(
+    task: Annotated[str, typer.Argument(help="A task that ships, or a .toml file.")] = "toast",
+    toasts: Toasts = 3,
+    advisor: AdvisorName = "expert",
+    view: Annotated[bool, typer.Option("--view/--no-view", help="Stream the scene to a page on 127.0.0.1.")] = False,
+    seed: Seed = 0,
+    toolbox: ToolboxFolder = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for pictures, replay and JSON; default: TASK-run.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Find or learn the skills, time them, find their best order, and carry them out in physics."""
+    from contextlib import ExitStack
+
+    from lab import taskfile
+    from lab.run import check_out, prepare
+    from lab.run import run as run_task
+    from lab.view.meshcat import LiveView
+    from lab.view.progress import RunProgress
+    from lab.view.summary import run_summary
+
+    loaded = taskfile.load(task)
+    folder = out or Path(f"{loaded.name}-run")
+    check_out(folder)
+    progress = RunProgress(_console())
+    teacher = _teacher(toolbox, advisor, seed, progress)
+    teacher.toolbox.check()
+    prepared = prepare(loaded, toasts, seed)
+    with ExitStack() as stack:
+        viewer = stack.enter_context(LiveView()) if view else None
+        if viewer is not None:
+            progress.console.print(f"live page: {viewer.url}\nfrom another machine: {viewer.hint}", soft_wrap=True)
+        stack.enter_context(progress)
+        report = run_task(prepared, teacher, folder, listener=progress, viewer=viewer)
+    _show(report.to_json(), as_json, run_summary)
+    if not report.success:
+        _end(report.outcome.failure or f"{len(report.outcome.delivered)} of {toasts} toasts were delivered", 1)
+
+
+@command(app, "teach", "lab teach insert --advisor terminal")
+def teach(
+    subtask: Annotated[
+        str, typer.Argument(help="transfer, grasp, insert, butter, place, or one skill by its full name.")
+    ],
+    task: Annotated[str, typer.Option("--task", help="A task that ships, or a .toml file.")] = "toast",
+    learner: Annotated[str | None, typer.Option("--learner", help="q, sarsa, q-lambda; default: the task's.")] = None,
+    gate: Annotated[
+        str | None, typer.Option("--gate", help="ccrl, ia, combined, always, never; default: the task's.")
+    ] = None,
+    advisor: AdvisorName = "expert",
+    episodes: Annotated[
+        int | None, typer.Option("--episodes", min=1, help="Session length; default: the task's.")
+    ] = None,
+    save: Annotated[str | None, typer.Option("--save", help="Name of the policy in the toolbox.")] = None,
+    seed: Seed = 0,
+    toolbox: ToolboxFolder = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for the learning curve (and the value map).")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """One teaching session: learn one sub-task with an advisor, and keep the policy."""
+    from lab import taskfile
+    from lab.lesson import teach_one
+    from lab.run import check_out
+    from lab.view.progress import RunProgress
+    from lab.view.summary import lesson_summary
+
+    loaded = taskfile.load(task)
+    if out is not None:
+        check_out(out)
+    progress = RunProgress(_console())
+    teacher = _teacher(toolbox, advisor, seed, progress)
+    teacher.toolbox.check()
+    document = teach_one(loaded, subtask, teacher, learner=learner, gate=gate, episodes=episodes, name=save, out=out)
+    _show(document, as_json, lesson_summary)
+    if document["final_steps"] is None:
+        _end(f"'{document['skill']}' does not reach its goal after {document['episodes']} episodes", 1)
+
+
+@command(app, "sequence", "lab sequence toast --toasts 4 --method srl")
+def sequence(
+    task: Annotated[str, typer.Argument(help="A task that ships, or a .toml file.")],
+    toasts: Toasts = 3,
+    method: Annotated[
+        str | None, typer.Option("--method", help="srl, exact, fifo, random; default: the task's.")
+    ] = None,
+    episodes: Annotated[
+        int | None, typer.Option("--episodes", min=1, help="Session length; default: the task's.")
+    ] = None,
+    sessions: Annotated[
+        int, typer.Option("--sessions", min=1, help="How many sessions, each with its own chance.")
+    ] = 1,
+    plot: Annotated[Path | None, typer.Option("--plot", help="A .png file for the makespans of the episodes.")] = None,
+    seed: Seed = 0,
+    toolbox: ToolboxFolder = None,
+    as_json: Json = False,
+) -> None:
+    """The high level alone: the order of the robot's transfers, beside the proven optimum."""
+    from lab import taskfile
+    from lab.lesson import sequence_task
+    from lab.view.progress import RunProgress
+    from lab.view.summary import sequence_summary
+
+    loaded = taskfile.load(task)
+    progress = RunProgress(_console())
+    teacher = _teacher(toolbox, "expert", seed, progress)
+    teacher.toolbox.check()
+    document = sequence_task(
+        loaded, toasts, teacher, method=method, episodes=episodes, sessions=sessions, plot=plot, listener=progress
+    )
+    _show(document, as_json, sequence_summary)
+
+
+@command(app, "see", "lab see overhead.png --task toast")
+def see(
+    image: Annotated[Path, typer.Argument(help="A PNG or JPEG picture from above, with round markers.")],
+    grid: Annotated[str, typer.Option("--grid", help="Rows x columns.")] = "12x12",
+    task: Annotated[
+        str | None, typer.Option("--task", help="Taken by this task's camera; else the frame is the grid.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="A .png file for the picture with the grid drawn on it.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Picture to grid: find the gripper (magenta), the toaster (cyan) and the obstacles (green)."""
+    from lab.lesson import see_picture
+    from lab.view.summary import grid_summary
+
+    _show(see_picture(image, grid, task, out), as_json, grid_summary)
+
+
+@command(app, "view", "lab view toast")
+def view(
+    what: Annotated[
+        str, typer.Argument(help="A task (its scene is shown) or the folder of a run (its replay is served).")
+    ],
+    toasts: Toasts = 3,
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="0: any free one.")] = 0,
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """Look at a task's scene or at a run's replay, on a page on 127.0.0.1, until Ctrl-C."""
+    from lab.lesson import show
+
+    def tell(url: str, hint: str) -> None:
+        if as_json:
+            print(json.dumps({"url": url, "hint": hint}), flush=True)
+        else:
+            print(f"{url}\nfrom another machine: {hint}\nCtrl-C ends it", flush=True)
+
+    show(what, toasts, seed, port, tell)
+
+
+@command(toolbox_app, "list", "lab toolbox list")
+def toolbox_list(toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
+    """The policies in the toolbox."""
+    from lab.toolbox import Toolbox
+    from lab.view.summary import table_of
+
+    box = Toolbox(toolbox)
+    columns = ("name", "subtask", "task", "solved", "signature", "created")
+    document = {"folder": str(box.folder), "policies": box.list()}
+    _show(
+        document, as_json, lambda d: table_of(d["policies"], columns) if d["policies"] else f"nothing in {d['folder']}"
+    )
+
+
+@command(toolbox_app, "show", "lab toolbox show 'insert at toaster 1a2b3c4d'")
+def toolbox_show(name: str, toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
+    """All that is known of one policy."""
+    from lab.toolbox import Toolbox
+    from lab.view.summary import table_of
+
+    document = Toolbox(toolbox).show(name)
+    rows = [{"field": key, "value": value} for key, value in document.items()]
+    _show(document, as_json, lambda _: table_of(rows, ("field", "value")))
+
+
+@command(toolbox_app, "verify", "lab toolbox verify")
+def toolbox_verify(toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
+    """Check every file: whole, finite, of the right shape. Exit 1 when one is not."""
+    from lab.toolbox import Toolbox
+    from lab.view.summary import table_of
+
+    rows = [{"file": str(path), "ok": ok, "reason": reason} for path, ok, reason in Toolbox(toolbox).verify()]
+    damaged = [row for row in rows if not row["ok"]]
+    _show({"files": rows, "damaged": len(damaged)}, as_json, lambda _: table_of(rows, ("ok", "file", "reason")))
+    if damaged:
+        _end(f"{len(damaged)} of {len(rows)} files in the toolbox are damaged", 1)
+
+
+@command(toolbox_app, "remove", "lab toolbox remove 'insert at toaster 1a2b3c4d'")
+def toolbox_remove(name: str, toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
+    """Delete one policy."""
+    from lab.toolbox import Toolbox
+
+    _show({"removed": str(Toolbox(toolbox).remove(name))}, as_json, lambda d: f"removed {d['removed']}")
+
+
+@command(task_app, "list", "lab task list")
+def task_list(as_json: Json = False) -> None:
+    """The tasks that ship."""
+    from lab import taskfile
+
+    _show({"tasks": taskfile.task_names()}, as_json, lambda d: "\n".join(d["tasks"]))
+
+
+@command(task_app, "show", "lab task show toast")
+def task_show(task: str, as_json: Json = False) -> None:
+    """The text of a task file: copy it, change it, run it."""
+    from lab import taskfile
+
+    path = taskfile.find(task)
+    loaded = taskfile.load(task)
+    if as_json:
+        print(json.dumps({"file": str(path), **loaded.model_dump(mode="json")}))
+    else:
+        print(path.read_text(encoding="utf-8"), end="")
+
+
+@command(task_app, "check", "lab task check my-toast.toml")
+def task_check(file: str, toasts: Toasts = 3, seed: Seed = 0, as_json: Json = False) -> None:
+    """Check a task file: its text, its reach, and that a way exists for every sub-task."""
+    from lab.lesson import check_task
+
+    errors = check_task(file, toasts, seed)
+    document = {"valid": not errors, "errors": errors}
+    _show(document, as_json, lambda d: f"{file} is sound" if d["valid"] else "not sound:")
+    if errors:
+        raise BadInput(errors[0])
+
+
+def main() -> None:
+    """The `lab` command."""
+    app()

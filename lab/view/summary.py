@@ -1,0 +1,97 @@
+"""What commands show when they are done: short rich tables and lines from plain data."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+
+def run_summary(report: Mapping[str, Any]) -> RenderableType:
+    """The end of `lab run`, from its JSON document."""
+    skills = report["skills"]
+    sources = [row["source"] for row in skills]
+    helped = sum(row["helped_steps"] for row in skills)
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="bold", justify="right")
+    table.add_column(overflow="fold")
+    done = f"{report['delivered']} of {report['toasts']} toasts delivered"
+    table.add_row("outcome", Text(done, "green" if report["success"] else "red"))
+    if report["failure"]:
+        table.add_row("stopped", Text(report["failure"], "red"))
+    if report["retries"]:
+        table.add_row("retries", Text("\n".join(report["retries"])))
+    learned = sources.count("learned") + sources.count("continued")
+    table.add_row("skills", f"{learned} learned, {sources.count('reused')} reused, {helped} helped steps")
+    table.add_row("sequence", " ".join(map(str, report["sequence"])))
+    measured = report["measured_makespan_s"]
+    text = f"{report['predicted_makespan_s']:.1f} s predicted"
+    if measured is not None:
+        text += f", {measured:.1f} s measured ({measured / report['predicted_makespan_s'] - 1:+.2%})"
+    table.add_row("makespan", text)
+    proven = "proven optimum" if report["optimum_proven"] else "best bound"
+    table.add_row(proven, f"{report['optimal_makespan_s']:.1f} s, gap {report['optimality_gap']:.2%}")
+    rate = report["sim_s"] / report["wall_s"] if report["wall_s"] else 0.0
+    table.add_row(
+        "time",
+        f"{report['wall_s']:.1f} s for {report['sim_s']:.0f} simulated seconds ({rate:.0f} x real time)",
+    )
+    for name, path in report["files"].items():
+        table.add_row(name.replace("_", " "), path)
+    return table
+
+
+def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
+    """The end of `lab teach`, from its JSON document."""
+    from lab.view.progress import sparkline
+
+    final = lesson["final_steps"] if lesson["final_steps"] is not None else "does not reach the goal"
+    verdict = "solved" if lesson["solved"] else "not the shortest"
+    advice = f"asked {lesson['requests']} times, {lesson['helped_steps']} helped steps, {lesson['misleads']} misleads"
+    lines = [
+        f"{lesson['skill']}: {lesson['episodes']} episodes   {sparkline(lesson['steps_per_episode'], 40)}",
+        f"learned way {final}, shortest {lesson['optimal_steps']} steps: {verdict}",
+        f"{advice}; {_rejected(lesson)}",
+        f"saved as '{lesson['saved_as']}' (seed {lesson['seed']})",
+    ]
+    return Group(*map(Text, lines))
+
+
+def _rejected(lesson: Mapping[str, Any]) -> str:
+    episode = lesson["rejected_at_episode"]
+    return "the advisor was not rejected" if episode is None else f"rejected its advisor in episode {episode}"
+
+
+def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
+    """The end of `lab sequence`, from its JSON document."""
+    proven = "proven" if found["optimum_proven"] else f"bound {found['bound_s']:.2f} s"
+    lines = [
+        f"{found['method']}: {found['makespan_s']:.2f} s for {found['toasts']} toasts (seed {found['seed']})",
+        f"order of the transfers: {' '.join(map(str, found['sequence']))}",
+        f"optimum {found['optimal_s']:.2f} s ({proven}), gap {found['gap']:.2%}",
+    ]
+    if found["sessions"] > 1:
+        hits = f"optimum found in {found['success_percent']:.0f} %"
+        lines.append(f"{found['sessions']} sessions: {hits}, mean best {found['mean_best_s']:.2f} s")
+    return Group(*map(Text, lines))
+
+
+def table_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> Table:
+    """Rows as a table with these columns."""
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for column in columns:
+        table.add_column(column.replace("_", " "), overflow="fold")
+    for row in rows:
+        table.add_row(*(str(row[column]) for column in columns))
+    return table
+
+
+def grid_summary(seen: Mapping[str, Any]) -> RenderableType:
+    """The end of `lab see`: the grid seen from above, y upwards, as the overhead camera shows it."""
+    marks = {".": "·", "S": "S", "G": "G", "#": "█"}
+    rows = ["".join(row) for row in seen["grid"]]
+    turned = ["  ".join(marks[rows[i][j]] for i in range(len(rows))) for j in reversed(range(len(rows[0])))]
+    ends = f"start {tuple(seen['start'])}, goal {tuple(seen['goal'])}"
+    found = f"{ends}, {len(seen['obstacles'])} cells with obstacles, {len(seen['markers'])} markers"
+    return Group(*map(Text, turned), Text(found))
