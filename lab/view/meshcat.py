@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from lab.view.server import Server
 
 HERE = Path(__file__).parent
-RULES = "default-src 'none'; img-src data: blob:; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
+RULES = "default-src 'none'; img-src data: blob:; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'"
 OFFLINE = f'<meta http-equiv="Content-Security-Policy" content="{RULES}">'
 
 

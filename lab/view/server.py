@@ -6,6 +6,7 @@ neither holds up the run nor lets messages pile up. What a page sends is dropped
 
 import asyncio
 import json
+import socket
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,7 +15,6 @@ from typing import Any
 
 from tornado.httpserver import HTTPServer
 from tornado.iostream import StreamClosedError
-from tornado.netutil import bind_sockets
 from tornado.web import Application, RequestHandler, StaticFileHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
@@ -59,14 +59,8 @@ class Server:
     """
 
     def __init__(self, port: int, page: str, script: Path) -> None:
-        try:
-            self._sockets = bind_sockets(port, address=ADDRESS)
-        except (OSError, OverflowError) as reason:
-            text = getattr(reason, "strerror", None) or reason
-            raise BadInput(
-                f"port {port} for the live view: {text}: choose a free one within 1024..65535, or 0 for any"
-            ) from None
-        self.port: int = self._sockets[0].getsockname()[1]
+        self._socket = _listen(port)
+        self.port: int = self._socket.getsockname()[1]
         self.connected = threading.Event()
         self.pages: set[Page] = set()
         self._page, self._script = page, script
@@ -89,8 +83,7 @@ class Server:
     def stop(self) -> None:
         """Give pages half a second to take the last frame, then close all; at most about 3 s, whatever pages do."""
         if self._loop is None:
-            for socket in self._sockets:
-                socket.close()
+            self._socket.close()
             return
         self._call(self._stopped.set)
         self._thread.join(STOP_S)
@@ -131,7 +124,7 @@ class Server:
             ],
         )
         server = HTTPServer(application)
-        server.add_sockets(self._sockets)
+        server.add_sockets([self._socket])
         self._ready.set()
         await self._stopped.wait()
         server.stop()
@@ -143,6 +136,21 @@ class Server:
             await asyncio.wait_for(server.close_all_connections(), FLUSH_S)
         except TimeoutError:
             return  # a page that does not answer; the loop's end cuts it off
+
+
+def _listen(port: int) -> socket.socket:
+    own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        own.setblocking(False)
+        own.bind((ADDRESS, port))
+        own.listen(16)
+    except (OSError, OverflowError) as reason:
+        own.close()
+        text = getattr(reason, "strerror", None) or "no such port"
+        allowed = "choose a free one within 1024..65535, or 0 for any"
+        raise BadInput(f"port {port} for the live view: {text}: {allowed}") from None
+    return own
 
 
 class Front(RequestHandler):

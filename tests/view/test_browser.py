@@ -1,0 +1,172 @@
+"""The live page and the replay in a real browser: poses as the page's scene tree has them. Skipped without Chromium."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import trimesh
+
+from lab.view.frames import Body, Frame, Recording, Shape
+from lab.view.meshcat import LiveView, replay_html
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+HALF = 0.5**0.5
+WHITE, BROWN = (1.0, 1.0, 1.0, 1.0), (0.5, 0.0, 0.0, 0.5)
+# where the slice is at the simulated seconds 3, 4 and 5, the last turned by a quarter about z
+POSES = [
+    (0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0),
+    (0.5, 0.2, 0.7, 0.0, 0.0, 0.0, 1.0),
+    (0.5, -0.2, 0.3, 0.0, 0.0, HALF, HALF),
+]
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Recording:
+    trimesh.creation.box((0.12, 0.015, 0.12)).export(tmp_path / "slice.stl")
+    post = Shape("cylinder", (0.05, 0.8), position=(0.0, 0.0, 0.4))
+    bodies = (
+        Body("table", (Shape("box", (2.0, 2.0, 0.04), position=(0.0, 0.0, -0.02)),)),
+        Body("arm", (post, Shape("sphere", (0.1,), position=(0.0, 0.0, 0.8)))),
+        Body("slice 1", (Shape("mesh", (1.0, 2.0, 1.0), mesh=tmp_path / "slice.stl"),)),
+    )
+    frames = [Frame(3.0 + number, {"slice 1": pose}) for number, pose in enumerate(POSES)]
+    frames[0] = Frame(3.0, {"table": (0, 0, 0, 0, 0, 0, 1), "arm": (-0.5, 0, 0, 0, 0, 0, 1), "slice 1": POSES[0]})
+    frames[1] = Frame(4.0, frames[1].poses, {"slice 1": BROWN}, {"arm": False})
+    return Recording(bodies, frames)
+
+
+def pose_of(page: "Page", *path: str) -> list[float]:
+    script = """path => {
+        const object = viewer.scene_tree.find(path).object;
+        return [...object.position.toArray(), ...object.quaternion.toArray()];
+    }"""
+    found = page.evaluate(script, ["lab", *path])
+    assert isinstance(found, list)
+    return found
+
+
+def look_of(page: "Page", body: str) -> dict[str, Any]:
+    """Opacity and colour (as written into the scene, sRGB) of a body's first shape, and whether the body is visible."""
+    script = """body => {
+        const material = viewer.scene_tree.find(["lab", body, "0", "<object>"]).object.material;
+        const color = material.color.clone().convertLinearToSRGB().toArray();
+        return { color, opacity: material.opacity, visible: viewer.scene_tree.find(["lab", body]).object.visible };
+    }"""
+    found = page.evaluate(script, body)
+    assert isinstance(found, dict)
+    return found
+
+
+def size_of(page: "Page", *path: str) -> list[float]:
+    """A shape's extent along its own axes [m]."""
+    script = """path => {
+        const { geometry, scale } = viewer.scene_tree.find(path).object;
+        geometry.computeBoundingBox();
+        return geometry.boundingBox.getSize(scale.clone()).multiply(scale).toArray();
+    }"""
+    found = page.evaluate(script, ["lab", *path, "<object>"])
+    assert isinstance(found, list)
+    return found
+
+
+def drawn_colors(page: "Page") -> int:
+    """How many different colours the 3D picture holds: one or two when nothing was drawn."""
+    script = """() => {
+        viewer.render();
+        const gl = viewer.renderer.getContext(), { drawingBufferWidth: w, drawingBufferHeight: h } = gl;
+        const pixels = new Uint8Array(4 * w * h);
+        gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+        return new Set(new Uint32Array(pixels.buffer)).size;
+    }"""
+    found = page.evaluate(script)
+    assert isinstance(found, int)
+    return found
+
+
+def test_the_live_page_shows_bodies_where_they_are(browser_page: "Page", recording: Recording) -> None:
+    with LiveView(title="Toast & more") as view:
+        view.show(recording.bodies)
+        view.update(recording.frames[0])
+        browser_page.goto(view.url)
+        assert view.wait_for_page(20)
+        browser_page.wait_for_function("document.getElementById('note').textContent === '3.0 s'")
+        assert pose_of(browser_page, "slice 1") == pytest.approx(POSES[0], abs=1e-5)
+        assert pose_of(browser_page, "arm", "1")[:3] == pytest.approx([0, 0, 0.8], abs=1e-5)
+        assert size_of(browser_page, "arm", "0") == pytest.approx([0.1, 0.1, 0.8], abs=1e-3)  # it stands along z
+        assert size_of(browser_page, "slice 1", "0") == pytest.approx([0.12, 0.03, 0.12], abs=1e-5)
+
+        view.update(recording.frames[1])
+        browser_page.wait_for_function("document.getElementById('note').textContent === '4.0 s'")
+        assert pose_of(browser_page, "slice 1") == pytest.approx(POSES[1], abs=1e-5)
+        look = look_of(browser_page, "slice 1")
+        assert [*look["color"], look["opacity"]] == pytest.approx(BROWN, abs=1e-3)
+        assert look_of(browser_page, "arm")["visible"] is False
+
+        view.update(recording.frames[2])
+    browser_page.wait_for_function("document.getElementById('note').textContent.startsWith('the run has ended')")
+    assert pose_of(browser_page, "slice 1") == pytest.approx(POSES[2], abs=1e-5)
+    assert browser_page.inner_text("#caption").startswith("Toast & more")
+    assert drawn_colors(browser_page) > 100
+
+
+def test_a_new_scene_replaces_the_old_one(browser_page: "Page", recording: Recording) -> None:
+    with LiveView() as view:
+        view.show(recording.bodies)
+        browser_page.goto(view.url)
+        browser_page.wait_for_function("viewer.scene_tree.children.lab")
+        view.show([Body("plate", (Shape("box", (1, 1, 1)),))])
+        browser_page.wait_for_function("viewer.scene_tree.children.lab?.children.plate")
+        assert browser_page.evaluate("Object.keys(viewer.scene_tree.children.lab.children)") == ["plate"]
+
+
+def test_the_replay_plays_from_disk_without_a_network(
+    browser_page: "Page", recording: Recording, tmp_path: Path
+) -> None:
+    path = replay_html(recording, tmp_path / "replay.html", speed=2, title="Toast <b>bold</b>")
+    asked: list[str] = []
+    browser_page.on("request", lambda request: asked.append(request.url))
+    browser_page.context.set_offline(True)
+    browser_page.goto(path.as_uri())
+    browser_page.wait_for_function("viewer.animator.playing && viewer.animator.time > 0")
+    assert "2 × real time" in browser_page.inner_text("#caption")
+    assert browser_page.inner_text("#caption").startswith("Toast <b>bold</b>")
+
+    browser_page.click("#play")
+    assert browser_page.evaluate("viewer.animator.playing") is False
+    middle = [0.3, 0.2, 0.5, 0.0, 0.0, 0.0, 1.0]  # half way between the first two poses
+    for time_s, pose in ((0.0, POSES[0]), (0.5, middle), (1.0, POSES[1]), (2.0, POSES[2])):
+        browser_page.evaluate("time => viewer.animator.seek(time)", time_s)
+        assert pose_of(browser_page, "slice 1") == pytest.approx(pose, abs=3e-4)
+        assert pose_of(browser_page, "arm")[0] == pytest.approx(-0.5)
+    assert drawn_colors(browser_page) > 100
+    assert [url for url in asked if not url.startswith(("data:", "blob:"))] == [path.as_uri()]
+
+
+def test_colours_and_visibility_step_in_the_replay(browser_page: "Page", recording: Recording, tmp_path: Path) -> None:
+    recording.frames[2] = Frame(5.0, {"slice 1": POSES[2]}, {"slice 1": WHITE}, {"arm": True})
+    browser_page.goto(replay_html(recording, tmp_path / "replay.html").as_uri())
+    browser_page.wait_for_function("viewer.animator.playing")
+    browser_page.evaluate("viewer.animator.pause()")
+    start = (*recording.bodies[2].shapes[0].rgba, True)
+    for time_s, expected in ((0.5, start), (1.5, (*BROWN, False)), (2.5, (*WHITE, True)), (0.2, start)):
+        browser_page.evaluate("time => viewer.animator.seek(time)", time_s)
+        look = look_of(browser_page, "slice 1")
+        assert [*look["color"], look["opacity"]] == pytest.approx(expected[:4], abs=1e-3)
+        assert look_of(browser_page, "arm")["visible"] is expected[4]
+
+
+def test_the_slider_moves_the_replay(browser_page: "Page", recording: Recording, tmp_path: Path) -> None:
+    browser_page.goto(replay_html(recording, tmp_path / "replay.html").as_uri())
+    browser_page.click("#play")
+    browser_page.evaluate("const s = document.getElementById('seek'); s.value = 1; s.dispatchEvent(new Event('input'))")
+    assert pose_of(browser_page, "slice 1") == pytest.approx(POSES[1], abs=3e-4)
+    browser_page.wait_for_function("document.getElementById('note').textContent.startsWith('4.0 s')")
+
+
+def test_a_still_recording_has_no_player(browser_page: "Page", recording: Recording, tmp_path: Path) -> None:
+    del recording.frames[1:]
+    browser_page.goto(replay_html(recording, tmp_path / "replay.html").as_uri())
+    assert pose_of(browser_page, "slice 1") == pytest.approx(POSES[0], abs=1e-5)
+    assert browser_page.is_hidden("#player")
