@@ -32,13 +32,13 @@ OFFLINE = f'<meta http-equiv="Content-Security-Policy" content="{RULES}">'
 class LiveView:
     """A page on 127.0.0.1 that shows what happens while it happens; a context manager.
 
-    `port` 0 takes any free one. Entering raises BadInput for a port it cannot have. Nothing that a page does reaches
-    the run: a slow page skips frames, what it sends is dropped, and leaving the context never waits longer than about
-    3 s.
+    `port` 0 takes any free one. `replay`: serve this file of `replay_html` instead of a live page. Entering raises
+    BadInput for a port it cannot have and a replay that cannot be read. Nothing that a page does reaches the run: a slow
+    page skips frames, what it sends is dropped, and leaving the context never waits longer than about 3 s.
     """
 
-    def __init__(self, port: int = 0, title: str = "Teaching lab, live") -> None:
-        self._wanted, self._title = port, title
+    def __init__(self, port: int = 0, *, title: str = "Teaching lab, live", replay: Path | None = None) -> None:
+        self._wanted, self._title, self._replay = port, title, replay
         self._server: Server | None = None
         self._shown: dict[str, tuple[float, ...] | None] = {}
 
@@ -46,8 +46,11 @@ class LiveView:
         from lab.view.server import Server
 
         script = viewer_script()
-        link = f'<script src="{script.name}"></script>'
-        self._server = Server(self._wanted, _page(self._title, {}, viewer=link), script)
+        if self._replay is None:
+            page = _page(self._title, {}, viewer=f'<script src="{script.name}"></script>')
+        else:
+            page = _read(self._replay)
+        self._server = Server(self._wanted, page, script)
         self._server.start()
         return self
 
@@ -190,6 +193,16 @@ def _page(title: str, data: Mapping[str, Any], *, viewer: str, policy: str = "",
         "script": (HERE / "page.js").read_text(encoding="utf-8"),
     }
     return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], (HERE / "page.html").read_text(encoding="utf-8"))
+
+
+def _read(path: Path) -> str:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as reason:
+        raise BadInput(f"cannot read the replay '{path}': {getattr(reason, 'strerror', None) or reason}") from None
+    if 'id="lab-data"' not in text:
+        raise BadInput(f"'{path}' is no replay: a replay.html that the lab wrote is wanted")
+    return text
 
 
 def _write(path: Path, text: str) -> None:

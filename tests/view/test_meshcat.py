@@ -305,6 +305,20 @@ def test_speeds_that_are_none_are_refused(speed: float, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+def test_a_replay_can_be_served(tmp_path: Path) -> None:
+    path = replay_html(moving(3), tmp_path / "replay.html")
+    with LiveView(replay=path) as view, urlopen(view.url) as answer:
+        assert answer.read() == path.read_bytes()
+
+
+@pytest.mark.parametrize("content", [None, b"", b"<html></html>", b"\xff\xfe"])
+def test_what_is_no_replay_is_not_served(content: bytes | None, tmp_path: Path) -> None:
+    if content is not None:
+        (tmp_path / "replay.html").write_bytes(content)
+    with pytest.raises(BadInput, match=r"replay\.html"), LiveView(replay=tmp_path / "replay.html"):
+        pass
+
+
 def test_a_recording_of_nothing_is_a_still_picture(tmp_path: Path) -> None:
     data = data_of(replay_html(Recording(BODIES), tmp_path / "replay.html"))
     assert data["duration_s"] == 0
