@@ -90,8 +90,8 @@ class Frame:
 class Camera:
     """Where the page looks from and to, in the world [m], z up."""
 
-    eye: Vector = (2.7, -2.2, 1.95)
-    target: Vector = (0.2, 0.0, 0.3)
+    eye: Vector = (2.65, -1.8, 1.65)
+    target: Vector = (0.35, 0.0, 0.3)
 
 
 @dataclass
