@@ -58,8 +58,8 @@ def browser() -> Iterator["Browser"]:
 
 @pytest.fixture
 def browser_page(browser: "Browser") -> Iterator["Page"]:
-    """A new page of 640 x 400 pixels; the test fails when a script on it raises."""
-    page = browser.new_page(viewport={"width": 640, "height": 400})
+    """A new page of 320 x 200 pixels; the test fails when a script on it raises."""
+    page = browser.new_page(viewport={"width": 320, "height": 200})
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     yield page

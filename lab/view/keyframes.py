@@ -143,8 +143,7 @@ def slerp(one: Floats, other: Floats, share: Floats) -> Floats:
     if cosine < 0:
         other, cosine = -other, -cosine
     whole = np.arccos(min(cosine, 1.0))
-    if whole < 1e-6:
-        mixed = one + share * (other - one)
-    else:
+    mixed = lerp(one, other, share)
+    if whole > 1e-6:
         mixed = np.sin((1 - share) * whole) * one + np.sin(share * whole) * other
     return np.asarray(mixed / np.linalg.norm(mixed, axis=1, keepdims=True))
