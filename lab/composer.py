@@ -106,6 +106,15 @@ def measure(crew: Crew, surveys: Surveys, on_move: Callable[[str, float], None] 
     return Durations(empty, loaded, process, steps * TIME_STEP)
 
 
+def try_grasp(crew: Crew, surveys: Surveys, grasp: Grasp) -> str | None:
+    """Carry a grasp out once in physics; None when the slice was lifted, else why it was not."""
+    with World() as world:
+        line = Line(world, crew, surveys.layout, 0)
+        line.scene.add_slice("slice 1", spots(crew.task.station(grasp.station))[0])
+        line.at(grasp.station, surveys)
+        return None if line.run(grasp.take("slice 1")) is Status.SUCCESS else grasp.reason
+
+
 def _timed(line: Line, skill: Skill) -> None:
     if line.run(skill) is not Status.SUCCESS:
         raise WorkFailed(f"measuring '{skill.name}': {skill.reason}")

@@ -27,10 +27,15 @@ def teach_one(
     name: str | None = None,
     out: Path | None = None,
 ) -> dict[str, Any]:
-    """One session in one sub-task of a task; the policy is kept. Returns the document of `lab teach --json`."""
+    """One session in one sub-task of a task; the policy is kept. Returns the document of `lab teach --json`.
+
+    A grasp counts as solved when its slice is also lifted in physics; `failure` says why it was not.
+    """
     from lab.advice.gates import GATES
+    from lab.composer import try_grasp
     from lab.learning.updates import UPDATES
     from lab.run import draw_value_map, prepare
+    from lab.skills import Grasp
     from lab.view.plots import learning_curves
 
     if learner is not None and learner not in UPDATES:
@@ -48,6 +53,8 @@ def teach_one(
     )
     result, files = lesson.result, {}
     assert result is not None
+    prepared.crew.policies[skill.name] = lesson.policy
+    failure = try_grasp(prepared.crew, prepared.surveys, skill) if isinstance(skill, Grasp) else None
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         files["learning_curve"] = str(out / "learning-curve.png")
@@ -71,7 +78,8 @@ def teach_one(
         "rejected_at_episode": result.rejected_at_episode,
         "optimal_steps": result.optimal_steps,
         "final_steps": result.final_steps,
-        "solved": result.solved,
+        "solved": result.solved and failure is None,
+        "failure": failure,
         "saved_as": lesson.policy.name,
         "files": files,
     }

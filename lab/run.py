@@ -270,8 +270,7 @@ def _write_files(prepared: Prepared, taught: Taught, report: Report, out: Path, 
         gantt(report.outcome.schedule, files["gantt"], predicted=predicted)
     else:
         del files["gantt"]
-    distinct = {lesson.policy.name: (name, lesson.policy) for name, lesson in reversed(taught.lessons.items())}
-    learning_curves(dict(reversed(distinct.values())), files["learning_curves"])
+    learning_curves(_curves(prepared, taught.lessons), files["learning_curves"])
     if not draw_value_map(prepared, taught.lessons, files["value_map"]):
         del files["value_map"]
     title = f"{prepared.task.title or prepared.task.name}: {prepared.toasts} toasts"
@@ -280,6 +279,17 @@ def _write_files(prepared: Prepared, taught: Taught, report: Report, out: Path, 
     _write_json(files["sequence"], _sequence_document(taught, report))
     report.wall_s = time.perf_counter() - began
     _write_json(files["run"], report.to_json() | {"schedule": report.outcome.schedule.to_json()})
+
+
+def _curves(prepared: Prepared, lessons: dict[str, Lesson]) -> dict[str, Policy]:
+    """Each policy once, under the skill that it was first found for."""
+    first = {lesson.policy.name: name for name, lesson in reversed(lessons.items())}
+    several = {name for name, problem in prepared.problems.items() if problem.mdp.starts}
+    return {
+        f"{name}, starts vary" if name in several else name: lesson.policy
+        for name, lesson in lessons.items()
+        if first[lesson.policy.name] == name
+    }
 
 
 def _sequence_document(taught: Taught, report: Report) -> dict[str, Any]:

@@ -70,8 +70,8 @@ class SessionResult:
     (episodes,) bool: at least one advised step; requests: episodes in which the learner asked; helped_steps:
     advised steps that were carried out; misleads and rejected_at_episode: see lab/advice/gates.py; final_steps:
     moves of the greedy path from the start, None if it does not reach the goal; solved: final_steps ==
-    optimal_steps, and the greedy path reaches the goal from each of the problem's `starts`; interrupted: stopped by
-    Ctrl-C, only finished episodes count.
+    optimal_steps, or, in a problem with several `starts`, the greedy path reaches the goal from each of them;
+    interrupted: stopped by Ctrl-C, only finished episodes count.
     """
 
     q: FloatArray
@@ -246,7 +246,7 @@ class _Session:
             rejected_at_episode=self.rejected_at,
             optimal_steps=self.optimal_steps,
             final_steps=final_steps,
-            solved=final_steps == self.optimal_steps and unreached(q, self.mdp) == (),
+            solved=not unreached(q, self.mdp) if self.mdp.starts else final_steps == self.optimal_steps,
             interrupted=interrupted,
         )
 
