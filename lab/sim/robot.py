@@ -51,6 +51,8 @@ def plan(
     rows = [_joints(np.array([np.interp(at, way, points[:, k]) for k in range(4)])) for at in ticks]
     joints = np.array(rows)
     joints[:, 5] = _unwound(joints[:, 5], None if before is None else float(before[5]))
+    if before is not None and abs(joints[0, 5] - before[5]) > pi:
+        joints = np.concatenate([_turned_back(before[5], joints[0], speed, acceleration), joints])
     velocities = np.gradient(joints, TIME_STEP, axis=0) if len(joints) > 1 else np.zeros_like(joints)
     hurry = float(np.max(np.abs(velocities) / kinematics.SPEED)) if len(joints) > 1 else 0.0
     if hurry > 1.0:
@@ -115,6 +117,15 @@ def _unwound(turns: Array, before: float | None) -> Array:
     while turns.min() < kinematics.LOWER[5]:
         turns = turns + 2 * pi
     return turns
+
+
+def _turned_back(turn: float, first: Array, speed: float, acceleration: float) -> Array:
+    """Rows (n, 6) that take the tool on the spot from `turn` [rad] by whole turns to `first` (6,): its range ends there."""
+    back = first[5] - turn
+    ticks = _trapezoid(abs(float(back)), speed / YAW_ARM, acceleration / YAW_ARM)
+    rows = np.repeat(first[None], len(ticks), axis=0)
+    rows[:, 5] = turn + np.sign(back) * ticks
+    return rows
 
 
 class Robot:
