@@ -194,6 +194,8 @@ class World:
 
     def set_joints(self, name: str, names: Sequence[str], positions: Sequence[float] | Array) -> None:
         """Put joints at `positions` at once, without physics: for building and surveying a scene."""
+        if not np.isfinite(positions).all():
+            raise WorkFailed(f"joint positions of '{name}' are not finite: {list(positions)}")
         entry = self._bodies[name]
         for joint, value in zip(names, positions, strict=True):
             self._call("resetJointState", entry.number, entry.joints[joint], float(value))
@@ -208,8 +210,8 @@ class World:
         force: float = 2000.0,
     ) -> None:
         """Set the position motors' targets [rad or m], with velocities fed forward; `force` [Nm or N] is the most they use."""
-        if not np.isfinite(positions).all():
-            raise WorkFailed(f"joint targets of '{name}' are not finite: {list(positions)}")
+        if not (np.isfinite(positions).all() and (velocities is None or np.isfinite(velocities).all())):
+            raise WorkFailed(f"joint targets of '{name}' are not finite: {list(positions)}, moving {velocities}")
         entry = self._bodies[name]
         self._call(
             "setJointMotorControlArray",
