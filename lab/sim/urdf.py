@@ -114,7 +114,7 @@ def _check_mesh(path: Path, name: str) -> None:
         vertices = np.array(rows, dtype=float)
     except (UnicodeDecodeError, ValueError) as error:
         raise BadInput(f"{path}: mesh '{name}' is not an OBJ file: {error}") from None
-    if len(vertices) < 4 or not np.isfinite(vertices).all():
+    if len(vertices) < 4 or vertices.shape[1] < 3 or not np.isfinite(vertices).all():
         raise BadInput(
-            f"{path}: mesh '{name}' has {len(vertices)} vertices or one that is not finite; wanted 4 or more"
+            f"{path}: mesh '{name}' has {len(vertices)} vertices or one that is not three finite numbers; wanted 4 or more"
         )
