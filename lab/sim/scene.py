@@ -184,7 +184,7 @@ def marker_offset_of_toaster() -> tuple[float, float]:
 
 
 def check_scene(task: Task) -> None:
-    """BadInput when a station's spots are out of the arm's reach, or slices would be swept by loaded transfers."""
+    """BadInput when spots are out of the arm's reach, a machine holds more than a slice, or transfers would sweep slices."""
     low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
     size = assets.SLICE
     highest = max(floor(s) for s in task.stations) + size[2]
@@ -193,6 +193,10 @@ def check_scene(task: Task) -> None:
             f"workspace.lower_m: the lowest tool height {low:.3f} m would sweep a carried slice through standing ones"
         )
     for station in task.stations:
+        if station.kind == "machine" and station.capacity > 1:
+            raise BadInput(
+                f"machine '{station.name}' has the capacity {station.capacity}: the machines of this cell hold 1 slice"
+            )
         for spot in spots(station):
             pose = spot.grasp()
             for at in (pose, ToolPose(pose.x, pose.y, low, pose.yaw)):
