@@ -1,0 +1,28 @@
+"""What the simulator's tests stand on: the shipped task, an empty world, and the arm alone in one."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from lab.sim.robot import Robot
+from lab.sim.world import World
+from lab.taskfile import Task, load
+
+
+@pytest.fixture(scope="session")
+def task() -> Task:
+    """The task that ships."""
+    return load("toast")
+
+
+@pytest.fixture
+def world() -> Iterator[World]:
+    """A world of its own."""
+    with World() as made:
+        yield made
+
+
+@pytest.fixture
+def robot(world: World) -> Robot:
+    """The arm, alone in `world`."""
+    return Robot(world, speed=0.5, acceleration=2.0, grip_force=25.0)

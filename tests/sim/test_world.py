@@ -1,0 +1,173 @@
+"""One PyBullet world: silent, repeatable, and closed to what would poison it."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lab.data import assets_folder
+from lab.errors import BadInput, WorkFailed
+from lab.sim.world import TIME_STEP, World
+from lab.view.frames import Frame
+
+SLICE = assets_folder() / "slice.urdf"
+TOASTER = assets_folder() / "toaster.urdf"
+HEADS = ("head_x", "head_z")
+WOOD = (0.7, 0.5, 0.3, 1.0)
+NAN, INF = float("nan"), float("inf")
+
+
+def tumble(world: World, steps: int = 120) -> Frame:
+    """A slice falls on its edge onto a turned cube while the applier's head moves past."""
+    world.box("cube", (0.1, 0.1, 0.1), (0, 0, 0.05), WOOD, yaw=0.3)
+    world.load("applier", assets_folder() / "applier.urdf", (0.3, 0, 0))
+    world.load("slice", SLICE, (0.01, 0.02, 0.2), yaw=0.2, fixed=False)
+    world.friction("slice", 0.6, spinning=0.001)
+    for step in range(steps):
+        world.drive("applier", HEADS, (0.04 * step / steps, 0.1 * step / steps))
+        world.step()
+    return world.frame()
+
+
+def test_nothing_is_said_on_the_terminal(root: Path) -> None:
+    talk = (
+        "from lab.sim.world import World\n"
+        "from lab.data import assets_folder\n"
+        "with World() as world:\n"
+        "    world.load('toaster', assets_folder() / 'toaster.urdf')\n"
+        "    world.load('robot', assets_folder() / 'robot.urdf', (1, 0, 0))\n"
+        "    world.gear('robot', 'finger_left', 'finger_right')\n"
+        "    world.step()\n"
+        "print('done')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", talk], cwd=root, capture_output=True, check=True)
+    assert (done.stdout, done.stderr) == (b"done\n", b"")
+
+
+def test_the_terminal_is_given_back(capfd: pytest.CaptureFixture[str]) -> None:
+    os.write(1, b"before\n")
+    with World() as world:
+        tumble(world, 5)
+        os.write(1, b"during\n")
+    os.write(1, b"after\n")
+    assert capfd.readouterr() == ("before\nduring\nafter\n", "")
+
+
+def test_the_same_calls_give_the_same_poses_to_the_last_bit() -> None:
+    with World() as one:
+        first = tumble(one)
+        with World() as other:  # beside the first one, and after it
+            assert tumble(other).poses == first.poses
+    with World() as third:
+        assert tumble(third).poses == first.poses
+
+
+def test_worlds_do_not_mix_and_can_be_closed_twice() -> None:
+    with World() as one, World() as other:
+        one.load("slice", SLICE, (0, 0, 1), fixed=False)
+        other.load("slice", SLICE, (5, 0, 1), fixed=False)
+        one.step()
+        assert (one.steps, other.steps) == (1, 0)
+        assert one.time_s == TIME_STEP
+        assert other.pose("slice")[0] == pytest.approx((5, 0, 1))
+        one.close()
+        one.close()
+        other.step()
+
+
+@pytest.mark.parametrize("bad", [NAN, INF, -INF])
+def test_targets_that_are_not_finite_are_refused(world: World, bad: float) -> None:
+    tumble(world, 2)
+    before = world.frame()
+    with pytest.raises(WorkFailed, match="joint targets of 'applier' are not finite"):
+        world.drive("applier", HEADS, (0.0, bad))
+    with pytest.raises(WorkFailed, match="joint targets of 'applier' are not finite"):
+        world.drive("applier", HEADS, (0.0, 0.0), (bad, 0.0))
+    with pytest.raises(WorkFailed, match="joint positions of 'applier' are not finite"):
+        world.set_joints("applier", HEADS, (bad, 0.0))
+    with pytest.raises(WorkFailed, match="body 'slice' cannot be put"):
+        world.put("slice", (0, bad, 0))
+    with pytest.raises(WorkFailed, match="body 'slice' cannot be put"):
+        world.put("slice", (0, 0, 0), (0, 0, 0, bad))
+    assert world.frame().poses == before.poses
+    world.step()
+    assert np.isfinite(list(world.frame().poses.values())).all()
+
+
+def test_a_bad_urdf_never_reaches_the_world(world: World, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.urdf"
+    bad.write_text(SLICE.read_text().replace('mass value="0.04"', 'mass value="-1"'))
+    with pytest.raises(BadInput, match=r"bad\.urdf: mass of link 'slice' is -1 kg"):
+        world.load("slice", bad)
+    with pytest.raises(BadInput, match="not a readable URDF"):
+        world.load("slice", tmp_path / "missing.urdf")
+    assert world.bodies() == ()
+    assert world.frame().poses == {}
+
+
+def test_what_falls_falls_and_rests(world: World) -> None:
+    world.box("table", (1, 1, 0.1), (0, 0, -0.05), WOOD)
+    world.load("slice", SLICE, (0, 0, 0.08), fixed=False)
+    world.step()
+    assert world.speed("slice") == pytest.approx(9.81 * TIME_STEP, rel=0.05)
+    assert not world.touching("slice", "table")
+    for _ in range(240):
+        world.step()
+    assert world.touching("slice", "table")
+    assert world.speed("slice") < 1e-3
+    assert world.pose("slice")[0] == pytest.approx((0, 0, 0.06), abs=1e-3)
+
+
+def test_mass_is_changed_with_its_inertia(world: World) -> None:
+    """Pushed by its own weight alone, a heavier slice falls alike; on a table it is as stable as before."""
+    world.box("table", (1, 1, 0.1), (0, 0, -0.05), WOOD)
+    world.load("slice", SLICE, (0, 0, 0.062), fixed=False)
+    world.mass("slice", 2.0)
+    for _ in range(240):
+        world.step()
+    assert world.pose("slice")[0] == pytest.approx((0, 0, 0.06), abs=1e-3)
+
+
+def test_distances_and_rays(world: World) -> None:
+    world.box("left", (0.2, 0.2, 0.2), (0, 0, 0.1), WOOD)
+    world.box("right", (0.2, 0.2, 0.2), (0.5, 0, 0.1), WOOD)
+    world.box("seen only", (0.2, 0.2, 0.2), (0.25, 0, 0.1), WOOD, solid=False)
+    world.step()
+    assert world.nearest("left", "right", 1.0) == pytest.approx(0.3, abs=1e-3)
+    assert world.nearest("left", "right", 0.1) == 0.1  # farther apart than asked for
+    hit = world.ray((-1, 0, 0.1), (1, 0, 0.1))
+    assert hit is not None
+    assert hit[0] == "left"
+    assert hit[1] == pytest.approx((-0.1, 0, 0.1), abs=1e-3)
+    assert world.ray((-1, 0, 0.5), (1, 0, 0.5)) is None
+
+
+def test_joints_are_set_driven_and_read(world: World) -> None:
+    world.load("applier", assets_folder() / "applier.urdf")
+    world.set_joints("applier", HEADS, (0.02, 0.05))
+    assert world.joints("applier", HEADS) == pytest.approx((0.02, 0.05))
+    base = world.pose("applier", "applier")[0]
+    before = world.pose("applier", "head")[0]
+    for _ in range(240):
+        world.drive("applier", HEADS, (-0.02, 0.08), force=300.0)
+        world.step()
+    assert world.joints("applier", HEADS) == pytest.approx((-0.02, 0.08), abs=1e-3)
+    assert world.pose("applier", "head")[0] - before == pytest.approx((-0.04, 0, 0.03), abs=2e-3)
+    assert base == pytest.approx((0, 0, 0))
+
+
+def test_the_viewer_sees_every_visible_link_where_it_is(world: World) -> None:
+    tumble(world, 3)
+    world.disc("spot", 0.02, 0.004, (1, 2, 3), (0, 1, 0, 1))
+    world.box("ghost", (0.1, 0.2, 0.3), (4, 5, 6), WOOD, solid=False)
+    bodies, poses = {body.name: body for body in world.bodies()}, world.frame().poses
+    assert set(bodies) == set(poses) == {"cube", "applier", "applier column", "applier head", "slice", "spot", "ghost"}
+    assert bodies["ghost"].shapes[0].size == (0.1, 0.2, 0.3)
+    assert bodies["spot"].shapes[0].size == (0.02, 0.004)
+    assert list(poses["spot"]) == [1, 2, 3, 0, 0, 0, 1]
+    assert list(poses["slice"][:3]) == world.pose("slice")[0].tolist()
+    assert list(poses["applier head"][:3]) == world.pose("applier", "head")[0].tolist()
+    assert world.frame().time_s == pytest.approx(3 * TIME_STEP)
