@@ -13,7 +13,7 @@ from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS
 if TYPE_CHECKING:
     from lab.policy import Policy
 
-ACTIONS = ("left", "right", "back", "forward", "down", "up", "turn right", "turn left")
+ACTIONS = ("left", "right", "backward", "forward", "down", "up", "turn right", "turn left")  # of the slice's axes
 GOAL = (2, 2, 0, 2)
 _SLOW = 0.6
 _BLEND_M = 0.008

@@ -22,7 +22,7 @@ from lab.vision import locate, see
 if TYPE_CHECKING:
     from lab.policy import Policy
 
-ACTIONS = ("back", "forward", "right", "left")  # -x, +x, -y, +y
+ACTIONS = ("left", "right", "backward", "forward")  # -x, +x, -y, +y: as the camera's picture shows them
 CLEARANCE_M = 0.006  # between a carried slice and a cube in its way
 SEEN_WITHIN_M = 0.008  # the camera must see the gripper this near to where the grid says it is
 CHECK_PIXELS = 320  # a side of the pictures taken on the way

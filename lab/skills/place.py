@@ -15,7 +15,7 @@ from lab.skills.surveys import NEAR_SHAPE, RELEASE_ABOVE, Surveys, near_pose
 if TYPE_CHECKING:
     from lab.policy import Policy
 
-ACTIONS = ("left", "right", "back", "forward", "down", "up")
+ACTIONS = ("left", "right", "backward", "forward", "down", "up")  # of the spot's axes
 GOAL = (2, 2, 0)
 NEAR_M = 0.012  # a slice this near to its spot stands on it
 _SLOW = 0.6

@@ -11,7 +11,7 @@ from lab.skills.surveys import INSERT_START, Surveys
 if TYPE_CHECKING:
     from lab.policy import Policy
 
-ACTIONS = ("back", "forward", "right", "left", "down", "up")  # -x, +x, -y, +y, -z, +z
+ACTIONS = ("left", "right", "backward", "forward", "down", "up")  # -x, +x, -y, +y, -z, +z, as seen from above
 _BLEND_M = 0.10
 
 

@@ -52,12 +52,20 @@ class _Marks:
 def direction_of(mdp: TabularMDP, action: int) -> int | None:
     """Where an action points in the picture, an index into DIRECTIONS; None when it leaves the picture's plane.
 
-    Axis 0 runs down and axis 1 to the right (a grid of one axis runs to the right).
+    Axis 0 runs down and axis 1 to the right (a grid of one axis runs to the right); on a map, axis 0 runs to the right
+    and axis 1 up.
     """
     axes = len(mdp.coverage_shape or mdp.shape)
     if mdp.n_actions != 2 * axes or action >= 4:
         return None
+    if is_map(mdp):
+        return (2, 3, 1, 0)[action]
     return action + 2 if axes == 1 else action
+
+
+def is_map(mdp: TabularMDP) -> bool:
+    """Whether axes 0 and 1 are the x and y of a map seen from above: the moves along axis 0 are called left and right."""
+    return len(mdp.shape) >= 2 and mdp.action_labels[:2] == ("left", "right")
 
 
 class TeachingPrompt:
@@ -186,8 +194,8 @@ def other_axes(request: AdviceRequest) -> list[str]:
 def draw(request: AdviceRequest, arrows: str = ARROWS, free: str = "·") -> Text | None:
     """The plane of axes 0 and 1 through the robot: R robot, G goal, # obstacle, x covered, an arrow.
 
-    The arrow stands in the cell that the learner itself would enter. None when the states are no grid. Columns run
-    to the right, rows down.
+    The arrow stands in the cell that the learner itself would enter. None when the states are no grid. Rows run down
+    and columns to the right, but a map is shown as from above: x to the right, y up.
     """
     mdp = request.mdp
     if not (mdp.shape or mdp.coverage_shape):
@@ -200,7 +208,7 @@ def draw(request: AdviceRequest, arrows: str = ARROWS, free: str = "·") -> Text
     if direction is not None and there != here and plane[there] in (free, "x"):
         plane[there] = arrows[direction]
     plane[here] = "R"
-    return _coloured(plane, arrows, bool(mdp.coverage_shape))
+    return _coloured(plane.T[::-1] if is_map(mdp) else plane, arrows, bool(mdp.coverage_shape))
 
 
 def _place(cell: tuple[int, ...]) -> tuple[int, int]:

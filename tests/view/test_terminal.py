@@ -160,7 +160,7 @@ def test_answers(line: str, action: int | None) -> None:
 def test_labels_come_before_directions() -> None:
     labels = ("left", "right", "back", "forward", "down", "up")
     mdp = grid((2, 2, 2), np.zeros((2, 2, 2), bool), (0, 0, 0), (1, 1, 1), action_labels=labels)
-    assert [understand(word, mdp) for word in ("up", "l", "b", "↑", "^")] == [5, 0, 2, 0, 0]
+    assert [understand(word, mdp) for word in ("up", "l", "b", "↑", "^")] == [5, 0, 2, 3, 3]
     assert [understand(word, space()) for word in ("up", "r", "+", "-z")] == [
         0,
         3,
@@ -295,3 +295,13 @@ def test_ctrl_c_keeps_what_was_learned() -> None:
         result = teach(prompt)
     assert (result.interrupted, len(result.steps), result.helped_steps) == (True, 3, 2)
     assert result.visits.sum() > 0
+
+
+def test_a_map_is_seen_from_above_with_y_upwards() -> None:
+    labels = ("left", "right", "backward", "forward")
+    mdp = grid((3, 2), np.zeros((3, 2), bool), (0, 0), (2, 1), action_labels=labels)
+    request = AdviceRequest(mdp, np.zeros((6, 4)).tolist(), mdp.start, 30, 1, 3, None, None, None)  # it would go forward
+    picture = draw(request)
+    assert picture is not None
+    assert picture.plain.splitlines()[:2] == [" ↑ · G", " R · ·"]
+    assert [understand(word, mdp) for word in ("right", "→", "forward", "↑")] == [1, 1, 3, 3]
