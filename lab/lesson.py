@@ -35,7 +35,7 @@ def teach_one(
     from lab.composer import try_grasp
     from lab.learning.updates import UPDATES
     from lab.run import draw_value_map, prepare
-    from lab.skills import Grasp
+    from lab.skills import Grasp, Insert
     from lab.view.plots import learning_curves
 
     if learner is not None and learner not in UPDATES:
@@ -59,7 +59,8 @@ def teach_one(
         out.mkdir(parents=True, exist_ok=True)
         files["learning_curve"] = str(out / "learning-curve.png")
         learning_curves({skill.name: lesson.policy}, out / "learning-curve.png")
-        if skill.subtask == "insert" and draw_value_map(prepared, {skill.name: lesson}, out / "insert-value-map.png"):
+        if isinstance(skill, Insert):
+            draw_value_map(skill, lesson.policy, out / "insert-value-map.png")
             files["value_map"] = str(out / "insert-value-map.png")
     return {
         "subtask": skill.subtask,

@@ -255,12 +255,14 @@ def _write_files(prepared: Prepared, taught: Taught, report: Report, out: Path, 
     """The pictures, the replay and the two JSON files."""
     from lab.view.meshcat import replay_html
     from lab.view.plots import gantt, learning_curves
+    from lab.vision import write_picture
 
     out.mkdir(parents=True, exist_ok=True)
     files = {
         "gantt": out / "gantt.png",
         "learning_curves": out / "learning-curves.png",
         "value_map": out / "insert-value-map.png",
+        "overhead": out / "overhead.png",
         "replay": out / "replay.html",
         "sequence": out / "sequence.json",
         "run": out / "run.json",
@@ -271,8 +273,12 @@ def _write_files(prepared: Prepared, taught: Taught, report: Report, out: Path, 
     else:
         del files["gantt"]
     learning_curves(_curves(prepared, taught.lessons), files["learning_curves"])
-    if not draw_value_map(prepared, taught.lessons, files["value_map"]):
-        del files["value_map"]
+    insert = next((skill for skill in prepared.crew.skills.values() if isinstance(skill, Insert)), None)
+    if insert is None:
+        del files["value_map"], files["overhead"]
+    else:
+        draw_value_map(insert, taught.lessons[insert.name].policy, files["value_map"])
+        write_picture(files["overhead"], insert.picture)
     title = f"{prepared.task.title or prepared.task.name}: {prepared.toasts} toasts"
     replay_html(report.recording, files["replay"], title=title)
     report.files = {name: str(path) for name, path in files.items()}
@@ -305,30 +311,24 @@ def _sequence_document(taught: Taught, report: Report) -> dict[str, Any]:
     }
 
 
-def draw_value_map(prepared: Prepared, lessons: dict[str, Lesson], path: Path) -> bool:
-    """The insert task's values over the camera picture, with the learned way; False when the task has no insert."""
+def draw_value_map(insert: Insert, policy: Policy, path: Path) -> None:
+    """The insert task's values over the camera's picture, with the learned way."""
     from lab.mdp import greedy_path
     from lab.view.plots import cell_corners, value_map
 
-    for name, skill in prepared.crew.skills.items():
-        if not isinstance(skill, Insert):
-            continue
-        mdp, q = skill.problem.mdp, lessons[name].policy.q
-        states, _, _ = greedy_path(q, mdp, mdp.n_states)
-        cells = [mdp.state_cell(state) for state in states]
-        blocked = (mdp.terminal & ~mdp.goal).reshape(mdp.shape)
-        value_map(
-            q.max(axis=1).reshape(mdp.shape),
-            skill.picture,
-            path,
-            corners=cell_corners(skill.seen.view),
-            route=[(cell[0], cell[1]) for cell in cells],
-            blocked=blocked,
-            start=skill.seen.start,
-            goal=skill.seen.goal,
-        )
-        return True
-    return False
+    mdp = insert.problem.mdp
+    states, _, _ = greedy_path(policy.q, mdp, mdp.n_states)
+    cells = [mdp.state_cell(state) for state in states]
+    value_map(
+        policy.q.max(axis=1).reshape(mdp.shape),
+        insert.picture,
+        path,
+        corners=cell_corners(insert.seen.view),
+        route=[(cell[0], cell[1]) for cell in cells],
+        blocked=(mdp.terminal & ~mdp.goal).reshape(mdp.shape),
+        start=insert.seen.start,
+        goal=insert.seen.goal,
+    )
 
 
 def _write_json(path: Path, document: dict[str, Any]) -> None:
