@@ -13,7 +13,7 @@ from lab.sim.world import World
 
 def test_the_committed_files_are_what_the_parameters_make(tmp_path: Path) -> None:
     written = assets.write(tmp_path)
-    committed = {path.name: path.read_text() for path in assets_folder().iterdir()}
+    committed = {path.name: path.read_text() for path in assets_folder().iterdir() if path.is_file()}
     assert sorted(committed) == sorted(path.name for path in written), "a stray or a missing file in assets/"
     changed = [path.name for path in written if path.read_text() != committed[path.name]]
     assert not changed, "run lab.sim.assets.write(assets_folder()) and commit"
