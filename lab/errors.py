@@ -5,9 +5,15 @@ from difflib import get_close_matches
 
 
 class LabError(Exception):
-    """Any failure the lab explains in one line; `exit_code` is what a command ends with."""
+    """Any failure the lab explains in one line; `exit_code` is what a command ends with.
+
+    What cannot be printed, such as a line break or an escape code in a bad value, is shown as its escape.
+    """
 
     exit_code = 1
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__("".join(c if c.isprintable() else ascii(c)[1:-1] for c in message))
 
 
 class BadInput(LabError):
@@ -27,4 +33,4 @@ def unknown(kind: str, value: object, known: Iterable[str], where: str) -> BadIn
     names = sorted(known)
     near = get_close_matches(str(value), names, n=1)
     hint = f" did you mean '{near[0]}'?" if near else ""
-    return BadInput(f"unknown {kind} '{value}' ({where}):{hint} known: {', '.join(names)}")
+    return BadInput(f"unknown {kind} '{value}' ({where}):{hint} known: {', '.join(names) or 'none'}")

@@ -23,6 +23,11 @@ def test_nothing_near_gives_no_hint() -> None:
     assert str(unknown("gate", "zzz", ["ccrl"], "--gate")) == "unknown gate 'zzz' (--gate): known: ccrl"
 
 
+def test_what_cannot_be_printed_is_escaped() -> None:
+    message = str(unknown("task", "a\nb\x1b[31m\udcff é", ["toast"], "TASK"))
+    assert message == r"unknown task 'a\nb\x1b[31m\udcff é' (TASK): known: toast"
+
+
 PRINTABLE = st.text(st.characters(exclude_categories=("C", "Z")), min_size=1)
 
 
@@ -31,4 +36,4 @@ def test_any_value_is_reported_in_one_line_with_all_that_is_known(value: str, kn
     message = str(unknown("task", value, known, "TASK"))
     assert len(message.splitlines()) == 1
     assert f"'{value}' (TASK)" in message
-    assert message.endswith(f"known: {', '.join(sorted(known))}")
+    assert message.endswith(f"known: {', '.join(sorted(known)) or 'none'}")
