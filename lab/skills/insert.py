@@ -17,7 +17,7 @@ from lab.skills.place import let_go, release_pose
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
 from lab.skills.surveys import Surveys, camera_view, overhead_camera
 from lab.taskfile import Task
-from lab.vision import locate, see
+from lab.vision import find_markers, locate, see
 
 if TYPE_CHECKING:
     from lab.policy import Policy
@@ -91,6 +91,7 @@ class Insert(Skill):
         if name is None:
             raise SkillFailed(f"nothing in the gripper to insert at '{self.station}'")
         self.deviations_m = []
+        yield from self._to_start(bench)
         self._same_picture(bench)
         for state in learned_path(policy, mdp, mdp.start):
             x, y = self.seen.view.centre((mdp.state_cell(state)[0], mdp.state_cell(state)[1]))
@@ -110,24 +111,35 @@ class Insert(Skill):
         spot = spots(task.station(self.station))[0]
         return replace(spot, x=marker.world_m[0], y=marker.world_m[1])
 
+    def _to_start(self, bench: Bench) -> Iterator[None]:
+        """Where the tool is not at the grid's start, as when trying again: over everything and down to it."""
+        task, tool = self.surveys.task, bench.scene.robot.tool()
+        x, y = self.seen.view.centre(self.seen.start)
+        if hypot(tool.x - x, tool.y - y, tool.z - task.insert.height_m) < task.insert.cell_m:
+            return
+        grid = task.workspace
+        over = grid.lower_m[2] + (grid.shape[2] - 0.5) * grid.cell_m[2]
+        poses = [ToolPose(tool.x, tool.y, over, 0.0), ToolPose(x, y, over), ToolPose(x, y, task.insert.height_m)]
+        for pose in poses:
+            yield from bench.scene.robot.follow([pose])
+
     def _same_picture(self, bench: Bench) -> None:
-        """A new snapshot must show the cubes and the toaster where they were learned around."""
-        now = see(overhead_camera(self.surveys.task).picture(bench.scene.world), self.seen.view)
-        for before in self.seen.markers:
-            if before.kind == "gripper":
-                continue
-            moved = min(
-                (
-                    hypot(m.world_m[0] - before.world_m[0], m.world_m[1] - before.world_m[1])
-                    for m in now.markers
-                    if m.kind == before.kind
-                ),
-                default=np.inf,
-            )
+        """A new snapshot must show the cubes and the toaster where they were learned around, and no others."""
+        view = self.seen.view
+        now, _ = find_markers(overhead_camera(self.surveys.task).picture(bench.scene.world), view)
+        for before in (marker for marker in self.seen.markers if marker.kind != "gripper"):
+            x, y = before.world_m
+            moved = min((hypot(m.world_m[0] - x, m.world_m[1] - y) for m in now if m.kind == before.kind), default=None)
+            if moved is None:
+                raise SkillFailed(f"the camera does not see the {before.kind} that '{self.name}' was learned with")
             if moved > SEEN_WITHIN_M:
                 raise SkillFailed(
-                    f"the camera sees a {before.kind} moved by {moved:.3f} m since '{self.name}' was learned"
+                    f"the camera sees the {before.kind} at ({x:.3f}, {y:.3f}) m moved by {moved:.3f} m "
+                    f"since '{self.name}' was learned"
                 )
+        count, known = (sum(m.kind == "obstacle" and view.holds(m.cell) for m in ms) for ms in (now, self.seen.markers))
+        if count > known:
+            raise SkillFailed(f"the camera sees {count} obstacles, '{self.name}' was learned with {known}")
 
     def _check_camera(self, bench: Bench, x: float, y: float) -> None:
         """Compare where the camera sees the gripper with where the grid has it."""
