@@ -1,0 +1,159 @@
+"""What the skills' tests stand on: one survey of the shipped cell, benches set up for a skill, and optimal policies."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import numpy as np
+import pytest
+
+from lab.mdp import optimal_values, shortest_steps
+from lab.policy import Policy
+from lab.sim import assets
+from lab.sim.kinematics import ToolPose
+from lab.sim.scene import GRASP_DEPTH, Layout, Scene, Spot, spots
+from lab.sim.world import World
+from lab.skills import Butter, Grasp, Insert, Place, Skill, Transfer
+from lab.skills.skill import Bench, Problem, Status
+from lab.skills.surveys import INSERT_START, Surveys
+from lab.taskfile import Task, load
+
+SLICE = "slice 1"
+
+
+@pytest.fixture(scope="session")
+def task() -> Task:
+    """The shipped task with everything where the file says, and a brisk butter applier."""
+    shipped = load("toast")
+    still = tuple(o.model_copy(update={"area": (0.0, 0.0)}) for o in shipped.obstacles)
+    brisk = {"head_speed_m_s": 0.2, "dwell_s": 0.05}
+    stations = tuple(s.model_copy(update=brisk) if s.process == "butter" else s for s in shipped.stations)
+    return shipped.model_copy(update={"obstacles": still, "stations": stations})
+
+
+@pytest.fixture(scope="session")
+def layout(task: Task) -> Layout:
+    """Every cube at its place, no slices."""
+    return Layout(tuple(o.position_m for o in task.obstacles), ())
+
+
+@pytest.fixture(scope="session")
+def surveys(task: Task, layout: Layout) -> Surveys:
+    """One set of surveys for all tests."""
+    return Surveys(task, layout)
+
+
+@pytest.fixture(scope="session")
+def make() -> dict[str, Callable[[], Skill]]:
+    """A fresh skill of every kind."""
+    return {
+        "transfer": lambda: Transfer("toaster_buffer", "plate", loaded=False),
+        "grasp": lambda: Grasp("plate").take(SLICE),
+        "insert": lambda: Insert("toaster"),
+        "butter": lambda: Butter("butter_applier").on(SLICE),
+        "place": lambda: Place("toaster_buffer"),
+    }
+
+
+@pytest.fixture(scope="session")
+def optimal() -> Callable[[Problem], Policy]:
+    """The policy that always takes a shortest way."""
+
+    def make_policy(problem: Problem) -> Policy:
+        return _policy(problem, optimal_values(problem.mdp, 0.99))
+
+    return make_policy
+
+
+@pytest.fixture(scope="session")
+def clueless() -> Callable[[Problem], Policy]:
+    """The policy that has learned nothing."""
+
+    def make_policy(problem: Problem) -> Policy:
+        return _policy(problem, np.zeros((problem.mdp.n_states, problem.mdp.n_actions)))
+
+    return make_policy
+
+
+def _policy(problem: Problem, q: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Policy:
+    mdp = problem.mdp
+    steps = shortest_steps(mdp)
+    return Policy(
+        name=f"{problem.name} policy",
+        subtask=problem.subtask,
+        task="toast",
+        q=q,
+        visits=np.zeros(q.shape, np.int64),
+        action_labels=mdp.action_labels,
+        shape=mdp.shape,
+        start=mdp.start,
+        signature=mdp.signature,
+        learner={},
+        gate={},
+        advisor="none",
+        seed=0,
+        curve=[],
+        guided=[],
+        helped_steps=0,
+        requests=0,
+        optimal_steps=steps,
+        final_steps=steps,
+        solved=True,
+        created="2024-05-01T12:00:00+00:00",
+        versions={},
+    )
+
+
+@pytest.fixture
+def stage(surveys: Surveys, layout: Layout) -> Iterator[Callable[..., Bench]]:
+    """A bench on which a set-up skill can begin: `stage(skill, layout=..., task=..., off=...)`."""
+    with ExitStack() as worlds:
+
+        def make_bench(
+            skill: Skill,
+            layout: Layout = layout,
+            task: Task = surveys.task,
+            off: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        ) -> Bench:
+            scene = Scene(worlds.enter_context(World()), task, 0, layout)
+            bench = Bench(scene)
+            if isinstance(skill, Grasp | Butter):
+                scene.add_slice(SLICE, spots(task.station(skill.station))[0], off)
+                for _ in range(60):
+                    scene.world.step()
+            if isinstance(skill, Transfer):
+                _begin(bench, surveys.approach(skill.origin), holding=skill.loaded)
+            elif isinstance(skill, Insert):
+                high = surveys.approach(INSERT_START)
+                _begin(bench, ToolPose(high.x, high.y, task.insert.height_m, 0.0), holding=True)
+            elif isinstance(skill, Grasp | Place):
+                _begin(bench, surveys.approach(skill.station), holding=isinstance(skill, Place))
+            return bench
+
+        yield make_bench
+
+
+def _begin(bench: Bench, pose: ToolPose, *, holding: bool) -> None:
+    """Put the arm at a pose, with a slice in its fingers or without."""
+    robot, world = bench.scene.robot, bench.scene.world
+    assert robot.stand(pose)
+    if not holding:
+        robot.open_at_once()
+        return
+    robot.open_at_once(assets.SLICE[1] / 2 + 0.0005)
+    bench.scene.add_slice(SLICE, Spot(pose.x, pose.y, pose.z + GRASP_DEPTH - assets.SLICE[2], pose.yaw))
+    for _ in robot.grip():
+        world.step()
+    bench.held = bench.taken = SLICE
+
+
+@pytest.fixture(scope="session")
+def run() -> Callable[[Skill, Bench, Policy], Status]:
+    """Carry a skill out to its end in physics."""
+
+    def carry_out(skill: Skill, bench: Bench, policy: Policy) -> Status:
+        skill.start(bench, policy)
+        while skill.step() is Status.RUNNING:
+            bench.scene.world.step()
+        return skill.status
+
+    return carry_out

@@ -1,0 +1,172 @@
+"""Surveys: made once, true to the scene, and changed exactly where the scene changed."""
+
+import numpy as np
+import pytest
+
+from lab.crew import Crew
+from lab.errors import BadInput
+from lab.sim.assets import SLICE as SIZE
+from lab.sim.scene import GRASP_DEPTH, Layout
+from lab.skills.surveys import INSERT_START, NEAR_SHAPE, NEAR_YAWS, Surveys, camera_view, overhead_camera
+from lab.taskfile import Obstacle, Task
+from lab.vision import see
+
+
+def signatures(surveys: Surveys) -> dict[str, str]:
+    crew = Crew.of(surveys.task, 2)
+    return {name: skill.setup(surveys).mdp.signature for name, skill in crew.skills.items()}
+
+
+@pytest.fixture(scope="module")
+def before(surveys: Surveys) -> dict[str, str]:
+    return signatures(surveys)
+
+
+def with_obstacle_moved(surveys: Surveys, name: str, dx: float, dy: float) -> Surveys:
+    places = []
+    for obstacle, (x, y) in zip(surveys.task.obstacles, surveys.layout.obstacles, strict=True):
+        places.append((x + dx, y + dy) if obstacle.name == name else (x, y))
+    return Surveys(surveys.task, Layout(tuple(places), ()))
+
+
+def changed(before: dict[str, str], after: dict[str, str]) -> set[str]:
+    assert before.keys() == after.keys()
+    return {name for name in before if before[name] != after[name]}
+
+
+def test_the_same_scene_gives_the_same_signatures(surveys: Surveys, before: dict[str, str]) -> None:
+    assert changed(before, signatures(Surveys(surveys.task, surveys.layout))) == set()
+
+
+@pytest.mark.parametrize(
+    ("name", "dx", "dy"), [("cubes A", 0.05, 0.0), ("cubes A", 0.0, -0.05), ("tower left", -0.12, 0.0)]
+)
+def test_a_moved_obstacle_changes_exactly_the_problems_whose_cells_it_changes(
+    name: str, dx: float, dy: float, surveys: Surveys, before: dict[str, str]
+) -> None:
+    moved = with_obstacle_moved(surveys, name, dx, dy)
+    found = changed(before, signatures(moved))
+    expected = set()
+    for loaded in (False, True):
+        if not np.array_equal(surveys.workspace(loaded).blocked, moved.workspace(loaded).blocked):
+            expected |= {n for n in before if n.startswith("transfer") and n.endswith("with slice") is loaded}
+    if name == "cubes A":  # the camera sees it; the tower stands outside of its grid
+        expected.add("insert at toaster")
+    assert found == expected
+    assert not any(n.startswith(("grasp", "butter", "place")) for n in found)
+    assert found
+
+
+def test_a_nudge_within_the_cells_changes_nothing(surveys: Surveys, before: dict[str, str]) -> None:
+    assert changed(before, signatures(with_obstacle_moved(surveys, "cubes A", 0.001, 0.001))) == set()
+
+
+def test_a_moved_station_changes_its_own_transfers(task: Task, layout: Layout, before: dict[str, str]) -> None:
+    stations = tuple(
+        s.model_copy(update={"pose": (0.42, -0.68, 0.0)}) if s.name == "butter_buffer" else s for s in task.stations
+    )
+    after = signatures(Surveys(task.model_copy(update={"stations": stations}), layout))
+    found = changed(before, after)
+    assert "insert at toaster" not in found
+    assert not any(n.startswith(("grasp", "butter at", "place")) for n in found)
+    assert {n for n in before if n.startswith("transfer") and " butter_buffer" in n} <= found
+
+
+def test_every_survey_is_made_once(surveys: Surveys) -> None:
+    assert surveys.workspace(True) is surveys.workspace(True)
+    assert surveys.around("plate", False) is surveys.around("plate", False)
+    assert surveys.picture() is surveys.picture()
+    assert surveys.layout.slices == ()
+
+
+def test_cells_are_tool_poses_in_the_work_space(surveys: Surveys, task: Task) -> None:
+    grid = task.workspace
+    first, last = (
+        surveys.cell_pose((0, 0, 0)),
+        surveys.cell_pose((grid.shape[0] - 1, grid.shape[1] - 1, grid.shape[2] - 1)),
+    )
+    for low, size, count, one, other in zip(
+        grid.lower_m, grid.cell_m, grid.shape, (first.x, first.y, first.z), (last.x, last.y, last.z), strict=True
+    ):
+        assert one == pytest.approx(low + size / 2)
+        assert other == pytest.approx(low + (count - 0.5) * size)
+
+
+def test_a_station_is_docked_at_from_a_free_cell_beside_it(surveys: Surveys, task: Task) -> None:
+    for place in [s.name for s in task.stations] + [INSERT_START]:
+        for loaded in (False, True):
+            cell = surveys.dock(place, loaded)
+            pose, approach = surveys.cell_pose(cell), surveys.approach(place)
+            assert not surveys.workspace(loaded).blocked[cell]
+            assert np.hypot(pose.x - approach.x, pose.y - approach.y) <= 1.6 * max(task.workspace.cell_m[:2])
+
+
+def test_around_a_slice_the_goal_is_free_and_what_stands_beside_blocks(surveys: Surveys) -> None:
+    empty = surveys.around("plate", False)
+    assert empty.causes.shape == (*NEAR_SHAPE, NEAR_YAWS)
+    assert not empty.blocked[2, 2, 0, NEAR_YAWS // 2]
+    assert set(np.unique(empty.causes)) >= {"slice behind", "slice in front"}
+    alone = surveys.around("toaster", False)  # a machine holds one slice
+    assert set(np.unique(alone.causes)) == {"", "the slice"}
+    assert all(empty.blocked[:, 0, 0, :].ravel())  # 2.4 cm aside a finger would stand in a slice
+    loaded = surveys.around("plate", True)
+    assert loaded.causes.shape == NEAR_SHAPE
+    assert not loaded.blocked[2, 2, 0]
+    assert not loaded.blocked[:, :, -1].any()
+
+
+def test_what_the_camera_sees_is_where_it_stands(surveys: Surveys, task: Task) -> None:
+    seen = see(surveys.picture(), camera_view(task))
+    kinds = [m.kind for m in seen.markers]
+    assert kinds.count("obstacle") == 3
+    for marker in seen.markers:
+        if marker.kind == "gripper":
+            at = task.insert.start_m
+        elif marker.kind == "toaster":
+            at = task.station("toaster").pose[:2]
+        else:
+            at = min(surveys.layout.obstacles, key=lambda p: np.hypot(*np.subtract(p, marker.world_m)))
+        assert np.hypot(*np.subtract(at, marker.world_m)) < 2e-3
+    assert surveys.picture().shape == (task.camera.pixels, task.camera.pixels, 3)
+    assert overhead_camera(task, 100).width == 100
+
+
+def test_a_turned_toaster_is_seen_in_its_place_too(task: Task) -> None:
+    stations = tuple(
+        s.model_copy(update={"pose": (0.9, 0.1, 0.7)}) if s.name == "toaster" else s for s in task.stations
+    )
+    bare = task.model_copy(update={"stations": stations, "obstacles": ()})
+    seen = see(Surveys(bare, Layout((), ())).picture(), camera_view(bare))
+    toaster = next(m for m in seen.markers if m.kind == "toaster")
+    assert toaster.world_m == pytest.approx((0.9, 0.1), abs=2e-3)
+
+
+def test_cubes_of_several_heights_in_the_picture_are_refused(task: Task) -> None:
+    made = (
+        Obstacle(name="low", position_m=(0.725, -0.075), cubes=2),
+        Obstacle(name="high", position_m=(0.775, 0.075), cubes=3),
+        Obstacle(name="far", position_m=(0.2, 0.9), cubes=9),
+    )
+    with pytest.raises(
+        BadInput, match=r"obstacles in the camera's grid must be equally high, got \[0\.122, 0\.182\] m"
+    ):
+        camera_view(task.model_copy(update={"obstacles": made}))
+    camera_view(task.model_copy(update={"obstacles": made[1:]}))
+
+
+def test_a_start_out_of_reach_is_refused(task: Task, layout: Layout) -> None:
+    far = task.insert.model_copy(update={"start_m": (1.6, 0.0)})
+    with pytest.raises(BadInput, match=r"insert\.start_m \[1\.6, 0\.0\]: out of the arm's reach"):
+        Surveys(task.model_copy(update={"insert": far}), layout).picture()
+
+
+def test_a_scene_that_cannot_be_is_refused_at_once(task: Task, layout: Layout) -> None:
+    stations = tuple(
+        s.model_copy(update={"pose": (1.5, 0.0, 0.0)}) if s.name == "toaster" else s for s in task.stations
+    )
+    with pytest.raises(BadInput, match="station 'toaster' is out of reach"):
+        Surveys(task.model_copy(update={"stations": stations}), layout)
+
+
+def test_the_carried_slice_hangs_above_the_standing_ones(surveys: Surveys) -> None:
+    assert surveys.approach("plate").z + GRASP_DEPTH - SIZE[2] > 0.012 + SIZE[2] + 0.01
