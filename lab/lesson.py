@@ -204,14 +204,12 @@ def show(what: str, toasts: int, seed: int, port: int, tell: Callable[[str, str]
         raise BadInput(f"{toasts} toasts (--toasts): allowed are 1 to {MAX_TOASTS}")
     import numpy as np
 
-    from lab.recorder import Recorder
-    from lab.sim.scene import Scene, check_scene, draw_layout
-    from lab.sim.world import World
+    from lab.recorder import show_scene
+    from lab.sim.scene import check_scene, draw_layout
 
     check_scene(task)
-    with World() as world, LiveView(port) as live:
-        Scene(world, task, toasts, draw_layout(task, toasts, np.random.default_rng([seed, 1])))
-        Recorder(world, toasts, live).take()
+    with LiveView(port) as live:
+        show_scene(task, toasts, draw_layout(task, toasts, np.random.default_rng([seed, 1])), live)
         tell(live.url, live.hint)
         _wait()
 

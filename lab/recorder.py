@@ -4,7 +4,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from lab.sim import assets
+from lab.sim.scene import Layout, Scene
 from lab.sim.world import TIME_STEP, World
+from lab.taskfile import Task
 from lab.view.frames import Body, Frame, Recording, Shape
 
 FRAME_EVERY = 24  # physics steps: ten frames a simulated second
@@ -68,6 +70,13 @@ class Recorder:
     def _show(self, name: str, number: int) -> None:
         self._shown[name] = number
         self._pending[name] = True
+
+
+def show_scene(task: Task, toasts: int, layout: Layout, viewer: Viewer) -> None:
+    """Show a viewer the scene before anything has happened in it."""
+    with World() as world:
+        Scene(world, task, toasts, layout)
+        Recorder(world, toasts, viewer).take()
 
 
 def _extras(number: int) -> list[Body]:
