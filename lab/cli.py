@@ -118,7 +118,8 @@ def run(
     from contextlib import ExitStack
 
     from lab import taskfile
-    from lab.run import check_out, prepare
+    from lab.report import check_out
+    from lab.run import prepare
     from lab.run import run as run_task
     from lab.view.meshcat import LiveView
     from lab.view.progress import RunProgress
@@ -167,7 +168,7 @@ def teach(
     """One teaching session: learn one sub-task with an advisor, and keep the policy."""
     from lab import taskfile
     from lab.lesson import teach_one
-    from lab.run import check_out
+    from lab.report import check_out
     from lab.view.progress import RunProgress
     from lab.view.summary import lesson_summary
 

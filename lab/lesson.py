@@ -34,7 +34,8 @@ def teach_one(
     from lab.advice.gates import GATES
     from lab.composer import try_grasp
     from lab.learning.updates import UPDATES
-    from lab.run import draw_value_map, prepare
+    from lab.report import draw_value_map
+    from lab.run import prepare
     from lab.skills import Grasp, Insert
     from lab.view.plots import learning_curves
 

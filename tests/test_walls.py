@@ -29,6 +29,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.teaching", "lab.crew"),
     ("lab.composer", "lab.listener"),
     ("lab.view",),
+    ("lab.report",),
     ("lab.run", "lab.studies", "lab.gym"),
     ("lab.lesson",),
     ("lab.cli",),
