@@ -61,7 +61,7 @@ class Policy:
             raise BadInput(f"policy '{str(self.name)[:MAX_NAME_LENGTH]}': {reason}")
 
     def _what_does_not_fit(self) -> str | None:
-        if not self.name.strip() or len(self.name) > MAX_NAME_LENGTH or not self.name.isprintable():
+        if not is_name(self.name):
             return f"its name must have 1 to {MAX_NAME_LENGTH} printable characters"
         if self.q.ndim != 2 or 0 in self.q.shape:
             return f"table q has shape {self.q.shape}, allowed (states, actions)"
@@ -125,6 +125,11 @@ class Policy:
             created=datetime.now(UTC).isoformat(timespec="microseconds"),
             versions=_versions(),
         )
+
+
+def is_name(name: str) -> bool:
+    """Whether a policy may have this name: 1 to 100 printable characters, not only blanks."""
+    return bool(name.strip()) and len(name) <= MAX_NAME_LENGTH and name.isprintable()
 
 
 def _versions() -> dict[str, str]:

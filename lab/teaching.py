@@ -12,17 +12,18 @@ from lab.errors import WorkFailed
 from lab.learning.session import Event, SessionResult, run_session, unreached
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, greedy_path
-from lab.policy import Policy
+from lab.policy import MAX_NAME_LENGTH, Policy
 from lab.skills.skill import Problem
 from lab.taskfile import Subtask
 from lab.toolbox import Toolbox
 
 MAX_SESSIONS = 6  # further sessions go on from the table of the one before
+_LONGEST_PROBLEM = MAX_NAME_LENGTH - 20  # characters of a policy's name; the rest is for its signature and state
 Source = Literal["learned", "reused", "continued"]
 
 
-class Interrupted(Exception):
-    """Ctrl-C: what was learned so far has been kept."""
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C: what was learned so far has been kept, and the text says so."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ class Teacher:
             if result.interrupted or fits(result.q, problem.mdp):
                 break
         assert whole is not None
-        policy = self._policy(whole, problem, learner, gate, task, name)
+        policy = self._policy(whole, problem, learner, gate, task, name or self._free_name(problem, whole.solved))
         self.toolbox.save(policy)
         if whole.interrupted:
             raise Interrupted(
@@ -94,6 +95,12 @@ class Teacher:
             )
         return Lesson(policy, "learned" if unfinished is None else "continued", whole)
 
+    def _free_name(self, problem: Problem, solved: bool) -> str:
+        """The name to save under; what did not get finished never replaces what is."""
+        name = f"{problem.name[:_LONGEST_PROBLEM]} {problem.mdp.signature[:8]}"
+        kept = None if solved else self.toolbox.find(problem.subtask, problem.mdp.signature, name)
+        return f"{name} unfinished" if kept is not None and kept.solved else name
+
     def _policy(
         self,
         result: SessionResult,
@@ -101,12 +108,12 @@ class Teacher:
         learner: LearnerSettings,
         gate: GateSettings,
         task: str,
-        name: str | None,
+        name: str,
     ) -> Policy:
         return Policy.of(
             result,
             problem.mdp,
-            name=name or f"{problem.name} {problem.mdp.signature[:8]}",
+            name=name,
             subtask=problem.subtask,
             task=task,
             learner=learner,

@@ -61,8 +61,11 @@ class Toolbox:
     def check(self) -> None:
         """Raises BadInput unless policies can be saved here; makes nothing."""
         place = self.folder
-        while not place.exists() and place != place.parent:
-            place = place.parent
+        try:
+            while not place.exists() and place != place.parent:
+                place = place.parent
+        except OSError as error:
+            raise BadInput(f"toolbox {self.folder}: {error.strerror}") from error
         if not place.is_dir():
             raise BadInput(f"toolbox {self.folder}: '{place}' is a file, a folder is needed")
         if not os.access(place, os.R_OK | os.W_OK | os.X_OK):
