@@ -1,6 +1,6 @@
 """How a run goes on, written to a console: phases, each skill's learning curve, when it asked and what came of it."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
@@ -17,6 +17,7 @@ from lab.sequencing.exact import Optimum
 from lab.teaching import Lesson
 
 BARS = "▁▂▃▄▅▆▇█"
+PLAIN_BARS = "_.-:=+*#"
 PHASES = {
     "learn": "Find or learn the skills",
     "measure": "Time every move in simulation",
@@ -24,30 +25,47 @@ PHASES = {
     "carry out": "Make toast in physics",
     "draw": "Draw the pictures",
 }
-_WIDTH = 16
+_CURVE = 16
+_NAME = 52
+_INDENT = 12
+_LONGEST_LIST = 8
+_SHOWN_MOVES = 24
+_UNLIMITED = 1000
 
 
 class RunProgress(Listener):
-    """Writes lines and a progress bar to `console`, which is not stdout; use it as a context manager."""
+    """Writes lines to `console`, which is not stdout, and on a terminal a progress bar below them.
+
+    Use it as a context manager for the bar; the lines come without it, too.
+    """
 
     def __init__(self, console: Console) -> None:
         self.console = console
         columns = (TextColumn("{task.description}"), BarColumn(30), MofNCompleteColumn(), TimeElapsedColumn())
-        self._progress = Progress(*columns, console=console, transient=True)
+        self._progress = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+        self._bars = bars_for(console)
+        self._running = False
         self._task: TaskID | None = None
         self._asked: dict[str, list[int]] = defaultdict(list)
         self._rejected: dict[str, AdviceRejected] = {}
+        self._reused: list[tuple[str, str]] = []  # skill, sub-task
 
     def __enter__(self) -> "RunProgress":
+        self._running = True
         self._progress.start()
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._running = False
+        self._tell_reused()
         self._progress.stop()
 
     @contextmanager
     def paused(self) -> Iterator[None]:
         """Leave the terminal to somebody else, such as the teaching prompt."""
+        if not self._running:
+            yield
+            return
         self._progress.stop()
         try:
             yield
@@ -55,14 +73,15 @@ class RunProgress(Listener):
             self._progress.start()
 
     def phase(self, name: str, parts: int) -> None:
+        self._tell_reused()
         if self._task is not None:
             self._progress.remove_task(self._task)
         title = PHASES.get(name, name)
-        self._say(f"[bold]{title}[/bold]")
+        self._say((title, "bold"))
         self._task = self._progress.add_task(title, total=parts)
 
     def skipped(self, what: str) -> None:
-        self._say(f"  [yellow]skipped:[/yellow] {_plain(what)}")
+        self._say(("  skipped: ", "yellow"), what)
 
     def learning(self, name: str, event: Event) -> None:
         if isinstance(event, AdviceRequested):
@@ -73,36 +92,50 @@ class RunProgress(Listener):
     def lesson(self, name: str, lesson: Lesson) -> None:
         policy, result = lesson.policy, lesson.result
         if result is None:
-            self._say(f"  [green]{'reused':9}[/green] {name}")
+            self._reused.append((name, policy.subtask))
         else:
-            curve = sparkline(result.steps.tolist())
-            steps = f"{policy.final_steps or '?'} of {policy.optimal_steps} steps"
-            self._say(f"  [cyan]{lesson.source:9}[/cyan] {name:52} {curve} {steps:>15}  {self._advice(name, lesson)}")
+            reached = "not reached" if policy.final_steps is None else f"{policy.final_steps} of {policy.optimal_steps}"
+            curve = sparkline(result.steps.tolist(), bars=self._bars)
+            head = Text.assemble("  ", (f"{lesson.source:9}", "cyan"), f" {name:{_NAME}}")
+            parts = [f"{curve} {reached:>8} steps", *self._advice(name, result.requests, result.helped_steps)]
+            self._pack([head, *map(Text, parts)])
         self._advance()
 
-    def _advice(self, name: str, lesson: Lesson) -> str:
-        result = lesson.result
-        if result is None or not result.requests:
-            return "never asked"
+    def _advice(self, name: str, requests: int, helped_steps: int) -> list[str]:
+        if not requests:
+            return ["never asked"]
         asked = self._asked.get(name, [])
         when = f" from episode {asked[0]} on" if asked else ""
-        text = f"asked {result.requests} x{when}, {result.helped_steps} helped steps"
+        parts = [f"asked {requests} x{when}, {helped_steps} helped steps"]
         rejected = self._rejected.get(name)
         if rejected is not None:
-            text += f"; [yellow]rejected its advisor[/yellow] after {rejected.misleads} misleads in episode {rejected.episode}"
-        return text
+            parts.append(f"rejected its advisor in episode {rejected.episode} after {rejected.misleads} misleads")
+        return parts
+
+    def _tell_reused(self) -> None:
+        """In few lines, all skills that were there already."""
+        reused, self._reused = self._reused, []
+        if not reused:
+            return
+        names = [name for name, _ in reused]
+        if len(names) > _LONGEST_LIST:
+            counts = Counter(subtask for _, subtask in reused)
+            names = [f"{len(reused)} skills: " + ", ".join(f"{count} x {name}" for name, count in counts.items())]
+        parts = [Text(name + ",") for name in names[:-1]] + [Text(names[-1])]
+        self._pack([Text.assemble("  ", (f"{'reused':9}", "green"), " ") + parts[0], *parts[1:]], gap=" ")
 
     def measured(self, name: str, seconds: float) -> None:
-        self._say(f"  {name:52} {seconds:6.2f} s")
+        self._say(f"  {name:{_NAME}} {seconds:6.2f} s")
         self._advance()
 
     def sequenced(self, best: SequenceResult, proven: Optimum) -> None:
         gap = best.makespan_s / proven.makespan_s - 1.0
         what = "proven optimum" if proven.proven else "best bound"
-        self._say(
-            f"  toasts {' '.join(map(str, best.sequence))}: {best.makespan_s:.1f} s, "
-            f"{what} {proven.makespan_s:.1f} s, gap {gap:.1%} ({len(best.episode_makespans_s)} episodes)"
-        )
+        order = " ".join(map(str, best.sequence[:_SHOWN_MOVES]))
+        more = f" and {len(best.sequence) - _SHOWN_MOVES} more" if len(best.sequence) > _SHOWN_MOVES else ""
+        found = f"{best.makespan_s:.1f} s after {len(best.episode_makespans_s)} episodes"
+        parts = [f"  toasts {order}{more}:", f"{found}, {what} {proven.makespan_s:.1f} s, gap {gap:.1%}"]
+        self._pack(list(map(Text, parts)), gap=" ")
         self._advance()
 
     def moved(self, move: Move) -> None:
@@ -112,25 +145,42 @@ class RunProgress(Listener):
         self._advance()
 
     def retried(self, text: str) -> None:
-        self._say(f"  [yellow]failed, trying again:[/yellow] {_plain(text)}")
+        self._say(("  failed, trying again: ", "yellow"), text)
 
-    def _say(self, markup: str) -> None:
-        self.console.print(Text.from_markup(markup), soft_wrap=True)
+    def _say(self, *parts: str | tuple[str, str]) -> None:
+        self.console.print(Text.assemble(*parts), soft_wrap=True)
+
+    def _pack(self, parts: Sequence[Text], gap: str = "  ") -> None:
+        """Write parts side by side; one that does not fit begins another line. What is no terminal has no width."""
+        width = self.console.width if self.console.is_terminal else _UNLIMITED
+        line = parts[0]
+        for part in parts[1:]:
+            if line.cell_len + len(gap) + part.cell_len > width:
+                self._print(line)
+                line = Text(" " * _INDENT) + part
+            else:
+                line = line + gap + part
+        self._print(line)
+
+    def _print(self, line: Text) -> None:
+        line.rstrip()
+        self.console.print(line, soft_wrap=True)
 
     def _advance(self) -> None:
         if self._task is not None:
             self._progress.advance(self._task)
 
 
-def sparkline(steps: Sequence[int], width: int = _WIDTH) -> str:
+def bars_for(console: Console) -> str:
+    """The eight heights of a sparkline that this console can show."""
+    return BARS if console.encoding.lower().startswith("utf") else PLAIN_BARS
+
+
+def sparkline(steps: Sequence[int], width: int = _CURVE, bars: str = BARS) -> str:
     """A learning curve as `width` characters: the mean steps of equal stretches of episodes, full height for the largest."""
     if not steps:
         return " " * width
     edges = [round(i * len(steps) / width) for i in range(width + 1)]
     means = [mean(steps[a:b] or steps[min(a, len(steps) - 1) :][:1]) for a, b in pairwise(edges)]
     top = max(means)
-    return "".join(BARS[min(len(BARS) - 1, int(height / top * len(BARS)))] for height in means)
-
-
-def _plain(text: str) -> str:
-    return text.replace("[", "\\[")
+    return "".join(bars[min(len(bars) - 1, int(height / top * len(bars)))] for height in means)
