@@ -14,7 +14,9 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import Rewards
 
 MAX_TOASTS = 50
-RESERVED = ("robot", "table", "insert")  # names of other things in the cell
+RESERVED = ("robot", "table", "insert", "the slice", "carried slice")  # names of other things in the cell
+RESERVED_STARTS = ("slice ", "toast ", "toasted ", "butter ", "robot ")
+RESERVED_ENDS = (" marker", " column", " head")
 SUBTASKS = ("transfer", "grasp", "insert", "butter", "place")
 NEAREST_STATIONS_M = 0.16  # two stations nearer than this overlap: a slice is 0.12 m wide
 
@@ -23,13 +25,15 @@ def _tuple(value: object) -> object:
     return tuple(value) if isinstance(value, list) else value
 
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Time = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
+Size = Annotated[float, Field(ge=0.001, le=10)]  # the bounds keep a slip of the pen from taking all memory or all day
+Time = Annotated[float, Field(ge=0, le=86_400)]
+Number = Annotated[float, Field(ge=-10, le=10)]
+Off = Annotated[float, Field(ge=0, le=10)]
+Count = Annotated[int, Field(ge=1, le=100)]
 XY = Annotated[tuple[Number, Number], BeforeValidator(_tuple)]
 XYZ = Annotated[tuple[Number, Number, Number], BeforeValidator(_tuple)]
-Sizes = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_tuple)]
-Area = Annotated[tuple[Time, Time], BeforeValidator(_tuple)]
+Sizes = Annotated[tuple[Size, Size, Size], BeforeValidator(_tuple)]
+Area = Annotated[tuple[Off, Off], BeforeValidator(_tuple)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$")]
 
 
@@ -43,17 +47,17 @@ class RobotSettings(Record):
     """Where the arm starts, and how fast and firm it works [m/s], [m/s2], [N]."""
 
     start: Name
-    speed_m_s: Annotated[float, Field(gt=0, le=1.5)] = 0.5
-    acceleration_m_s2: Annotated[float, Field(gt=0, le=10)] = 2.0
+    speed_m_s: Annotated[float, Field(ge=0.01, le=1.5)] = 0.5
+    acceleration_m_s2: Annotated[float, Field(ge=0.01, le=10)] = 2.0
     grip_force_n: Annotated[float, Field(gt=0, le=200)] = 25.0
 
 
 class Slices(Record):
     """The bread: mass [kg], friction; `area` is how far a slice may stand off its spot: x, y [m], yaw [rad]."""
 
-    mass_kg: Annotated[float, Field(gt=0, le=6)] = 0.04
+    mass_kg: Annotated[float, Field(ge=0.001, le=6)] = 0.04
     friction: Annotated[float, Field(ge=0, le=5)] = 0.8
-    area: Annotated[tuple[Time, Time, Time], BeforeValidator(_tuple)] = (0.0, 0.0, 0.0)
+    area: Annotated[tuple[Off, Off, Off], BeforeValidator(_tuple)] = (0.0, 0.0, 0.0)
 
 
 class Workspace(Record):
@@ -61,7 +65,7 @@ class Workspace(Record):
 
     lower_m: XYZ
     cell_m: Sizes
-    shape: Annotated[tuple[int, int, int], BeforeValidator(_tuple)]
+    shape: Annotated[tuple[Count, Count, Count], BeforeValidator(_tuple)]
 
 
 class CameraSettings(Record):
@@ -76,10 +80,10 @@ class InsertGrid(Record):
     """The camera's grid around the toaster (ch. 8): origin, cell, start [m], and the finger tips' height on the way [m]."""
 
     origin_m: XY
-    cell_m: Positive
-    shape: Annotated[tuple[int, int], BeforeValidator(_tuple)] = (12, 12)
+    cell_m: Size
+    shape: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] = (12, 12)
     start_m: XY
-    height_m: Positive
+    height_m: Size
 
 
 class Station(Record):
@@ -88,10 +92,10 @@ class Station(Record):
     name: Name
     kind: Literal["storage", "buffer", "machine"]
     pose: XYZ
-    capacity: Annotated[int, Field(ge=1)]
+    capacity: Count
     processing_s: Time | None = None
     process: Literal["butter"] | None = None
-    head_speed_m_s: Positive = 0.02
+    head_speed_m_s: Annotated[float, Field(ge=0.001, le=2)] = 0.02
     dwell_s: Time = 3.0
 
     @model_validator(mode="after")
@@ -135,7 +139,7 @@ class Sequencing(Record):
     episodes: Annotated[int, Field(ge=1, le=1_000_000)] = 400
     alpha: Annotated[float, Field(gt=0, le=1)] = 0.05
     discount: Annotated[float, Field(gt=0, le=1)] = 0.9
-    beta: Annotated[float, Field(ge=0)] = 1.0
+    beta: Annotated[float, Field(ge=0, le=100)] = 1.0
     reward_factor: Literal["A", "B"] = "B"
 
 
@@ -173,12 +177,9 @@ class Task(Record):
             twice = {n for n in names if names.count(n) > 1}
             if twice:
                 raise ValueError(f"{label} '{min(twice)}' stands twice in the file")
-        for name in [o.name for o in self.obstacles]:
-            if name in stations or name in RESERVED or name.startswith(("slice ", "toasted ", "butter ")):
-                raise ValueError(f"obstacle '{name}' has the name of something else in the cell: choose another")
-        for name in stations:
-            if name in RESERVED or name.startswith(("slice ", "toast ", "butter ")):
-                raise ValueError(f"station '{name}' has the name of something else in the cell: choose another")
+            for name in names:
+                if _reserved(name) or (label == "obstacle" and name in stations):
+                    raise ValueError(f"{label} '{name}' has the name of something else in the cell: choose another")
         for stage in self.route:
             for name in filter(None, (stage.station, stage.buffer)):
                 if name not in stations:
@@ -215,6 +216,10 @@ class Task(Record):
         return self
 
 
+def _reserved(name: str) -> bool:
+    return name in RESERVED or name.startswith(RESERVED_STARTS) or name.endswith(RESERVED_ENDS)
+
+
 def task_names() -> list[str]:
     """The tasks that ship, by name."""
     return sorted(path.stem for path in tasks_folder().glob("*.toml"))
@@ -239,10 +244,10 @@ def load(task: str) -> Task:
     path = find(task)
     try:
         raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise BadInput(f"{path}: not valid TOML: {error}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"{path}: cannot be read: {error}") from None
+    except (ValueError, RecursionError) as error:  # beside TOMLDecodeError: numbers or nests beyond Python's limits
+        raise BadInput(f"{path}: not valid TOML: {error}") from None
     try:
         return Task.model_validate(raw)
     except ValidationError as error:
