@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from lab.errors import BadInput
 from lab.mdp import NoPath, TabularMDP, grid
 from lab.sim.kinematics import ToolPose
+from lab.sim.survey import Survey
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
 
@@ -33,9 +35,8 @@ class Grasp(Skill):
         self.surveys = surveys
         survey = surveys.around(self.station, False)
         try:
-            mdp = grid(
-                survey.causes.shape, survey.blocked, _top(0, 0, 0), GOAL, surveys.task.subtask("grasp").rewards, ACTIONS
-            )
+            start = free_above(self.name, survey, GOAL)
+            mdp = grid(survey.causes.shape, survey.blocked, start, GOAL, surveys.task.subtask("grasp").rewards, ACTIONS)
         except NoPath as error:
             raise no_way(self.name, error, survey.names(error.enclosing)) from None
         self.problem = Problem(self.name, self.subtask, from_above(mdp))
@@ -70,6 +71,16 @@ class Grasp(Skill):
 
 def _top(x: int, y: int, yaw: int) -> tuple[int, int, int, int]:
     return (x, y, NEAR_SHAPE[2] - 1, yaw)
+
+
+def free_above(what: str, survey: Survey, goal: tuple[int, ...]) -> tuple[int, ...]:
+    """The first free cell of the highest level; BadInput names what blocks them all, or the goal."""
+    top = [cell for cell in np.ndindex(*survey.causes.shape) if cell[2] == NEAR_SHAPE[2] - 1]
+    free = [cell for cell in top if not survey.blocked[cell]]
+    if survey.blocked[goal] or not free:
+        names = survey.names([goal] if survey.blocked[goal] else top)
+        raise BadInput(f"{what}: no room for gripper and slice; in the way: {', '.join(names)}")
+    return free[0]
 
 
 def from_above(mdp: TabularMDP) -> TabularMDP:

@@ -8,9 +8,9 @@ import numpy as np
 from lab.mdp import NoPath, grid
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Spot, spots
-from lab.skills.grasp import entry_cell, from_above
+from lab.skills.grasp import entry_cell, free_above, from_above
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
-from lab.skills.surveys import NEAR_SHAPE, RELEASE_ABOVE, Surveys, near_pose
+from lab.skills.surveys import RELEASE_ABOVE, Surveys, near_pose
 
 if TYPE_CHECKING:
     from lab.policy import Policy
@@ -36,8 +36,8 @@ class Place(Skill):
         """The positions above a spot with slices beside it; episodes begin anywhere above it."""
         self.surveys = surveys
         survey = surveys.around(self.station, True)
-        start = (0, 0, NEAR_SHAPE[2] - 1)
         try:
+            start = free_above(self.name, survey, GOAL)
             mdp = grid(survey.causes.shape, survey.blocked, start, GOAL, surveys.task.subtask("place").rewards, ACTIONS)
         except NoPath as error:
             raise no_way(self.name, error, survey.names(error.enclosing)) from None

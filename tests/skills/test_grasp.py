@@ -5,15 +5,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from lab.errors import BadInput
 from lab.mdp import grid
 from lab.policy import Policy
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Layout, Spot, spots
-from lab.skills import Grasp
+from lab.skills import Grasp, Place
 from lab.skills.grasp import ACTIONS, GOAL, entry_cell, from_above
 from lab.skills.skill import Bench, Problem, Skill, Status
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, Surveys, near_pose
-from lab.taskfile import Task
+from lab.taskfile import Obstacle, Task
 
 PolicyOf = Callable[[Problem], Policy]
 Run = Callable[[Skill, Bench, Policy], Status]
@@ -121,3 +122,21 @@ def test_near_poses_are_relative_to_the_slice() -> None:
 def test_obstacles_elsewhere_do_not_change_the_problem(task: Task, surveys: Surveys) -> None:
     bare = Surveys(task.model_copy(update={"obstacles": ()}), Layout((), ()))
     assert Grasp("plate").setup(bare).mdp.signature == Grasp("plate").setup(surveys).mdp.signature
+
+
+def test_no_room_beside_the_slice_is_bad_input_that_names_what_is_in_the_way(task: Task) -> None:
+    x, y, _ = task.station("toaster_buffer").pose
+    near = Obstacle(name="pillar", position_m=(x, y - 0.06), cubes=3)
+    crowded = Surveys(task.model_copy(update={"obstacles": (near,)}), Layout((near.position_m,), ()))
+    for skill in (Grasp("toaster_buffer"), Place("toaster_buffer")):
+        with pytest.raises(BadInput, match=rf"^{skill.name}: no room for gripper and slice; in the way: pillar$"):
+            skill.setup(crowded)
+
+
+def test_a_pillar_at_one_side_leaves_the_other_side_to_begin_from(task: Task) -> None:
+    x, y, _ = task.station("toaster_buffer").pose
+    near = Obstacle(name="pillar", position_m=(x, y - 0.105), cubes=6)
+    narrow = Surveys(task.model_copy(update={"obstacles": (near,)}), Layout((near.position_m,), ()))
+    mdp = Grasp("toaster_buffer").setup(narrow).mdp
+    assert mdp.terminal[int(np.ravel_multi_index((0, 0, NEAR_SHAPE[2] - 1, 0), mdp.shape))]
+    assert mdp.start in mdp.starts
