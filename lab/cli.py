@@ -1,9 +1,11 @@
 """The command line: parse, call one function, render. The only module that prints. Contract: see the README."""
 
 import json
+import os
 import sys
 from collections.abc import Callable
 from functools import wraps
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -22,6 +24,10 @@ toolbox_app = typer.Typer(no_args_is_help=True, help="The policies that were lea
 task_app = typer.Typer(no_args_is_help=True, help="Task files.")
 app.add_typer(toolbox_app, name="toolbox")
 app.add_typer(task_app, name="task")
+
+STOPPED = "stopped by Ctrl-C; what was learned is kept"
+MAX_EPISODES = 1_000_000
+MAX_SESSIONS = 10_000
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Where all chance comes from.")]
@@ -46,9 +52,12 @@ def command(group: typer.Typer, name: str, example: str) -> Callable[[Callable[.
             except LabError as error:
                 _end(str(error), error.exit_code)
             except KeyboardInterrupt as stopped:
-                _end(str(stopped) or "stopped by Ctrl-C; what was learned is kept", 130)
+                _end(str(stopped) or STOPPED, 130)
             except BrokenPipeError:
+                _silence()
                 _end("", 1)
+            except OSError as error:  # a full disk, a folder taken away meanwhile
+                _end(str(error), 1)
 
         group.command(name, epilog=f"Example: {example}")(guarded)
         return guarded
@@ -56,10 +65,24 @@ def command(group: typer.Typer, name: str, example: str) -> Callable[[Callable[.
     return register
 
 
+_FILE_WIDTH = 200  # characters; where stdout is no terminal, nothing needs to be folded
+_PLAIN = str.maketrans("▁▂▃▄▅▆▇█·", "_.-:=+*#.")  # for a stdout that is not Unicode
+
+
 def _end(message: str, code: int) -> NoReturn:
     if message:
-        sys.stderr.write(f"lab: {' '.join(message.split())}\n")
+        _complain(message)
     raise typer.Exit(code)
+
+
+def _complain(message: str) -> None:
+    """Write one line to stderr, whatever the message holds."""
+    sys.stderr.write(f"lab: {LabError(' '.join(message.split()))}\n")
+
+
+def _silence() -> None:
+    """Nobody reads stdout any more: let the interpreter's last flush go nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _console() -> "Console":
@@ -74,7 +97,11 @@ def _show(document: dict[str, Any], as_json: bool, render: Callable[[dict[str, A
         return
     from rich.console import Console
 
-    Console(highlight=False).print(render(document), soft_wrap=True)
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else _FILE_WIDTH)
+    with console.capture() as shown:
+        console.print(render(document), soft_wrap=True)
+    text = "\n".join(line.rstrip() for line in shown.get().splitlines())
+    print(text if console.encoding.lower().startswith("utf") else text.translate(_PLAIN))
 
 
 def _teacher(toolbox: Path | None, advisor: str, seed: int, progress: "RunProgress") -> "Teacher":
@@ -155,7 +182,8 @@ def teach(
     ] = None,
     advisor: AdvisorName = "expert",
     episodes: Annotated[
-        int | None, typer.Option("--episodes", min=1, help="Session length; default: the task's.")
+        int | None,
+        typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the task's."),
     ] = None,
     save: Annotated[str | None, typer.Option("--save", help="Name of the policy in the toolbox.")] = None,
     seed: Seed = 0,
@@ -180,6 +208,8 @@ def teach(
     teacher.toolbox.check()
     document = teach_one(loaded, subtask, teacher, learner=learner, gate=gate, episodes=episodes, name=save, out=out)
     _show(document, as_json, lesson_summary)
+    if document["failure"] is not None:
+        _end(document["failure"], 1)
     if document["final_steps"] is None:
         _end(f"'{document['skill']}' does not reach its goal after {document['episodes']} episodes", 1)
 
@@ -192,10 +222,11 @@ def sequence(
         str | None, typer.Option("--method", help="srl, exact, fifo, random; default: the task's.")
     ] = None,
     episodes: Annotated[
-        int | None, typer.Option("--episodes", min=1, help="Session length; default: the task's.")
+        int | None,
+        typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the task's."),
     ] = None,
     sessions: Annotated[
-        int, typer.Option("--sessions", min=1, help="How many sessions, each with its own chance.")
+        int, typer.Option("--sessions", min=1, max=MAX_SESSIONS, help="How many sessions, each with its own chance.")
     ] = 1,
     plot: Annotated[Path | None, typer.Option("--plot", help="A .png file for the makespans of the episodes.")] = None,
     seed: Seed = 0,
@@ -212,9 +243,10 @@ def sequence(
     progress = RunProgress(_console())
     teacher = _teacher(toolbox, "expert", seed, progress)
     teacher.toolbox.check()
-    document = sequence_task(
-        loaded, toasts, teacher, method=method, episodes=episodes, sessions=sessions, plot=plot, listener=progress
-    )
+    with progress:
+        document = sequence_task(
+            loaded, toasts, teacher, method=method, episodes=episodes, sessions=sessions, plot=plot, listener=progress
+        )
     _show(document, as_json, sequence_summary)
 
 
@@ -263,36 +295,32 @@ def view(
 def toolbox_list(toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
     """The policies in the toolbox."""
     from lab.toolbox import Toolbox
-    from lab.view.summary import table_of
+    from lab.view.summary import toolbox_summary
 
     box = Toolbox(toolbox)
-    columns = ("name", "subtask", "task", "solved", "signature", "created")
-    document = {"folder": str(box.folder), "policies": box.list()}
-    _show(
-        document, as_json, lambda d: table_of(d["policies"], columns) if d["policies"] else f"nothing in {d['folder']}"
-    )
+    _show({"folder": str(box.folder), "policies": box.list()}, as_json, toolbox_summary)
 
 
 @command(toolbox_app, "show", "lab toolbox show 'insert at toaster 1a2b3c4d'")
 def toolbox_show(name: str, toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
     """All that is known of one policy."""
     from lab.toolbox import Toolbox
-    from lab.view.summary import table_of
+    from lab.view.summary import policy_summary
 
-    document = Toolbox(toolbox).show(name)
-    rows = [{"field": key, "value": value} for key, value in document.items()]
-    _show(document, as_json, lambda _: table_of(rows, ("field", "value")))
+    _show(Toolbox(toolbox).show(name), as_json, policy_summary)
 
 
 @command(toolbox_app, "verify", "lab toolbox verify")
 def toolbox_verify(toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
     """Check every file: whole, finite, of the right shape. Exit 1 when one is not."""
     from lab.toolbox import Toolbox
-    from lab.view.summary import table_of
+    from lab.view.summary import verify_summary
 
-    rows = [{"file": str(path), "ok": ok, "reason": reason} for path, ok, reason in Toolbox(toolbox).verify()]
+    box = Toolbox(toolbox)
+    rows = [{"file": str(path), "ok": ok, "reason": reason} for path, ok, reason in box.verify()]
     damaged = [row for row in rows if not row["ok"]]
-    _show({"files": rows, "damaged": len(damaged)}, as_json, lambda _: table_of(rows, ("ok", "file", "reason")))
+    document = {"folder": str(box.folder), "files": rows, "damaged": len(damaged)}
+    _show(document, as_json, verify_summary)
     if damaged:
         _end(f"{len(damaged)} of {len(rows)} files in the toolbox are damaged", 1)
 
@@ -327,17 +355,50 @@ def task_show(task: str, as_json: Json = False) -> None:
 
 
 @command(task_app, "check", "lab task check my-toast.toml")
-def task_check(file: str, toasts: Toasts = 3, seed: Seed = 0, as_json: Json = False) -> None:
-    """Check a task file: its text, its reach, and that a way exists for every sub-task."""
+def task_check(
+    file: str,
+    toasts: Annotated[
+        int | None, typer.Option("--toasts", "-n", help="How many slices, 1 to 50; default: 3, if they fit.")
+    ] = None,
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """Check a task file: its text, its reach, and that a way exists for every sub-task. Exit 2 when it is not sound.
+
+    With --json the document comes in both cases.
+    """
     from lab.lesson import check_task
 
     errors = check_task(file, toasts, seed)
-    document = {"valid": not errors, "errors": errors}
-    _show(document, as_json, lambda d: f"{file} is sound" if d["valid"] else "not sound:")
+    if as_json or not errors:
+        _show({"valid": not errors, "errors": errors}, as_json, lambda _: f"{file} is sound")
     if errors:
         raise BadInput(errors[0])
 
 
 def main() -> None:
-    """The `lab` command."""
-    app()
+    """The `lab` command; typer's own complaints come in one line, too."""
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: a name must not end a command
+    try:
+        code = app(standalone_mode=False)
+    except (KeyboardInterrupt, typer.Abort):
+        _complain(STOPPED)
+        code = 130
+    except Exception as error:
+        code = _usage(error)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _usage(error: Exception) -> int:
+    """Say in one line what is wrong with the words of a command; raises again what is no complaint of typer's."""
+    explain, context = getattr(error, "format_message", None), getattr(error, "ctx", None)
+    if explain is None:
+        raise error
+    if type(error).__name__ == "NoArgsIsHelpError":
+        error.show()  # type: ignore[attr-defined]
+    else:
+        path = context.command_path if context is not None else "lab"
+        text = " ".join(str(explain()).split()).rstrip(".")
+        _complain(f"{text[:1].lower()}{text[1:]} (see {path} --help)")
+    return 2

@@ -4,12 +4,13 @@ import re
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput, LabError, unknown
 from lab.listener import Listener
-from lab.taskfile import MAX_TOASTS, Task, load
+from lab.taskfile import MAX_TOASTS, Task, find, load
 from lab.teaching import Teacher
 
 if TYPE_CHECKING:
@@ -33,7 +34,9 @@ def teach_one(
     """
     from lab.advice.gates import GATES
     from lab.composer import try_grasp
+    from lab.crew import Crew
     from lab.learning.updates import UPDATES
+    from lab.policy import MAX_NAME_LENGTH, is_name
     from lab.report import draw_value_map
     from lab.run import prepare
     from lab.skills import Grasp, Insert
@@ -43,7 +46,11 @@ def teach_one(
         raise unknown("learner", learner, UPDATES, "--learner")
     if gate is not None and gate not in GATES:
         raise unknown("gate", gate, GATES, "--gate")
-    prepared = prepare(task, 2, teacher.seed)
+    if name is not None and not is_name(name):
+        raise BadInput(f"policy name '{name}' (--save): wanted 1 to {MAX_NAME_LENGTH} printable characters")
+    toasts = fitting(task, 2)
+    find_skill(Crew.of(task, toasts).skills, subtask)  # before the scene is surveyed
+    prepared = prepare(task, toasts, teacher.seed)
     skill = find_skill(prepared.crew.skills, subtask)
     problem, settings = prepared.problems[skill.name], task.subtask(skill.subtask)
     how = replace(
@@ -94,7 +101,16 @@ def find_skill(skills: "dict[str, Skill]", name: str) -> "Skill":
     for skill in skills.values():
         if skill.subtask == name:
             return skill
-    raise unknown("sub-task", name, {skill.subtask for skill in skills.values()} | set(skills), "SUBTASK")
+    subtasks = sorted({skill.subtask for skill in skills.values()})
+    near = get_close_matches(name, [*subtasks, *skills], n=1)
+    hint = f" did you mean '{near[0]}'?" if near else ""
+    allowed = f"{', '.join(subtasks)}, or one skill's full name, such as '{next(iter(skills))}'"
+    raise BadInput(f"unknown sub-task '{name}' (SUBTASK):{hint} known: {allowed}")
+
+
+def fitting(task: Task, wanted: int) -> int:
+    """As many toasts as wanted, or as both ends of the route hold."""
+    return min(wanted, *(task.station(stage.station).capacity for stage in (task.route[0], task.route[-1])))
 
 
 def sequence_task(
@@ -122,8 +138,11 @@ def sequence_task(
     if plot is not None:
         check_png(plot)
     cell = teach_all(prepare(task, toasts, teacher.seed), teacher, listener).cell
-    proven = optimum(cell)
-    found = [sequence(task, cell, teacher.seed + n, method=name, episodes=episodes) for n in range(sessions)]
+    listener.phase("sequence", sessions)
+    proven, found = optimum(cell), []
+    for session in range(sessions):
+        found.append(sequence(task, cell, teacher.seed + session, method=name, episodes=episodes))
+        listener.sequenced(found[-1], proven)
     best = min(found, key=lambda result: result.makespan_s)
     hits = [result.makespan_s <= proven.makespan_s + 1e-6 for result in found]
     settled = [result.final_makespan_s <= proven.makespan_s + 1e-6 for result in found if isinstance(result, SrlResult)]
@@ -220,12 +239,17 @@ def _wait() -> None:
         time.sleep(3600)
 
 
-def check_task(file: str, toasts: int, seed: int) -> list[str]:
-    """What is wrong with a task file, its scene and its problems; empty when nothing is."""
+def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
+    """What is wrong with a task file, its scene and its problems for so many toasts; empty when nothing is.
+
+    Without a number: for 3 toasts, or as many as there is room for.
+    """
     from lab.run import prepare
 
+    find(file)
     try:
-        prepare(load(file), toasts, seed)
+        task = load(file)
+        prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
     except LabError as error:
         return [str(error)]
     return []

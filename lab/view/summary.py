@@ -17,7 +17,7 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     table.add_column(style="bold", justify="right")
     table.add_column(overflow="fold")
     done = f"{report['delivered']} of {report['toasts']} toasts delivered"
-    table.add_row("outcome", Text(done, "green" if report["success"] else "red"))
+    table.add_row("outcome", Text(f"{done} (seed {report['seed']})", "green" if report["success"] else "red"))
     if report["failure"]:
         table.add_row("stopped", Text(report["failure"], "red"))
     if report["retries"]:
@@ -46,16 +46,24 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
     """The end of `lab teach`, from its JSON document."""
     from lab.view.progress import sparkline
 
-    final = lesson["final_steps"] if lesson["final_steps"] is not None else "does not reach the goal"
-    verdict = "solved" if lesson["solved"] else "not the shortest"
+    final = "does not reach the goal" if lesson["final_steps"] is None else f"{lesson['final_steps']} steps"
     advice = f"asked {lesson['requests']} times, {lesson['helped_steps']} helped steps, {lesson['misleads']} misleads"
     lines = [
         f"{lesson['skill']}: {lesson['episodes']} episodes   {sparkline(lesson['steps_per_episode'], 40)}",
-        f"learned way {final}, shortest {lesson['optimal_steps']} steps: {verdict}",
+        f"learned way: {final}, the shortest takes {lesson['optimal_steps']}: {_verdict(lesson)}",
         f"{advice}; {_rejected(lesson)}",
         f"saved as '{lesson['saved_as']}' (seed {lesson['seed']})",
+        *lesson["files"].values(),
     ]
     return Group(*map(Text, lines))
+
+
+def _verdict(lesson: Mapping[str, Any]) -> str:
+    if lesson["failure"] is not None:
+        return f"not solved in physics: {lesson['failure']}"
+    if lesson["solved"]:
+        return "solved"
+    return "not solved" if lesson["final_steps"] is None else "not solved, it is longer or not there from every start"
 
 
 def _rejected(lesson: Mapping[str, Any]) -> str:
@@ -85,6 +93,45 @@ def table_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> Table
     for row in rows:
         table.add_row(*(str(row[column]) for column in columns))
     return table
+
+
+def toolbox_summary(box: Mapping[str, Any]) -> RenderableType:
+    """What `lab toolbox list` shows, from its JSON document."""
+    if not box["policies"]:
+        return Text(f"nothing in {box['folder']}")
+    columns = ("name", "subtask", "task", "solved", "signature", "created")
+    rows = [
+        {**row, "created": row["created"][:16].replace("T", " "), "solved": "yes" if row["solved"] else "no"}
+        for row in box["policies"]
+    ]
+    return table_of(rows, columns)
+
+
+def policy_summary(policy: Mapping[str, Any]) -> RenderableType:
+    """What `lab toolbox show` shows, from its JSON document."""
+    from lab.view.progress import sparkline
+
+    curve = policy["curve"] or [0]
+    guided = [str(n) for n, was_guided in enumerate(policy["guided"], start=1) if was_guided]
+    shown = {
+        **policy,
+        "curve": f"{sparkline(curve, 40)}  {min(curve)} to {max(curve)} steps",
+        "guided": f"{len(guided)} episodes" + (f", the first {guided[0]}, the last {guided[-1]}" if guided else ""),
+        "created": policy["created"].replace("T", " "),
+        "solved": "yes" if policy["solved"] else "no",
+        **{name: ", ".join(f"{k} {v}" for k, v in policy[name].items()) for name in ("learner", "gate", "versions")},
+        **{name: ", ".join(map(str, policy[name])) for name in ("action_labels", "shape")},
+    }
+    return table_of(
+        [{"field": name.replace("_", " "), "value": value} for name, value in shown.items()], ("field", "value")
+    )
+
+
+def verify_summary(report: Mapping[str, Any]) -> RenderableType:
+    """What `lab toolbox verify` shows, from its JSON document: the damaged files, and how many are sound."""
+    files, damaged = report["files"], [row for row in report["files"] if not row["ok"]]
+    lines = [Text(f"{len(files) - len(damaged)} of {len(files)} files in {report['folder']} are sound")]
+    return Group(*lines, *(Text(row["reason"], "red") for row in damaged))
 
 
 def grid_summary(seen: Mapping[str, Any]) -> RenderableType:
