@@ -196,7 +196,9 @@ class Production:
         self._await(toast, origin)
         pick_s = line.now_s
         spot = self._free_spot(target, to)
-        self._try(toast, target, [_aimed(skill, _slice(toast), spot) for skill in line.crew.leg(origin, target)])
+        leg = [_aimed(skill, _slice(toast), spot) for skill in line.crew.leg(origin, target)]
+        self._try(toast, origin, leg[:1])
+        self._try(toast, target, leg[1:])
         self.locations[toast - 1], self.place, self.spot_of[toast] = to, target, spot
         self.moves.append(Move(toast, start, origin, target, leave_s, reach_s, pick_s, line.now_s))
         self._start_machine(toast, target)
@@ -237,15 +239,19 @@ class Production:
     def _await(self, toast: int, station: str) -> None:
         """Wait at a machine until it is done with its toast; a learned process that failed is tried again."""
         machine = self.line.machines.get(station)
-        tries = 1
-        while self.line.now_s < self.ready_s.get(station, 0.0) or (machine and machine.status is Status.RUNNING):
-            self.line.tick()
-            if machine and machine.status is Status.FAILURE:
+        tries = 0
+        while True:
+            if machine and machine.status is Status.FAILURE:  # now, or while the robot was elsewhere
+                tries += 1
                 self._note(f"toast {toast} at '{station}', try {tries}: {machine.reason}")
                 if tries == MAX_TRIES:
                     raise _Stopped(f"toast {toast} at '{station}': {machine.reason} (tried {MAX_TRIES} times)")
-                tries += 1
                 machine.start(self.line.bench, self.line.crew.policies[machine.name])
+            elif self.line.now_s >= self.ready_s.get(station, 0.0) and not (
+                machine and machine.status is Status.RUNNING
+            ):
+                return
+            self.line.tick()
 
     def _start_machine(self, toast: int, station: str) -> None:
         task = self.line.crew.task
