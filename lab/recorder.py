@@ -68,8 +68,9 @@ class Recorder:
         self._show(f"butter {number} {cell[0]}{cell[1]}", number)
 
     def _show(self, name: str, number: int) -> None:
-        self._shown[name] = number
-        self._pending[name] = True
+        if name not in self._shown:
+            self._shown[name] = number
+            self._pending[name] = True
 
 
 def show_scene(task: Task, toasts: int, layout: Layout, viewer: Viewer) -> None:
