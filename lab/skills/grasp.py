@@ -7,7 +7,7 @@ import numpy as np
 
 from lab.errors import BadInput
 from lab.mdp import NoPath, TabularMDP, grid
-from lab.sim.kinematics import ToolPose
+from lab.sim.kinematics import ToolPose, inverse
 from lab.sim.survey import Survey
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
@@ -48,6 +48,8 @@ class Grasp(Skill):
         if robot.closed:
             yield from robot.release()
         goal = bench.slice_pose(name)
+        if inverse(goal) is None:
+            raise SkillFailed(f"{name} is out of reach at ({goal.x:.2f}, {goal.y:.2f}) m")
         entry = entry_cell(goal, robot.tool())
         cells = [mdp.state_cell(s) for s in learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))]
         poses = [near_pose(goal, cell) for cell in cells]
