@@ -1,0 +1,351 @@
+"""Sequence + skills -> motions: durations measured, toasts delivered, failures noticed, tried again and explained."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lab.composer import MAX_TRIES, Line, Outcome, Production, carry_out, measure, try_grasp
+from lab.crew import Crew, Durations, cell_of
+from lab.errors import WorkFailed
+from lab.mdp import optimal_values, shortest_steps
+from lab.policy import Policy
+from lab.sequencing.cell import Cell
+from lab.sequencing.events import Move, simulate
+from lab.sim.scene import Layout, spots
+from lab.sim.world import TIME_STEP, World
+from lab.skills import Butter, Grasp
+from lab.skills.skill import Problem, Status
+from lab.skills.surveys import Surveys
+from lab.taskfile import Stage, Task, load
+from lab.view.frames import Body, Frame
+
+
+@pytest.fixture(scope="module")
+def task() -> Task:
+    """The shipped cell without buffers and with machines that take seconds: three moves bring a toast to the end."""
+    shipped = load("toast")
+    still = tuple(o.model_copy(update={"area": (0.0, 0.0)}) for o in shipped.obstacles)
+    brisk = {"toaster": {"processing_s": 4.0}, "butter_applier": {"head_speed_m_s": 0.2, "dwell_s": 0.05}}
+    stations = tuple(s.model_copy(update=brisk.get(s.name, {})) for s in shipped.stations)
+    route = tuple(Stage(station=stage.station) for stage in shipped.route)
+    return shipped.model_copy(update={"obstacles": still, "stations": stations, "route": route})
+
+
+@pytest.fixture(scope="module")
+def layout(task: Task) -> Layout:
+    return Layout(tuple(o.position_m for o in task.obstacles), ((0.006, -0.003, 0.04), (-0.006, 0.003, -0.04)))
+
+
+@pytest.fixture(scope="module")
+def surveys(task: Task, layout: Layout) -> Surveys:
+    return Surveys(task, layout)
+
+
+def policy(problem: Problem, q: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Policy:
+    mdp, steps = problem.mdp, shortest_steps(problem.mdp)
+    return Policy(
+        name=f"{problem.name} policy",
+        subtask=problem.subtask,
+        task="toast",
+        q=q,
+        visits=np.zeros(q.shape, np.int64),
+        action_labels=mdp.action_labels,
+        shape=mdp.shape,
+        start=mdp.start,
+        signature=mdp.signature,
+        learner={},
+        gate={},
+        advisor="none",
+        seed=0,
+        curve=[],
+        guided=[],
+        helped_steps=0,
+        requests=0,
+        optimal_steps=steps,
+        final_steps=steps,
+        solved=True,
+        created="2024-05-01T12:00:00+00:00",
+        versions={},
+    )
+
+
+def staffed(task: Task, surveys: Surveys, toasts: int) -> Crew:
+    """A crew whose every skill takes the shortest way."""
+    crew = Crew.of(task, toasts)
+    for name, skill in crew.skills.items():
+        problem = skill.setup(surveys)
+        crew.policies[name] = policy(problem, optimal_values(problem.mdp, 0.99))
+    return crew
+
+
+@pytest.fixture(scope="module")
+def crew(task: Task, surveys: Surveys) -> Crew:
+    return staffed(task, surveys, 2)
+
+
+@pytest.fixture(scope="module")
+def told() -> list[tuple[str, float]]:
+    """What `measure` said on its way."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def durations(crew: Crew, surveys: Surveys, told: list[tuple[str, float]]) -> Durations:
+    return measure(crew, surveys, lambda name, seconds: told.append((name, seconds)))
+
+
+@pytest.fixture(scope="module")
+def cell(task: Task, durations: Durations) -> Cell:
+    return cell_of(task, durations, 1)
+
+
+@pytest.fixture
+def clueless(crew: Crew) -> Iterator[Callable[[str], None]]:
+    """Lets a skill forget all it knows; it knows it again after the test."""
+    kept = dict(crew.policies)
+
+    def forget(name: str) -> None:
+        crew.policies[name] = replace(kept[name], q=np.zeros_like(kept[name].q))
+
+    yield forget
+    crew.policies.update(kept)
+
+
+class Watcher:
+    """A live viewer that keeps what it is shown."""
+
+    def __init__(self) -> None:
+        self.bodies: tuple[Body, ...] = ()
+        self.frames: list[Frame] = []
+
+    def show(self, bodies: tuple[Body, ...]) -> None:
+        self.bodies = bodies
+
+    def update(self, frame: Frame) -> None:
+        self.frames.append(frame)
+
+
+def test_every_needed_move_is_measured(crew: Crew, durations: Durations, told: list[tuple[str, float]]) -> None:
+    assert set(durations.empty_s) == set(crew.moves.empty)
+    assert set(durations.loaded_s) == set(crew.moves.loaded)
+    assert set(durations.process_s) == {"butter_applier"}
+    times = [*durations.empty_s.values(), *durations.loaded_s.values(), *durations.process_s.values()]
+    assert all(1.0 < seconds < 40.0 for seconds in times)
+    assert min(durations.loaded_s.values()) > max(durations.empty_s.values())  # grasping and placing included
+    assert durations.sim_s > sum(times)
+    assert sorted(seconds for _, seconds in told) == sorted(times)
+    assert {"plate > toaster, loaded", "butter at butter_applier", "toaster_buffer > plate, empty"} <= {
+        n for n, _ in told
+    }
+
+
+def test_measuring_again_gives_the_same_to_the_last_bit(task: Task, surveys: Surveys) -> None:
+    short = task.model_copy(update={"route": (task.route[0], task.route[-1])})
+    one = measure(staffed(short, surveys, 1), surveys)
+    assert list(one.loaded_s) == [("plate", "finished_plate")]
+    assert one == measure(staffed(short, surveys, 1), surveys)
+
+
+def test_a_move_that_cannot_be_measured_is_a_failure_that_says_so(
+    crew: Crew, surveys: Surveys, clueless: Callable[[str], None]
+) -> None:
+    clueless("grasp at plate")
+    with pytest.raises(WorkFailed, match=r"^measuring 'grasp at plate': policy 'grasp at plate policy' does not reach"):
+        measure(crew, surveys)
+
+
+def test_one_toast_is_delivered_in_the_time_predicted(crew: Crew, surveys: Surveys, layout: Layout, cell: Cell) -> None:
+    moves: list[Move] = []
+    watcher = Watcher()
+    outcome, recording = carry_out(crew, surveys, layout, cell, (1, 1, 1), viewer=watcher, on_move=moves.append)
+    assert outcome.failure is None
+    assert (outcome.delivered, outcome.dropped, outcome.retries) == ((1,), (), ())
+    predicted = simulate(cell, (1, 1, 1))
+    assert outcome.schedule.makespan_s == pytest.approx(predicted.makespan_s, rel=0.03)
+    assert outcome.schedule.sequence == (1, 1, 1)
+    assert [(m.origin, m.target) for m in moves] == list(crew.moves.loaded)
+    assert moves[1].pick_s >= moves[0].drop_s + 4.0  # the toaster's time
+    assert 0 < max(outcome.camera_deviations_m) < 0.008
+    recording.check()
+    assert (watcher.bodies, watcher.frames) == (recording.bodies, recording.frames)
+    shown = [name for frame in recording.frames for name, visible in frame.visible.items() if visible]
+    assert shown[0] == "toasted 1"
+    assert sorted(shown[1:]) == [f"butter 1 {row}{column}" for row in range(3) for column in range(3)]
+    last = recording.frames[-1].poses["slice 1"]
+    spot = spots(crew.task.station("finished_plate"))[0]
+    assert (last[0], last[1]) == pytest.approx((spot.x, spot.y), abs=0.005)
+    assert outcome.sim_s >= outcome.schedule.makespan_s
+
+
+def test_two_toasts_share_the_machines(
+    task: Task, crew: Crew, surveys: Surveys, layout: Layout, durations: Durations
+) -> None:
+    cell = cell_of(task, durations, 2)
+    sequence = (1, 1, 2, 1, 2, 2)
+    outcome, recording = carry_out(crew, surveys, layout, cell, sequence)
+    assert outcome.failure is None
+    assert outcome.delivered == (1, 2)
+    assert outcome.schedule.makespan_s == pytest.approx(simulate(cell, sequence).makespan_s, rel=0.03)
+    first, second = (recording.frames[-1].poses[f"slice {n}"] for n in (1, 2))
+    assert np.hypot(first[0] - second[0], first[1] - second[1]) > 0.05  # each on a spot of its own
+
+
+def failed(outcome: Outcome, where: str, why: str) -> None:
+    """It was tried three times, each noted, and then told which toast, where and why."""
+    assert outcome.failure == f"toast 1 at '{where}': {why} (tried {MAX_TRIES} times)"
+    assert len(outcome.retries) == MAX_TRIES == 3
+    assert outcome.delivered == ()
+    assert all(f"try {n}: {why}" in text for n, text in enumerate(outcome.retries, start=1))
+
+
+@pytest.mark.parametrize(
+    ("skill", "where"),
+    [
+        ("transfer toaster_buffer to plate", "plate"),
+        ("grasp at plate", "plate"),
+        ("transfer plate to insert with slice", "toaster"),
+        ("insert at toaster", "toaster"),
+    ],
+)
+def test_a_step_that_goes_on_failing_stops_the_run_with_toast_place_and_reason(
+    skill: str,
+    where: str,
+    crew: Crew,
+    surveys: Surveys,
+    layout: Layout,
+    cell: Cell,
+    clueless: Callable[[str], None],
+) -> None:
+    clueless(skill)
+    heard: list[str] = []
+    outcome, _ = carry_out(crew, surveys, layout, cell, (1, 1, 1), on_retry=heard.append)
+    start = crew.skills[skill].reason
+    assert f"policy '{skill} policy' does not reach its goal" in start
+    failed(outcome, where, start)
+    assert tuple(heard) == outcome.retries
+    assert all(text.startswith(f"toast 1 at '{where}', '{skill}', try ") for text in heard)
+    assert outcome.schedule.robot == ()
+
+
+def test_slippery_slices_are_not_delivered_and_said_to_be_lost(
+    task: Task, crew: Crew, layout: Layout, cell: Cell
+) -> None:
+    oily = task.model_copy(update={"slices": task.slices.model_copy(update={"friction": 0.0})})
+    slippery = replace(staffed(oily, Surveys(oily, layout), 1))
+    outcome, recording = carry_out(slippery, Surveys(oily, layout), layout, cell, (1, 1, 1))
+    assert outcome.failure is not None
+    assert outcome.failure.startswith("toast 1 at 'plate': slice 1 is ")
+    assert outcome.retries[0] == (
+        "toast 1 at 'plate', 'grasp at plate', try 1: slice 1 is not in the gripper after grasping at 'plate'"
+    )
+    assert outcome.delivered == ()
+    assert outcome.dropped == (1,)
+    recording.check()
+
+
+class Ground:
+    """A line with a production on it, begun at the robot's start."""
+
+    def __init__(self, world: World, crew: Crew, surveys: Surveys, layout: Layout, cell: Cell) -> None:
+        self.line = Line(world, crew, layout, cell.toasts)
+        self.line.at(cell.robot_start, surveys)
+        self.line.restart_clock()
+        self.work = Production(self.line, cell, surveys)
+
+    def put(self, name: str, x: float, y: float, z: float) -> None:
+        self.line.world.put(name, (x, y, z))
+
+
+@pytest.fixture
+def ground(crew: Crew, surveys: Surveys, layout: Layout, cell: Cell) -> Iterator[Ground]:
+    with World() as world:
+        yield Ground(world, crew, surveys, layout, cell)
+
+
+def test_a_grasp_that_failed_once_is_tried_again_and_the_run_goes_on(ground: Ground) -> None:
+    place = ground.line.world.pose("slice 1")[0]
+    ground.put("slice 1", 0.6, 0.0, -9.0)
+
+    def put_back(text: str) -> None:
+        assert text.endswith("try 1: slice 1 is out of reach at (0.60, 0.00) m")
+        ground.put("slice 1", *place)
+
+    ground.work.on_retry = put_back
+    assert ground.work.carry_out((1,)) is None
+    assert len(ground.work.retries) == 1
+    assert ground.work.moves[0].target == "toaster"
+
+
+def test_a_slice_set_down_beside_the_slot_is_picked_up_again_and_inserted(ground: Ground, task: Task) -> None:
+    line = ground.line
+    x, y, _ = task.station("toaster").pose
+    spoiled: list[float] = []
+
+    def spoil() -> None:
+        insert = line.crew.skills["insert at toaster"]
+        if insert.status is Status.RUNNING and line.bench.taken and line.bench.held is None and not spoiled:
+            spoiled.append(line.now_s)
+            line.world.put("slice 1", (x, y - 0.11, 0.06))  # beside the toaster
+
+    line.on_tick = spoil
+    failure = ground.work.carry_out((1,))
+    assert spoiled
+    assert failure is None, ground.work.retries
+    assert len(ground.work.retries) == 1
+    assert "slice 1 is not in the slot of 'toaster'" in ground.work.retries[0]
+
+
+def test_a_machine_that_failed_while_the_robot_was_away_is_noticed_and_tried_again(ground: Ground) -> None:
+    """The butter's failure is over long before the robot asks for the slice."""
+    line, work = ground.line, ground.work
+    butter = line.crew.skills["butter at butter_applier"]
+    assert isinstance(butter, Butter)
+    line.scene.world.put("slice 1", (0.80, -0.52, 0.0805))
+    butter.on("slice 1")
+    line.machines["butter_applier"] = butter
+    butter.status, butter.reason = Status.FAILURE, "the butter missed 9 of 9 cells"
+    work._await(1, "butter_applier")
+    assert work.retries == ["toast 1 at 'butter_applier', try 1: the butter missed 9 of 9 cells"]
+    assert butter.status is Status.SUCCESS
+    assert len(butter.covered) == 9
+
+
+def test_a_machine_that_goes_on_failing_stops_the_run(
+    ground: Ground, clueless: Callable[[str], None], surveys: Surveys
+) -> None:
+    clueless("butter at butter_applier")
+    work = ground.work
+    ground.line.bench.held = None
+    work.locations = [work.cell.index("butter_applier")]
+    ground.put("slice 1", 0.80, -0.52, 0.0805)
+    ground.line.at("butter_applier", surveys)
+    work.place = "butter_applier"
+    work._start_machine(1, "butter_applier")
+    failure = work.carry_out((1,))
+    assert failure is not None
+    assert failure.startswith("toast 1 at 'butter_applier': policy 'butter at butter_applier policy' does not reach")
+    assert failure.endswith(f"(tried {MAX_TRIES} times)")
+
+
+def test_a_toast_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None:
+    ground.work.locations = [ground.work.cell.last]
+    assert ground.work.carry_out((1,)) == "toast 1 at 'finished_plate' has nowhere to go"
+    assert ground.work.done() == [1]
+
+
+def test_the_robot_waits_until_the_machine_is_done(ground: Ground) -> None:
+    ground.work.ready_s["toaster"] = 0.5
+    ground.work._await(1, "toaster")
+    assert ground.line.now_s == pytest.approx(0.5, abs=TIME_STEP)
+    ground.work._await(1, "toaster")
+    assert ground.line.now_s == pytest.approx(0.5, abs=TIME_STEP)
+
+
+def test_a_grasp_can_be_tried_alone(crew: Crew, surveys: Surveys, clueless: Callable[[str], None]) -> None:
+    grasp = crew.skills["grasp at plate"]
+    assert isinstance(grasp, Grasp)
+    assert try_grasp(crew, surveys, grasp) is None
+    clueless("grasp at plate")
+    assert "does not reach its goal" in (try_grasp(crew, surveys, grasp) or "")

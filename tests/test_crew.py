@@ -1,0 +1,111 @@
+"""A task's crew: exactly the skills that its route needs, and the cell that its measured durations make."""
+
+import json
+
+import numpy as np
+import pytest
+
+from lab.crew import Crew, Durations, cell_of, is_toaster, route, stations
+from lab.errors import BadInput
+from lab.skills import SKILLS, Insert, Place, Transfer
+from lab.skills.surveys import INSERT_START
+from lab.taskfile import Stage, Task, load
+
+
+@pytest.fixture(scope="module")
+def task() -> Task:
+    return load("toast")
+
+
+def durations(crew: Crew) -> Durations:
+    """Empty moves take 2, 3, ... s, loaded ones 20, 21, ... s, butter 30 s."""
+    empty = {pair: 2.0 + n for n, pair in enumerate(crew.moves.empty)}
+    loaded = {pair: 20.0 + n for n, pair in enumerate(crew.moves.loaded)}
+    return Durations(empty, loaded, {"butter_applier": 30.0}, 99.0)
+
+
+def test_the_crew_for_one_toast_is_what_its_way_needs(task: Task) -> None:
+    direct = task.model_copy(update={"route": tuple(Stage(station=s.station) for s in task.route)})
+    assert set(Crew.of(direct, 1).skills) == {
+        "transfer toaster_buffer to plate",
+        "grasp at plate",
+        "transfer plate to insert with slice",
+        "insert at toaster",
+        "grasp at toaster",
+        "transfer toaster to butter_applier with slice",
+        "place at butter_applier",
+        "butter at butter_applier",
+        "grasp at butter_applier",
+        "transfer butter_applier to finished_plate with slice",
+        "place at finished_plate",
+    }
+
+
+@pytest.mark.parametrize("toasts", [1, 2, 50])
+def test_every_needed_move_has_its_skills(task: Task, toasts: int) -> None:
+    crew = Crew.of(task, toasts)
+    assert {skill.subtask for skill in crew.skills.values()} == set(SKILLS)
+    for origin, target in crew.moves.loaded:
+        grasp, transfer, arrive = crew.leg(origin, target)
+        assert grasp.name == f"grasp at {origin}"
+        assert isinstance(transfer, Transfer)
+        assert transfer.loaded
+        if target == "toaster":
+            assert (transfer.target, type(arrive)) == (INSERT_START, Insert)
+        else:
+            assert (transfer.target, type(arrive)) == (target, Place)
+        assert arrive.name.endswith(f" at {target}")
+    for origin, target in crew.moves.empty:
+        assert crew.empty(origin, target).name == f"transfer {origin} to {target}"
+    assert crew.policies == {}
+
+
+def test_more_toasts_need_more_empty_ways_but_no_other_skills(task: Task) -> None:
+    one, two, many = (set(Crew.of(task, toasts).skills) for toasts in (1, 2, 30))
+    assert one < two == many
+    assert all(name.startswith("transfer ") and "slice" not in name for name in two - one)
+
+
+def test_only_the_toaster_is_reached_through_the_camera(task: Task) -> None:
+    assert [s.name for s in task.stations if is_toaster(task, s.name)] == ["toaster"]
+
+
+def test_the_sequencer_is_told_what_the_task_says(task: Task) -> None:
+    told = {s.name: s for s in stations(task, {"butter_applier": 42.0})}
+    assert [(s.name, s.kind, s.capacity) for s in told.values()] == [
+        (s.name, s.kind, s.capacity) for s in task.stations
+    ]
+    assert told["toaster"].processing_s == 60.0
+    assert told["butter_applier"].processing_s == 42.0
+    assert told["plate"].processing_s == 0.0
+    assert [(s.station, s.buffer) for s in route(task)] == [(s.station, s.buffer) for s in task.route]
+
+
+def test_the_cell_holds_the_measured_times_and_nothing_else(task: Task) -> None:
+    crew = Crew.of(task, 2)
+    measured = durations(crew)
+    cell = cell_of(task, measured, 2)
+    assert cell.toasts == 2
+    assert cell.robot_start == task.robot.start
+    for table, times in ((cell.empty_s, measured.empty_s), (cell.loaded_s, measured.loaded_s)):
+        found = {
+            (cell.names[i], cell.names[j]): float(table[i, j]) for i, j in np.argwhere(np.isfinite(table)) if i != j
+        }
+        assert found == dict(times)
+
+
+def test_a_move_that_was_not_measured_is_missed(task: Task) -> None:
+    crew = Crew.of(task, 2)
+    measured = durations(crew)
+    less = Durations(measured.empty_s, {}, measured.process_s)
+    with pytest.raises(BadInput, match="loaded_s 'plate' -> 'toaster' is missing"):
+        cell_of(task, less, 2)
+
+
+def test_durations_survive_json(task: Task) -> None:
+    measured = durations(Crew.of(task, 3))
+    back = Durations.from_json(json.loads(json.dumps(measured.to_json())))
+    assert back.empty_s == measured.empty_s
+    assert back.loaded_s == measured.loaded_s
+    assert back.process_s == measured.process_s
+    assert back.sim_s == 0.0  # nothing was simulated when they are read back
