@@ -99,7 +99,7 @@ def _show(document: dict[str, Any], as_json: bool, render: Callable[[dict[str, A
 
     console = Console(highlight=False, width=None if sys.stdout.isatty() else _FILE_WIDTH)
     with console.capture() as shown:
-        console.print(render(document), soft_wrap=True)
+        console.print(render(document), soft_wrap=not sys.stdout.isatty())
     text = "\n".join(line.rstrip() for line in shown.get().splitlines())
     print(text if console.encoding.lower().startswith("utf") else text.translate(_PLAIN))
 
@@ -123,7 +123,7 @@ def _teacher(toolbox: Path | None, advisor: str, seed: int, progress: "RunProgre
     def on_event(name: str, event: Event) -> None:
         progress.learning(name, event)
         if prompt is not None:
-            prompt.on_event(event)
+            prompt.on_event(event, name)
 
     return Teacher(Toolbox(toolbox), advisor, seed, ask if prompt else None, on_event)
 

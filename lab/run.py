@@ -62,7 +62,8 @@ def _durations(prepared: Prepared, teacher: Teacher, listener: Listener) -> Dura
     kept = _kept_durations(teacher, key, crew)
     if kept is not None:
         return kept
-    listener.phase("measure", len(crew.moves.loaded) + len(crew.moves.empty))
+    processes = sum(station.process is not None for station in prepared.task.stations)
+    listener.phase("measure", len(crew.moves.loaded) + len(crew.moves.empty) + processes)
     durations = measure(crew, prepared.surveys, listener.measured)
     teacher.toolbox.save_record("durations", key, durations.to_json())
     return durations

@@ -25,7 +25,7 @@ PHASES = {
     "carry out": "Make toast in physics",
     "draw": "Draw the pictures",
 }
-_CURVE = 16
+_CURVE = 10
 _NAME = 52
 _INDENT = 12
 _LONGEST_LIST = 8
@@ -94,10 +94,13 @@ class RunProgress(Listener):
         if result is None:
             self._reused.append((name, policy.subtask))
         else:
-            reached = "not reached" if policy.final_steps is None else f"{policy.final_steps} of {policy.optimal_steps}"
+            reached = "?" if policy.final_steps is None else str(policy.final_steps)
             curve = sparkline(result.steps.tolist(), bars=self._bars)
             head = Text.assemble("  ", (f"{lesson.source:9}", "cyan"), f" {name:{_NAME}}")
-            parts = [f"{curve} {reached:>8} steps", *self._advice(name, result.requests, result.helped_steps)]
+            parts = [
+                f"{curve} {reached + '/' + str(policy.optimal_steps):>5} steps",
+                *self._advice(name, result.requests, result.helped_steps),
+            ]
             self._pack([head, *map(Text, parts)])
         self._advance()
 
@@ -105,7 +108,7 @@ class RunProgress(Listener):
         if not requests:
             return ["never asked"]
         asked = self._asked.get(name, [])
-        when = f" from episode {asked[0]} on" if asked else ""
+        when = f" from episode {asked[0]}" if asked else ""
         parts = [f"asked {requests} x{when}, {helped_steps} helped steps"]
         rejected = self._rejected.get(name)
         if rejected is not None:

@@ -109,11 +109,12 @@ class TeachingPrompt:
                 case _:
                     self._say(answer, "yellow")
 
-    def on_event(self, event: Event) -> None:
-        """Tells the person when the learner starts asking, what came of it, and why it stops."""
+    def on_event(self, event: Event, skill: str = "") -> None:
+        """Tells the person when the learner of `skill` starts asking, what came of it, and why it stops."""
         match event:
             case AdviceRequested():
-                self._say(f"Episode {event.episode}: the learner asks for advice.", "bold")
+                what = f" about '{skill}'" if skill else ""
+                self._say(f"Episode {event.episode}: the learner asks for advice{what}.", "bold")
             case EpisodeEnded(guided=True):
                 outcome = f"reached the goal in {event.steps} steps" if event.reached else "did not reach the goal"
                 self._say(f"Episode {event.episode} {outcome}; moves advised: {event.helped_steps}.")
@@ -194,8 +195,9 @@ def other_axes(request: AdviceRequest) -> list[str]:
 def draw(request: AdviceRequest, arrows: str = ARROWS, free: str = "·") -> Text | None:
     """The plane of axes 0 and 1 through the robot: R robot, G goal, # obstacle, x covered, an arrow.
 
-    The arrow stands in the cell that the learner itself would enter. None when the states are no grid. Rows run down
-    and columns to the right, but a map is shown as from above: x to the right, y up.
+    A goal in another plane casts a small g into this one. The arrow stands in the cell that the learner itself would
+    enter. None when the states are no grid. Rows run down and columns to the right, but a map is shown as from above: x
+    to the right, y up.
     """
     mdp = request.mdp
     if not (mdp.shape or mdp.coverage_shape):
@@ -208,7 +210,10 @@ def draw(request: AdviceRequest, arrows: str = ARROWS, free: str = "·") -> Text
     if direction is not None and there != here and plane[there] in (free, "x"):
         plane[there] = arrows[direction]
     plane[here] = "R"
-    return _coloured(plane.T[::-1] if is_map(mdp) else plane, arrows, bool(mdp.coverage_shape))
+    legend = "R head, x covered" if mdp.coverage_shape else "R robot, G goal, # obstacle"
+    if "g" in plane:
+        legend = legend.replace("G goal", "g goal, in another plane")
+    return _coloured(plane.T[::-1] if is_map(mdp) else plane, arrows, legend)
 
 
 def _place(cell: tuple[int, ...]) -> tuple[int, int]:
@@ -223,18 +228,28 @@ def _plane(mdp: TabularMDP, state: int, free: str) -> Plane:
         return marks.reshape(1, -1)
     rest = mdp.state_cell(state)[2:]
     layer = int(np.ravel_multi_index(rest, mdp.shape[2:])) if rest else 0
-    return marks.reshape(*mdp.shape[:2], -1)[:, :, layer]
+    plane: Plane = marks.reshape(*mdp.shape[:2], -1)[:, :, layer]
+    goal = _place(_nearest_goal(mdp, mdp.state_cell(state)))
+    if plane[goal] == free:
+        plane[goal] = "g"
+    return plane
 
 
-def _coloured(plane: Plane, arrows: str, is_coverage: bool) -> Text:
-    styles = {"R": "bold cyan", "G": "bold green", "#": "red", "x": "green", **dict.fromkeys(arrows, "bold magenta")}
+def _coloured(plane: Plane, arrows: str, legend: str) -> Text:
+    styles = {
+        "R": "bold cyan",
+        "G": "bold green",
+        "g": "green",
+        "#": "red",
+        "x": "green",
+        **dict.fromkeys(arrows, "bold magenta"),
+    }
     text = Text()
     for row in plane:
         for mark in row:
             text.append(f" {mark}", styles.get(str(mark), "dim"))
         text.append("\n")
-    text.append("R head, x covered" if is_coverage else "R robot, G goal, # obstacle")
-    return text.append(", arrow: the learner's own choice")
+    return text.append(f"{legend}, arrow: the learner's own choice")
 
 
 def understand(line: str, mdp: TabularMDP) -> int | str:

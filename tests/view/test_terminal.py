@@ -91,7 +91,11 @@ def test_obstacles_and_goals_are_not_hidden_by_the_arrow() -> None:
 
 def test_a_space_shows_the_robots_slice_and_names_the_rest() -> None:
     mdp = space()
-    assert picture(request(mdp, action=0))[:2] == ["· # ↑", "· · R"]
+    assert picture(request(mdp, action=0)) == [
+        "g # ↑",
+        "· · R",
+        "R robot, g goal, in another plane, # obstacle, arrow: the learner's own choice",
+    ]
     assert other_axes(request(mdp)) == ["Not in the picture: -z / +z is at 2 of 0..3; the goal is 2 below (-z)."]
     bottom = int(np.ravel_multi_index((1, 2, 0), mdp.shape))
     assert picture(request(mdp, action=5, state=bottom))[:2] == ["G · ·", "· · R"]
@@ -107,7 +111,7 @@ def test_four_axes_name_two_others() -> None:
         "-z / +z is at 0 of 0..1; the goal is 1 above (+z).",
         "turn left / turn right is at 0 of 0..2; the goal is 2 above (turn right).",
     ]
-    assert picture(request(mdp))[:2] == ["R →", "· ·"]
+    assert picture(request(mdp))[:2] == ["R →", "· g"]
 
 
 def test_one_axis_runs_to_the_right() -> None:
@@ -253,6 +257,7 @@ def test_events_are_told_with_their_numbers() -> None:
         AdviceEnded(35, "advisor left"),
     ):
         prompt.on_event(event)
+    prompt.on_event(AdviceRequested(36, None, None, None), "insert at toaster")
     assert said(shown).splitlines() == [
         "Episode 30: the learner asks for advice.",
         "Episode 30 reached the goal in 12 steps; moves advised: 9.",
@@ -261,6 +266,7 @@ def test_events_are_told_with_their_numbers() -> None:
         "those before it 44.2.",
         "Episode 34: the same result again and again; the learner asks no more.",
         "Episode 35: advice has ended; the learner goes on alone.",
+        "Episode 36: the learner asks for advice about 'insert at toaster'.",
     ]
 
 
@@ -300,7 +306,9 @@ def test_ctrl_c_keeps_what_was_learned() -> None:
 def test_a_map_is_seen_from_above_with_y_upwards() -> None:
     labels = ("left", "right", "backward", "forward")
     mdp = grid((3, 2), np.zeros((3, 2), bool), (0, 0), (2, 1), action_labels=labels)
-    request = AdviceRequest(mdp, np.zeros((6, 4)).tolist(), mdp.start, 30, 1, 3, None, None, None)  # it would go forward
+    request = AdviceRequest(
+        mdp, np.zeros((6, 4)).tolist(), mdp.start, 30, 1, 3, None, None, None
+    )  # it would go forward
     picture = draw(request)
     assert picture is not None
     assert picture.plain.splitlines()[:2] == [" ↑ · G", " R · ·"]
