@@ -32,6 +32,7 @@ Off = Annotated[float, Field(ge=0, le=10)]
 Count = Annotated[int, Field(ge=1, le=100)]
 XY = Annotated[tuple[Number, Number], BeforeValidator(_tuple)]
 XYZ = Annotated[tuple[Number, Number, Number], BeforeValidator(_tuple)]
+Above = Annotated[tuple[Number, Number, Size], BeforeValidator(_tuple)]
 Sizes = Annotated[tuple[Size, Size, Size], BeforeValidator(_tuple)]
 Area = Annotated[tuple[Off, Off], BeforeValidator(_tuple)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$")]
@@ -69,9 +70,9 @@ class Workspace(Record):
 
 
 class CameraSettings(Record):
-    """The overhead camera: position [m], field of view [rad], picture width and height [pixels]."""
+    """The overhead camera: position above the table [m], field of view [rad], picture width and height [pixels]."""
 
-    position_m: XYZ
+    position_m: Above
     field_of_view_rad: Annotated[float, Field(gt=0.01, lt=2.5)]
     pixels: Annotated[int, Field(ge=64, le=4096)] = 640
 

@@ -214,6 +214,11 @@ def test_what_is_no_text_is_said(tmp_path: Path) -> None:
             "robot.speed_m_s: Input should be greater than or equal to 0.01 (got 0.0)",
         ),
         ("pixels = 640", "pixels = 640000", "camera.pixels: Input should be less than or equal to 4096"),
+        (
+            "position_m = [0.80, 0.0, 2.4]",
+            "position_m = [0.80, 0.0, 0.0]",
+            "camera.position_m.2: Input should be greater",
+        ),
         ("episodes = 200", "episodes = 0", "subtasks.transfer.learner.episodes: Input should be greater than or equal"),
         ("lower_m = [-0.48, -1.08, 0.24]", "lower_m = 3", "workspace.lower_m: Input should be a valid tuple (got 3)"),
     ],
