@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, ClassVar
 
+from lab.errors import BadInput
 from lab.mdp import NoPath, grid
 from lab.sim.kinematics import ToolPose
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
@@ -29,6 +30,11 @@ class Transfer(Skill):
         self.surveys = surveys
         survey = surveys.workspace(self.loaded)
         start, goal = surveys.dock(self.origin, self.loaded), surveys.dock(self.target, self.loaded)
+        if start == goal:
+            raise BadInput(
+                f"{self.name}: both ends are approached from the same cell {goal} of the workspace: "
+                "move the stations apart, or make workspace.cell_m smaller"
+            )
         try:
             mdp = grid(
                 survey.causes.shape, survey.blocked, start, goal, surveys.task.subtask("transfer").rewards, ACTIONS

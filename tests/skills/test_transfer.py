@@ -122,3 +122,19 @@ def test_a_tower_on_a_station_is_bad_input_that_names_both(task: Task) -> None:
         BadInput, match="station 'butter_buffer' cannot be approached with a slice: in the way: tower 1"
     ):
         Transfer("plate", "butter_buffer", loaded=True).setup(surveys)
+
+
+def test_stations_in_one_cell_are_too_near_to_each_other_for_this_grid(task: Task) -> None:
+    x, y, yaw = task.station("butter_buffer").pose
+    near = task.station("butter_applier").model_copy(update={"pose": (x + 0.17, y, yaw)})
+    stations = tuple(near if s.name == near.name else s for s in task.stations)
+    _, low_y, low_z = task.workspace.lower_m
+    wide = task.workspace.model_copy(
+        update={"cell_m": (0.4, 0.12, 0.12), "shape": (4, 18, 3), "lower_m": (x - 0.12 - 0.4, low_y, low_z)}
+    )
+    crowded = task.model_copy(update={"stations": stations, "workspace": wide, "obstacles": ()})
+    surveys = Surveys(crowded, Layout((), ()))
+    with pytest.raises(
+        BadInput, match=r"^transfer .*: both ends are approached from the same cell \(1, \d+, 0\) of the"
+    ):
+        Transfer("butter_buffer", "butter_applier", loaded=False).setup(surveys)
