@@ -1,21 +1,16 @@
 """The meshes and URDFs of the cell, made with trimesh from the parameters below; `write(folder)` regenerates `assets/`."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING
-from xml.etree import ElementTree as Xml
 
 import numpy as np
 
 from lab.sim import kinematics as arm
+from lab.sim.parts import Joint, Link, Model, Part, Vector, box, cylinder, hull, join, urdf
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
-
-Vector = tuple[float, float, float]
-Color = tuple[float, float, float, float]
 
 SLICE = (0.12, 0.015, 0.12)  # [m] width, thickness, height
 SLICE_KG = 0.040
@@ -40,82 +35,6 @@ STEEL, RUBBER, CRUST, CRUMB = (
 MARKER_MAGENTA, MARKER_CYAN, MARKER_GREEN = (0.95, 0.0, 0.95, 1.0), (0.0, 0.85, 0.85, 1.0), (0.0, 0.80, 0.0, 1.0)
 
 
-@dataclass(frozen=True)
-class Part:
-    """A visible and, unless `ghost`, solid piece of a link: a mesh, or a box or cylinder of `size` [m] at `at` [m]."""
-
-    color: Color
-    size: tuple[float, ...] = ()
-    at: Vector = (0.0, 0.0, 0.0)
-    mesh: "Trimesh | None" = None
-    ghost: bool = False
-    hidden: bool = False
-
-
-@dataclass(frozen=True)
-class Link:
-    """One link: its parts and mass [kg], and the joint that carries it (None for the root)."""
-
-    name: str
-    mass: float
-    parts: Sequence[Part]
-    joint: "Joint | None" = None
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A joint at `at` [m] on `parent`, turning about or sliding along `axis` within [lower, upper] [rad or m]."""
-
-    name: str
-    kind: str
-    parent: str
-    at: Vector
-    axis: Vector = (0.0, 0.0, 1.0)
-    limits: tuple[float, float] = (0.0, 0.0)
-    speed: float = 1.0
-    effort: float = 1000.0
-
-
-@dataclass
-class Model:
-    """A URDF to be: its name and links, root first."""
-
-    name: str
-    links: list[Link] = field(default_factory=list)
-
-
-def _cylinder(radius: float, length: float, at: Vector = (0, 0, 0), along: str = "z") -> "Trimesh":
-    import trimesh
-
-    mesh: Trimesh = trimesh.creation.cylinder(radius=radius, height=length, sections=40)
-    if along != "z":
-        turn: Vector = (0, 1, 0) if along == "x" else (1, 0, 0)
-        mesh.apply_transform(trimesh.transformations.rotation_matrix(pi / 2, turn))  # type: ignore[no-untyped-call]
-    mesh.apply_translation(at)
-    return mesh
-
-
-def _join(*meshes: "Trimesh") -> "Trimesh":
-    import trimesh
-
-    joined = trimesh.util.concatenate(list(meshes))
-    assert isinstance(joined, trimesh.Trimesh)
-    return joined
-
-
-def _hull(*meshes: "Trimesh") -> "Trimesh":
-    hull: Trimesh = _join(*meshes).convex_hull
-    return hull
-
-
-def _box(size: Vector, at: Vector = (0, 0, 0)) -> "Trimesh":
-    import trimesh
-
-    mesh: Trimesh = trimesh.creation.box(extents=size)
-    mesh.apply_translation(at)
-    return mesh
-
-
 def _turning(number: int, parent: str, at: Vector, axis: Vector) -> Joint:
     limits = (float(arm.LOWER[number]), float(arm.UPPER[number]))
     return Joint(arm.JOINTS[number], "revolute", parent, at, axis, limits, float(arm.SPEED[number]))
@@ -125,28 +44,26 @@ def robot() -> Model:
     """The six-axis arm with its two-finger gripper (an approximate model of the UP6 class, see kinematics)."""
     shoulder, elbow = (arm.SHOULDER_OUT, 0.0, 0.20), (0.0, 0.0, arm.UPPER_ARM)
     forearm_root, half = 0.20, arm.FOREARM
-    base = _join(
-        _hull(_cylinder(0.19, 0.02, (0, 0, 0.01)), _cylinder(0.15, 0.02, (0, 0, 0.06))),
-        _cylinder(0.13, 0.19, (0, 0, 0.155)),
+    base = join(
+        hull(cylinder(0.19, 0.02, (0, 0, 0.01)), cylinder(0.15, 0.02, (0, 0, 0.06))),
+        cylinder(0.13, 0.19, (0, 0, 0.155)),
     )
-    turret = _join(
-        _cylinder(0.145, 0.06, (0, 0, 0.03)),
-        _hull(_cylinder(0.12, 0.05, (0, 0, 0.06)), _cylinder(0.10, 0.18, shoulder, "y")),
+    turret = join(
+        cylinder(0.145, 0.06, (0, 0, 0.03)),
+        hull(cylinder(0.12, 0.05, (0, 0, 0.06)), cylinder(0.10, 0.18, shoulder, "y")),
     )
-    upper = _join(
-        _hull(_cylinder(0.085, 0.11, (0, 0, 0), "y"), _cylinder(0.065, 0.10, elbow, "y")),
-        _cylinder(0.055, 0.17, elbow, "y"),
+    upper = join(
+        hull(cylinder(0.085, 0.11, (0, 0, 0), "y"), cylinder(0.065, 0.10, elbow, "y")),
+        cylinder(0.055, 0.17, elbow, "y"),
     )
-    fore = _hull(_cylinder(0.085, 0.12, (0, 0, 0.06), "y"), _cylinder(0.07, 0.14, (0.10, 0, arm.ELBOW_UP), "x"))
-    roll = _hull(
-        _cylinder(0.062, 0.02, (0.0, 0, 0), "x"), _cylinder(0.045, 0.02, (half - forearm_root - 0.04, 0, 0), "x")
-    )
-    wrist = _join(_cylinder(0.047, 0.085, (0, 0, 0), "y"), _cylinder(0.034, 0.075, (0.0375, 0, 0), "x"))
+    fore = hull(cylinder(0.085, 0.12, (0, 0, 0.06), "y"), cylinder(0.07, 0.14, (0.10, 0, arm.ELBOW_UP), "x"))
+    roll = hull(cylinder(0.062, 0.02, (0.0, 0, 0), "x"), cylinder(0.045, 0.02, (half - forearm_root - 0.04, 0, 0), "x"))
+    wrist = join(cylinder(0.047, 0.085, (0, 0, 0), "y"), cylinder(0.034, 0.075, (0.0375, 0, 0), "x"))
     tip_to_pad = arm.TOOL - FINGER[0]
-    palm = _join(
-        _cylinder(0.032, 0.02, (0.01, 0, 0), "x"),
-        _box((0.05, 0.10, 0.05), (0.045, 0, 0)),
-        _box((0.026, 0.085, 0.034), (0.083, 0, 0)),
+    palm = join(
+        cylinder(0.032, 0.02, (0.01, 0, 0), "x"),
+        box((0.05, 0.10, 0.05), (0.045, 0, 0)),
+        box((0.026, 0.085, 0.034), (0.083, 0, 0)),
     )
     marker_x = arm.TOOL - MARKER_UP
     bar = (0.008, 0.018, MARKER_OUT - MARKER_RADIUS)
@@ -163,7 +80,7 @@ def robot() -> Model:
             [
                 Part(GRAPHITE, mesh=palm),
                 Part(STEEL, bar, (marker_x + 0.006, 0, bar[2] / 2), ghost=True),
-                Part(MARKER_MAGENTA, mesh=_cylinder(MARKER_RADIUS, 0.004, (marker_x, 0, MARKER_OUT), "x"), ghost=True),
+                Part(MARKER_MAGENTA, mesh=cylinder(MARKER_RADIUS, 0.004, (marker_x, 0, MARKER_OUT), "x"), ghost=True),
             ],
             _turning(5, "wrist", (arm.FLANGE, 0, 0), (1, 0, 0)),
         ),
@@ -224,7 +141,7 @@ def bread() -> Model:
         outline += [(-x, z) for x, z in outline]
         import trimesh
 
-        return _hull(trimesh.Trimesh([(x, y, z) for x, z in outline for y in (-depth / 2, depth / 2)]))
+        return hull(trimesh.Trimesh([(x, y, z) for x, z in outline for y in (-depth / 2, depth / 2)]))
 
     solid = Part(CRUST, SLICE, hidden=True)
     return Model(
@@ -244,90 +161,6 @@ def bread() -> Model:
 
 
 MODELS = {"robot": robot, "toaster": toaster, "applier": applier, "slice": bread}
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(f"{round(float(v), 6) + 0.0:g}" for v in values)
-
-
-def _geometry(parent: Xml.Element, part: Part, mesh_file: str) -> None:
-    Xml.SubElement(parent, "origin", xyz=_numbers(part.at), rpy="0 0 0")
-    shape = Xml.SubElement(parent, "geometry")
-    if part.mesh is not None:
-        Xml.SubElement(shape, "mesh", filename=mesh_file)
-    else:
-        Xml.SubElement(shape, "box", size=_numbers(part.size))
-
-
-def _solid(part: Part) -> "Trimesh":
-    size = part.size
-    return part.mesh if part.mesh is not None else _box((size[0], size[1], size[2]), part.at)
-
-
-def _inertial(element: Xml.Element, link: Link) -> None:
-    """Mass and inertia of the link's solid parts taken as one homogeneous body."""
-    body = _join(*[_solid(part) for part in link.parts if not part.ghost])
-    tensor = body.moment_inertia / body.volume * link.mass
-    inertial = Xml.SubElement(element, "inertial")
-    Xml.SubElement(inertial, "origin", xyz=_numbers(body.center_mass), rpy="0 0 0")
-    Xml.SubElement(inertial, "mass", value=_numbers([link.mass]))
-    names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    Xml.SubElement(
-        inertial, "inertia", {name: f"{round(float(tensor[at]), 9) + 0.0:.9g}" for name, at in names.items()}
-    )
-
-
-def _joint(root: Xml.Element, link: Link, joint: Joint) -> None:
-    element = Xml.SubElement(root, "joint", name=joint.name, type=joint.kind)
-    Xml.SubElement(element, "parent", link=joint.parent)
-    Xml.SubElement(element, "child", link=link.name)
-    Xml.SubElement(element, "origin", xyz=_numbers(joint.at), rpy="0 0 0")
-    Xml.SubElement(element, "axis", xyz=_numbers(joint.axis))
-    low, high = joint.limits
-    Xml.SubElement(
-        element,
-        "limit",
-        lower=_numbers([low]),
-        upper=_numbers([high]),
-        effort=_numbers([joint.effort]),
-        velocity=_numbers([joint.speed]),
-    )
-
-
-def urdf(model: Model) -> tuple[str, dict[str, str]]:
-    """The URDF text of `model`, and the OBJ text of each mesh it names by file name."""
-    root = Xml.Element("robot", name=model.name)
-    meshes: dict[str, str] = {}
-    for link in model.links:
-        element = Xml.SubElement(root, "link", name=link.name)
-        _inertial(element, link)
-        for number, part in enumerate(link.parts):
-            mesh_file = f"{model.name}_{link.name}_{number}.obj"
-            if part.mesh is not None:
-                meshes[mesh_file] = obj(part.mesh)
-            if not part.hidden:
-                visual = Xml.SubElement(element, "visual")
-                _geometry(visual, part, mesh_file)
-                material = Xml.SubElement(visual, "material", name=f"{link.name}_{number}")
-                Xml.SubElement(material, "color", rgba=_numbers(part.color))
-            if not part.ghost:
-                _geometry(Xml.SubElement(element, "collision"), part, mesh_file)
-        if link.joint is not None:
-            _joint(root, link, link.joint)
-    Xml.indent(root)
-    return '<?xml version="1.0"?>\n' + Xml.tostring(root, encoding="unicode") + "\n", meshes
-
-
-def obj(mesh: "Trimesh") -> str:
-    """`mesh` as OBJ text with a normal per face, rounded to micrometres so that every machine writes the same file."""
-    lines = [f"v {_numbers(vertex)}" for vertex in mesh.vertices]
-    normals = {tuple(np.round(normal, 3) + 0.0): None for normal in mesh.face_normals}
-    index = {normal: number for number, normal in enumerate(normals, start=1)}
-    lines += [f"vn {_numbers(normal)}" for normal in normals]
-    for face, normal in zip(mesh.faces, mesh.face_normals, strict=True):
-        at = index[tuple(np.round(normal, 3) + 0.0)]
-        lines.append("f " + " ".join(f"{corner + 1}//{at}" for corner in face))
-    return "\n".join(lines) + "\n"
 
 
 def write(folder: Path) -> list[Path]:
