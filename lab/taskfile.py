@@ -50,7 +50,7 @@ class RobotSettings(Record):
     start: Name
     speed_m_s: Annotated[float, Field(ge=0.01, le=1.5)] = 0.5
     acceleration_m_s2: Annotated[float, Field(ge=0.01, le=10)] = 2.0
-    grip_force_n: Annotated[float, Field(gt=0, le=200)] = 25.0
+    grip_force_n: Annotated[float, Field(gt=0, le=100)] = 25.0  # from about 150 N on it squeezes slices out
 
 
 class Slices(Record):
