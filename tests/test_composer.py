@@ -82,7 +82,7 @@ def staffed(task: Task, surveys: Surveys, toasts: int) -> Crew:
 
 @pytest.fixture(scope="module")
 def crew(task: Task, surveys: Surveys) -> Crew:
-    return staffed(task, surveys, 2)
+    return staffed(task, surveys, 1)
 
 
 @pytest.fixture(scope="module")
@@ -177,19 +177,6 @@ def test_one_toast_is_delivered_in_the_time_predicted(crew: Crew, surveys: Surve
     spot = spots(crew.task.station("finished_plate"))[0]
     assert (last[0], last[1]) == pytest.approx((spot.x, spot.y), abs=0.005)
     assert outcome.sim_s >= outcome.schedule.makespan_s
-
-
-def test_two_toasts_share_the_machines(
-    task: Task, crew: Crew, surveys: Surveys, layout: Layout, durations: Durations
-) -> None:
-    cell = cell_of(task, durations, 2)
-    sequence = (1, 1, 2, 1, 2, 2)
-    outcome, recording = carry_out(crew, surveys, layout, cell, sequence)
-    assert outcome.failure is None
-    assert outcome.delivered == (1, 2)
-    assert outcome.schedule.makespan_s == pytest.approx(simulate(cell, sequence).makespan_s, rel=0.03)
-    first, second = (recording.frames[-1].poses[f"slice {n}"] for n in (1, 2))
-    assert np.hypot(first[0] - second[0], first[1] - second[1]) > 0.05  # each on a spot of its own
 
 
 def failed(outcome: Outcome, where: str, why: str) -> None:
@@ -327,6 +314,14 @@ def test_a_machine_that_goes_on_failing_stops_the_run(
     assert failure is not None
     assert failure.startswith("toast 1 at 'butter_applier': policy 'butter at butter_applier policy' does not reach")
     assert failure.endswith(f"(tried {MAX_TRIES} times)")
+
+
+def test_each_toast_gets_a_free_spot(task: Task, ground: Ground) -> None:
+    work, last = ground.work, ground.work.cell.last
+    places = spots(task.station("finished_plate"))
+    assert work._free_spot("finished_plate", last) == places[0]
+    work.locations, work.spot_of = [last, last, work.cell.first], {1: places[0], 2: places[2], 3: places[1]}
+    assert work._free_spot("finished_plate", last) == places[1]
 
 
 def test_a_toast_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None:

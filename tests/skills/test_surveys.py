@@ -13,7 +13,7 @@ from lab.vision import see
 
 
 def signatures(surveys: Surveys) -> dict[str, str]:
-    crew = Crew.of(surveys.task, 2)
+    crew = Crew.of(surveys.task, 1)
     return {name: skill.setup(surveys).mdp.signature for name, skill in crew.skills.items()}
 
 
@@ -32,10 +32,6 @@ def with_obstacle_moved(surveys: Surveys, name: str, dx: float, dy: float) -> Su
 def changed(before: dict[str, str], after: dict[str, str]) -> set[str]:
     assert before.keys() == after.keys()
     return {name for name in before if before[name] != after[name]}
-
-
-def test_the_same_scene_gives_the_same_signatures(surveys: Surveys, before: dict[str, str]) -> None:
-    assert changed(before, signatures(Surveys(surveys.task, surveys.layout))) == set()
 
 
 @pytest.mark.parametrize(
