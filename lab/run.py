@@ -20,7 +20,7 @@ from lab.sequencing.cell import Cell
 from lab.sequencing.events import EpisodeSequenced, SequenceResult
 from lab.sequencing.exact import optimum
 from lab.sequencing.srl import srl
-from lab.sim.scene import Layout, draw_layout
+from lab.sim.scene import Layout, check_apart, draw_layout
 from lab.skills.surveys import Surveys
 from lab.taskfile import Task, check_toasts
 from lab.teaching import Teacher
@@ -30,6 +30,7 @@ def prepare(task: Task, toasts: int, seed: int) -> Prepared:
     """Lay the scene out as the seed says and survey every problem of it. BadInput for whatever cannot be; writes nothing."""
     began = time.perf_counter()
     check_toasts(toasts, task)
+    check_apart(task, toasts)
     layout = draw_layout(task, toasts, np.random.default_rng([seed, 1]))
     surveys = Surveys(task, layout)
     crew = Crew.of(task, toasts)

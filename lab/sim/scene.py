@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 from math import ceil, cos, hypot, sin
 
 import numpy as np
@@ -13,7 +13,7 @@ from lab.sim import assets, kinematics
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import Robot
 from lab.sim.world import World
-from lab.taskfile import Obstacle, Station, Task
+from lab.taskfile import NEAREST_STATIONS_M, Obstacle, Station, Task
 
 SLAB = 0.012  # [m] plates and buffers are slabs this thick
 GRASP_DEPTH = 0.03  # [m] how far the fingers reach below a slice's top
@@ -192,6 +192,7 @@ def check_scene(task: Task) -> None:
         raise BadInput(
             f"workspace.lower_m: the lowest tool height {low:.3f} m would sweep a carried slice through standing ones"
         )
+    _check_toaster(task)
     for station in task.stations:
         if station.kind == "machine" and station.capacity > 1:
             raise BadInput(
@@ -205,6 +206,32 @@ def check_scene(task: Task) -> None:
                         f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m is "
                         f"{hypot(at.x, at.y):.2f} m from the robot; the arm reaches {NEAREST_M:.2f} to about 1.2 m"
                     )
+
+
+def _check_toaster(task: Task) -> None:
+    """BadInput for a second toaster, which the camera's grid has no room for, or one that a carried slice would hit."""
+    toasters = [s.name for s in task.stations if s.kind == "machine" and not is_applier(s)]
+    if len(toasters) > 1:
+        raise BadInput(
+            f"machines '{toasters[0]}' and '{toasters[1]}' both have processing_s: the camera's grid leads to one toaster"
+        )
+    lowest = assets.TOASTER[2] + assets.SLICE[2] - GRASP_DEPTH + 0.005
+    if toasters and task.insert.height_m < lowest:
+        raise BadInput(
+            f"insert.height_m {task.insert.height_m}: a carried slice would hit the toaster, at least {lowest:.3f} needed"
+        )
+
+
+def check_apart(task: Task, toasts: int) -> None:
+    """BadInput when slices at two stations would stand in each other's place, with so many toasts under way."""
+    feet = [(station.name, spot) for station in task.stations for spot in spots(station)[:toasts]]
+    for (one, a), (other, b) in combinations(feet, 2):
+        apart = hypot(a.x - b.x, a.y - b.y)
+        if one != other and apart < NEAREST_STATIONS_M:
+            raise BadInput(
+                f"stations '{one}' and '{other}' overlap: with {toasts} toasts, slices may stand {apart:.3f} m apart, "
+                f"at least {NEAREST_STATIONS_M} m needed"
+            )
 
 
 NEAREST_M = 0.36  # [m] nearer to its own axis than this the arm would touch itself

@@ -44,7 +44,7 @@ class Insert(Skill):
         """Take the overhead picture, find the markers, and block the cells in which the slice would meet a cube."""
         self.surveys = surveys
         self.picture = surveys.picture()
-        self.seen = see(self.picture, camera_view(surveys.task))
+        self.seen = see(self.picture, camera_view(surveys.task), where="the overhead camera's picture")
         blocked, names = self._blocked(surveys.task)
         rewards = surveys.task.subtask("insert").rewards
         try:

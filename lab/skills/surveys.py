@@ -22,7 +22,7 @@ from lab.sim.scene import (
     marker_offset_of_toaster,
     spots,
 )
-from lab.sim.survey import Survey, Surveyor
+from lab.sim.survey import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.world import World
 from lab.taskfile import Station, Task
 
@@ -133,12 +133,19 @@ class Surveys:
 
     def _picture(self) -> NDArray[np.uint8]:
         """The overhead picture with the arm at the insert grid's start, (pixels, pixels, 3) uint8 RGB."""
+        x, y = self.task.insert.start_m
+        start = ToolPose(x, y, self.task.insert.height_m, 0.0)
         with World() as world:
             scene = Scene(world, self.task, 0, self.layout)
-            x, y = self.task.insert.start_m
-            start = ToolPose(x, y, self.task.insert.height_m, 0.0)
-            if not scene.robot.stand(start):
-                raise BadInput(f"insert.start_m {[x, y]}: out of the arm's reach")
+            cause = Surveyor(scene, loaded=True, clearance=_TOUCH_CLEARANCE[True]).cause(start)
+        if cause:
+            why = (
+                "out of the arm's reach" if cause == OUT_OF_REACH else f"{cause} is in the way of a carried slice there"
+            )
+            raise BadInput(f"insert.start_m {[x, y]}: {why}")
+        with World() as world:
+            scene = Scene(world, self.task, 0, self.layout)
+            scene.robot.stand(start)
             scene.robot.open_at_once(assets.SLICE[1] / 2)
             return overhead_camera(self.task).picture(world)
 

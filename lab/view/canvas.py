@@ -37,11 +37,13 @@ STYLE: dict[str, Any] = {
 
 
 def check_png(path: Path) -> None:
-    """Raise BadInput unless `path` ends in .png and its folder is there."""
+    """Raise BadInput unless `path` ends in .png, its folder is there, and it is no folder itself."""
     if path.suffix.lower() != ".png":
         raise BadInput(f"picture '{path}': plots are written as .png")
     if not path.parent.is_dir():
         raise BadInput(f"picture '{path}': there is no folder '{path.parent}'")
+    if path.is_dir():
+        raise BadInput(f"picture '{path}': it is a folder, a file is wanted")
 
 
 @contextmanager
