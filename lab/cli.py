@@ -288,7 +288,10 @@ def view(
         else:
             print(f"{url}\nfrom another machine: {hint}\nCtrl-C ends it", flush=True)
 
-    show(what, toasts, seed, port, tell)
+    try:
+        show(what, toasts, seed, port, tell)
+    except KeyboardInterrupt:
+        _end("stopped by Ctrl-C", 130)
 
 
 @command(toolbox_app, "list", "lab toolbox list")

@@ -288,7 +288,11 @@ def plain_reader(console: Console, stream: TextIO) -> ReadLine:
 
     def read_line(prompt: str) -> str:
         console.print(Text(prompt), end="")
-        line = stream.readline()
+        try:
+            line = stream.readline()
+        except KeyboardInterrupt:
+            console.print()  # what comes next begins a line
+            raise
         console.print(Text(line.rstrip("\r\n")))  # piped answers are not echoed by a terminal
         if not line:
             raise EOFError
