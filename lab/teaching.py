@@ -56,6 +56,8 @@ class Teacher:
         An unfinished policy is learned on from where it stands. WorkFailed when no session finds a way; Interrupted on Ctrl-C.
         """
         found = known.get((problem.subtask, problem.mdp.signature))
+        if found is not None and not _belongs(found, problem.mdp):
+            found = None
         if found is not None and fits(found.q, problem.mdp):
             return Lesson(found, "reused")
         return self.teach(problem, settings.learner, settings.gate, task, unfinished=found)
@@ -126,6 +128,11 @@ class Teacher:
 def fits(q: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]", mdp: TabularMDP) -> bool:
     """Whether greedy steps lead from every start of the problem to its goal."""
     return greedy_path(q, mdp, mdp.n_states)[2] and not unreached(q, mdp)
+
+
+def _belongs(policy: Policy, mdp: TabularMDP) -> bool:
+    """Whether a policy that bears a problem's signature also has its table's size and its actions."""
+    return policy.q.shape == (mdp.n_states, mdp.n_actions) and policy.action_labels == mdp.action_labels
 
 
 def _joined(before: SessionResult | None, after: SessionResult) -> SessionResult:
