@@ -16,6 +16,7 @@ from lab.sim.scene import (
     Layout,
     Scene,
     Spot,
+    check_apart,
     check_scene,
     draw_layout,
     floor,
@@ -162,3 +163,31 @@ def test_the_toasters_marker_is_on_its_top_beside_the_slot(world: World) -> None
     assert z == pytest.approx(assets.TOASTER[2] + 0.002)
     assert y == pytest.approx(0.1)
     assert assets.TOASTER_SLOT[1] / 2 + assets.MARKER_RADIUS < 0.9 - x < assets.TOASTER[1] / 2 - assets.MARKER_RADIUS
+
+
+def test_a_second_toaster_is_refused(task: Task) -> None:
+    second = task.station("toaster").model_copy(update={"name": "grill", "pose": (0.8, 0.4, 0.0)})
+    with pytest.raises(
+        BadInput, match=r"machines 'toaster' and 'grill' both have processing_s: .* leads to one toaster"
+    ):
+        check_scene(task.model_copy(update={"stations": (*task.stations, second)}))
+
+
+def test_a_way_so_low_that_the_slice_would_hit_the_toaster_is_refused(task: Task) -> None:
+    low = task.insert.model_copy(update={"height_m": 0.19})
+    with pytest.raises(
+        BadInput, match=r"insert\.height_m 0\.19: a carried slice would hit the toaster, at least 0\.195"
+    ):
+        check_scene(task.model_copy(update={"insert": low}))
+
+
+def test_slices_of_neighbouring_stations_must_not_meet(task: Task) -> None:
+    """0.2 m along y the buffer's slots come within a row of each other once three toasts are under way."""
+    check_apart(task, 50)
+    x, y, yaw = task.station("toaster_buffer").pose
+    near = moved(task, "butter_buffer", pose=(x, y - 0.2, yaw))
+    check_apart(near, 1)
+    with pytest.raises(
+        BadInput, match="stations 'toaster_buffer' and 'butter_buffer' overlap: with 4 toasts, slices may"
+    ):
+        check_apart(near, 4)

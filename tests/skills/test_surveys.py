@@ -166,3 +166,13 @@ def test_a_scene_that_cannot_be_is_refused_at_once(task: Task, layout: Layout) -
 
 def test_the_carried_slice_hangs_above_the_standing_ones(surveys: Surveys) -> None:
     assert surveys.approach("plate").z + GRASP_DEPTH - SIZE[2] > 0.012 + SIZE[2] + 0.01
+
+
+def test_a_start_with_a_cube_in_the_way_of_the_slice_is_refused(task: Task) -> None:
+    x, y = task.insert.start_m
+    near = Obstacle(name="cube", position_m=(x + 0.08, y), cubes=3)
+    beside = Surveys(task.model_copy(update={"obstacles": (near,)}), Layout((near.position_m,), ()))
+    with pytest.raises(
+        BadInput, match=r"insert\.start_m \[0\.\d+, -0\.\d+\]: cube is in the way of a carried slice there"
+    ):
+        beside.picture()
