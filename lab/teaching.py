@@ -17,7 +17,7 @@ from lab.skills.skill import Problem
 from lab.taskfile import Subtask
 from lab.toolbox import Toolbox
 
-MAX_SESSIONS = 6  # further sessions go on from the table of the one before
+MAX_SESSIONS = 20  # further sessions go on from the table of the one before
 _LONGEST_PROBLEM = MAX_NAME_LENGTH - 20  # characters of a policy's name; the rest is for its signature and state
 Source = Literal["learned", "reused", "continued"]
 
@@ -93,7 +93,8 @@ class Teacher:
             )
         if sessions > 1 and not fits(whole.q, problem.mdp):
             raise WorkFailed(
-                f"'{problem.name}' was not learned in {len(whole.steps)} episodes; what was learned is kept"
+                f"'{problem.name}' was not learned in {len(whole.steps)} episodes with the advisor '{self.advisor}'; "
+                "what was learned is kept: try a better advisor, or more episodes in the task file"
             )
         return Lesson(policy, "learned" if unfinished is None else "continued", whole)
 
