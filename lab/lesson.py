@@ -49,9 +49,9 @@ def teach_one(
     if name is not None and not is_name(name):
         raise BadInput(f"policy name '{name}' (--save): wanted 1 to {MAX_NAME_LENGTH} printable characters")
     toasts = fitting(task, 2)
-    find_skill(Crew.of(task, toasts).skills, subtask)  # before the scene is surveyed
-    prepared = prepare(task, toasts, teacher.seed)
-    skill = find_skill(prepared.crew.skills, subtask)
+    wanted = find_skill(Crew.of(task, toasts).skills, subtask).name  # before the scene is surveyed
+    prepared = prepare(task, toasts, teacher.seed, wanted)
+    skill = prepared.crew.skills[wanted]
     problem, settings = prepared.problems[skill.name], task.subtask(skill.subtask)
     how = replace(
         settings.learner, learner=learner or settings.learner.learner, episodes=episodes or settings.learner.episodes

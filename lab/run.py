@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lab import __version__
 from lab.composer import carry_out, measure
 from lab.crew import Crew, Durations, cell_of
 from lab.errors import unknown
@@ -26,15 +27,18 @@ from lab.taskfile import Task, check_toasts
 from lab.teaching import Teacher
 
 
-def prepare(task: Task, toasts: int, seed: int) -> Prepared:
-    """Lay the scene out as the seed says and survey every problem of it. BadInput for whatever cannot be; writes nothing."""
+def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prepared:
+    """Lay the scene out as the seed says and survey every problem of it, or `only` one skill's.
+
+    BadInput for whatever cannot be; writes nothing.
+    """
     began = time.perf_counter()
     check_toasts(toasts, task)
     check_apart(task, toasts)
     layout = draw_layout(task, toasts, np.random.default_rng([seed, 1]))
     surveys = Surveys(task, layout)
     crew = Crew.of(task, toasts)
-    problems = {name: skill.setup(surveys) for name, skill in crew.skills.items()}
+    problems = {name: skill.setup(surveys) for name, skill in crew.skills.items() if only in (None, name)}
     return Prepared(task, toasts, seed, layout, surveys, crew, problems, time.perf_counter() - began)
 
 
@@ -88,9 +92,9 @@ def _kept_durations(teacher: Teacher, key: str, crew: Crew) -> Durations | None:
 
 
 def _fingerprint(task: Task, layout: Layout, crew: Crew) -> str:
-    """A hash of all that a move's duration depends on: the scene, where things stand, and the tables that are followed."""
+    """A hash of all that a move's duration depends on: the lab, the scene, where things stand, the tables followed."""
     physical = task.model_dump_json(exclude={"name", "title", "sequencing", "subtasks"})
-    digest = hashlib.sha256(f"{physical}{layout.obstacles}{crew.moves}".encode())
+    digest = hashlib.sha256(f"{__version__}{physical}{layout.obstacles}{crew.moves}".encode())
     for name in sorted(crew.policies):
         policy: Policy = crew.policies[name]
         digest.update(f"{name}{policy.signature}".encode() + policy.q.tobytes())

@@ -47,7 +47,9 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
     from lab.view.progress import sparkline
 
     final = "does not reach the goal" if lesson["final_steps"] is None else f"{lesson['final_steps']} steps"
-    advice = f"asked {lesson['requests']} times, {lesson['helped_steps']} helped steps, {lesson['misleads']} misleads"
+    advice = (
+        f"asked in {lesson['requests']} episodes, {lesson['helped_steps']} helped steps, {lesson['misleads']} misleads"
+    )
     lines = [
         f"{lesson['skill']}: {lesson['episodes']} episodes   {sparkline(lesson['steps_per_episode'], 40)}",
         f"learned way: {final}, the shortest takes {lesson['optimal_steps']}: {_verdict(lesson)}",
@@ -68,6 +70,8 @@ def _verdict(lesson: Mapping[str, Any]) -> str:
 
 def _rejected(lesson: Mapping[str, Any]) -> str:
     episode = lesson["rejected_at_episode"]
+    if not lesson["requests"]:
+        return "nobody was asked"
     return "the advisor was not rejected" if episode is None else f"rejected its advisor in episode {episode}"
 
 
@@ -82,7 +86,7 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     if found["sessions"] > 1:
         hits = f"optimum found in {found['success_percent']:.0f} %"
         lines.append(f"{found['sessions']} sessions: {hits}, mean best {found['mean_best_s']:.2f} s")
-    return Group(*map(Text, lines))
+    return Group(*map(Text, [*lines, *found["files"].values()]))
 
 
 def table_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> Table:
