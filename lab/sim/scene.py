@@ -140,7 +140,7 @@ class Scene:
         edge = obstacle.edge_m
         self.world.box(obstacle.name, (edge, edge, edge * obstacle.cubes), (*place, edge * obstacle.cubes / 2), WOOD)
         self.solid.append(obstacle.name)
-        if self.in_camera_grid(place):
+        if in_camera_grid(self.task, place):
             at = (*place, edge * obstacle.cubes + MARKER_ABOVE)
             self.world.disc(f"{obstacle.name} marker", assets.MARKER_RADIUS, 0.004, at, assets.MARKER_GREEN)
 
@@ -153,12 +153,6 @@ class Scene:
         self.world.mass(name, self.task.slices.mass_kg)
         self.world.friction(name, self.task.slices.friction, spinning=0.001)
 
-    def in_camera_grid(self, place: Sequence[float]) -> bool:
-        """Whether a point (x, y) [m] lies in the grid that the camera looks at."""
-        grid = self.task.insert
-        steps = [(p - o) / grid.cell_m for p, o in zip(place, grid.origin_m, strict=False)]
-        return all(0 <= step < count for step, count in zip(steps, grid.shape, strict=True))
-
     def approach(self, station: Station) -> ToolPose:
         """Where transfers to and from a station end: above its middle, at the lowest level of the workspace grid."""
         x, y, yaw = station.pose
@@ -168,6 +162,13 @@ class Scene:
         """The lowest height [m] of the finger tips on a transfer."""
         grid = self.task.workspace
         return grid.lower_m[2] + grid.cell_m[2] / 2
+
+
+def in_camera_grid(task: Task, place: Sequence[float]) -> bool:
+    """Whether a point (x, y) [m] lies in the grid that the camera looks at."""
+    grid = task.insert
+    steps = [(p - o) / grid.cell_m for p, o in zip(place, grid.origin_m, strict=True)]
+    return all(0 <= step < count for step, count in zip(steps, grid.shape, strict=True))
 
 
 def marker_of_toaster(station: Station) -> tuple[float, float, float]:

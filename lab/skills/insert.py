@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.mdp import NoPath, grid
+from lab.overhead import Marker
 from lab.sim import assets
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import GRASP_DEPTH, Spot, spots
 from lab.skills.place import let_go, release_pose
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
 from lab.skills.surveys import Surveys, camera_view, overhead_camera
-from lab.taskfile import Task
+from lab.taskfile import Obstacle, Task
 from lab.vision import find_markers, locate, see
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 ACTIONS = ("left", "right", "backward", "forward")  # -x, +x, -y, +y: as the camera's picture shows them
 CLEARANCE_M = 0.006  # between a carried slice and a cube in its way
+_GRIPPER_HALF_M = 0.055  # as high as the fingers, the gripper is wider than the slice
 SEEN_WITHIN_M = 0.008  # the camera must see the gripper this near to where the grid says it is
 CHECK_PIXELS = 320  # a side of the pictures taken on the way
 IN_SLOT_M = 0.008
@@ -44,7 +46,9 @@ class Insert(Skill):
         """Take the overhead picture, find the markers, and block the cells in which the slice would meet a cube."""
         self.surveys = surveys
         self.picture = surveys.picture()
-        self.seen = see(self.picture, camera_view(surveys.task), where="the overhead camera's picture")
+        self.seen = see(
+            self.picture, camera_view(surveys.task, layout=surveys.layout), where="the overhead camera's picture"
+        )
         blocked, names = self._blocked(surveys.task)
         rewards = surveys.task.subtask("insert").rewards
         try:
@@ -60,30 +64,28 @@ class Insert(Skill):
         return self.problem
 
     def _blocked(self, task: Task) -> tuple[NDArray[np.bool_], dict[tuple[int, ...], str]]:
-        """Cells whose middle is so near to a seen cube that the carried slice would touch it, and which cubes those are."""
-        view = self.seen.view
-        half = (assets.SLICE[0] / 2 + CLEARANCE_M, assets.SLICE[1] / 2 + CLEARANCE_M)
+        """Cells in which the carried slice would touch a cube that the camera sees, or cannot be for another reason; and why."""
+        causes: dict[tuple[int, ...], list[str]] = {cell: [] for cell in np.ndindex(*task.insert.shape)}
+        seen = {self._named(task, marker): marker.world_m for marker in self.seen.markers if marker.kind == "obstacle"}
+        for name, place in seen.items():
+            reach = _reach(task, next(o for o in task.obstacles if o.name == name))
+            for cell, found in causes.items():
+                middle = self.seen.view.centre((cell[0], cell[1]))
+                if all(abs(m - p) < r for m, p, r in zip(middle, place, reach, strict=True)):
+                    found.append(name)
+        unseen = self.surveys.over_grid(frozenset(seen)).causes
+        for cell in zip(*np.nonzero(unseen != ""), strict=True):
+            causes[tuple(map(int, cell))].append(str(unseen[cell]))
         blocked = np.zeros(task.insert.shape, bool)
-        names: dict[tuple[int, ...], str] = {}
-        places = dict(zip((o.name for o in task.obstacles), self.surveys.layout.obstacles, strict=True))
-        for marker in self.seen.markers:
-            if marker.kind != "obstacle":
-                continue
-            name = min(places, key=lambda n: hypot(places[n][0] - marker.world_m[0], places[n][1] - marker.world_m[1]))
-            obstacle = next(o for o in task.obstacles if o.name == name)
-            low = task.insert.height_m + GRASP_DEPTH - assets.SLICE[2] - CLEARANCE_M
-            tall = obstacle.edge_m * obstacle.cubes
-            if tall < low:
-                continue
-            reach = [h + obstacle.edge_m / 2 for h in half]
-            if tall > task.insert.height_m - CLEARANCE_M:  # as high as the fingers: the gripper is wider than the slice
-                reach[1] = _GRIPPER_HALF_M + CLEARANCE_M + obstacle.edge_m / 2
-            for cell in np.ndindex(*task.insert.shape):
-                x, y = view.centre((cell[0], cell[1]))
-                if abs(x - marker.world_m[0]) < reach[0] and abs(y - marker.world_m[1]) < reach[1]:
-                    blocked[cell] = True
-                    names[cell] = ", ".join(filter(None, (names.get(cell), name)))
-        return blocked, names
+        for cell, found in causes.items():
+            blocked[cell] = bool(found)
+        return blocked, {cell: ", ".join(found) for cell, found in causes.items() if found}
+
+    def _named(self, task: Task, marker: Marker) -> str:
+        """The name of the obstacle that a marker lies on."""
+        x, y = marker.world_m
+        places = zip(task.obstacles, self.surveys.layout.obstacles, strict=True)
+        return min(places, key=lambda place: hypot(place[1][0] - x, place[1][1] - y))[0].name
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Cell by cell, each time seen by the camera; then above the slot, down, let go, and see that the slice is in it."""
@@ -143,7 +145,7 @@ class Insert(Skill):
 
     def _check_camera(self, bench: Bench, x: float, y: float) -> None:
         """Compare where the camera sees the gripper with where the grid has it."""
-        small = camera_view(self.surveys.task, CHECK_PIXELS)
+        small = camera_view(self.surveys.task, CHECK_PIXELS, self.surveys.layout)
         picture = overhead_camera(self.surveys.task, CHECK_PIXELS).picture(bench.scene.world)
         try:
             seen = locate(picture, small, "gripper").world_m
@@ -154,4 +156,12 @@ class Insert(Skill):
             raise SkillFailed(f"the camera sees the gripper {self.deviations_m[-1]:.3f} m off its cell")
 
 
-_GRIPPER_HALF_M = 0.055
+def _reach(task: Task, obstacle: Obstacle) -> tuple[float, float]:
+    """How near along x and y [m] the tool may come to the middle of an obstacle with a slice in its fingers."""
+    tall = obstacle.edge_m * obstacle.cubes
+    if tall < task.insert.height_m + GRASP_DEPTH - assets.SLICE[2] - CLEARANCE_M:
+        return (0.0, 0.0)  # the slice passes over it
+    across = _GRIPPER_HALF_M if tall > task.insert.height_m - CLEARANCE_M else assets.SLICE[1] / 2
+    half_cell = task.insert.cell_m / 2  # moves between free cells must not jump over an obstacle
+    x, y = (max(half + CLEARANCE_M + obstacle.edge_m / 2, half_cell) for half in (assets.SLICE[0] / 2, across))
+    return (x, y)

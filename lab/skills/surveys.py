@@ -19,6 +19,7 @@ from lab.sim.scene import (
     Scene,
     Spot,
     check_scene,
+    in_camera_grid,
     marker_offset_of_toaster,
     spots,
 )
@@ -33,6 +34,7 @@ NEAR_STEP_M = (0.012, 0.012, 0.030)
 NEAR_YAWS = 5
 NEAR_YAW_STEP = 0.06  # [rad]
 _TRAVEL_MARGIN = 0.01  # [m] beyond half a cell: a move between free cells then touches nothing
+_GRID_MARGIN = 0.005  # [m] the same on the way through the insert grid
 _DOCK_CLEARANCE = 0.012  # [m]
 _TOUCH_CLEARANCE = {True: 0.0012, False: 0.004}  # [m] near a station, by whether a slice is carried
 RELEASE_ABOVE = 0.002  # [m] a slice is let go this high above its foot
@@ -56,6 +58,7 @@ class Surveys:
         self.dock = cache(self._dock)
         self.around = cache(self._around)
         self.picture = cache(self._picture)
+        self.over_grid = cache(self._over_grid)
 
     # ---- transfer: the whole workspace --------------------------------------------------------------------------
 
@@ -149,12 +152,20 @@ class Surveys:
             scene.robot.open_at_once(assets.SLICE[1] / 2)
             return overhead_camera(self.task).picture(world)
 
-    def machine(self, process: str | None) -> Station:
-        """The machine with this learned process (None: the toaster, which only waits)."""
-        found = [s for s in self.task.stations if s.kind == "machine" and s.process == process]
-        if len(found) != 1:
-            raise BadInput(f"task '{self.task.name}' has {len(found)} machines with process {process!r}, wanted 1")
-        return found[0]
+    def grid_pose(self, cell: Cell) -> ToolPose:
+        """The tool pose on the way through the insert grid, over the middle of a cell."""
+        grid = self.task.insert
+        x, y = ((o + (i + 0.5) * grid.cell_m) for o, i in zip(grid.origin_m, cell, strict=True))
+        return ToolPose(x, y, grid.height_m, 0.0)
+
+    def _over_grid(self, seen: frozenset[str]) -> Survey:
+        """The insert grid's cells that a carried slice or the arm cannot be in, whatever the camera has `seen` left out."""
+        with World() as world:
+            scene = Scene(world, self.task, 0, self.layout)
+            toasters = [s.name for s in self.task.stations if s.kind == "machine" and s.process is None]
+            clearance = self.task.insert.cell_m / 2 + _GRID_MARGIN
+            surveyor = Surveyor(scene, loaded=True, clearance=clearance, ignore=[*seen, *toasters])
+            return surveyor.grid(self.task.insert.shape, self.grid_pose)
 
 
 INSERT_START = "insert"
@@ -165,10 +176,15 @@ def overhead_camera(task: Task, pixels: int | None = None) -> Camera:
     return Camera.overhead(task.camera.position_m, task.camera.field_of_view_rad, pixels or task.camera.pixels)
 
 
-def camera_view(task: Task, pixels: int | None = None) -> View:
-    """How the overhead picture maps to the insert grid: projection, grid, the markers' heights and offsets [m]."""
+def camera_view(task: Task, pixels: int | None = None, layout: Layout | None = None) -> View:
+    """How the overhead picture maps to the insert grid: projection, grid, the markers' heights and offsets [m].
+
+    Without a layout the obstacles are taken to stand where the task file has them.
+    """
     grid = task.insert
-    heights = [o.edge_m * o.cubes + MARKER_ABOVE for o in task.obstacles if _within(task, o.position_m)]
+    places = [o.position_m for o in task.obstacles] if layout is None else layout.obstacles
+    stand = zip(task.obstacles, places, strict=True)
+    heights = [o.edge_m * o.cubes + MARKER_ABOVE for o, place in stand if in_camera_grid(task, place)]
     if len({round(height, 6) for height in heights}) > 1:
         raise BadInput(
             f"task '{task.name}': obstacles in the camera's grid must be equally high, got {sorted(set(heights))} m"
@@ -191,11 +207,6 @@ def _toaster_offset(task: Task) -> tuple[float, float]:
     yaw = next((s.pose[2] for s in task.stations if s.kind == "machine" and s.process is None), 0.0)
     along, across = marker_offset_of_toaster()
     return (np.sin(yaw) * across - np.cos(yaw) * along, -np.sin(yaw) * along - np.cos(yaw) * across)
-
-
-def _within(task: Task, place: tuple[float, float]) -> bool:
-    grid = task.insert
-    return all(0 <= (p - o) / grid.cell_m < n for p, o, n in zip(place, grid.origin_m, grid.shape, strict=True))
 
 
 def _neighbours(station: Station, spot: Spot) -> dict[str, Spot]:
