@@ -47,13 +47,10 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
     from lab.view.progress import sparkline
 
     final = "does not reach the goal" if lesson["final_steps"] is None else f"{lesson['final_steps']} steps"
-    advice = (
-        f"asked in {lesson['requests']} episodes, {lesson['helped_steps']} helped steps, {lesson['misleads']} misleads"
-    )
     lines = [
         f"{lesson['skill']}: {lesson['episodes']} episodes   {sparkline(lesson['steps_per_episode'], 40)}",
         f"learned way: {final}, the shortest takes {lesson['optimal_steps']}: {_verdict(lesson)}",
-        f"{advice}; {_rejected(lesson)}",
+        _advice(lesson),
         f"saved as '{lesson['saved_as']}' (seed {lesson['seed']})",
         *lesson["files"].values(),
     ]
@@ -68,11 +65,14 @@ def _verdict(lesson: Mapping[str, Any]) -> str:
     return "not solved" if lesson["final_steps"] is None else "not solved, it is longer or not there from every start"
 
 
-def _rejected(lesson: Mapping[str, Any]) -> str:
-    episode = lesson["rejected_at_episode"]
+def _advice(lesson: Mapping[str, Any]) -> str:
     if not lesson["requests"]:
-        return "nobody was asked"
-    return "the advisor was not rejected" if episode is None else f"rejected its advisor in episode {episode}"
+        return "the learner asked nobody"
+    text = (
+        f"asked in {lesson['requests']} episodes, {lesson['helped_steps']} helped steps, {lesson['misleads']} misleads"
+    )
+    episode = lesson["rejected_at_episode"]
+    return text if episode is None else f"{text}: rejected its advisor in episode {episode}"
 
 
 def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
