@@ -33,9 +33,9 @@ def teach_one(
     A grasp counts as solved when its slice is also lifted in physics; `failure` says why it was not.
     """
     from lab.advice.gates import GATES
-    from lab.composer import try_grasp
     from lab.crew import Crew
     from lab.learning.updates import UPDATES
+    from lab.line import try_grasp
     from lab.policy import MAX_NAME_LENGTH, is_name
     from lab.report import draw_value_map
     from lab.run import prepare

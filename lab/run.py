@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from lab import __version__
-from lab.composer import carry_out, measure
+from lab.composer import carry_out
 from lab.crew import Crew, Durations, cell_of
 from lab.errors import unknown
+from lab.line import measure
 from lab.listener import Listener
 from lab.policy import Policy
 from lab.recorder import Viewer, show_scene

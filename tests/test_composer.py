@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lab.composer import MAX_TRIES, Line, Outcome, Production, carry_out, measure, try_grasp
+from lab.composer import MAX_TRIES, Outcome, Production, carry_out
 from lab.crew import Crew, Durations, cell_of
 from lab.errors import WorkFailed
+from lab.line import Line, measure, try_grasp
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import Move, simulate
 from lab.sim.scene import Layout, spots
