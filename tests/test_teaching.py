@@ -1,0 +1,161 @@
+"""Teaching a skill: found, learned, continued; what was learned is kept whatever happens."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lab.advice.advisors import AdviceRequest
+from lab.errors import WorkFailed
+from lab.learning.session import EpisodeEnded
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.mdp import grid
+from lab.policy import Policy
+from lab.skills.skill import Problem
+from lab.taskfile import Subtask
+from lab.teaching import MAX_SESSIONS, Interrupted, Teacher, fits
+from lab.toolbox import Toolbox
+
+QUICK = LearnerSettings(episodes=60, max_steps=40)
+HOPELESS = LearnerSettings(episodes=1, max_steps=1)
+GATE = GateSettings(first_episode=12)
+
+
+def problem(name: str = "insert at toaster", columns: int = 4) -> Problem:
+    """From one corner of a small board to the other, 1 + columns moves."""
+    blocked = np.zeros((3, columns), bool)
+    blocked[1, 1] = True
+    return Problem(name, "insert", grid(blocked.shape, blocked, (0, 0), (2, columns - 1)))
+
+
+@pytest.fixture
+def teacher(tmp_path: Path) -> Teacher:
+    return Teacher(Toolbox(tmp_path / "toolbox"))
+
+
+def settings(learner: LearnerSettings = QUICK) -> Subtask:
+    return Subtask(learner=learner, gate=GATE)
+
+
+def known(policy: Policy) -> dict[tuple[str, str], Policy]:
+    return {(policy.subtask, policy.signature): policy}
+
+
+def test_a_new_problem_is_learned_kept_and_then_found(teacher: Teacher) -> None:
+    lesson = teacher.find_or_teach(problem(), settings(), "toast", {})
+    assert (lesson.source, lesson.policy.solved, lesson.policy.final_steps) == ("learned", True, 5)
+    assert lesson.policy.name == f"insert at toaster {problem().mdp.signature[:8]}"
+    index, damaged = teacher.toolbox.index()
+    assert (len(index), damaged) == (1, [])
+    again = teacher.find_or_teach(problem("insert elsewhere"), settings(HOPELESS), "toast", index)
+    assert (again.source, again.result, again.policy.name) == ("reused", None, lesson.policy.name)
+    assert np.array_equal(again.policy.q, lesson.policy.q)
+
+
+def test_another_scene_is_learned_anew(teacher: Teacher) -> None:
+    first = teacher.find_or_teach(problem(), settings(), "toast", {})
+    other = teacher.find_or_teach(problem(columns=5), settings(), "toast", known(first.policy))
+    assert other.source == "learned"
+    assert len(teacher.toolbox.index()[0]) == 2
+
+
+def test_an_unfinished_policy_is_learned_on(teacher: Teacher) -> None:
+    with pytest.raises(WorkFailed, match=f"'insert at toaster' was not learned in {MAX_SESSIONS} episodes.*what was learned is kept"):
+        teacher.find_or_teach(problem(), settings(HOPELESS), "toast", {})
+    index, _ = teacher.toolbox.index()
+    (unfinished,) = index.values()
+    assert (unfinished.solved, len(unfinished.curve), unfinished.visits.sum()) == (False, MAX_SESSIONS, MAX_SESSIONS)
+    lesson = teacher.find_or_teach(problem(), settings(), "toast", index)
+    assert (lesson.source, lesson.policy.solved) == ("continued", True)
+    assert teacher.toolbox.index()[0].keys() == index.keys()
+
+
+def test_a_policy_of_another_size_or_with_other_actions_is_not_taken(teacher: Teacher) -> None:
+    sound = teacher.find_or_teach(problem(), settings(), "toast", {}).policy
+    q, visits = np.zeros((7, 4)), np.zeros((7, 4), np.int64)
+    for wrong in (
+        replace(sound, q=q, visits=visits, shape=(7,), start=0),
+        replace(sound, action_labels=("n", "s", "w", "e")),
+    ):
+        assert teacher.find_or_teach(problem(), settings(), "toast", known(wrong)).source == "learned"
+
+
+class Person:
+    """Answers like the learner itself and presses Ctrl-C at the given question."""
+
+    def __init__(self, patience: int) -> None:
+        self.left = patience
+
+    def __call__(self, request: AdviceRequest) -> int:
+        self.left -= 1
+        if self.left < 0:
+            raise KeyboardInterrupt
+        return request.learner_action
+
+
+def test_ctrl_c_keeps_what_was_learned_and_the_next_run_goes_on(tmp_path: Path) -> None:
+    toolbox = Toolbox(tmp_path)
+    with pytest.raises(Interrupted) as stopped:
+        Teacher(toolbox, "terminal", ask=Person(50)).teach(problem(), QUICK, GateSettings("always"), "toast")
+    assert isinstance(stopped.value, KeyboardInterrupt)
+    index, _ = toolbox.index()
+    (kept,) = index.values()
+    assert (0 < len(kept.curve) < 50, kept.helped_steps, kept.visits.sum(), kept.advisor) == (True, 50, 50, "terminal")
+    after = f"after {len(kept.curve)} episodes of 'insert at toaster'"
+    assert str(stopped.value) == f"stopped by Ctrl-C {after}; what was learned is kept"
+    on = Teacher(toolbox).find_or_teach(problem(), settings(), "toast", index)
+    assert on.source in ("continued", "reused")
+    assert fits(on.policy.q, problem().mdp)
+
+
+def test_the_unfinished_never_replaces_the_finished(teacher: Teacher) -> None:
+    done = teacher.teach(problem(), QUICK, GATE, "toast").policy
+    half = teacher.teach(problem(), HOPELESS, GATE, "toast", sessions=1).policy
+    assert (done.solved, half.solved, half.name) == (True, False, f"{done.name} unfinished")
+    assert [row["name"] for row in teacher.toolbox.list()] == [done.name, half.name]
+    found = teacher.toolbox.find("insert", done.signature)
+    assert found is not None
+    assert found.name == done.name
+    again = teacher.teach(problem(), QUICK, GATE, "toast").policy
+    assert again.name == done.name
+
+
+def test_a_name_of_ones_own_is_used_as_it_is(teacher: Teacher) -> None:
+    assert teacher.teach(problem(), HOPELESS, GATE, "toast", name="mine", sessions=1).policy.name == "mine"
+    assert teacher.teach(problem(), QUICK, GATE, "toast", name="mine").policy.name == "mine"
+    assert [row["solved"] for row in teacher.toolbox.list()] == [True]
+
+
+def test_a_long_skill_name_fits(teacher: Teacher) -> None:
+    long = problem(f"transfer {'a' * 40} to {'b' * 40} with slice")
+    teacher.teach(long, QUICK, GATE, "toast")
+    name = teacher.teach(long, HOPELESS, GATE, "toast", sessions=1).policy.name
+    assert name.endswith(f"{long.mdp.signature[:8]} unfinished")
+
+
+def test_several_sessions_are_one_lesson(teacher: Teacher) -> None:
+    slow = LearnerSettings(episodes=2, max_steps=8)
+    events: list[tuple[str, object]] = []
+    lesson = replace(teacher, on_event=lambda name, event: events.append((name, event))).teach(
+        problem(), slow, GATE, "toast"
+    )
+    assert lesson.result is not None
+    episodes = len(lesson.result.steps)
+    assert episodes in (4, 6, 8, 10, 12)
+    assert lesson.policy.curve == lesson.result.steps.tolist()
+    assert len(lesson.policy.guided) == episodes
+    ended = [(name, event.episode) for name, event in events if isinstance(event, EpisodeEnded)]
+    assert ended == [("insert at toaster", n % 2 + 1) for n in range(episodes)]
+    assert lesson.policy.visits.sum() >= episodes
+
+
+def test_the_seed_and_the_skill_decide_what_is_learned(tmp_path: Path) -> None:
+    def table(seed: int, name: str = "insert at toaster") -> list[float]:
+        teacher = Teacher(Toolbox(tmp_path), seed=seed)
+        q: list[float] = teacher.teach(problem(name), QUICK, GATE, "toast").policy.q.ravel().tolist()
+        return q
+
+    assert table(1) == table(1)
+    assert table(1) != table(2)
+    assert table(1) != table(1, "insert at oven")
