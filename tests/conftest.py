@@ -1,10 +1,14 @@
 """What every test stands on: its own toolbox folder, and hypothesis without a clock."""
 
+import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
@@ -35,6 +39,36 @@ def _own_toolbox(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("LAB_TOOLBOX", str(tmp_path_factory.mktemp("toolbox")))
         yield
+
+
+@dataclass(frozen=True)
+class Ran:
+    """A command that ended: its exit code, stdout and stderr."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        """What stdout holds, one JSON document."""
+        return json.loads(self.out)
+
+
+@pytest.fixture
+def lab(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ran]:
+    """The command `lab` in this process, without a terminal: lab("run", "toast", stdin="typed lines")."""
+    from lab.cli import main
+
+    def run(*words: str, stdin: str = "") -> Ran:
+        out, err = StringIO(), StringIO()
+        monkeypatch.setattr("sys.argv", ["lab", *words])
+        monkeypatch.setattr("sys.stdin", StringIO(stdin))
+        with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as ended:
+            main()
+        return Ran(int(ended.value.code or 0), out.getvalue(), err.getvalue())
+
+    return run
 
 
 @pytest.fixture(scope="session")

@@ -61,7 +61,8 @@ def test_another_scene_is_learned_anew(teacher: Teacher) -> None:
 
 
 def test_an_unfinished_policy_is_learned_on(teacher: Teacher) -> None:
-    with pytest.raises(WorkFailed, match=f"'insert at toaster' was not learned in {MAX_SESSIONS} episodes.*what was learned is kept"):
+    why = f"'insert at toaster' was not learned in {MAX_SESSIONS} episodes.*what was learned is kept"
+    with pytest.raises(WorkFailed, match=why):
         teacher.find_or_teach(problem(), settings(HOPELESS), "toast", {})
     index, _ = teacher.toolbox.index()
     (unfinished,) = index.values()
