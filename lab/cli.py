@@ -384,7 +384,7 @@ def main() -> None:
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: a name must not end a command
     try:
-        code = app(standalone_mode=False)
+        code = app(prog_name="lab", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         _complain(STOPPED)
         code = 130

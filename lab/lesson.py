@@ -219,9 +219,8 @@ def show(what: str, toasts: int, seed: int, port: int, tell: Callable[[str, str]
         with LiveView(port, replay=replay) as page:
             tell(page.url, page.hint)
             _wait()
+    _check_number(toasts)
     task = load(what)
-    if not 1 <= toasts <= MAX_TOASTS:
-        raise BadInput(f"{toasts} toasts (--toasts): allowed are 1 to {MAX_TOASTS}")
     import numpy as np
 
     from lab.recorder import show_scene
@@ -232,6 +231,11 @@ def show(what: str, toasts: int, seed: int, port: int, tell: Callable[[str, str]
         show_scene(task, toasts, draw_layout(task, toasts, np.random.default_rng([seed, 1])), live)
         tell(live.url, live.hint)
         _wait()
+
+
+def _check_number(toasts: int) -> None:
+    if not 1 <= toasts <= MAX_TOASTS:
+        raise BadInput(f"{toasts} toasts (--toasts): allowed are 1 to {MAX_TOASTS}")
 
 
 def _wait() -> None:
@@ -247,6 +251,8 @@ def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
     from lab.run import prepare
 
     find(file)
+    if toasts is not None:
+        _check_number(toasts)
     try:
         task = load(file)
         prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
