@@ -133,7 +133,7 @@ class RunProgress(Listener):
 
     def sequenced(self, best: SequenceResult, proven: Optimum) -> None:
         gap = best.makespan_s / proven.makespan_s - 1.0
-        what = "proven optimum" if proven.proven else "best bound"
+        what = "proven optimum" if proven.proven else "best known"
         order = " ".join(map(str, best.sequence[:_SHOWN_MOVES]))
         more = f" and {len(best.sequence) - _SHOWN_MOVES} more" if len(best.sequence) > _SHOWN_MOVES else ""
         found = f"{best.makespan_s:.1f} s after {len(best.episode_makespans_s)} episodes"
@@ -183,7 +183,7 @@ def sparkline(steps: Sequence[int], width: int = _CURVE, bars: str = BARS) -> st
     """A learning curve as `width` characters: the mean steps of equal stretches of episodes, full height for the largest."""
     if not steps:
         return " " * width
-    edges = [round(i * len(steps) / width) for i in range(width + 1)]
-    means = [mean(steps[a:b] or steps[min(a, len(steps) - 1) :][:1]) for a, b in pairwise(edges)]
-    top = max(means)
+    edges = [i * len(steps) // width for i in range(width + 1)]
+    means = [mean(steps[a : max(b, a + 1)]) for a, b in pairwise(edges)]
+    top = max(means) or 1
     return "".join(bars[min(len(bars) - 1, int(height / top * len(bars)))] for height in means)

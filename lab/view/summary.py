@@ -18,6 +18,8 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     table.add_column(overflow="fold")
     done = f"{report['delivered']} of {report['toasts']} toasts delivered"
     table.add_row("outcome", Text(f"{done} (seed {report['seed']})", "green" if report["success"] else "red"))
+    if report["dropped"]:
+        table.add_row("dropped", f"{report['dropped']} toasts")
     if report["failure"]:
         table.add_row("stopped", Text(report["failure"], "red"))
     if report["retries"]:
@@ -30,7 +32,7 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     if measured is not None:
         text += f", {measured:.1f} s measured ({measured / report['predicted_makespan_s'] - 1:+.2%})"
     table.add_row("makespan", text)
-    proven = "proven optimum" if report["optimum_proven"] else "best bound"
+    proven = "proven optimum" if report["optimum_proven"] else "best known"
     table.add_row(proven, f"{report['optimal_makespan_s']:.1f} s, gap {report['optimality_gap']:.2%}")
     rate = report["sim_s"] / report["wall_s"] if report["wall_s"] else 0.0
     table.add_row(
@@ -38,7 +40,7 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
         f"{report['wall_s']:.1f} s for {report['sim_s']:.0f} simulated seconds ({rate:.0f} x real time)",
     )
     for name, path in report["files"].items():
-        table.add_row(name.replace("_", " "), path)
+        table.add_row(name.replace("_", " "), Text(path))
     return table
 
 
@@ -95,7 +97,7 @@ def table_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> Table
     for column in columns:
         table.add_column(column.replace("_", " "), overflow="fold")
     for row in rows:
-        table.add_row(*(str(row[column]) for column in columns))
+        table.add_row(*(Text(str(row[column])) for column in columns))
     return table
 
 

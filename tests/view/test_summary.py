@@ -1,0 +1,228 @@
+"""What commands show at their end, from their JSON documents."""
+
+from io import StringIO
+from typing import Any
+
+import pytest
+from rich.console import Console, RenderableType
+
+from lab.view.summary import (
+    grid_summary,
+    lesson_summary,
+    policy_summary,
+    run_summary,
+    sequence_summary,
+    table_of,
+    toolbox_summary,
+    verify_summary,
+)
+
+
+def shown(what: RenderableType, width: int = 100) -> list[str]:
+    console = Console(file=StringIO(), width=width, color_system=None, highlight=False)
+    console.print(what)
+    assert isinstance(console.file, StringIO)
+    return [line.rstrip() for line in console.file.getvalue().splitlines()]
+
+
+def skill(source: str, helped_steps: int = 0) -> dict[str, Any]:
+    return {"source": source, "helped_steps": helped_steps}
+
+
+RUN: dict[str, Any] = {
+    "seed": 7,
+    "toasts": 2,
+    "success": True,
+    "delivered": 2,
+    "dropped": 0,
+    "failure": None,
+    "retries": [],
+    "skills": [skill("learned", 30), skill("continued", 12), skill("reused")],
+    "sequence": [1, 2, 1, 2],
+    "predicted_makespan_s": 100.0,
+    "measured_makespan_s": 101.0,
+    "optimal_makespan_s": 80.0,
+    "optimality_gap": 0.25,
+    "optimum_proven": True,
+    "sim_s": 300.0,
+    "wall_s": 10.0,
+    "files": {"gantt": "out/gantt.png", "learning_curves": "[out]/learning-curves.png"},
+}
+
+
+def test_a_run_that_went_well() -> None:
+    assert shown(run_summary(RUN)) == [
+        "        outcome  2 of 2 toasts delivered (seed 7)",
+        "         skills  2 learned, 1 reused, 42 helped steps",
+        "       sequence  1 2 1 2",
+        "       makespan  100.0 s predicted, 101.0 s measured (+1.00%)",
+        " proven optimum  80.0 s, gap 25.00%",
+        "           time  10.0 s for 300 simulated seconds (30 x real time)",
+        "          gantt  out/gantt.png",
+        "learning curves  [out]/learning-curves.png",
+    ]
+
+
+def test_a_run_that_failed_says_which_toast_where_and_why() -> None:
+    why = "toast 2 at 'toaster': slice 2 is not in the slot of 'toaster' (tried 3 times)"
+    failed = {"success": False, "delivered": 1, "dropped": 1, "measured_makespan_s": None, "failure": why}
+    lines = shown(run_summary(RUN | failed | {"retries": ["try 1: a", "try 2: b"], "optimum_proven": False}))
+    assert lines[:5] == [
+        "        outcome  1 of 2 toasts delivered (seed 7)",
+        "        dropped  1 toasts",
+        f"        stopped  {why}",
+        "        retries  try 1: a",
+        "                 try 2: b",
+    ]
+    assert "       makespan  100.0 s predicted" in lines
+    assert "     best known  80.0 s, gap 25.00%" in lines
+
+
+@pytest.mark.parametrize("width", [40, 80])
+def test_a_summary_fits_a_narrow_terminal(width: int) -> None:
+    assert max(map(len, shown(run_summary(RUN | {"sequence": list(range(200))}), width))) <= width
+
+
+LESSON: dict[str, Any] = {
+    "skill": "insert at toaster",
+    "episodes": 4,
+    "steps_per_episode": [40, 20, 10, 10],
+    "requests": 5,
+    "helped_steps": 80,
+    "misleads": 3,
+    "rejected_at_episode": None,
+    "optimal_steps": 16,
+    "final_steps": 16,
+    "solved": True,
+    "failure": None,
+    "saved_as": "insert at toaster 1a2b",
+    "seed": 0,
+    "files": {"learning_curve": "out/learning-curve.png"},
+}
+
+
+def test_a_lesson() -> None:
+    assert shown(lesson_summary(LESSON)) == [
+        f"insert at toaster: 4 episodes   {'█' * 10}{'▅' * 10}{'▃' * 20}",
+        "learned way: 16 steps, the shortest takes 16: solved",
+        "asked in 5 episodes, 80 helped steps, 3 misleads",
+        "saved as 'insert at toaster 1a2b' (seed 0)",
+        "out/learning-curve.png",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ({"requests": 0}, "the learner asked nobody"),
+        (
+            {"rejected_at_episode": 95, "misleads": 8},
+            "asked in 5 episodes, 80 helped steps, 8 misleads: rejected its advisor in episode 95",
+        ),
+        (
+            {"final_steps": None, "solved": False},
+            "learned way: does not reach the goal, the shortest takes 16: not solved",
+        ),
+        (
+            {"final_steps": 18, "solved": False},
+            "learned way: 18 steps, the shortest takes 16: not solved, it is longer or not there from every start",
+        ),
+        (
+            {"solved": False, "failure": "slice 1 slipped"},
+            "learned way: 16 steps, the shortest takes 16: not solved in physics: slice 1 slipped",
+        ),
+    ],
+)
+def test_lessons_that_went_otherwise(change: dict[str, Any], line: str) -> None:
+    assert line in shown(lesson_summary(LESSON | change), 200)
+
+
+def test_a_sequence() -> None:
+    found = {
+        "method": "srl",
+        "makespan_s": 110.0,
+        "toasts": 2,
+        "seed": 3,
+        "sequence": [2, 1, 2, 1],
+        "optimal_s": 100.0,
+        "optimum_proven": True,
+        "bound_s": 100.0,
+        "gap": 0.1,
+        "sessions": 1,
+        "success_percent": 0.0,
+        "mean_best_s": 110.0,
+        "files": {},
+    }
+    first = [
+        "srl: 110.00 s for 2 toasts (seed 3)",
+        "order of the transfers: 2 1 2 1",
+        "optimum 100.00 s (proven), gap 10.00%",
+    ]
+    assert shown(sequence_summary(found)) == first
+    several = {"sessions": 4, "success_percent": 75.0, "mean_best_s": 102.5, "files": {"plot": "e.png"}}
+    assert shown(sequence_summary(found | several)) == [
+        *first,
+        "4 sessions: optimum found in 75 %, mean best 102.50 s",
+        "e.png",
+    ]
+    unproven = found | {"optimum_proven": False, "bound_s": 90.0}
+    assert shown(sequence_summary(unproven))[2] == "optimum 100.00 s (bound 90.00 s), gap 10.00%"
+
+
+def test_a_table_takes_what_looks_like_markup_as_it_is() -> None:
+    assert shown(table_of([{"a_b": "[red]x", "c": 1}], ("a_b", "c"))) == ["a b     c", "[red]x  1"]
+
+
+POLICY: dict[str, Any] = {
+    "name": "insert 1a2b",
+    "subtask": "insert",
+    "task": "toast",
+    "solved": True,
+    "signature": "1a2b",
+    "created": "2026-01-02T03:04:05.678+00:00",
+    "curve": [9, 5, 4],
+    "guided": [False, True, True],
+    "learner": {"learner": "q", "alpha": 0.5},
+    "gate": {"gate": "never"},
+    "versions": {"numpy": "2"},
+    "action_labels": ("up", "down"),
+    "shape": (2, 3),
+}
+
+
+def test_a_toolbox() -> None:
+    assert shown(toolbox_summary({"folder": "/box", "policies": []})) == ["nothing in /box"]
+    assert shown(toolbox_summary({"folder": "/box", "policies": [POLICY, POLICY | {"solved": False}]})) == [
+        "name         subtask  task   solved  signature  created",
+        "insert 1a2b  insert   toast  yes     1a2b       2026-01-02 03:04",
+        "insert 1a2b  insert   toast  no      1a2b       2026-01-02 03:04",
+    ]
+
+
+def test_a_policy() -> None:
+    lines = [" ".join(line.split()) for line in shown(policy_summary(POLICY))]
+    assert "learner learner q, alpha 0.5" in lines
+    assert "guided 2 episodes, the first 2, the last 3" in lines
+    assert "action labels up, down" in lines
+    assert "shape 2, 3" in lines
+    assert any(line.startswith("curve █") and line.endswith("4 to 9 steps") for line in lines)
+    fresh = [" ".join(line.split()) for line in shown(policy_summary(POLICY | {"curve": [], "guided": []}))]
+    assert "guided 0 episodes" in fresh
+
+
+def test_a_verified_toolbox() -> None:
+    rows = [{"file": "/box/a", "ok": True, "reason": ""}, {"file": "/box/b", "ok": False, "reason": "/box/b: cut off"}]
+    assert shown(verify_summary({"folder": "/box", "files": rows, "damaged": 1})) == [
+        "1 of 2 files in /box are sound",
+        "/box/b: cut off",
+    ]
+
+
+def test_a_grid_is_seen_from_above() -> None:
+    """x (first index) to the right, y (second index) up."""
+    seen = {"grid": ["S.", "#.", ".G"], "start": [0, 0], "goal": [2, 1], "obstacles": [[1, 0]], "markers": [1, 2, 3]}
+    assert shown(grid_summary(seen)) == [
+        "·  ·  G",
+        "S  █  ·",
+        "start (0, 0), goal (2, 1), 1 cells with obstacles, 3 markers",
+    ]
