@@ -1,0 +1,304 @@
+"""Single commands: a teaching session, the order alone, a picture, a look at a scene, a checked file."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+
+from lab.errors import BadInput
+from lab.lesson import check_task, find_skill, fitting, see_picture, sequence_task, show, teach_one
+from lab.listener import Listener
+from lab.sequencing.cell import Cell
+from lab.sequencing.events import SequenceResult
+from lab.sequencing.exact import Optimum
+from lab.skills import Butter, Grasp, Skill
+from lab.taskfile import Task, load
+from lab.teaching import Interrupted, Teacher
+from lab.toolbox import Toolbox
+from lab.vision import MARKERS, read_picture, write_picture
+
+
+@pytest.fixture(scope="module")
+def task() -> Task:
+    return load("toast")
+
+
+@pytest.fixture
+def teacher(tmp_path: Path) -> Teacher:
+    return Teacher(Toolbox(tmp_path / "toolbox"))
+
+
+# ---- teach --------------------------------------------------------------------------------------------------------
+
+TEACH_FIELDS = (
+    *("subtask", "skill", "task", "learner", "gate", "advisor", "seed", "episodes", "steps_per_episode"),
+    *("guided_episodes", "requests", "helped_steps", "misleads", "rejected_at_episode", "optimal_steps"),
+    *("final_steps", "solved", "failure", "saved_as", "files"),
+)
+
+
+def test_one_session_with_pictures(task: Task, teacher: Teacher, tmp_path: Path) -> None:
+    document = teach_one(task, "insert", teacher, out=tmp_path / "out")
+    assert tuple(document) == TEACH_FIELDS
+    assert (document["skill"], document["episodes"], len(document["steps_per_episode"])) == (
+        "insert at toaster",
+        200,
+        200,
+    )
+    assert (document["solved"], document["final_steps"]) == (True, document["optimal_steps"])
+    assert document["guided_episodes"][0] == 30
+    assert document["helped_steps"] > 0
+    assert document["files"].keys() == {"learning_curve", "value_map"}
+    assert all(min(read_picture(Path(path)).shape[:2]) > 200 for path in document["files"].values())
+    (row,) = teacher.toolbox.list()
+    assert (row["name"], row["solved"], row["episodes"]) == (document["saved_as"], True, 200)
+
+
+def test_options_change_the_session(task: Task, teacher: Teacher) -> None:
+    document = teach_one(
+        task, "butter at butter_applier", teacher, learner="sarsa", gate="never", episodes=7, name="mine"
+    )
+    assert {name: document[name] for name in ("learner", "gate", "episodes", "requests", "saved_as", "files")} == {
+        "learner": "sarsa",
+        "gate": "never",
+        "episodes": 7,
+        "requests": 0,
+        "saved_as": "mine",
+        "files": {},
+    }
+    assert teacher.toolbox.show("mine")["learner"]["learner"] == "sarsa"
+
+
+def test_a_taught_grasp_is_tried_in_physics(task: Task, teacher: Teacher) -> None:
+    good = teach_one(task, "grasp", teacher)
+    assert (good["solved"], good["failure"]) == (True, None)
+    bad = teach_one(task, "grasp", teacher, episodes=1)
+    assert bad["solved"] is False
+    assert "does not reach its goal" in bad["failure"]
+    assert bad["saved_as"] == f"{good['saved_as']} unfinished"
+
+
+def test_ctrl_c_keeps_the_session(task: Task, tmp_path: Path) -> None:
+    def ask(_: object) -> int:
+        raise KeyboardInterrupt
+
+    teacher = Teacher(Toolbox(tmp_path), "terminal", ask=ask)
+    with pytest.raises(Interrupted, match="stopped by Ctrl-C after 29 episodes of 'insert at toaster'"):
+        teach_one(task, "insert", teacher, out=tmp_path / "out")
+    (row,) = teacher.toolbox.list()
+    assert (row["episodes"], row["solved"]) == (29, False)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("subtask", "options", "reason"),
+    [
+        ("inser", {}, "unknown sub-task 'inser' .SUBTASK.: did you mean 'insert'. known: butter, grasp, insert, place"),
+        ("grasp at plat", {}, "did you mean 'grasp at plate'. .* or one skill's full name, such as 'grasp at plate'$"),
+        ("insert", {"learner": "x"}, "unknown learner 'x' .--learner."),
+        ("insert", {"gate": "x"}, "unknown gate 'x' .--gate."),
+        ("insert", {"name": " "}, "policy name ' ' .--save.: wanted 1 to 100 printable characters"),
+    ],
+)
+def test_bad_words_are_refused_before_the_scene_is_surveyed(
+    task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch, subtask: str, options: dict[str, Any], reason: str
+) -> None:
+    monkeypatch.setattr("lab.run.prepare", lambda *_: pytest.fail("surveyed"))
+    with pytest.raises(BadInput, match=reason):
+        teach_one(task, subtask, teacher, **options)
+    assert not teacher.toolbox.folder.exists()
+
+
+def test_a_skill_by_its_name_or_the_first_of_a_sub_task() -> None:
+    skills: dict[str, Skill] = {skill.name: skill for skill in (Grasp("plate"), Grasp("toaster"), Butter("applier"))}
+    assert find_skill(skills, "grasp").name == "grasp at plate"
+    assert find_skill(skills, "grasp at toaster").name == "grasp at toaster"
+
+
+def test_as_many_toasts_as_both_ends_hold(task: Task) -> None:
+    small = task.model_copy(
+        update={
+            "stations": tuple(
+                s.model_copy(update={"capacity": 2}) if s.name == "finished_plate" else s for s in task.stations
+            )
+        }
+    )
+    assert [fitting(task, 3), fitting(small, 3), fitting(small, 1)] == [3, 2, 1]
+
+
+# ---- sequence -----------------------------------------------------------------------------------------------------
+
+
+class Heard(Listener):
+    """Notes what it hears."""
+
+    def __init__(self) -> None:
+        self.notes: list[object] = []
+
+    def phase(self, name: str, parts: int) -> None:
+        self.notes.append((name, parts))
+
+    def sequenced(self, best: SequenceResult, proven: Optimum) -> None:
+        self.notes.append(best.makespan_s / proven.makespan_s >= 1)
+
+
+@pytest.fixture
+def measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cell as if it had been measured: 1 s to go, 2 s to carry, 10 s in the oven."""
+    from lab.sequencing.cell import Stage, Station
+
+    def cell(prepared: int, *_: object) -> SimpleNamespace:
+        stations = (Station("in", "storage", 9), Station("oven", "machine", 1, 10.0), Station("out", "storage", 9))
+        step = np.ones((3, 3)) - np.eye(3)
+        return SimpleNamespace(
+            cell=Cell(stations, (Stage("in"), Stage("oven"), Stage("out")), step, 2 * step, "in", prepared)
+        )
+
+    monkeypatch.setattr("lab.run.prepare", lambda task, toasts, seed: toasts)
+    monkeypatch.setattr("lab.run.teach_all", cell)
+
+
+SEQUENCE_FIELDS = (
+    *("task", "toasts", "seed", "method", "sessions", "makespan_s", "sequence", "episode_makespans_s", "optimal_s"),
+    *("optimum_proven", "bound_s", "gap", "success_percent", "final_success_percent", "mean_best_s", "files"),
+)
+
+
+@pytest.mark.usefixtures("measured")
+@pytest.mark.parametrize("method", [None, "srl", "exact", "fifo", "random"])
+def test_the_order_alone(task: Task, teacher: Teacher, tmp_path: Path, method: str | None) -> None:
+    """A toast takes 2 s into the oven, 10 s in it and 2 s out; the robot comes back in 1 s for the other: 29 s."""
+    heard, plot = Heard(), tmp_path / "episodes.png"
+    document = sequence_task(task, 2, teacher, method=method, episodes=20, sessions=3, plot=plot, listener=heard)
+    assert tuple(document) == SEQUENCE_FIELDS
+    assert document["method"] == method or document["method"] == "srl"
+    assert (document["optimal_s"], document["optimum_proven"], document["bound_s"]) == (29.0, True, 29.0)
+    assert (document["makespan_s"], document["gap"], document["success_percent"]) == (29.0, 0.0, 100.0)
+    assert sorted(document["sequence"]) == [1, 1, 2, 2]
+    assert document["files"] == {"plot": str(plot)}
+    assert read_picture(plot).shape[2] == 3
+    assert heard.notes == [("sequence", 3), True, True, True]
+
+
+@pytest.mark.usefixtures("measured")
+def test_the_same_seed_gives_the_same_order(task: Task, teacher: Teacher) -> None:
+    def found() -> dict[str, Any]:
+        return sequence_task(task, 4, teacher, method="srl", episodes=5, sessions=1, plot=None, listener=Listener())
+
+    assert found() == found()
+
+
+# ---- see ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> Callable[..., Path]:
+    """Draws a grid of 4 x 6 cells of 40 pixels with round markers in the middle of cells."""
+
+    def draw(**cells: list[tuple[int, int]]) -> Path:
+        image = np.full((160, 240, 3), 200, np.uint8)
+        down, right = np.mgrid[:160, :240]
+        for kind, places in cells.items():
+            for i, j in places:
+                disc = np.hypot(down - (40 * i + 19.5), right - (40 * j + 19.5)) < 14
+                image[disc] = MARKERS[kind].rgb
+        path = tmp_path / "picture.png"
+        write_picture(path, image)
+        return path
+
+    return draw
+
+
+def test_a_picture_becomes_a_grid(picture: Callable[..., Path], tmp_path: Path) -> None:
+    path = picture(gripper=[(0, 0)], toaster=[(3, 5)], obstacle=[(1, 1), (2, 3)])
+    document = see_picture(path, "4x6", None, tmp_path / "seen.png")
+    assert document["grid"] == ["S.....", ".#....", "...#..", ".....G"]
+    assert (document["start"], document["goal"]) == ([0, 0], [3, 5])
+    assert document["obstacles"] == [[1, 1], [2, 3]]
+    assert [marker["kind"] for marker in document["markers"]] == ["gripper", "obstacle", "obstacle", "toaster"]
+    assert document["markers"][0]["pixel"] == pytest.approx([19.5, 19.5], abs=0.5)
+    assert document["files"] == {"picture": str(tmp_path / "seen.png")}
+    assert read_picture(tmp_path / "seen.png").shape == (160, 240, 3)
+
+
+@pytest.mark.parametrize(
+    ("markers", "reason"),
+    [
+        ({}, "no round coloured marker found"),
+        ({"gripper": [(0, 0)]}, "no toaster marker: wanted exactly one round cyan spot"),
+        ({"gripper": [(0, 0)], "toaster": [(1, 1), (3, 5)]}, "2 toaster markers at pixels"),
+    ],
+)
+def test_pictures_without_start_or_goal(
+    picture: Callable[..., Path], tmp_path: Path, markers: dict[str, Any], reason: str
+) -> None:
+    path = picture(**markers)
+    with pytest.raises(BadInput, match=f"^{path}: {reason}"):
+        see_picture(path, "4x6", None, tmp_path / "seen.png")
+    assert not (tmp_path / "seen.png").exists()
+
+
+@pytest.mark.parametrize("grid", ["", "12", "0x3", "3x0", "-1x3", "1000x3", "3x3x3", "axb", "3X3"])
+def test_grids_that_are_none(tmp_path: Path, grid: str) -> None:
+    with pytest.raises(BadInput, match=r"--grid.: wanted ROWSxCOLUMNS"):
+        see_picture(tmp_path / "none.png", grid, None, None)
+
+
+# ---- view ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def looked_at(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """The page is read once, then Ctrl-C is pressed."""
+    told: list[str] = []
+
+    def look() -> None:
+        with urlopen(told[0], timeout=10) as page:
+            told.append(page.read().decode())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lab.lesson._wait", look)
+    return told  # type: ignore[return-value]
+
+
+def test_a_scene_is_shown_on_this_computer_only(looked_at: list[str]) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        show("toast", 1, 0, 0, lambda url, hint: looked_at.append(url))
+    url, page = looked_at
+    assert url.startswith("http://127.0.0.1:")
+    assert "<canvas" in page or "<script" in page
+    with pytest.raises(OSError, match="refused"):
+        urlopen(url, timeout=10)
+
+
+def test_a_runs_replay_is_served(looked_at: list[str], tmp_path: Path) -> None:
+    (tmp_path / "replay.html").write_text('<p>replay</p><script id="lab-data"></script>')
+    with pytest.raises(KeyboardInterrupt):
+        show(str(tmp_path), 3, 0, 0, lambda url, hint: looked_at.append(url))
+    assert looked_at[1].startswith("<p>replay</p>")
+
+
+def test_what_is_neither_a_task_nor_a_run(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"holds no replay.html: give the folder of a run"):
+        show(str(tmp_path), 3, 0, 0, lambda url, hint: None)
+    with pytest.raises(BadInput, match=r"^51 toasts"):
+        show("toast", 51, 0, 0, lambda url, hint: None)
+
+
+# ---- check --------------------------------------------------------------------------------------------------------
+
+
+def test_check_finds_what_is_wrong(tmp_path: Path, root: Path) -> None:
+    text = (root / "tasks" / "toast.toml").read_text(encoding="utf-8")
+    path = tmp_path / "t.toml"
+    path.write_text(text.replace("capacity = 50", "capacity = 2"))
+    assert check_task(str(path), None, 0) == []
+    (error,) = check_task(str(path), 3, 0)
+    assert error == "3 toasts (--toasts) do not fit on 'plate': its capacity in the task file is 2"
+    path.write_text("name =")
+    (error,) = check_task(str(path), 3, 0)
+    assert error.startswith(f"{path}: not valid TOML: Invalid value (at end of document)")

@@ -1,0 +1,368 @@
+"""The main job end to end: one toast cold and warm; what a changed scene, a damaged file or Ctrl-C does to a run."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lab.report
+import lab.run
+from lab.composer import Outcome
+from lab.crew import Crew, Durations
+from lab.errors import BadInput, WorkFailed
+from lab.listener import Listener
+from lab.report import FILES, Prepared, Report, Taught, check_out, write_files
+from lab.run import prepare, sequence, teach_all
+from lab.sequencing.events import Schedule
+from lab.sequencing.exact import optimum
+from lab.taskfile import Task, load
+from lab.teaching import Teacher
+from lab.toolbox import Toolbox
+from lab.view.frames import Recording
+from lab.vision import read_picture
+
+RUN_FIELDS = (
+    *("task", "seed", "toasts", "success", "delivered", "dropped", "failure", "retries", "skills", "sequence"),
+    *("predicted_makespan_s", "measured_makespan_s", "optimal_makespan_s", "optimality_gap", "optimum_proven"),
+    *("camera_deviation_m", "sim_s", "wall_s", "files"),
+)
+SKILL_FIELDS = {"name", "subtask", "source", "policy", "episodes", "requests", "helped_steps", "solved"}
+
+
+@dataclass(frozen=True)
+class Ran:
+    """A finished `lab run toast --toasts 1 --json` in a process of its own, and the folder that it ran in."""
+
+    document: dict[str, Any]
+    stdout: str
+    stderr: str
+    folder: Path
+
+
+def run_toast(folder: Path, root: Path) -> Ran:
+    code = "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()"
+    ran = subprocess.run(
+        [sys.executable, "-c", code, "run", "toast", "--toasts", "1", "--json"],
+        cwd=folder,
+        env={**os.environ, "LAB_TOOLBOX": str(folder / "toolbox"), "PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stderr
+    return Ran(json.loads(ran.stdout), ran.stdout, ran.stderr, folder)
+
+
+@pytest.fixture(scope="module")
+def cold(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Ran:
+    return run_toast(tmp_path_factory.mktemp("run"), root)
+
+
+@pytest.fixture(scope="module")
+def warm(cold: Ran, root: Path) -> Ran:
+    return run_toast(cold.folder, root)
+
+
+# ---- the document -------------------------------------------------------------------------------------------------
+
+
+def test_stdout_is_one_document_with_all_fields(cold: Ran) -> None:
+    assert cold.stdout.count("\n") == 1
+    assert tuple(cold.document) == RUN_FIELDS
+    assert all(row.keys() >= SKILL_FIELDS for row in cold.document["skills"])
+
+
+def test_the_toast_is_delivered_as_predicted(cold: Ran) -> None:
+    document = cold.document
+    assert (document["task"], document["seed"], document["toasts"]) == ("toast", 0, 1)
+    assert (document["success"], document["delivered"], document["dropped"]) == (True, 1, 0)
+    assert (document["failure"], document["sequence"]) == (None, [1, 1, 1])
+    assert document["measured_makespan_s"] == pytest.approx(document["predicted_makespan_s"], rel=0.03)
+    assert (document["optimality_gap"], document["optimum_proven"]) == (pytest.approx(0.0), True)
+    assert document["camera_deviation_m"] < 0.008
+    assert document["sim_s"] > document["measured_makespan_s"]
+    assert document["wall_s"] > 0
+
+
+def test_every_skill_was_learned_or_is_the_same_table_as_one_that_was(cold: Ran) -> None:
+    learned = {row["policy"] for row in cold.document["skills"] if row["source"] == "learned"}
+    assert {row["subtask"] for row in cold.document["skills"]} == {"transfer", "grasp", "insert", "butter", "place"}
+    assert {row["policy"] for row in cold.document["skills"]} == learned
+    assert sum(row["helped_steps"] for row in cold.document["skills"]) > 100
+    assert all(row["solved"] for row in cold.document["skills"])
+
+
+def test_all_files_are_there_and_whole(cold: Ran) -> None:
+    files = {name: cold.folder / path for name, path in cold.document["files"].items()}
+    assert {name: path.name for name, path in files.items()} == FILES
+    assert sorted(os.listdir(cold.folder / "toast-run")) == sorted(FILES.values())
+    for name in ("gantt", "learning_curves", "value_map", "overhead"):
+        assert min(read_picture(files[name]).shape[:2]) > 200
+    assert 'id="lab-data"' in files["replay"].read_text(encoding="utf-8")
+
+
+def test_the_json_files_hold_the_run(cold: Ran, warm: Ran) -> None:
+    folder = warm.folder / "toast-run"
+    run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    assert {name: run[name] for name in RUN_FIELDS} == warm.document
+    assert run["schedule"]["makespan_s"] == warm.document["measured_makespan_s"]
+    order = json.loads((folder / "sequence.json").read_text(encoding="utf-8"))
+    assert order["sequence"] == order["optimal_sequence"] == [1, 1, 1]
+    assert order["makespan_s"] == min(order["episode_makespans_s"]) == warm.document["predicted_makespan_s"]
+    assert order["durations"]["process_s"].keys() == {"butter_applier"}
+
+
+def test_progress_goes_to_stderr_in_lines_a_log_can_hold(cold: Ran) -> None:
+    lines = cold.stderr.splitlines()
+    phases = [line for line in lines if line and not line.startswith(" ")]
+    assert phases == [
+        "Find or learn the skills",
+        "Time every move in simulation",
+        "Find the order of the transfers",
+        "Make toast in physics",
+        "Draw the pictures",
+    ]
+    assert "\x1b" not in cold.stderr
+    learned = sum(row["source"] == "learned" for row in cold.document["skills"])
+    assert sum(line.startswith("  learned ") for line in lines) == learned
+    assert any("asked" in line and "helped steps" in line for line in lines)
+
+
+def test_a_second_run_learns_nothing_and_does_the_same(cold: Ran, warm: Ran) -> None:
+    assert {row["source"] for row in warm.document["skills"]} == {"reused"}
+    assert sum(row["episodes"] + row["helped_steps"] for row in warm.document["skills"]) == 0
+    assert [row["policy"] for row in warm.document["skills"]] == [row["policy"] for row in cold.document["skills"]]
+    same = set(RUN_FIELDS) - {"skills", "sim_s", "wall_s"}
+    assert {name: warm.document[name] for name in same} == {name: cold.document[name] for name in same}
+    assert "Time every move" not in warm.stderr
+    assert f"  reused    {len(warm.document['skills'])} skills: " in warm.stderr
+
+
+# ---- what is reused, and what is not -------------------------------------------------------------------------------
+
+
+class Heard(Listener):
+    """Notes what was skipped and which phases came."""
+
+    def __init__(self) -> None:
+        self.damaged: list[str] = []
+        self.phases: list[str] = []
+
+    def skipped(self, what: str) -> None:
+        self.damaged.append(what)
+
+    def phase(self, name: str, parts: int) -> None:
+        self.phases.append(name)
+
+
+@pytest.fixture(scope="module")
+def prepared() -> Prepared:
+    return prepare(load("toast"), 1, 0)
+
+
+@pytest.fixture
+def toolbox(cold: Ran, tmp_path: Path) -> Toolbox:
+    """A copy of what the first run learned."""
+    kept = cold.folder / "toolbox"
+    for path in kept.rglob("*"):
+        if path.is_file():
+            copy = tmp_path / "toolbox" / path.relative_to(kept)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes(path.read_bytes())
+    return Toolbox(tmp_path / "toolbox")
+
+
+@pytest.fixture
+def measured(monkeypatch: pytest.MonkeyPatch) -> list[Crew]:
+    """The crews whose moves were timed; each move takes 5 s."""
+    crews: list[Crew] = []
+
+    def measure(crew: Crew, *_: object) -> Durations:
+        crews.append(crew)
+        every = dict.fromkeys((*crew.moves.empty, *crew.moves.loaded), 5.0)
+        return Durations(every, every, {"butter_applier": 5.0}, 1.0)
+
+    monkeypatch.setattr(lab.run, "measure", measure)
+    return crews
+
+
+def sources(taught: Taught) -> dict[str, str]:
+    return {name: lesson.source for name, lesson in taught.lessons.items()}
+
+
+def test_the_same_scene_needs_nothing(prepared: Prepared, toolbox: Toolbox, measured: list[Crew]) -> None:
+    heard = Heard()
+    taught = teach_all(prepared, Teacher(toolbox), heard)
+    assert set(sources(taught).values()) == {"reused"}
+    assert (heard.phases, heard.damaged, measured) == (["learn"], [], [])
+
+
+def move(task: Task, name: str, by: tuple[float, float]) -> Task:
+    """The task with one stack of cubes elsewhere."""
+    obstacles = tuple(
+        o.model_copy(update={"position_m": (o.position_m[0] + by[0], o.position_m[1] + by[1])}) if o.name == name else o
+        for o in task.obstacles
+    )
+    return task.model_copy(update={"obstacles": obstacles})
+
+
+def same(one: Prepared, other: Prepared, name: str) -> bool:
+    """Whether a skill has the same problem in both scenes, number by number."""
+    a, b = one.problems[name].mdp, other.problems[name].mdp
+    arrays = ("successor", "reward", "terminal", "goal")
+    return (a.start, a.starts, a.shape) == (b.start, b.starts, b.shape) and all(
+        np.array_equal(getattr(a, array), getattr(b, array)) for array in arrays
+    )
+
+
+@pytest.mark.parametrize(
+    ("cubes", "by", "must"), [("tower left", (0.0, 0.1), "transfer"), ("cubes A", (0.0, -0.05), "insert")]
+)
+def test_a_moved_obstacle_is_learned_around_and_nothing_else(
+    prepared: Prepared, toolbox: Toolbox, measured: list[Crew], cubes: str, by: tuple[float, float], must: str
+) -> None:
+    changed = prepare(move(prepared.task, cubes, by), 1, 0)
+    affected = {name for name in prepared.problems if not same(prepared, changed, name)}
+    assert must in {prepared.problems[name].subtask for name in affected}
+    assert not {prepared.problems[name].subtask for name in affected} & {"grasp", "butter", "place"}
+    assert len(affected) < len(prepared.problems)
+    found = sources(teach_all(changed, Teacher(toolbox), Listener()))
+    assert {name for name, source in found.items() if source == "learned"} == affected
+    assert set(found.values()) == {"learned", "reused"}
+    assert len(measured) == 1
+
+
+def test_damaged_policies_are_named_and_learned_again(
+    prepared: Prepared, toolbox: Toolbox, measured: list[Crew]
+) -> None:
+    files = {path.stem.partition("-at-")[0]: path for path in toolbox.folder.glob("*-at-*.safetensors")}
+    files["insert"].write_bytes(files["insert"].read_bytes()[:-8])
+    files["butter"].write_bytes(b"")
+    heard = Heard()
+    found = sources(teach_all(prepared, Teacher(toolbox), heard))
+    assert {name for name, source in found.items() if source == "learned"} == {
+        "insert at toaster",
+        "butter at butter_applier",
+    }
+    assert len(heard.damaged) == 2
+    assert all(str(files[name]) in " ".join(heard.damaged) for name in ("insert", "butter"))
+    assert measured == []  # the same seed learns the same tables: the durations still hold
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda record: {},
+        lambda record: record | {"empty_s": {}},
+        lambda record: record | {"loaded_s": dict.fromkeys(record["loaded_s"], -1.0)},
+        lambda record: record | {"process_s": {"butter_applier": "soon"}},
+        lambda record: record | {"empty_s": [1, 2]},
+    ],
+)
+def test_damaged_durations_are_measured_again(
+    prepared: Prepared, toolbox: Toolbox, measured: list[Crew], damage: Callable[[dict[str, Any]], dict[str, Any]]
+) -> None:
+    (path,) = (toolbox.folder / "records" / "durations").glob("*.json")
+    whole = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps(whole | {"record": damage(whole["record"])}), encoding="utf-8")
+    taught = teach_all(prepared, Teacher(toolbox), Listener())
+    assert len(measured) == 1
+    assert set(taught.durations.loaded_s.values()) == {5.0}
+    teach_all(prepared, Teacher(toolbox), Listener())
+    assert len(measured) == 1
+
+
+def test_only_one_skill_can_be_prepared() -> None:
+    assert list(prepare(load("toast"), 1, 0, "butter at butter_applier").problems) == ["butter at butter_applier"]
+
+
+def test_methods_of_sequencing(prepared: Prepared, toolbox: Toolbox) -> None:
+    cell = teach_all(prepared, Teacher(toolbox), Listener()).cell
+    for method in (None, "srl", "exact", "fifo", "random"):
+        assert sequence(prepared.task, cell, 0, method=method, episodes=5).sequence == (1, 1, 1)
+    with pytest.raises(BadInput, match=r"unknown method 'x' .--method.: known: exact, fifo, random, srl"):
+        sequence(prepared.task, cell, 0, method="x")
+
+
+# ---- the files of a run ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def report(prepared: Prepared, toolbox: Toolbox) -> tuple[Taught, Report]:
+    """A run whose second step failed."""
+    taught = teach_all(prepared, Teacher(toolbox), Listener())
+    why = "toast 1 at 'plate': slice 1 is not in the gripper after grasping at 'plate' (tried 3 times)"
+    outcome = Outcome(Schedule.from_moves(taught.cell, []), (), (1,), ("try 1",), why, 30.0, ())
+    found = sequence(prepared.task, taught.cell, 0)
+    made = Report(
+        "toast", 0, 1, taught.lessons, taught.durations, found, optimum(taught.cell), outcome, Recording((), []), 0.0
+    )
+    return taught, made
+
+
+def draw(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) -> None:
+    def quick(prepared: Prepared, taught: Taught, report: Report, folder: Path) -> None:
+        for name in report.files:
+            (folder / FILES[name]).write_text("new")
+        if stop is not None:
+            raise stop
+
+    monkeypatch.setattr(lab.report, "_draw_all", quick)
+
+
+def test_a_failed_run_says_so_and_leaves_no_old_chart(
+    prepared: Prepared, report: tuple[Taught, Report], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taught, failed = report
+    document = failed.to_json()
+    assert (document["success"], document["delivered"], document["dropped"]) == (False, 0, 1)
+    assert (document["measured_makespan_s"], document["camera_deviation_m"]) == (None, None)
+    assert document["failure"].startswith("toast 1 at 'plate': ")
+    (tmp_path / "gantt.png").write_text("old")
+    (tmp_path / "mine.txt").write_text("mine")
+    draw(monkeypatch)
+    write_files(prepared, taught, failed, tmp_path)
+    assert sorted(failed.files) == sorted(set(FILES) - {"gantt"})
+    assert sorted(os.listdir(tmp_path)) == sorted(["mine.txt", "toolbox", *map(FILES.__getitem__, failed.files)])
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt(), OSError(28, "No space left on device")])
+def test_nothing_is_half_written(
+    prepared: Prepared,
+    report: tuple[Taught, Report],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    stop: BaseException,
+) -> None:
+    taught, failed = report
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "run.json").write_text("old")
+    draw(monkeypatch, stop)
+    with pytest.raises((KeyboardInterrupt, WorkFailed)):
+        write_files(prepared, taught, failed, out)
+    assert {path.name: path.read_text() for path in out.iterdir()} == {"run.json": "old"}
+
+
+def test_output_folders(tmp_path: Path) -> None:
+    check_out(tmp_path / "a" / "b")
+    assert os.listdir(tmp_path) == []
+    (tmp_path / "file").write_text("mine")
+    for wrong in ("file", "file/below", "x" * 300):
+        with pytest.raises(BadInput, match=r"output folder '.*' .--out.: "):
+            check_out(tmp_path / wrong)
+
+
+def test_lessons_are_drawn_once_for_each_table(prepared: Prepared, toolbox: Toolbox) -> None:
+    taught = teach_all(prepared, Teacher(toolbox), Listener())
+    drawn = lab.report._curves(prepared, taught.lessons)
+    assert len(drawn) == len({lesson.policy.name for lesson in taught.lessons.values()})
+    assert "grasp at plate, starts vary" in drawn
+    assert "insert at toaster" in drawn
