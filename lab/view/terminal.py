@@ -287,8 +287,8 @@ def plain_reader(console: Console, stream: TextIO) -> ReadLine:
     """Shows the prompt on the console and reads one line of the stream; raises EOFError at its end."""
 
     def read_line(prompt: str) -> str:
-        console.print(Text(prompt), end="")
         try:
+            console.print(Text(prompt), end="")
             line = stream.readline()
         except KeyboardInterrupt:
             console.print()  # what comes next begins a line
