@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import hypot
 
 from lab.crew import Crew
 from lab.line import Line, aimed
@@ -10,12 +11,13 @@ from lab.sequencing.cell import Cell
 from lab.sequencing.events import Move, Schedule
 from lab.sim.scene import Layout, Spot, spots
 from lab.sim.world import World
-from lab.skills import Butter, Grasp, Insert, Place, Skill
+from lab.skills import Butter, Grasp, Insert, Skill
 from lab.skills.skill import UPRIGHT, Status
 from lab.skills.surveys import Surveys
 from lab.view.frames import Recording
 
 MAX_TRIES = 3  # a failed step is tried again from the state reached, at most twice
+ASTRAY_M = 0.15  # a slice this near to a spot of a station can be taken up again from there
 DELIVERED_M = 0.02  # a slice this near to its spot has been delivered
 
 
@@ -79,14 +81,12 @@ class Production:
             raise _Stopped(f"toast {toast} at '{names[at]}' has nowhere to go")
         origin, target, start, leave_s = names[at], names[to], self.place, line.now_s
         if start != origin:
-            self._try(toast, origin, [line.crew.empty(start, origin)])
+            self._try(toast, origin, line.crew.empty(start, origin))
         reach_s = line.now_s
         self._await(toast, origin)
         pick_s = line.now_s
         spot = self._free_spot(target, to)
-        leg = [aimed(skill, _slice(toast), spot) for skill in line.crew.leg(origin, target)]
-        self._try(toast, origin, leg[:1])
-        self._try(toast, target, leg[1:])
+        self._carry(toast, origin, target, spot)
         self.locations[toast - 1], self.place, self.spot_of[toast] = to, target, spot
         self.moves.append(Move(toast, start, origin, target, leave_s, reach_s, pick_s, line.now_s))
         self._start_machine(toast, target)
@@ -97,27 +97,47 @@ class Production:
         taken = [self.spot_of[t] for t, at in enumerate(self.locations, start=1) if at == number]
         return next(spot for spot in spots(self.line.crew.task.station(station)) if spot not in taken)
 
-    def _try(self, toast: int, where: str, skills: Sequence[Skill]) -> None:
-        """Carry skills out one after the other; a failed one is tried again from the state reached, at most twice."""
-        for skill in skills:
-            for attempt in range(1, MAX_TRIES + 1):
-                if attempt > 1:
-                    self._pick_up_again(skill)
-                if self.line.run(skill) is Status.SUCCESS:
-                    break
-                self._note(f"toast {toast} at '{where}', '{skill.name}', try {attempt}: {skill.reason}")
-                if attempt == MAX_TRIES:
-                    raise _Stopped(f"toast {toast} at '{where}': {skill.reason} (tried {MAX_TRIES} times)")
-            if isinstance(skill, Insert):
-                self.deviations_m += skill.deviations_m
+    def _carry(self, toast: int, origin: str, target: str, spot: Spot) -> None:
+        """Grasp, carry, set down; what fails is tried again from the state reached, at most twice."""
+        name = _slice(toast)
+        grasp, *rest = (aimed(skill, name, spot) for skill in self.line.crew.leg(origin, target))
+        self._try(toast, origin, grasp)
+        tries, step, first = [0] * len(rest), 0, ""
+        while step < len(rest):
+            skill = rest[step]
+            if self.line.run(skill) is Status.SUCCESS:
+                step += 1
+                continue
+            tries[step] += 1
+            first = first or skill.reason
+            self._note(f"toast {toast} at '{target}', '{skill.name}', try {tries[step]}: {skill.reason}")
+            if tries[step] == MAX_TRIES:
+                raise _Stopped(f"toast {toast} at '{target}': {first} (tried {MAX_TRIES} times)")
+            if not self.line.bench.holds(name):
+                step = self._pick_up_again(toast, origin, target, first)
+        self.deviations_m += [d for skill in rest if isinstance(skill, Insert) for d in skill.deviations_m]
 
-    def _pick_up_again(self, skill: Skill) -> None:
-        """Before setting down is tried again: take the slice from where it was let go, if it is not in the gripper."""
-        line = self.line
-        station = skill.station if isinstance(skill, Place | Insert) else ""
-        again = line.crew.skills.get(Grasp(station).name)
-        if line.bench.held is None and isinstance(again, Grasp) and line.bench.taken is not None:
-            line.run(again.take(line.bench.taken))
+    def _pick_up_again(self, toast: int, origin: str, target: str, why: str) -> int:
+        """Take a slice that is not in the gripper from where it stands; which step of the rest of the leg comes next."""
+        bench, crew, name = self.line.bench, self.line.crew, _slice(toast)
+        bench.held = None
+        if bench.upright(name) < UPRIGHT:
+            raise _Stopped(f"toast {toast} at '{target}': {why}; {name} has fallen over")
+        for station, step in ((target, 1), (origin, 0)):
+            grasp = crew.skills[Grasp(station).name]
+            at, foots = bench.slice_pose(name), spots(crew.task.station(station))
+            near = any(hypot(at.x - foot.x, at.y - foot.y) < ASTRAY_M for foot in foots)
+            if near and self.line.run(aimed(grasp, name, None)) is Status.SUCCESS:
+                return step
+        raise _Stopped(f"toast {toast} at '{target}': {why}; {name} could not be taken up again from where it is")
+
+    def _try(self, toast: int, where: str, skill: Skill) -> None:
+        """Carry a skill out; when it fails it is tried again from the state reached, at most twice."""
+        for attempt in range(1, MAX_TRIES + 1):
+            if self.line.run(skill) is Status.SUCCESS:
+                return
+            self._note(f"toast {toast} at '{where}', '{skill.name}', try {attempt}: {skill.reason}")
+        raise _Stopped(f"toast {toast} at '{where}': {skill.reason} (tried {MAX_TRIES} times)")
 
     def _note(self, text: str) -> None:
         self.retries.append(text)

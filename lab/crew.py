@@ -52,12 +52,16 @@ class Crew:
 
     @classmethod
     def of(cls, task: Task, toasts: int) -> "Crew":
-        """One skill instance for each place and way that a run with so many toasts may need."""
+        """One skill instance for each place and way that a run with so many toasts may need.
+
+        What is set down at the last station may have to be taken up again there, when setting it down failed.
+        """
         moves = needed_moves(stations(task, {}), route(task), task.robot.start, toasts)
         skills: list[Skill] = []
         for origin, target in moves.loaded:
             skills += [Grasp(origin), Transfer(origin, _entry(task, target), loaded=True), _arrival(task, target)]
         skills += [Transfer(origin, target, loaded=False) for origin, target in moves.empty]
+        skills += [Grasp(task.route[-1].station)]
         skills += [Butter(station.name) for station in task.stations if station.process == "butter"]
         return cls(task, moves, {skill.name: skill for skill in skills})
 

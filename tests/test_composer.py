@@ -253,7 +253,7 @@ def test_a_slice_set_down_beside_the_slot_is_picked_up_again_and_inserted(ground
 
     def spoil() -> None:
         insert = line.crew.skills["insert at toaster"]
-        if insert.status is Status.RUNNING and line.bench.taken and line.bench.held is None and not spoiled:
+        if insert.status is Status.RUNNING and line.bench.held is None and not spoiled:
             spoiled.append(line.now_s)
             line.world.put("slice 1", (x, y - 0.11, 0.06))  # beside the toaster
 
@@ -263,6 +263,28 @@ def test_a_slice_set_down_beside_the_slot_is_picked_up_again_and_inserted(ground
     assert failure is None, ground.work.retries
     assert len(ground.work.retries) == 1
     assert "slice 1 is not in the slot of 'toaster'" in ground.work.retries[0]
+
+
+def test_a_slice_set_down_beside_its_spot_on_the_last_plate_is_taken_up_again_and_delivered(
+    ground: Ground, task: Task
+) -> None:
+    line = ground.line
+    x, y, _ = task.station("finished_plate").pose
+    spoiled: list[float] = []
+
+    def spoil() -> None:
+        place = line.crew.skills["place at finished_plate"]
+        if place.status is Status.RUNNING and line.bench.held is None and not spoiled:
+            spoiled.append(line.now_s)
+            line.world.put("slice 1", (x - 0.03, y + 0.02, 0.073))
+
+    line.on_tick = spoil
+    failure = ground.work.carry_out((1, 1, 1))
+    assert spoiled
+    assert failure is None, ground.work.retries
+    assert [note for note in ground.work.retries if "does not stand on 'finished_plate'" in note] == ground.work.retries
+    assert len(ground.work.retries) == 1
+    assert line.bench.stands("slice 1", ground.work.spot_of[1].grasp(), 0.012)
 
 
 def test_a_machine_that_failed_while_the_robot_was_away_is_noticed_and_tried_again(ground: Ground) -> None:

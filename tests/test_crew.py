@@ -38,6 +38,7 @@ def test_the_crew_for_one_toast_is_what_its_way_needs(task: Task) -> None:
         "grasp at butter_applier",
         "transfer butter_applier to finished_plate with slice",
         "place at finished_plate",
+        "grasp at finished_plate",  # to take up again what was set down badly
     }
 
 

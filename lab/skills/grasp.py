@@ -1,6 +1,7 @@
 """Grasp: the gripper comes to a slice, aligns itself, closes, and lifts the slice."""
 
 from collections.abc import Iterator
+from math import hypot
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -9,7 +10,7 @@ from lab.errors import BadInput
 from lab.mdp import NoPath, TabularMDP, grid
 from lab.sim.kinematics import ToolPose, inverse
 from lab.sim.survey import Survey
-from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
+from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 ACTIONS = ("left", "right", "backward", "forward", "down", "up", "turn right", "turn left")  # of the slice's axes
 GOAL = (2, 2, 0, 2)
+FAR_M = 0.2  # [m] a tool farther from the station's approach, as when trying again, comes over everything
 _SLOW = 0.6
 _BLEND_M = 0.008
 
@@ -50,6 +52,9 @@ class Grasp(Skill):
         goal = bench.slice_pose(name)
         if inverse(goal) is None:
             raise SkillFailed(f"{name} is out of reach at ({goal.x:.2f}, {goal.y:.2f}) m")
+        tool, approach = robot.tool(), self.surveys.approach(self.station)
+        if tool.z < approach.z - 0.01 or hypot(tool.x - approach.x, tool.y - approach.y) > FAR_M:
+            yield from over_everything(bench, approach)
         entry = entry_cell(goal, robot.tool())
         cells = [mdp.state_cell(s) for s in learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))]
         poses = [near_pose(goal, cell) for cell in cells]
@@ -57,7 +62,7 @@ class Grasp(Skill):
         yield from robot.follow([ToolPose(poses[0].x, poses[0].y, high, poses[0].yaw)], slow=_SLOW)
         yield from robot.follow(poses, blend=_BLEND_M, slow=_SLOW)
         yield from robot.grip()
-        bench.held = bench.taken = name
+        bench.held = name
         lifted = self.surveys.approach(self.station)
         yield from robot.follow([ToolPose(goal.x, goal.y, lifted.z, goal.yaw)], slow=_SLOW)
         yield from robot.follow([lifted], slow=_SLOW)

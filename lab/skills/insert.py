@@ -15,7 +15,7 @@ from lab.sim import assets
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import GRASP_DEPTH, Spot, spots
 from lab.skills.place import let_go, release_pose
-from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
+from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import Surveys, camera_view, overhead_camera
 from lab.taskfile import Obstacle, Task
 from lab.vision import find_markers, locate, see
@@ -117,13 +117,8 @@ class Insert(Skill):
         """Where the tool is not at the grid's start, as when trying again: over everything and down to it."""
         task, tool = self.surveys.task, bench.scene.robot.tool()
         x, y = self.seen.view.centre(self.seen.start)
-        if hypot(tool.x - x, tool.y - y, tool.z - task.insert.height_m) < task.insert.cell_m:
-            return
-        grid = task.workspace
-        over = grid.lower_m[2] + (grid.shape[2] - 0.5) * grid.cell_m[2]
-        poses = [ToolPose(tool.x, tool.y, over, 0.0), ToolPose(x, y, over), ToolPose(x, y, task.insert.height_m)]
-        for pose in poses:
-            yield from bench.scene.robot.follow([pose])
+        if hypot(tool.x - x, tool.y - y, tool.z - task.insert.height_m) >= task.insert.cell_m:
+            yield from over_everything(bench, ToolPose(x, y, task.insert.height_m))
 
     def _same_picture(self, bench: Bench) -> None:
         """A new snapshot must show the cubes and the toaster where they were learned around, and no others."""

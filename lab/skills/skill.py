@@ -47,11 +47,10 @@ class Problem:
 
 @dataclass
 class Bench:
-    """The cell in which skills are carried out; the slice that the robot holds, and the one that it took last."""
+    """The cell in which skills are carried out, and the slice that the robot holds."""
 
     scene: Scene
     held: str | None = None
-    taken: str | None = None
 
     def slice_pose(self, name: str) -> ToolPose:
         """The tool pose that would hold the slice where it is now, its yaw within a quarter turn of the world's x axis."""
@@ -119,6 +118,15 @@ class Skill:
     def stop(self) -> None:
         """Break off; the skill can be started again."""
         self._motion, self.status = None, Status.IDLE
+
+
+def over_everything(bench: Bench, end: ToolPose) -> Iterator[None]:
+    """Bring the tool from wherever it is to `end`, over all that stands in the cell: up, across, down."""
+    robot, grid = bench.scene.robot, bench.scene.task.workspace
+    high = max(end.z, grid.lower_m[2] + (grid.shape[2] - 0.5) * grid.cell_m[2])
+    tool = robot.tool()
+    for pose in (ToolPose(tool.x, tool.y, high, end.yaw), ToolPose(end.x, end.y, high, end.yaw), end):
+        yield from robot.follow([pose])
 
 
 def learned_path(policy: "Policy", mdp: TabularMDP, start: int) -> list[int]:
