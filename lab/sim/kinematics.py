@@ -26,7 +26,6 @@ SPEED = np.radians([140.0, 160.0, 170.0, 335.0, 335.0, 500.0])  # [rad/s]
 
 _FOREARM_LENGTH = hypot(FOREARM, ELBOW_UP)
 _FOREARM_TILT = atan2(ELBOW_UP, FOREARM)
-MAX_REACH = SHOULDER_OUT + UPPER_ARM + _FOREARM_LENGTH  # [m] 1.373
 
 
 @dataclass(frozen=True)

@@ -32,11 +32,6 @@ class Trajectory:
     positions: Array
     velocities: Array
 
-    @property
-    def duration_s(self) -> float:
-        """How long it takes [s], settling included."""
-        return (len(self.positions) + _SETTLE_STEPS) * TIME_STEP
-
 
 def plan(
     poses: Sequence[ToolPose], speed: float, acceleration: float, blend: float = 0.0, before: Array | None = None

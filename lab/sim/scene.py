@@ -153,16 +153,6 @@ class Scene:
         self.world.mass(name, self.task.slices.mass_kg)
         self.world.friction(name, self.task.slices.friction, spinning=0.001)
 
-    def approach(self, station: Station) -> ToolPose:
-        """Where transfers to and from a station end: above its middle, at the lowest level of the workspace grid."""
-        x, y, yaw = station.pose
-        return ToolPose(x, y, self.travel_height(), yaw)
-
-    def travel_height(self) -> float:
-        """The lowest height [m] of the finger tips on a transfer."""
-        grid = self.task.workspace
-        return grid.lower_m[2] + grid.cell_m[2] / 2
-
 
 def in_camera_grid(task: Task, place: Sequence[float]) -> bool:
     """Whether a point (x, y) [m] lies in the grid that the camera looks at."""

@@ -179,11 +179,6 @@ class World:
         position, turn = self._call("getBasePositionAndOrientation", entry.number) if entry.moves else entry.pose
         return np.array(position), np.array(turn)
 
-    def speed(self, name: str) -> float:
-        """How fast a body's centre moves [m/s]."""
-        linear, _ = self._call("getBaseVelocity", self._bodies[name].number)
-        return float(np.linalg.norm(linear))
-
     # ---- joints -------------------------------------------------------------------------------------------------
 
     def joints(self, name: str, names: Sequence[str]) -> Array:

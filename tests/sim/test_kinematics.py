@@ -66,7 +66,7 @@ def test_what_is_out_of_reach_has_no_joints(pose: ToolPose) -> None:
 
 @given(st.floats(-1.2, 1.2), st.integers(0, 60))
 def test_the_border_of_the_reach_is_no_error(slope: float, steps: int) -> None:
-    distance = arm.MAX_REACH - arm.SHOULDER_OUT
+    distance = arm.UPPER_ARM + hypot(arm.FOREARM, arm.ELBOW_UP)
     for _ in range(steps):
         distance = nextafter(distance, 0.0)
     z = arm.SHOULDER_UP - arm.TOOL_DOWN + distance * sin(slope)
