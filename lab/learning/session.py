@@ -153,19 +153,21 @@ class _Session:
         self.tau = 1.0
         self.episode = 0
         self.improved: Improvement | None = None
-        self.asked_now = False
+        self.asked_now = False  # in the episode under way; booked when it has ended
+        self.helped_now = 0
 
     def play(self, episode: int) -> None:
         """One episode with the gate's decision before it and its verdict after it."""
-        self.episode, self.asked_now = episode, False
+        self.episode, self.asked_now, self.helped_now = episode, False, 0
         self.tau = temperature(episode, self.settings.beta)
         was_converged = self.gate.converged
         is_open = self.gate.opens(episode, self.steps) and self.advisor is not None
         if self.gate.converged and not was_converged and self.advisor is not None:
             self.tell(AdviceEnded(episode, "converged"))
-        helped_before = self.helped_steps
         steps = self._walk(self._advised_choice if is_open else self._own_choice)
-        helped = self.helped_steps - helped_before
+        helped = self.helped_now
+        self.requests += self.asked_now
+        self.helped_steps += helped
         self.steps.append(steps)
         self.guided.append(helped > 0)
         self.improved = improvement(self.steps, self.gate_settings.window)
@@ -213,7 +215,6 @@ class _Session:
         rate, current, previous = (means.rate, means.current_mean, means.previous_mean) if means else (None, None, None)
         if not self.asked_now:
             self.asked_now = True
-            self.requests += 1
             self.tell(AdviceRequested(self.episode, rate, current, previous))
         request = AdviceRequest(self.mdp, self.q, state, self.episode, step, own, rate, current, previous)
         try:
@@ -226,7 +227,7 @@ class _Session:
             return own
         if action not in range(self.mdp.n_actions):
             raise BadInput(f"the advisor named action {action}: allowed 0..{self.mdp.n_actions - 1}")
-        self.helped_steps += 1
+        self.helped_now += 1
         return action
 
     def result(self, interrupted: bool) -> SessionResult:

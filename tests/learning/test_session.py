@@ -190,6 +190,7 @@ def test_an_interruption_loses_nothing(learner: str) -> None:
     assert (result.interrupted, result.steps.tolist(), result.guided.tolist()) == (True, [3, 3], [True, True])
     assert result.visits[:, 1].tolist() == [3, 2, 2, 0]  # the step under way counts too
     assert result.q[2, 1] > 1.0
+    assert (result.requests, result.helped_steps) == (2, 6)  # those of the episode under way are not booked
 
 
 def test_an_interruption_while_reporting_keeps_the_episode() -> None:
