@@ -27,11 +27,13 @@ ASCII_ARROWS = "^v<>"
 HELP = """\
 The learner is stuck and asks you where to go. It does what you say, and
 learns from it as if the move were its own.
-  a direction   a word from the list of moves, its beginning, an arrow key,
-                or up, down, left, right as seen in the picture
+  a direction   a word from the list of moves, or its beginning; arrow keys
+                follow the picture, and so do up, down, left, right where
+                the list has no such words
   enter         agree with the learner: take the move it would make itself
   skip          leave this step to the learner
-  auto          no more advice in this session: the learner goes on alone
+  auto          no more advice for this skill: the learner goes on alone
+  done          no more advice in this whole run, whatever is learned
   Ctrl-C        stop the session; what has been learned is kept
 When episodes with your advice are no shorter than those before, the learner
 counts that, and after a few of them it asks no more."""
@@ -74,16 +76,20 @@ class TeachingPrompt:
     console: where everything is written, usually stderr. read_line shows a prompt and returns one line or raises
     EOFError; by default the terminal with arrow keys when stdin is one, else plain lines of stdin. Returns the
     action, None for "skip".
-    Raises AdvisorLeft for "auto" and at the end of the input; Ctrl-C is a KeyboardInterrupt.
+    Raises AdvisorLeft for "auto" and at the end of the input; Ctrl-C is a KeyboardInterrupt. After "done" every
+    request raises AdvisorLeft, and nothing more is written.
     """
 
     def __init__(self, console: Console, read_line: ReadLine | None = None):
         self._console = console
         self._marks = _Marks.of(console)
         self._read_line = read_line
+        self._done = False
 
     def __call__(self, request: AdviceRequest) -> int | None:
         """Shows where the learner is and returns what the person says."""
+        if self._done:
+            raise AdvisorLeft
         if self._read_line is None:
             self._read_line = default_reader(self._console)
         self._show(request)
@@ -104,6 +110,10 @@ class TeachingPrompt:
                     return None
                 case "auto":
                     raise AdvisorLeft
+                case "done":
+                    self._say("No more advice in this run: from here on learners go on alone.")
+                    self._done = True
+                    raise AdvisorLeft
                 case "help":
                     self._say(HELP)
                 case _:
@@ -111,6 +121,8 @@ class TeachingPrompt:
 
     def on_event(self, event: Event, skill: str = "") -> None:
         """Tells the person when the learner of `skill` starts asking, what came of it, and why it stops."""
+        if self._done:
+            return
         match event:
             case AdviceRequested():
                 what = f" about '{skill}'" if skill else ""
@@ -253,13 +265,13 @@ def _coloured(plane: Plane, arrows: str, legend: str) -> Text:
 
 
 def understand(line: str, mdp: TabularMDP) -> int | str:
-    """The action that a typed line names, or "own", "skip", "auto", "help", or else a hint of one line.
+    """The action that a typed line names, or "own", "skip", "auto", "done", "help", or else a hint of one line.
 
     An exact label comes first, then the beginning of exactly one label, then an arrow or the (beginning of the)
     word for a direction in the picture.
     """
     word = line.strip().lower()
-    if word in ("", "skip", "auto", "?", "help"):
+    if word in ("", "skip", "auto", "done", "?", "help"):
         return {"": "own", "?": "help"}.get(word, word)
     labels = [label.lower() for label in mdp.action_labels]
     if word in labels:
@@ -274,7 +286,7 @@ def understand(line: str, mdp: TabularMDP) -> int | str:
             return pointing[direction]
     if begun:
         return f"'{word[:20]}' could be {' or '.join(mdp.action_labels[a] for a in begun)}: type more of it"
-    return f"'{word[:20]}' is no direction: type {', '.join(mdp.action_labels)}, skip, auto or ?"
+    return f"'{word[:20]}' is no direction: type {', '.join(mdp.action_labels)}, skip, auto, done or ?"
 
 
 def default_reader(console: Console, stdin: TextIO | None = None) -> ReadLine:

@@ -176,7 +176,7 @@ def test_labels_come_before_directions() -> None:
 def test_wrong_words_get_one_line_and_another_chance() -> None:
     answer, shown = ask("sideways\nu\n")
     assert answer == 0
-    assert "'sideways' is no direction: type up, down, left, right, skip, auto or ?\n" in shown
+    assert "'sideways' is no direction: type up, down, left, right, skip, auto, done or ?\n" in shown
     assert shown.count("Which way? [enter = → right, ? explains]") == 2
 
 
@@ -192,13 +192,35 @@ def test_any_line_is_an_action_a_command_or_a_hint(line: str) -> None:
     if isinstance(answer, int):
         assert 0 <= answer < 4
     else:
-        assert answer in ("own", "skip", "auto", "help") or "no direction" in answer
+        assert answer in ("own", "skip", "auto", "done", "help") or "no direction" in answer
 
 
-@pytest.mark.parametrize("lines", ["auto\n", "", "?\n", "sideways"])
+@pytest.mark.parametrize("lines", ["auto\n", "done\n", "", "?\n", "sideways"])
 def test_auto_and_the_end_of_the_input_end_advice(lines: str) -> None:
     with pytest.raises(AdvisorLeft):
         ask(lines)
+
+
+def test_done_ends_advice_for_every_skill() -> None:
+    shown = console()
+    prompt = TeachingPrompt(shown, plain_reader(shown, StringIO("done\nright\n")))
+    with pytest.raises(AdvisorLeft):
+        prompt(request(board()))
+    assert "No more advice in this run" in said(shown)
+    before = said(shown)
+    prompt.on_event(AdviceEnded(31, "advisor left"), "insert at toaster")
+    prompt.on_event(AdviceRequested(30, None, None, None), "place at plate")
+    with pytest.raises(AdvisorLeft):
+        prompt(request(space()))
+    assert said(shown) == before
+
+
+def test_auto_ends_advice_for_one_skill() -> None:
+    shown = console()
+    prompt = TeachingPrompt(shown, plain_reader(shown, StringIO("auto\nright\n")))
+    with pytest.raises(AdvisorLeft):
+        prompt(request(board()))
+    assert prompt(request(board())) == 3
 
 
 @contextmanager
@@ -299,7 +321,7 @@ def test_a_session_whose_adviser_misleads_says_so() -> None:
 def test_ctrl_c_keeps_what_was_learned() -> None:
     with at_terminal("right\rright\r\x03") as prompt:
         result = teach(prompt)
-    assert (result.interrupted, len(result.steps), result.helped_steps) == (True, 3, 2)
+    assert (result.interrupted, len(result.steps), result.helped_steps) == (True, 3, 0)
     assert result.visits.sum() > 0
 
 
