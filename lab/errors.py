@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+MOST_NAMES = 30  # an error lists so many known names at the most
+
 
 class LabError(Exception):
     """Any failure the lab explains in one line; `exit_code` is what a command ends with.
@@ -33,4 +35,5 @@ def unknown(kind: str, value: object, known: Iterable[str], where: str) -> BadIn
     names = sorted(known)
     near = get_close_matches(str(value), names, n=1)
     hint = f" did you mean '{near[0]}'?" if near else ""
-    return BadInput(f"unknown {kind} '{value}' ({where}):{hint} known: {', '.join(names) or 'none'}")
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return BadInput(f"unknown {kind} '{value}' ({where}):{hint} known: {', '.join(names[:MOST_NAMES]) or 'none'}{more}")

@@ -81,8 +81,8 @@ class Report:
 
     @property
     def gap(self) -> float:
-        """How much longer the used sequence takes than the proven optimum, as a fraction of it."""
-        return self.sequenced.makespan_s / self.proven.makespan_s - 1.0
+        """How much longer the used sequence takes than the proven optimum (or the bound), as a fraction of it."""
+        return self.proven.gap(self.sequenced.makespan_s)
 
     def to_json(self) -> dict[str, Any]:
         """The document of `lab run --json`."""
@@ -100,7 +100,8 @@ class Report:
             "sequence": list(self.sequenced.sequence),
             "predicted_makespan_s": self.sequenced.makespan_s,
             "measured_makespan_s": outcome.schedule.makespan_s if self.success else None,
-            "optimal_makespan_s": self.proven.makespan_s,
+            "optimal_makespan_s": self.proven.optimal_s,
+            "bound_s": self.proven.bound_s,
             "optimality_gap": self.gap,
             "optimum_proven": self.proven.proven,
             "camera_deviation_m": max(outcome.camera_deviations_m, default=None),
@@ -210,7 +211,7 @@ def _sequence_document(taught: Taught, report: Report) -> dict[str, Any]:
         "sequence": list(report.sequenced.sequence),
         "makespan_s": report.sequenced.makespan_s,
         "episode_makespans_s": list(report.sequenced.episode_makespans_s),
-        "optimal_s": report.proven.makespan_s,
+        "optimal_s": report.proven.optimal_s,
         "optimal_sequence": list(report.proven.sequence),
         "durations": taught.durations.to_json(),
         "stations": [asdict(station) for station in taught.cell.stations],

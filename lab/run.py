@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from lab import __version__
 from lab.composer import carry_out
 from lab.crew import Crew, Durations, cell_of
 from lab.errors import unknown
@@ -26,6 +25,8 @@ from lab.sim.scene import Layout, check_apart, draw_layout
 from lab.skills.surveys import Surveys
 from lab.taskfile import Task, check_toasts
 from lab.teaching import Teacher
+
+_LAB = Path(__file__).resolve().parent  # whose code the kept durations depend on
 
 
 def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prepared:
@@ -86,6 +87,7 @@ def _kept_durations(teacher: Teacher, key: str, crew: Crew) -> Durations | None:
         kept is None
         or not set(crew.moves.empty) <= kept.empty_s.keys()
         or not set(crew.moves.loaded) <= kept.loaded_s.keys()
+        or not {station.name for station in crew.task.stations if station.process} <= kept.process_s.keys()
     ):
         return None
     times = (*kept.empty_s.values(), *kept.loaded_s.values(), *kept.process_s.values())
@@ -93,9 +95,11 @@ def _kept_durations(teacher: Teacher, key: str, crew: Crew) -> Durations | None:
 
 
 def _fingerprint(task: Task, layout: Layout, crew: Crew) -> str:
-    """A hash of all that a move's duration depends on: the lab, the scene, where things stand, the tables followed."""
+    """A hash of all that a move's duration depends on: the code, the scene, where things stand, the tables followed."""
     physical = task.model_dump_json(exclude={"name", "title", "sequencing", "subtasks"})
-    digest = hashlib.sha256(f"{__version__}{physical}{layout.obstacles}{crew.moves}".encode())
+    digest = hashlib.sha256(f"{physical}{layout.obstacles}{crew.moves}".encode())
+    for code in sorted([*_LAB.glob("sim/*.py"), *_LAB.glob("skills/*.py"), _LAB / "line.py"]):
+        digest.update(code.read_bytes())
     for name in sorted(crew.policies):
         policy: Policy = crew.policies[name]
         digest.update(f"{name}{policy.signature}".encode() + policy.q.tobytes())
@@ -109,12 +113,13 @@ def sequence(
     *,
     method: str | None = None,
     episodes: int | None = None,
+    session: int = 0,
     on_episode: Callable[[EpisodeSequenced], None] | None = None,
 ) -> SequenceResult:
     """The best sequence that a method finds, by default the task's own with its settings. BadInput for an unknown method."""
     settings = task.sequencing
     name, count = method or settings.method, episodes or settings.episodes
-    rng = np.random.default_rng([seed, 2])
+    rng = np.random.default_rng([seed, 2, session])
     if name not in SEQUENCERS:
         raise unknown("method", name, SEQUENCERS, "--method")
     if name != "srl":

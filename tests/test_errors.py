@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.errors import BadInput, LabError, WorkFailed, unknown
+from lab.errors import MOST_NAMES, BadInput, LabError, WorkFailed, unknown
 
 
 @pytest.mark.parametrize(("kind", "code"), [(BadInput, 2), (WorkFailed, 1), (LabError, 1)])
@@ -36,4 +36,5 @@ def test_any_value_is_reported_in_one_line_with_all_that_is_known(value: str, kn
     message = str(unknown("task", value, known, "TASK"))
     assert len(message.splitlines()) == 1
     assert f"'{value}' (TASK)" in message
-    assert message.endswith(f"known: {', '.join(sorted(known)) or 'none'}")
+    more = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
+    assert message.endswith(f"known: {', '.join(sorted(known)[:MOST_NAMES]) or 'none'}{more}")

@@ -3,7 +3,7 @@
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal, get_args
 
 from lab.errors import BadInput
@@ -79,7 +79,8 @@ class Schedule:
         end_s = max((move.drop_s for move in moves), default=0.0)
         for toast in range(1, cell.toasts + 1):
             activities += _toast_activities(cell, toast, [move for move in moves if move.toast == toast], end_s)
-        return cls.from_activities(activities, [move.toast for move in moves])
+        timed = cls.from_activities(activities, [move.toast for move in moves])
+        return replace(timed, makespan_s=end_s)  # a last carry of 0 s is no activity, yet it ends the run
 
     def to_json(self) -> dict[str, Any]:
         """Plain dicts, lists, numbers and strings, for `json.dumps`."""

@@ -30,6 +30,15 @@ class Optimum:
     bound_s: float
     expanded: int
 
+    @property
+    def optimal_s(self) -> float | None:
+        """The makespan when it is proven to be optimal, else None [s]."""
+        return self.makespan_s if self.proven else None
+
+    def gap(self, makespan_s: float) -> float:
+        """How much longer a makespan is than the proven optimum, or than the bound when there is none; a fraction."""
+        return makespan_s / self.bound_s - 1.0
+
 
 class _State(NamedTuple):
     """Between two moves, in ticks: toasts per station, robot's station, when the toasts of each machine are finished.

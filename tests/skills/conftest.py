@@ -143,7 +143,7 @@ def _begin(bench: Bench, pose: ToolPose, *, holding: bool) -> None:
     bench.scene.add_slice(SLICE, Spot(pose.x, pose.y, pose.z + GRASP_DEPTH - assets.SLICE[2], pose.yaw))
     for _ in robot.grip():
         world.step()
-    bench.held = bench.taken = SLICE
+    bench.held = SLICE
 
 
 @pytest.fixture(scope="session")
