@@ -33,7 +33,6 @@ def test_a_slice_is_set_down_and_left_standing(
     assert at.yaw == pytest.approx(spot.yaw, abs=0.02)
     assert bench.upright(SLICE) > 0.999
     assert bench.held is None
-    assert bench.taken == SLICE
     assert not bench.holds(SLICE)
     assert not bench.scene.robot.closed
 
