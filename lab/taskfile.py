@@ -1,12 +1,23 @@
 """Task files: tasks/*.toml -> validated frozen models. The only place where raw text is checked."""
 
 import tomllib
+from dataclasses import asdict
 from itertools import combinations
 from math import hypot
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self, cast
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import CoreSchema
 
 from lab.data import tasks_folder
 from lab.errors import BadInput, unknown
@@ -14,6 +25,7 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import Rewards
 
 MAX_TOASTS = 50
+MAX_REWARD = 1_000_000  # sums of larger ones lose the small ones, and of much larger ones overflow
 RESERVED = ("robot", "table", "insert", "the slice", "carried slice")  # names of other things in the cell
 RESERVED_STARTS = ("slice ", "toast ", "toasted ", "butter ", "robot ")
 RESERVED_ENDS = (" marker", " column", " head")
@@ -41,7 +53,19 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$")]
 class Record(BaseModel):
     """A frozen record that knows its fields and takes no others."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class _FromTable:
+    """Lets a dataclass in a strict record be written as a table; its own fields stay strict."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        schema = handler(source)
+        cast(dict[str, Any], handler.resolve_ref_schema(schema))["strict"] = False
+        return schema
+
+
+FROM_TABLE = _FromTable()
 
 
 class RobotSettings(Record):
@@ -101,6 +125,9 @@ class Station(Record):
 
     @model_validator(mode="after")
     def _one_time(self) -> Self:
+        for field in ("processing_s", "process"):
+            if self.kind != "machine" and getattr(self, field) is not None:
+                raise ValueError(f"station '{self.name}' is a {self.kind}: only a machine has {field}")
         if self.kind == "machine" and (self.processing_s is None) == (self.process is None):
             raise ValueError(
                 f"machine '{self.name}' needs either processing_s or process = 'butter', not both or neither"
@@ -128,9 +155,17 @@ class Obstacle(Record):
 class Subtask(Record):
     """How a sub-task is learned: rewards, learner and gate."""
 
-    rewards: Rewards = Rewards()
-    learner: LearnerSettings = LearnerSettings()
-    gate: GateSettings = GateSettings()
+    rewards: Annotated[Rewards, FROM_TABLE] = Rewards()
+    learner: Annotated[LearnerSettings, FROM_TABLE] = LearnerSettings()
+    gate: Annotated[GateSettings, FROM_TABLE] = GateSettings()
+
+    @field_validator("rewards")
+    @classmethod
+    def _sums_are_finite(cls, rewards: Rewards) -> Rewards:
+        for field, value in asdict(rewards).items():
+            if abs(value) > MAX_REWARD:
+                raise ValueError(f"{field} = {value}: allowed are -{MAX_REWARD} to {MAX_REWARD}")
+        return rewards
 
 
 class Sequencing(Record):
