@@ -30,7 +30,8 @@ from lab.vision import read_picture
 
 RUN_FIELDS = (
     *("task", "seed", "toasts", "success", "delivered", "dropped", "failure", "retries", "skills", "sequence"),
-    *("predicted_makespan_s", "measured_makespan_s", "optimal_makespan_s", "optimality_gap", "optimum_proven"),
+    *("predicted_makespan_s", "measured_makespan_s", "optimal_makespan_s", "bound_s"),
+    *("optimality_gap", "optimum_proven"),
     *("camera_deviation_m", "sim_s", "wall_s", "files"),
 )
 SKILL_FIELDS = {"name", "subtask", "source", "policy", "episodes", "requests", "helped_steps", "solved"}

@@ -2,19 +2,20 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from lab.advice.advisors import AdviceRequest
+from lab.advice.advisors import AdviceRequest, AdvisorLeft
 from lab.errors import WorkFailed
-from lab.learning.session import EpisodeEnded
+from lab.learning.session import AdviceRejected, EpisodeEnded, SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.mdp import grid
+from lab.mdp import TabularMDP, greedy_path, grid
 from lab.policy import Policy
 from lab.skills.skill import Problem
 from lab.taskfile import Subtask
-from lab.teaching import MAX_SESSIONS, Interrupted, Teacher, fits
+from lab.teaching import MAX_SESSIONS, MORE_SESSIONS, Interrupted, Teacher, fits
 from lab.toolbox import Toolbox
 
 QUICK = LearnerSettings(episodes=60, max_steps=40)
@@ -82,6 +83,126 @@ def test_a_policy_of_another_size_or_with_other_actions_is_not_taken(teacher: Te
         assert teacher.find_or_teach(problem(), settings(), "toast", known(wrong)).source == "learned"
 
 
+def detour(teacher: Teacher) -> Policy:
+    """A policy that reaches the goal, in 7 moves instead of 5."""
+    board = problem().mdp
+    q = np.zeros((board.n_states, board.n_actions))
+    state = board.start
+    for action in (3, 3, 3, 1, 2, 1, 3):
+        q[state, action] = 1.0
+        state = int(board.successor[state, action])
+    assert board.goal[state]
+    half = teacher.teach(problem(), HOPELESS, GATE, "toast", sessions=1).policy
+    longer = replace(half, q=q, final_steps=7)
+    teacher.toolbox.save(longer)
+    return longer
+
+
+def test_a_way_that_is_not_the_shortest_is_learned_on_until_it_is(teacher: Teacher) -> None:
+    longer = detour(teacher)
+    lesson = teacher.find_or_teach(problem(), settings(), "toast", known(longer))
+    assert (lesson.source, lesson.policy.solved, lesson.policy.final_steps) == ("continued", True, 5)
+    index, _ = teacher.toolbox.index()
+    assert teacher.find_or_teach(problem(), settings(), "toast", index).source == "reused"
+
+
+def test_the_longer_way_is_followed_when_no_shorter_one_is_found(teacher: Teacher) -> None:
+    longer = detour(teacher)
+    for tries in (1, 2):
+        (kept,) = teacher.toolbox.index()[0].values()
+        lesson = teacher.find_or_teach(problem(), settings(HOPELESS), "toast", known(kept))
+        assert lesson.result is not None
+        assert (lesson.source, len(lesson.result.steps), lesson.policy.final_steps) == ("continued", MORE_SESSIONS, 7)
+        assert (lesson.policy.solved, len(lesson.policy.curve)) == (False, 1 + tries * MORE_SESSIONS)
+        assert np.array_equal(lesson.policy.q, longer.q)  # what was measured with it still holds
+
+
+def scripted(monkeypatch: pytest.MonkeyPatch, tables: "list[np.ndarray[Any, Any]]", solved: bool = False) -> list[Any]:
+    """Sessions that end with these tables; returns the start tables that they were given."""
+    began: list[Any] = []
+
+    def run(mdp: TabularMDP, *args: Any, q0: Any, **more: Any) -> SessionResult:
+        began.append(q0)
+        result = run_session(mdp, HOPELESS, GATE, None, np.random.default_rng(0))
+        q = tables[len(began) - 1]
+        moves = greedy_path(q, mdp, 40)
+        return replace(result, q=q, final_steps=len(moves[1]) if moves[2] else None, solved=solved)
+
+    monkeypatch.setattr("lab.teaching.run_session", run)
+    return began
+
+
+def test_a_worse_table_never_replaces_a_better_one(teacher: Teacher, monkeypatch: pytest.MonkeyPatch) -> None:
+    longer = detour(teacher)
+    lost = np.zeros_like(longer.q)
+    began = scripted(monkeypatch, [lost, longer.q, lost, lost, lost])
+    policy = teacher.teach(problem(), QUICK, GATE, "toast").policy
+    assert [q is longer.q for q in began] == [False, False, True, True, True]  # MORE_SESSIONS after it fits
+    assert (policy.final_steps, policy.solved, policy.q is longer.q) == (7, False, True)
+    scripted(monkeypatch, [lost])
+    policy = teacher.teach(problem(), QUICK, GATE, "toast", unfinished=longer, sessions=1).policy
+    assert (policy.final_steps, policy.q is longer.q) == (7, True)
+
+
+def test_going_on_keeps_the_history(teacher: Teacher) -> None:
+    half = teacher.teach(problem(), HOPELESS, GateSettings("always"), "toast", sessions=1).policy
+    assert (half.curve, half.guided, half.helped_steps, half.requests) == ([2], [True], 1, 1)
+    lesson = teacher.teach(problem(), QUICK, GateSettings("always"), "toast", unfinished=half, sessions=1)
+    policy, now = lesson.policy, lesson.result
+    assert now is not None
+    assert policy.curve == [2, *now.steps.tolist()]
+    assert policy.guided == [True, *now.guided.tolist()]
+    assert (policy.helped_steps, policy.requests) == (1 + now.helped_steps, 1 + now.requests)
+    assert np.array_equal(policy.visits, half.visits + now.visits)
+    assert lesson.source == "continued"
+
+
+def test_the_unfinished_one_is_found_also_beside_a_finished_one(teacher: Teacher) -> None:
+    assert teacher.unfinished(problem()) is None
+    half = teacher.teach(problem(), HOPELESS, GATE, "toast", sessions=1).policy
+    found = teacher.unfinished(problem())
+    assert found is not None
+    assert found.name == half.name
+    teacher.teach(problem(), QUICK, GATE, "toast")
+    assert teacher.unfinished(problem()) is None
+    beside = teacher.teach(problem(), HOPELESS, GATE, "toast", sessions=1).policy
+    found = teacher.unfinished(problem())
+    assert found is not None
+    assert found.name == beside.name == f"{half.name} unfinished"
+    done = teacher.teach(problem(), QUICK, GATE, "toast", unfinished=found).policy
+    assert (done.solved, done.curve[0]) == (True, 2)
+    assert [row["name"] for row in teacher.toolbox.list()] == [half.name]
+
+
+def test_who_left_or_was_rejected_is_not_asked_in_further_sessions(tmp_path: Path) -> None:
+    asked: list[AdviceRequest] = []
+
+    def leave(request: AdviceRequest) -> int:
+        asked.append(request)
+        raise AdvisorLeft
+
+    teacher = Teacher(Toolbox(tmp_path), "terminal", ask=leave)
+    slow = Subtask(learner=HOPELESS, gate=GateSettings("always"))
+    for times in (1, 2):  # each skill asks once
+        with pytest.raises(WorkFailed):
+            teacher.find_or_teach(problem(columns=3 + times), slow, "toast", {})
+        assert len(asked) == times
+
+    def stay(request: AdviceRequest) -> int:
+        asked.append(request)
+        return 0  # into the wall
+
+    events: list[object] = []
+    wary = GateSettings(first_episode=5, window=2, omega=0, lambda_threshold=1.0)
+    short = LearnerSettings(episodes=8, max_steps=2)
+    asked.clear()
+    teacher = Teacher(Toolbox(tmp_path), "terminal", ask=stay, on_event=lambda _, event: events.append(event))
+    with pytest.raises(WorkFailed):
+        teacher.find_or_teach(problem(columns=6), Subtask(learner=short, gate=wary), "toast", {})
+    assert sum(isinstance(event, AdviceRejected) for event in events) == 1
+    assert {request.episode for request in asked} == {5}
+
+
 class Person:
     """Answers like the learner itself and presses Ctrl-C at the given question."""
 
@@ -102,7 +223,10 @@ def test_ctrl_c_keeps_what_was_learned_and_the_next_run_goes_on(tmp_path: Path) 
     assert isinstance(stopped.value, KeyboardInterrupt)
     index, _ = toolbox.index()
     (kept,) = index.values()
-    assert (0 < len(kept.curve) < 50, kept.helped_steps, kept.visits.sum(), kept.advisor) == (True, 50, 50, "terminal")
+    assert 0 < len(kept.curve) < 50
+    # advice counts once its episode is over; what was learned is all kept
+    assert (0 < kept.helped_steps < 50, kept.requests) == (True, len(kept.curve))
+    assert (kept.visits.sum(), kept.advisor) == (50, "terminal")
     after = f"after {len(kept.curve)} episodes of 'insert at toaster'"
     assert str(stopped.value) == f"stopped by Ctrl-C {after}; what was learned is kept"
     on = Teacher(toolbox).find_or_teach(problem(), settings(), "toast", index)

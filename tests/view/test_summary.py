@@ -42,6 +42,7 @@ RUN: dict[str, Any] = {
     "predicted_makespan_s": 100.0,
     "measured_makespan_s": 101.0,
     "optimal_makespan_s": 80.0,
+    "bound_s": 80.0,
     "optimality_gap": 0.25,
     "optimum_proven": True,
     "sim_s": 300.0,
@@ -66,7 +67,9 @@ def test_a_run_that_went_well() -> None:
 def test_a_run_that_failed_says_which_toast_where_and_why() -> None:
     why = "toast 2 at 'toaster': slice 2 is not in the slot of 'toaster' (tried 3 times)"
     failed = {"success": False, "delivered": 1, "dropped": 1, "measured_makespan_s": None, "failure": why}
-    lines = shown(run_summary(RUN | failed | {"retries": ["try 1: a", "try 2: b"], "optimum_proven": False}))
+    lines = shown(
+        run_summary(RUN | failed | {"retries": ["try 1: a", "try 2: b"], "optimum_proven": False, "bound_s": 75.0})
+    )
     assert lines[:5] == [
         "        outcome  1 of 2 toasts delivered (seed 7)",
         "        dropped  1 toasts",
@@ -75,7 +78,7 @@ def test_a_run_that_failed_says_which_toast_where_and_why() -> None:
         "                 try 2: b",
     ]
     assert "       makespan  100.0 s predicted" in lines
-    assert "     best known  80.0 s, gap 25.00%" in lines
+    assert "   proven bound  75.0 s, gap 25.00%" in lines
 
 
 @pytest.mark.parametrize("width", [40, 80])
@@ -156,7 +159,7 @@ def test_a_sequence() -> None:
     first = [
         "srl: 110.00 s for 2 toasts (seed 3)",
         "order of the transfers: 2 1 2 1",
-        "optimum 100.00 s (proven), gap 10.00%",
+        "proven optimum 100.00 s, gap 10.00%",
     ]
     assert shown(sequence_summary(found)) == first
     several = {"sessions": 4, "success_percent": 75.0, "mean_best_s": 102.5, "files": {"plot": "e.png"}}
@@ -166,7 +169,7 @@ def test_a_sequence() -> None:
         "e.png",
     ]
     unproven = found | {"optimum_proven": False, "bound_s": 90.0}
-    assert shown(sequence_summary(unproven))[2] == "optimum 100.00 s (bound 90.00 s), gap 10.00%"
+    assert shown(sequence_summary(unproven))[2] == "proven bound 90.00 s, gap 10.00%"
 
 
 def test_a_table_takes_what_looks_like_markup_as_it_is() -> None:
