@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 from lab.errors import BadInput, LabError, unknown
 from lab.listener import Listener
 from lab.taskfile import MAX_TOASTS, Task, find, load
-from lab.teaching import Teacher
+from lab.teaching import Teacher, plain_name
 
 if TYPE_CHECKING:
-    from lab.skills.skill import Skill
+    from lab.skills.skill import Problem, Skill
+    from lab.toolbox import Toolbox
 
 
 def teach_one(
@@ -30,7 +31,9 @@ def teach_one(
 ) -> dict[str, Any]:
     """One session in one sub-task of a task; the policy is kept. Returns the document of `lab teach --json`.
 
-    A grasp counts as solved when its slice is also lifted in physics; `failure` says why it was not.
+    It goes on from an unfinished policy of the same problem, if there is one. A grasp counts as solved when its slice
+    is also lifted in physics; `failure` says why it was not. BadInput when the policy called `name` is of another
+    problem.
     """
     from lab.advice.gates import GATES
     from lab.crew import Crew
@@ -53,22 +56,33 @@ def teach_one(
     prepared = prepare(task, toasts, teacher.seed, wanted)
     skill = prepared.crew.skills[wanted]
     problem, settings = prepared.problems[skill.name], task.subtask(skill.subtask)
+    if name is not None:
+        _check_free(name, problem, teacher.toolbox)
+    earlier = teacher.toolbox.find(problem.subtask, problem.mdp.signature, name or plain_name(problem))
     how = replace(
         settings.learner, learner=learner or settings.learner.learner, episodes=episodes or settings.learner.episodes
     )
     lesson = teacher.teach(
-        problem, how, replace(settings.gate, gate=gate or settings.gate.gate), task.name, name=name, sessions=1
+        problem,
+        how,
+        replace(settings.gate, gate=gate or settings.gate.gate),
+        task.name,
+        unfinished=teacher.unfinished(problem, name),
+        name=name,
+        sessions=1,
     )
-    result, files = lesson.result, {}
+    result, policy, files = lesson.result, lesson.policy, {}
     assert result is not None
-    prepared.crew.policies[skill.name] = lesson.policy
+    prepared.crew.policies[skill.name] = policy
     failure = try_grasp(prepared.crew, prepared.surveys, skill) if isinstance(skill, Grasp) else None
+    if failure is not None and policy.solved:
+        policy = teacher.lessen(policy, earlier)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         files["learning_curve"] = str(out / "learning-curve.png")
-        learning_curves({skill.name: lesson.policy}, out / "learning-curve.png")
+        learning_curves({skill.name: policy}, out / "learning-curve.png")
         if isinstance(skill, Insert):
-            draw_value_map(skill, lesson.policy, out / "insert-value-map.png")
+            draw_value_map(skill, policy, out / "insert-value-map.png")
             files["value_map"] = str(out / "insert-value-map.png")
     return {
         "subtask": skill.subtask,
@@ -89,9 +103,19 @@ def teach_one(
         "final_steps": result.final_steps,
         "solved": result.solved and failure is None,
         "failure": failure,
-        "saved_as": lesson.policy.name,
+        "saved_as": policy.name,
         "files": files,
     }
+
+
+def _check_free(name: str, problem: "Problem", toolbox: "Toolbox") -> None:
+    """Raises BadInput when the policy of that name was learned in another problem."""
+    for row in toolbox.list():
+        if row["name"] == name and (row["subtask"], row["signature"]) != (problem.subtask, problem.mdp.signature):
+            raise BadInput(
+                f"policy name '{name}' (--save): it is the name of a policy for '{row['subtask']}' in another problem "
+                f"({row['signature'][:8]}): choose another name, or remove that policy"
+            )
 
 
 def find_skill(skills: "dict[str, Skill]", name: str) -> "Skill":

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Literal
 from zlib import crc32
 
@@ -9,15 +10,17 @@ import numpy as np
 
 from lab.advice.advisors import Ask, make_advisor
 from lab.errors import WorkFailed
-from lab.learning.session import Event, SessionResult, run_session, unreached
+from lab.learning.session import AdviceEnded, AdviceRejected, Event, SessionResult, run_session, unreached
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.mdp import TabularMDP, greedy_path
+from lab.mdp import FloatArray, TabularMDP, greedy_path
 from lab.policy import MAX_NAME_LENGTH, Policy
 from lab.skills.skill import Problem
 from lab.taskfile import Subtask
 from lab.toolbox import Toolbox
 
-MAX_SESSIONS = 20  # further sessions go on from the table of the one before
+MAX_SESSIONS = 20  # to reach the goal at all; further sessions go on from the table of the one before
+MORE_SESSIONS = 3  # to find a shorter way once the goal is reached
+_UNFINISHED = " unfinished"
 _LONGEST_PROBLEM = MAX_NAME_LENGTH - 20  # characters of a policy's name; the rest is for its signature and state
 Source = Literal["learned", "reused", "continued"]
 
@@ -28,7 +31,7 @@ class Interrupted(KeyboardInterrupt):
 
 @dataclass(frozen=True)
 class Lesson:
-    """A taught skill: its policy, where that came from, and the last session (None when it was reused)."""
+    """A taught skill: its policy with all its history, where that came from, and the sessions now (None when reused)."""
 
     policy: Policy
     source: Source
@@ -53,14 +56,24 @@ class Teacher:
     ) -> Lesson:
         """A policy that reaches the goal in exactly this problem: from `known`, by (sub-task, signature), or learned now.
 
-        An unfinished policy is learned on from where it stands. WorkFailed when no session finds a way; Interrupted on Ctrl-C.
+        Only a solved policy is reused; any other is learned on from where it stands, and followed when it fits though
+        no shorter way was found. WorkFailed when no session finds a way; Interrupted on Ctrl-C.
         """
         found = known.get((problem.subtask, problem.mdp.signature))
         if found is not None and not _belongs(found, problem.mdp):
             found = None
-        if found is not None and fits(found.q, problem.mdp):
+        if found is not None and found.solved and fits(found.q, problem.mdp):
             return Lesson(found, "reused")
         return self.teach(problem, settings.learner, settings.gate, task, unfinished=found)
+
+    def unfinished(self, problem: Problem, name: str | None = None) -> Policy | None:
+        """The unsolved policy to go on from: the one of that name, the best one, or the one beside a solved one."""
+        key = (problem.subtask, problem.mdp.signature)
+        for wanted in (name, None, f"{plain_name(problem)}{_UNFINISHED}"):
+            found = self.toolbox.find(*key, wanted)
+            if found is not None and not found.solved and _belongs(found, problem.mdp):
+                return found
+        return None
 
     def teach(
         self,
@@ -73,36 +86,81 @@ class Teacher:
         name: str | None = None,
         sessions: int = MAX_SESSIONS,
     ) -> Lesson:
-        """Learn `problem` in up to `sessions` sessions, until a greedy path leads to the goal, and save the policy."""
-        rng = np.random.default_rng([self.seed, crc32(problem.name.encode())])
-        table = None if unfinished is None else unfinished.q
-        whole: SessionResult | None = None
-        for _ in range(sessions):
-            advisor = make_advisor(self.advisor, problem.mdp, learner.discount, rng, self.ask)
-            tell = None if self.on_event is None else lambda event: self.on_event(problem.name, event)  # type: ignore[misc]
-            result = run_session(problem.mdp, learner, gate, advisor, rng, q0=table, on_event=tell)
-            whole, table = _joined(whole, result), result.q
-            if result.interrupted or fits(result.q, problem.mdp):
-                break
-        assert whole is not None
-        policy = self._policy(whole, problem, learner, gate, task, name or self._free_name(problem, whole.solved))
+        """Learn `problem` in up to `sessions` sessions, until its greedy path is as short as can be, and save the policy.
+
+        Once the path leads to the goal, at most MORE_SESSIONS further ones look for a shorter one. A table that leads
+        to the goal is never given up for a worse one. `unfinished`, a policy of this very problem, is learned on.
+        """
+        result = self._learn(problem, learner, gate, unfinished, sessions)
+        reaches = fits(result.q, problem.mdp)
+        whole = result if unfinished is None else _after(unfinished, result)
+        policy = self._policy(whole, problem, learner, gate, task, name or self._free_name(problem, result.solved))
         self.toolbox.save(policy)
-        if whole.interrupted:
+        if policy.solved and unfinished is not None and unfinished.name == f"{policy.name}{_UNFINISHED}":
+            self.toolbox.remove(unfinished.name)  # it is finished now, under its plain name
+        if result.interrupted:
             raise Interrupted(
-                f"stopped by Ctrl-C after {len(whole.steps)} episodes of '{problem.name}'; what was learned is kept"
+                f"stopped by Ctrl-C after {len(result.steps)} episodes of '{problem.name}'; what was learned is kept"
             )
-        if sessions > 1 and not fits(whole.q, problem.mdp):
+        if sessions > 1 and not reaches:
             raise WorkFailed(
-                f"'{problem.name}' was not learned in {len(whole.steps)} episodes with the advisor '{self.advisor}'; "
+                f"'{problem.name}' was not learned in {len(result.steps)} episodes with the advisor '{self.advisor}'; "
                 "what was learned is kept: try a better advisor, or more episodes in the task file"
             )
-        return Lesson(policy, "learned" if unfinished is None else "continued", whole)
+        return Lesson(policy, "learned" if unfinished is None else "continued", result)
+
+    def _learn(
+        self, problem: Problem, learner: LearnerSettings, gate: GateSettings, unfinished: Policy | None, sessions: int
+    ) -> SessionResult:
+        """All sessions of one lesson as one, with the best table of these and of `unfinished`."""
+        mdp = problem.mdp
+        lived = 0 if unfinished is None else len(unfinished.curve)  # what did not help before is not drawn again
+        rng = np.random.default_rng([self.seed, crc32(problem.name.encode()), lived])
+        kept: SessionResult | Policy | None = unfinished
+        moves = before = inf if unfinished is None else _moves(unfinished.q, mdp)
+        left = sessions if moves == inf else min(sessions, MORE_SESSIONS)
+        whole: SessionResult | None = None
+        alone = False  # the advisor left or was rejected: nobody is asked about this skill again
+
+        def tell(event: Event) -> None:
+            nonlocal alone
+            left_for_good = isinstance(event, AdviceEnded) and event.reason == "advisor left"
+            alone = alone or left_for_good or isinstance(event, AdviceRejected)
+            if self.on_event is not None:
+                self.on_event(problem.name, event)
+
+        while left:
+            left -= 1
+            advisor = None if alone else make_advisor(self.advisor, mdp, learner.discount, rng, self.ask)
+            table = None if kept is None else kept.q
+            result = run_session(mdp, learner, gate, advisor, rng, q0=table, on_event=tell)
+            whole, now = _joined(whole, result), _moves(result.q, mdp)
+            if now <= moves:
+                if now < moves == inf:
+                    left = MORE_SESSIONS if sessions > 1 else 0
+                kept, moves = result, now
+            if result.interrupted or (kept is result and result.solved and now < inf):
+                break
+        assert whole is not None
+        assert kept is not None
+        if sessions > 1 and not (whole.interrupted or kept.solved) and before == moves < inf and unfinished is not None:
+            kept = unfinished  # no shorter way: with the same table, what was measured with it still holds
+        return replace(whole, q=kept.q, final_steps=kept.final_steps, solved=kept.solved)
+
+    def lessen(self, policy: Policy, earlier: Policy | None) -> Policy:
+        """Keep a policy that failed in physics as unsolved, and put back the solved one that it has replaced, if any."""
+        if earlier is not None and earlier.solved and earlier.name == policy.name:
+            self.toolbox.save(earlier)
+            policy = replace(policy, name=f"{policy.name[: MAX_NAME_LENGTH - len(_UNFINISHED)]}{_UNFINISHED}")
+        policy = replace(policy, solved=False)
+        self.toolbox.save(policy)
+        return policy
 
     def _free_name(self, problem: Problem, solved: bool) -> str:
         """The name to save under; what did not get finished never replaces what is."""
-        name = f"{problem.name[:_LONGEST_PROBLEM]} {problem.mdp.signature[:8]}"
+        name = plain_name(problem)
         kept = None if solved else self.toolbox.find(problem.subtask, problem.mdp.signature, name)
-        return f"{name} unfinished" if kept is not None and kept.solved else name
+        return f"{name}{_UNFINISHED}" if kept is not None and kept.solved else name
 
     def _policy(
         self,
@@ -126,14 +184,37 @@ class Teacher:
         )
 
 
-def fits(q: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]", mdp: TabularMDP) -> bool:
+def fits(q: FloatArray, mdp: TabularMDP) -> bool:
     """Whether greedy steps lead from every start of the problem to its goal."""
-    return greedy_path(q, mdp, mdp.n_states)[2] and not unreached(q, mdp)
+    return _moves(q, mdp) < inf
+
+
+def _moves(q: FloatArray, mdp: TabularMDP) -> float:
+    """The moves of the greedy path from the start; infinite when it, or that from another start, misses the goal."""
+    _, actions, reached = greedy_path(q, mdp, mdp.n_states)
+    return len(actions) if reached and not unreached(q, mdp) else inf
+
+
+def plain_name(problem: Problem) -> str:
+    """What a policy of this problem is called when nobody names it."""
+    return f"{problem.name[:_LONGEST_PROBLEM]} {problem.mdp.signature[:8]}"
 
 
 def _belongs(policy: Policy, mdp: TabularMDP) -> bool:
     """Whether a policy that bears a problem's signature also has its table's size and its actions."""
     return policy.q.shape == (mdp.n_states, mdp.n_actions) and policy.action_labels == mdp.action_labels
+
+
+def _after(policy: Policy, result: SessionResult) -> SessionResult:
+    """What was learned on from a policy, with the history of that policy before it."""
+    return replace(
+        result,
+        visits=policy.visits + result.visits,
+        steps=np.concatenate([np.array(policy.curve, np.int64), result.steps]),
+        guided=np.concatenate([np.array(policy.guided, bool), result.guided]),
+        requests=policy.requests + result.requests,
+        helped_steps=policy.helped_steps + result.helped_steps,
+    )
 
 
 def _joined(before: SessionResult | None, after: SessionResult) -> SessionResult:

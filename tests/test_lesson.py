@@ -94,6 +94,47 @@ def test_ctrl_c_keeps_the_session(task: Task, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+def test_an_interrupted_session_is_gone_on_with(task: Task, tmp_path: Path) -> None:
+    def ask(_: object) -> int:
+        raise KeyboardInterrupt
+
+    toolbox = Toolbox(tmp_path)
+    with pytest.raises(Interrupted):
+        teach_one(task, "insert", Teacher(toolbox, "terminal", ask=ask))
+    again = teach_one(task, "insert", Teacher(toolbox))
+    assert again["episodes"] == 200
+    (row,) = toolbox.list()
+    assert (row["name"], row["episodes"], row["solved"]) == (again["saved_as"], 29 + 200, again["solved"])
+
+
+def test_a_name_of_another_problem_is_refused(task: Task, teacher: Teacher) -> None:
+    for _ in range(2):  # its own name may be used again
+        teach_one(task, "butter", teacher, episodes=1, name="mine")
+    with pytest.raises(BadInput, match=r"policy name 'mine' .--save.: it is the name of a policy for 'butter'"):
+        teach_one(task, "insert", teacher, name="mine")
+    (row,) = teacher.toolbox.list()
+    assert (row["subtask"], row["episodes"]) == ("butter", 2)
+
+
+def test_a_grasp_that_lifts_nothing_is_not_kept_as_solved(
+    task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lab.line.try_grasp", lambda *_: "slice 1 is not in the gripper")
+    bad = teach_one(task, "grasp", teacher)
+    assert (bad["solved"], bad["failure"]) == (False, "slice 1 is not in the gripper")
+    assert [(row["name"], row["solved"]) for row in teacher.toolbox.list()] == [(bad["saved_as"], False)]
+    monkeypatch.undo()
+    good = teach_one(task, "grasp", teacher)
+    assert [(row["name"], row["solved"]) for row in teacher.toolbox.list()] == [(good["saved_as"], True)]
+    monkeypatch.setattr("lab.line.try_grasp", lambda *_: "slice 1 is not in the gripper")
+    worse = teach_one(task, "grasp", teacher)
+    assert worse["saved_as"] == f"{good['saved_as']} unfinished"
+    assert {row["name"]: row["solved"] for row in teacher.toolbox.list()} == {
+        good["saved_as"]: True,
+        worse["saved_as"]: False,
+    }
+
+
 @pytest.mark.parametrize(
     ("subtask", "options", "reason"),
     [

@@ -101,6 +101,8 @@ class RunProgress(Listener):
                 f"{curve} {reached + '/' + str(policy.optimal_steps):>5} steps",
                 *self._advice(name, result.requests, result.helped_steps),
             ]
+            if policy.final_steps is not None and policy.final_steps > policy.optimal_steps:
+                parts.insert(1, "not the shortest way")
             self._pack([head, *map(Text, parts)])
         self._advance()
 

@@ -1,6 +1,7 @@
 """How a run's progress looks: short lines at any width, each fact once, nothing that a log could not hold."""
 
 import re
+from dataclasses import replace
 from io import StringIO
 
 import numpy as np
@@ -94,6 +95,16 @@ def test_who_never_asked_says_so(board: TabularMDP) -> None:
     (line,) = lines(shown)
     assert line.startswith("  continued butter at applier ")
     assert line.endswith("never asked")
+
+
+def test_a_way_that_is_not_the_shortest_is_called_so(board: TabularMDP) -> None:
+    shown = console(200)
+    known = lesson(board)
+    RunProgress(shown).lesson("insert", replace(known, policy=replace(known.policy, final_steps=6, solved=False)))
+    RunProgress(shown).lesson("insert", known)
+    longer, shortest = lines(shown)
+    assert "  6/4 steps  not the shortest way  never asked" in longer
+    assert "not the shortest" not in shortest
 
 
 def test_reused_skills_come_together_when_the_phase_is_over(board: TabularMDP) -> None:
