@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from math import ceil, cos, hypot, sin
+from math import ceil, cos, hypot, pi, sin
 
 import numpy as np
 
@@ -25,6 +25,13 @@ WOOD, TABLE_RGBA, PLATE_RGBA, BUFFER_RGBA = (
     (0.97, 0.97, 0.98, 1.0),
     (0.55, 0.57, 0.6, 1.0),
 )
+FOOTPRINT = (0.07, 0.05)  # [m] a slice and the gripper around it reach this far from its spot, along and across
+APPLIER_BASE = (
+    0.18,
+    0.34,
+    -0.07,
+)  # [m] of the butter applier: along and across the slice, its middle off the slice across
+MAX_DRAWS = 100  # of an obstacle's place
 MARKER_ABOVE = 0.002  # [m] a marker's centre above what it lies on
 
 
@@ -51,13 +58,31 @@ class Layout:
 
 
 def draw_layout(task: Task, toasts: int, rng: np.random.Generator) -> Layout:
-    """A layout drawn uniformly within the areas that the task gives its obstacles and slices."""
-    places = []
-    for obstacle in task.obstacles:
-        dx, dy = rng.uniform(-1, 1, 2) * obstacle.area
-        places.append((obstacle.position_m[0] + float(dx), obstacle.position_m[1] + float(dy)))
+    """A layout drawn uniformly within the areas that the task gives its obstacles and slices.
+
+    An obstacle drawn onto a station is drawn again; BadInput names both when its area leaves no room beside the station.
+    """
+    kept = _kept_free(task, toasts)
+    places = [_draw_place(obstacle, kept, rng) for obstacle in task.obstacles]
     offsets = [tuple(map(float, rng.uniform(-1, 1, 3) * task.slices.area)) for _ in range(toasts)]
     return Layout(tuple(places), tuple(offsets))  # type: ignore[arg-type]
+
+
+def _draw_place(
+    obstacle: Obstacle, kept: "Sequence[tuple[str, Rectangle]]", rng: np.random.Generator
+) -> tuple[float, float]:
+    half = obstacle.edge_m / 2
+    for _ in range(MAX_DRAWS):
+        dx, dy = rng.uniform(-1, 1, 2) * obstacle.area
+        x, y = obstacle.position_m[0] + float(dx), obstacle.position_m[1] + float(dy)
+        square = Rectangle(x, y, half, half, 0.0)
+        hit = next((station for station, taken in kept if taken.meets(square)), None)
+        if hit is None:
+            return x, y
+    raise BadInput(
+        f"obstacle '{obstacle.name}' stands on station '{hit}' or too near for the gripper: at ({x:.2f}, {y:.2f}) m "
+        f"its {obstacle.edge_m} m square meets where slices are set down; move one of them"
+    )
 
 
 def is_applier(station: Station) -> bool:
@@ -90,6 +115,47 @@ def spots(station: Station) -> list[Spot]:
 def used_spots(station: Station, toasts: int) -> list[Spot]:
     """The spots that so many toasts can ever need, and one more row's worth for a plate."""
     return spots(station)[: max(toasts, 4)]
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """A turned rectangle on the table: its middle, half its length and half its width [m], and yaw [rad]."""
+
+    x: float
+    y: float
+    half_along: float
+    half_across: float
+    yaw: float
+
+    def meets(self, other: "Rectangle") -> bool:
+        """Whether the two overlap: no side of either has the other wholly beyond it."""
+        dx, dy = other.x - self.x, other.y - self.y
+        for yaw in (self.yaw, self.yaw + pi / 2, other.yaw, other.yaw + pi / 2):
+            apart = abs(cos(yaw) * dx + sin(yaw) * dy)
+            if apart >= self._reach(yaw) + other._reach(yaw):
+                return False
+        return True
+
+    def _reach(self, yaw: float) -> float:
+        turn = yaw - self.yaw
+        return abs(cos(turn)) * self.half_along + abs(sin(turn)) * self.half_across
+
+
+def _kept_free(task: Task, toasts: int) -> list[tuple[str, Rectangle]]:
+    """What no obstacle may stand on: the machines' bodies, and around the spots in use a slice and the gripper; by station."""
+    kept = []
+    for station in task.stations:
+        x, y, yaw = station.pose
+        if station.kind == "machine":
+            length, width, off = APPLIER_BASE if is_applier(station) else (*assets.TOASTER[:2], 0.0)
+            body = Rectangle(x - sin(yaw) * off, y + cos(yaw) * off, length / 2, width / 2, yaw)
+            kept.append((station.name, body))
+            continue
+        # only where they start do slices stand off their spots: the robot sets them down on them
+        off_x, off_y = task.slices.area[:2] if station.name == task.route[0].station else (0.0, 0.0)
+        along, across = FOOTPRINT[0] + off_x, FOOTPRINT[1] + off_y
+        kept += [(station.name, Rectangle(s.x, s.y, along, across, s.yaw)) for s in used_spots(station, toasts)]
+    return kept
 
 
 class Scene:
