@@ -22,10 +22,11 @@ from lab.sim.scene import (
     in_camera_grid,
     marker_offset_of_toaster,
     spots,
+    used_spots,
 )
 from lab.sim.survey import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.world import World
-from lab.taskfile import Station, Task
+from lab.taskfile import InsertGrid, Station, Task
 
 Cell = tuple[int, ...]
 
@@ -35,6 +36,7 @@ NEAR_YAWS = 5
 NEAR_YAW_STEP = 0.06  # [rad]
 _TRAVEL_MARGIN = 0.01  # [m] beyond half a cell: a move between free cells then touches nothing
 _GRID_MARGIN = 0.005  # [m] the same on the way through the insert grid
+_WAITING_WITHIN = 0.25  # [m] of the insert grid: no slice farther off can meet the carried one
 _DOCK_CLEARANCE = 0.012  # [m]
 _TOUCH_CLEARANCE = {True: 0.0012, False: 0.004}  # [m] near a station, by whether a slice is carried
 RELEASE_ABOVE = 0.002  # [m] a slice is let go this high above its foot
@@ -53,7 +55,7 @@ class Surveys:
 
     def __init__(self, task: Task, layout: Layout) -> None:
         check_scene(task)
-        self.task, self.layout = task, Layout(layout.obstacles, ())
+        self.task, self.layout, self.toasts = task, Layout(layout.obstacles, ()), len(layout.slices)
         self.workspace = cache(self._workspace)
         self.dock = cache(self._dock)
         self.around = cache(self._around)
@@ -162,10 +164,24 @@ class Surveys:
         """The insert grid's cells that a carried slice or the arm cannot be in, whatever the camera has `seen` left out."""
         with World() as world:
             scene = Scene(world, self.task, 0, self.layout)
+            for name, spot in self._waiting().items():
+                scene.add_slice(name, spot)
+                scene.solid.append(name)
             toasters = [s.name for s in self.task.stations if s.kind == "machine" and s.process is None]
             clearance = self.task.insert.cell_m / 2 + _GRID_MARGIN
             surveyor = Surveyor(scene, loaded=True, clearance=clearance, ignore=[*seen, *toasters])
             return surveyor.grid(self.task.insert.shape, self.grid_pose)
+
+    def _waiting(self) -> dict[str, Spot]:
+        """Where slices may stand while another is carried through the insert grid, as far as they are near it."""
+        waiting = {}
+        for station in self.task.stations:
+            if station.kind == "machine" and station.process is None:
+                continue
+            for number, spot in enumerate(used_spots(station, self.toasts), start=1):
+                if _far_from_grid(self.task.insert, spot) < _WAITING_WITHIN:
+                    waiting[f"slice {number} at {station.name}"] = spot
+        return waiting
 
 
 INSERT_START = "insert"
@@ -221,6 +237,12 @@ def _neighbours(station: Station, spot: Spot) -> dict[str, Spot]:
         f"slice {where}": Spot(spot.x + c * dx - s * dy, spot.y + s * dx + c * dy, spot.z, spot.yaw)
         for where, (dx, dy) in steps.items()
     }
+
+
+def _far_from_grid(grid: InsertGrid, spot: Spot) -> float:
+    """How far a spot is from the insert grid [m], 0 within it."""
+    sides = zip((spot.x, spot.y), grid.origin_m, grid.shape, strict=True)
+    return hypot(*(max(low - at, at - (low + count * grid.cell_m), 0.0) for at, low, count in sides))
 
 
 def _between(one: ToolPose, other: ToolPose, count: int = 8) -> list[ToolPose]:

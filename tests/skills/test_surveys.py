@@ -5,8 +5,10 @@ import pytest
 
 from lab.crew import Crew
 from lab.errors import BadInput
+from lab.mdp import greedy_path, optimal_values
 from lab.sim.assets import SLICE as SIZE
-from lab.sim.scene import GRASP_DEPTH, Layout
+from lab.sim.scene import GRASP_DEPTH, Layout, spots
+from lab.skills import Insert
 from lab.skills.surveys import INSERT_START, NEAR_SHAPE, NEAR_YAWS, Surveys, camera_view, overhead_camera
 from lab.taskfile import Obstacle, Task
 from lab.vision import see
@@ -176,3 +178,45 @@ def test_a_start_with_a_cube_in_the_way_of_the_slice_is_refused(task: Task) -> N
         BadInput, match=r"insert\.start_m \[0\.\d+, -0\.\d+\]: cube is in the way of a carried slice there"
     ):
         beside.picture()
+
+
+def with_buffer_at(task: Task, pose: tuple[float, float, float]) -> Task:
+    stations = tuple(s.model_copy(update={"pose": pose}) if s.name == "butter_buffer" else s for s in task.stations)
+    return task.model_copy(update={"stations": stations, "obstacles": ()})
+
+
+def test_waiting_slices_block_the_grid_where_a_carried_one_would_hit_them(task: Task) -> None:
+    """The buffer itself is low; the slices that wait in it reach 7 mm above the foot of a carried one."""
+    surveys = Surveys(with_buffer_at(task, (0.60, -0.02, 0.0)), Layout((), ()))
+    causes = surveys.over_grid(frozenset()).causes
+    for spot in spots(surveys.task.station("butter_buffer")):
+        steps = zip((spot.x, spot.y), task.insert.origin_m, strict=True)
+        cell = tuple(int((at - low) / task.insert.cell_m) for at, low in steps)
+        assert causes[cell].startswith("slice ")
+        assert causes[cell].endswith(" at butter_buffer")
+    problem = Insert("toaster").setup(surveys)
+    crossed = {problem.mdp.state_cell(s) for s in greedy_path(optimal_values(problem.mdp, 0.99), problem.mdp, 99)[0]}
+    assert not any(causes[cell] for cell in crossed)
+
+
+def test_slices_that_wait_far_from_the_grid_change_nothing(task: Task, surveys: Surveys) -> None:
+    """The shipped stations stand clear of it: the nearest block no cell, and the plates are not even looked at."""
+    assert {str(name) for name in np.unique(surveys.over_grid(frozenset()).causes)} <= {
+        "",
+        "out of reach",
+        "cubes A",
+        "cubes B",
+        "cubes C",
+    }
+    assert not any("plate" in name for name in surveys._waiting())
+
+
+def test_a_slice_waits_on_every_spot_that_the_toasts_need(task: Task) -> None:
+    roomy = with_buffer_at(task, (0.60, -0.02, 0.0))
+    stations = tuple(s.model_copy(update={"capacity": 6}) if s.name == "butter_buffer" else s for s in roomy.stations)
+    roomy = roomy.model_copy(update={"stations": stations})
+    still = (0.0, 0.0, 0.0)
+    for toasts, waiting in ((0, 4), (5, 5), (9, 6)):
+        names = Surveys(roomy, Layout((), (still,) * toasts))._waiting()
+        assert sum(name.endswith(" at butter_buffer") for name in names) == waiting
+        assert sum(name.endswith(" at butter_applier") for name in names) == 1
