@@ -76,7 +76,7 @@ def teach_one(
     prepared.crew.policies[skill.name] = policy
     failure = try_grasp(prepared.crew, prepared.surveys, skill) if isinstance(skill, Grasp) else None
     if failure is not None and policy.solved:
-        policy = teacher.lessen(policy, earlier)
+        policy = teacher.keep_unsolved(policy, earlier)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         files["learning_curve"] = str(out / "learning-curve.png")

@@ -67,9 +67,9 @@ class Teacher:
         return self.teach(problem, settings.learner, settings.gate, task, unfinished=found)
 
     def unfinished(self, problem: Problem, name: str | None = None) -> Policy | None:
-        """The unsolved policy to go on from: the one of that name, the best one, or the one beside a solved one."""
+        """The unsolved policy to go on from: the one it would replace, the best one, or the one beside a solved one."""
         key = (problem.subtask, problem.mdp.signature)
-        for wanted in (name, None, f"{plain_name(problem)}{_UNFINISHED}"):
+        for wanted in (name or plain_name(problem), None, f"{plain_name(problem)}{_UNFINISHED}"):
             found = self.toolbox.find(*key, wanted)
             if found is not None and not found.solved and _belongs(found, problem.mdp):
                 return found
@@ -147,7 +147,7 @@ class Teacher:
             kept = unfinished  # no shorter way: with the same table, what was measured with it still holds
         return replace(whole, q=kept.q, final_steps=kept.final_steps, solved=kept.solved)
 
-    def lessen(self, policy: Policy, earlier: Policy | None) -> Policy:
+    def keep_unsolved(self, policy: Policy, earlier: Policy | None) -> Policy:
         """Keep a policy that failed in physics as unsolved, and put back the solved one that it has replaced, if any."""
         if earlier is not None and earlier.solved and earlier.name == policy.name:
             self.toolbox.save(earlier)

@@ -134,12 +134,12 @@ class RunProgress(Listener):
         self._advance()
 
     def sequenced(self, best: SequenceResult, proven: Optimum) -> None:
-        gap = best.makespan_s / proven.makespan_s - 1.0
-        what = "proven optimum" if proven.proven else "best known"
+        gap = proven.gap(best.makespan_s)
+        what = "proven optimum" if proven.proven else "proven bound"
         order = " ".join(map(str, best.sequence[:_SHOWN_MOVES]))
         more = f" and {len(best.sequence) - _SHOWN_MOVES} more" if len(best.sequence) > _SHOWN_MOVES else ""
         found = f"{best.makespan_s:.1f} s after {len(best.episode_makespans_s)} episodes"
-        parts = [f"  toasts {order}{more}:", f"{found}, {what} {proven.makespan_s:.1f} s, gap {gap:.1%}"]
+        parts = [f"  toasts {order}{more}:", f"{found}, {what} {proven.bound_s:.1f} s, gap {gap:.1%}"]
         self._pack(list(map(Text, parts)), gap=" ")
         self._advance()
 

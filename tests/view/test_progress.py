@@ -158,7 +158,7 @@ def test_a_long_order_is_cut_and_what_is_not_proven_is_not_called_so() -> None:
     RunProgress(shown).sequenced(SequenceResult(order, 300.0, (300.0,)), Optimum(200.0, order, False, 150.0, 9))
     first, second = lines(shown)
     assert first.endswith(" 23 24 and 176 more:")
-    assert second == "            300.0 s after 1 episodes, best known 200.0 s, gap 50.0%"
+    assert second == "            300.0 s after 1 episodes, proven bound 150.0 s, gap 100.0%"
 
 
 def test_a_prompt_gets_the_terminal_for_itself() -> None:
