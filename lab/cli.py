@@ -253,7 +253,7 @@ def sequence(
 @command(app, "see", "lab see overhead.png --task toast")
 def see(
     image: Annotated[Path, typer.Argument(help="A PNG or JPEG picture from above, with round markers.")],
-    grid: Annotated[str, typer.Option("--grid", help="Rows x columns.")] = "12x12",
+    grid: Annotated[str | None, typer.Option("--grid", help="Rows x columns; default: 12x12, or the task's.")] = None,
     task: Annotated[
         str | None, typer.Option("--task", help="Taken by this task's camera; else the frame is the grid.")
     ] = None,

@@ -168,10 +168,10 @@ def sequence_task(
         found.append(sequence(task, cell, teacher.seed + session, method=name, episodes=episodes))
         listener.sequenced(found[-1], proven)
     best = min(found, key=lambda result: result.makespan_s)
-    hits = [result.makespan_s <= proven.makespan_s + 1e-6 for result in found]
-    settled = [result.final_makespan_s <= proven.makespan_s + 1e-6 for result in found if isinstance(result, SrlResult)]
+    hits = [result.makespan_s <= proven.bound_s + 1e-6 for result in found]
+    settled = [result.final_makespan_s <= proven.bound_s + 1e-6 for result in found if isinstance(result, SrlResult)]
     if plot is not None:
-        sequence_plot(found[0].episode_makespans_s, proven.makespan_s, plot)
+        sequence_plot(found[0].episode_makespans_s, proven.optimal_s, plot)
     return {
         "task": task.name,
         "toasts": toasts,
@@ -181,10 +181,10 @@ def sequence_task(
         "makespan_s": best.makespan_s,
         "sequence": list(best.sequence),
         "episode_makespans_s": list(found[0].episode_makespans_s),
-        "optimal_s": proven.makespan_s,
+        "optimal_s": proven.optimal_s,
         "optimum_proven": proven.proven,
         "bound_s": proven.bound_s,
-        "gap": best.makespan_s / proven.makespan_s - 1.0,
+        "gap": proven.gap(best.makespan_s),
         "success_percent": 100.0 * sum(hits) / sessions,
         "final_success_percent": 100.0 * sum(settled) / sessions if settled else None,
         "mean_best_s": sum(result.makespan_s for result in found) / sessions,
@@ -192,11 +192,14 @@ def sequence_task(
     }
 
 
-def see_picture(image: Path, grid: str, task: str | None, out: Path | None) -> dict[str, Any]:
-    """A picture's markers as a grid, the document of `lab see --json`: '.' free, 'S' start, 'G' goal, '#' obstacle."""
+def see_picture(image: Path, grid: str | None, task: str | None, out: Path | None) -> dict[str, Any]:
+    """A picture's markers as a grid, the document of `lab see --json`: '.' free, 'S' start, 'G' goal, '#' an obstacle's marker.
+
+    With a task the grid is the one of its overhead camera; without, the frame is the grid, 12 x 12 unless `grid` says so.
+    """
     from lab.vision import draw, read_picture, see, write_picture
 
-    match = re.fullmatch(r"([1-9]\d{0,2})x([1-9]\d{0,2})", grid)
+    match = re.fullmatch(r"([1-9]\d{0,2})x([1-9]\d{0,2})", "12x12" if grid is None else grid)
     if match is None:
         raise BadInput(f"grid '{grid}' (--grid): wanted ROWSxCOLUMNS, each 1 to 999, such as 12x12")
     shape = (int(match[1]), int(match[2]))
@@ -205,7 +208,14 @@ def see_picture(image: Path, grid: str, task: str | None, out: Path | None) -> d
     if task is not None:
         from lab.skills.surveys import camera_view
 
-        camera = replace(camera_view(load(task), picture.shape[0]), shape=shape)
+        height, width = picture.shape[:2]
+        if height != width:
+            raise BadInput(f"{image}: {width} x {height} pixels: the task's camera takes square pictures")
+        camera = camera_view(load(task), height)
+        if grid is not None and shape != camera.shape:
+            own = f"{camera.shape[0]}x{camera.shape[1]}"
+            raise BadInput(f"grid '{grid}' (--grid): the grid of the task's camera is {own}; leave --grid away")
+        shape = camera.shape
     seen = see(picture, camera, shape=shape, where=str(image))
     cells = [["." for _ in range(shape[1])] for _ in range(shape[0])]
     for i, j in seen.obstacles:

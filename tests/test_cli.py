@@ -208,7 +208,11 @@ TOASTER = '[[route]]\nstation = "toaster"'
             "processing_s = 9.0 #",
             "machines 'toaster' and 'butter_applier' both have processing_s",
         ),
-        ("position_m = [0.68, 0.45]", "position_m = [0.42, 0.56]", "station 'toaster_buffer' cannot be approached"),
+        (
+            "position_m = [0.68, 0.45]",
+            "position_m = [0.42, 0.56]",
+            "obstacle 'tower left' stands on station 'toaster_buffer'",
+        ),
         ("height_m = 0.215", "height_m = 0.1", "insert.height_m 0.1: a carried slice would hit the toaster"),
         ("mass_kg", "weight", "t.toml: slices.weight: Extra inputs are not permitted"),
     ],
