@@ -215,8 +215,8 @@ def test_what_is_no_text_is_said(tmp_path: Path) -> None:
         ),
         ("pixels = 640", "pixels = 640000", "camera.pixels: Input should be less than or equal to 4096"),
         (
-            "position_m = [0.80, 0.0, 2.4]",
-            "position_m = [0.80, 0.0, 0.0]",
+            "position_m = [0.84, 0.0, 2.4]",
+            "position_m = [0.84, 0.0, 0.0]",
             "camera.position_m.2: Input should be greater",
         ),
         ("episodes = 200", "episodes = 0", "subtasks.transfer.learner.episodes: Input should be greater than or equal"),

@@ -170,7 +170,20 @@ class Surveys:
             toasters = [s.name for s in self.task.stations if s.kind == "machine" and s.process is None]
             clearance = self.task.insert.cell_m / 2 + _GRID_MARGIN
             surveyor = Surveyor(scene, loaded=True, clearance=clearance, ignore=[*seen, *toasters])
-            return surveyor.grid(self.task.insert.shape, self.grid_pose)
+            survey = surveyor.grid(self.task.insert.shape, self.grid_pose)
+        for cell in np.ndindex(*survey.causes.shape):
+            if not survey.causes[cell] and not self._in_sight(self.grid_pose(cell)):
+                survey.causes[cell] = OUT_OF_SIGHT
+        return survey
+
+    def _in_sight(self, pose: ToolPose) -> bool:
+        """Whether the gripper's marker lies wholly in the overhead picture when the tool is at `pose`."""
+        camera = overhead_camera(self.task)
+        x, y, z = pose.x + assets.MARKER_OUT, pose.y, pose.z + assets.MARKER_UP
+        edges = [(x + dx, y + dy, z, 1.0) for dx in (-_MARKER, _MARKER) for dy in (-_MARKER, _MARKER)]
+        across, down, far = camera.pixel_from_world() @ np.array(edges).T
+        pixels = np.concatenate([across / far, down / far])
+        return bool(pixels.min() >= 0.0 and pixels.max() <= camera.width - 1)
 
     def _waiting(self) -> dict[str, Spot]:
         """Where slices may stand while another is carried through the insert grid, as far as they are near it."""
@@ -185,6 +198,8 @@ class Surveys:
 
 
 INSERT_START = "insert"
+OUT_OF_SIGHT = "out of the camera's sight"
+_MARKER = assets.MARKER_RADIUS + 0.003  # [m] half of what the camera must see around the gripper's marker
 
 
 def overhead_camera(task: Task, pixels: int | None = None) -> Camera:
