@@ -21,7 +21,7 @@ from lab.toolbox import Toolbox
 CODE = "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()"
 TEACH = ("teach", "insert", "--advisor", "terminal")
 QUESTION = "Which way?"
-STOPPED = "stopped by Ctrl-C after 29 episodes of 'insert at toaster'; what was learned is kept"
+STOPPED = r"lab: stopped by Ctrl-C after (\d+) episodes of 'insert at toaster'; what was learned is kept\s*$"
 LONGEST_WAIT_S = 20.0  # for the next output; only a hanging program takes it
 
 
@@ -107,13 +107,16 @@ def test_a_lesson_in_a_terminal(terminal: Callable[..., Terminal], tmp_path: Pat
     teacher.ask("auto\r")
     assert teacher.end() == 0
     screen = teacher.screen
-    assert screen.index("Episode 30: the learner asks for advice about 'insert at toaster'.") < screen.index(QUESTION)
+    first = re.search(r"Episode (\d+): the learner asks for advice about 'insert at toaster'\.", screen)
+    assert first is not None
+    assert first.end() < screen.index(QUESTION)
+    episode = first[1]
     assert "R robot, G goal, # obstacle, arrow: the learner's own choice" in screen
     assert "The learner is stuck and asks you where to go." in screen
     assert "'sideways' is no direction: type " in screen
-    assert "Episode 30, step 2: at (2, 1)" in screen
-    assert "Episode 30, step 3: at (2, 2)" in screen
-    assert "Episode 30: advice has ended; the learner goes on alone." in screen
+    assert f"Episode {episode}, step 2: at (2, 1)" in screen
+    assert f"Episode {episode}, step 3: at (2, 2)" in screen
+    assert f"Episode {episode}: advice has ended; the learner goes on alone." in screen
     assert re.search(r"asked in 1 episodes, 3 helped steps", screen)
     assert max(len(line) for line in screen.splitlines() if QUESTION not in line) <= 80
     (row,) = Toolbox(tmp_path / "toolbox").list()
@@ -126,15 +129,12 @@ def test_ctrl_c_in_a_terminal_loses_nothing(terminal: Callable[..., Terminal], t
     teacher.ask("right\r")
     teacher.ask(key)
     assert teacher.end() == 130
-    last = teacher.screen.split("lab: ")[-1]
-    assert "".join(last.split()) == "".join(STOPPED.split())  # the terminal may fold it
+    stopped = re.search(STOPPED, teacher.screen)
+    assert stopped is not None
     assert "Traceback" not in teacher.screen
     (row,) = Toolbox(tmp_path / "toolbox").list()
-    assert (row["episodes"], row["helped_steps"], row["solved"]) == (
-        29,
-        0,
-        False,
-    )  # advice counts once its episode is over
+    assert (row["episodes"], row["solved"]) == (int(stopped[1]), False)
+    assert row["helped_steps"] == 0  # advice counts once its episode is over
     assert sorted(path.name for path in tmp_path.iterdir()) == ["toolbox"]
 
 
@@ -212,6 +212,7 @@ def test_ctrl_c_at_a_piped_question(tmp_path: Path, root: Path) -> None:
         lab.send_signal(signal.SIGINT)
         out, rest = lab.stdout.read(), lab.stderr.read()
     assert (lab.returncode, out) == (130, b"")
-    assert (said + rest).decode().endswith(f"lab: {STOPPED}\n")
+    stopped = re.search(STOPPED, (said + rest).decode())
+    assert stopped is not None
     (row,) = Toolbox(tmp_path / "toolbox").list()
-    assert (row["episodes"], row["helped_steps"]) == (29, 0)
+    assert (row["episodes"], row["helped_steps"]) == (int(stopped[1]), 0)
