@@ -24,6 +24,7 @@ FINGER = (0.075, 0.012, 0.030)  # [m] length, thickness, width
 FINGER_OPEN = 0.022  # [m] each finger's pad from the middle when open
 MARKER_OUT, MARKER_UP = 0.13, 0.165  # [m] the gripper's marker beside the tool's axis and above the tips
 MARKER_RADIUS = 0.017
+MARKER_THICK = 0.001  # thin: a side that the camera sees would shift the middle of what it sees
 
 WHITE, GRAPHITE, BLUE = (0.93, 0.93, 0.95, 1.0), (0.22, 0.23, 0.26, 1.0), (0.16, 0.30, 0.55, 1.0)
 STEEL, RUBBER, CRUST, CRUMB = (
@@ -80,7 +81,11 @@ def robot() -> Model:
             [
                 Part(GRAPHITE, mesh=palm),
                 Part(STEEL, bar, (marker_x + 0.006, 0, bar[2] / 2), ghost=True),
-                Part(MARKER_MAGENTA, mesh=cylinder(MARKER_RADIUS, 0.004, (marker_x, 0, MARKER_OUT), "x"), ghost=True),
+                Part(
+                    MARKER_MAGENTA,
+                    mesh=cylinder(MARKER_RADIUS, MARKER_THICK, (marker_x, 0, MARKER_OUT), "x"),
+                    ghost=True,
+                ),
             ],
             _turning(5, "wrist", (arm.FLANGE, 0, 0), (1, 0, 0)),
         ),

@@ -183,7 +183,9 @@ class Scene:
             self.world.friction(station.name, 0.5)
             if model == "toaster":
                 at = marker_of_toaster(station)
-                self.world.disc(f"{station.name} marker", assets.MARKER_RADIUS, 0.004, at, assets.MARKER_CYAN)
+                self.world.disc(
+                    f"{station.name} marker", assets.MARKER_RADIUS, assets.MARKER_THICK, at, assets.MARKER_CYAN
+                )
         else:
             self._build_slab(station)
         self.solid.append(station.name)
@@ -208,7 +210,9 @@ class Scene:
         self.solid.append(obstacle.name)
         if in_camera_grid(self.task, place):
             at = (*place, edge * obstacle.cubes + MARKER_ABOVE)
-            self.world.disc(f"{obstacle.name} marker", assets.MARKER_RADIUS, 0.004, at, assets.MARKER_GREEN)
+            self.world.disc(
+                f"{obstacle.name} marker", assets.MARKER_RADIUS, assets.MARKER_THICK, at, assets.MARKER_GREEN
+            )
 
     def add_slice(self, name: str, spot: Spot, off: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Stand a slice called `name` on `spot`, `off` it by x, y [m] and yaw [rad]."""

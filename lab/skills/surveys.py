@@ -212,7 +212,7 @@ def camera_view(task: Task, pixels: int | None = None, layout: Layout | None = N
 
     Without a layout the obstacles are taken to stand where the task file has them.
     """
-    grid = task.insert
+    grid, upper = task.insert, assets.MARKER_THICK / 2
     places = [o.position_m for o in task.obstacles] if layout is None else layout.obstacles
     stand = zip(task.obstacles, places, strict=True)
     heights = [o.edge_m * o.cubes + MARKER_ABOVE for o, place in stand if in_camera_grid(task, place)]
@@ -226,9 +226,9 @@ def camera_view(task: Task, pixels: int | None = None, layout: Layout | None = N
         cell_m=grid.cell_m,
         shape=grid.shape,
         heights_m={
-            "gripper": grid.height_m + assets.MARKER_UP + 0.002,
-            "obstacle": (heights or [0.18])[0] + 0.002,
-            "toaster": assets.TOASTER[2] + MARKER_ABOVE + 0.002,
+            "gripper": grid.height_m + assets.MARKER_UP + upper,
+            "obstacle": (heights or [0.18])[0] + upper,
+            "toaster": assets.TOASTER[2] + MARKER_ABOVE + upper,
         },
         offsets_m={"gripper": (-assets.MARKER_OUT, 0.0), "toaster": _toaster_offset(task)},
     )
