@@ -20,6 +20,7 @@ Image = NDArray[np.uint8]  # (H, W, 3), RGB
 SATURATION = 100  # of 255; wood, bread, steel and skin stay below it or have another hue
 CHROMA = 12  # of 255, largest minus smallest channel: on black, sensor noise has every hue and full saturation
 MIN_PIXELS = 8.0  # a smaller spot is noise
+RIM = 1.0  # pixels from the spot's hull: the outline's points that are its edge and not a highlight's
 MAX_CELLS = 2.0  # a larger spot is no marker
 ROUNDNESS = 0.72  # of the spot's smallest circle that it fills: a disc near 1, a square 0.64
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -60,14 +61,15 @@ def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
         mask = cv2.inRange(hsv, np.array(low), np.array(high)) * colourful
         for outline in cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]:
             hull = cv2.convexHull(outline)  # a highlight may bite into the outline
-            moments = cv2.moments(hull)
-            area, radius = moments["m00"], cv2.minEnclosingCircle(hull)[1]
+            area, radius = cv2.contourArea(hull), cv2.minEnclosingCircle(hull)[1]
             if area < MIN_PIXELS:
                 continue
             if area > MAX_CELLS * view.cell_pixels or cv2.contourArea(outline) < ROUNDNESS * pi * radius**2:
                 ignored += 1
                 continue
-            pixel = (moments["m10"] / area, moments["m01"] / area)
+            rim = [p for p in outline if abs(cv2.pointPolygonTest(hull, tuple(map(float, p[0])), True)) < RIM]
+            (x, y), _, _ = cv2.fitEllipse(np.array(rim))
+            pixel = (float(x), float(y))
             place = view.place(pixel, kind)
             markers.append(Marker(kind, pixel, place, view.cell(place)))
     return tuple(sorted(markers, key=lambda m: (m.kind, m.cell, m.pixel))), ignored

@@ -19,6 +19,7 @@ import pytest
 from lab.toolbox import Toolbox
 
 CODE = "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()"
+LISTENING = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # background jobs ignore Ctrl-C
 TEACH = ("teach", "insert", "--advisor", "terminal")
 QUESTION = "Which way?"
 STOPPED = r"lab: stopped by Ctrl-C after (\d+) episodes of 'insert at toaster'; what was learned is kept\s*$"
@@ -197,7 +198,7 @@ def test_a_bad_adviser_is_told_so_with_the_numbers(piped: Callable[[str], Any]) 
 def test_ctrl_c_at_a_piped_question(tmp_path: Path, root: Path) -> None:
     env = {**os.environ, "LAB_TOOLBOX": str(tmp_path / "toolbox"), "PYTHONPATH": str(root)}
     with subprocess.Popen(
-        [sys.executable, "-c", CODE, *TEACH, "--json"],
+        [sys.executable, "-c", LISTENING + CODE, *TEACH, "--json"],
         cwd=tmp_path,
         env=env,
         stdin=subprocess.PIPE,
