@@ -106,13 +106,13 @@ def _show(document: dict[str, Any], as_json: bool, render: Callable[[dict[str, A
 
 def _teacher(toolbox: Path | None, advisor: str, seed: int, progress: "RunProgress") -> "Teacher":
     """The teacher that the options describe; a person is asked on the terminal, with the progress bar out of the way."""
-    from lab.advice.advisors import AdviceRequest, check_advisor
+    from lab.advice.advisors import AdviceRequest, parse_advisor
     from lab.learning.session import Event
     from lab.teaching import Teacher
     from lab.toolbox import Toolbox
     from lab.view.terminal import TeachingPrompt
 
-    check_advisor(advisor, "--advisor")
+    parse_advisor(advisor, "--advisor")
     prompt = TeachingPrompt(progress.console) if advisor == "terminal" else None
 
     def ask(request: AdviceRequest) -> int | None:
@@ -173,9 +173,15 @@ def run(
 @command(app, "teach", "lab teach insert --advisor terminal")
 def teach(
     subtask: Annotated[
-        str, typer.Argument(help="transfer, grasp, insert, butter, place, or one skill by its full name.")
+        str,
+        typer.Argument(
+            help="transfer, grasp, insert, butter, place, one skill by its full name, or a world: its name, a .toml "
+            "file, a .txt grid, random:SHAPE:DENSITY:SEED."
+        ),
     ],
-    task: Annotated[str, typer.Option("--task", help="A task that ships, or a .toml file.")] = "toast",
+    task: Annotated[
+        str | None, typer.Option("--task", help="A task that ships, or a .toml file; default: toast. None for a world.")
+    ] = None,
     learner: Annotated[str | None, typer.Option("--learner", help="q, sarsa, q-lambda; default: the task's.")] = None,
     gate: Annotated[
         str | None, typer.Option("--gate", help="ccrl, ia, combined, always, never; default: the task's.")
@@ -186,6 +192,10 @@ def teach(
         typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the task's."),
     ] = None,
     save: Annotated[str | None, typer.Option("--save", help="Name of the policy in the toolbox.")] = None,
+    view: Annotated[
+        str | None,
+        typer.Option("--view", help="Of a world: full, or limited to the region that its file gives; default: full."),
+    ] = None,
     seed: Seed = 0,
     toolbox: ToolboxFolder = None,
     out: Annotated[
@@ -193,20 +203,19 @@ def teach(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """One teaching session: learn one sub-task with an advisor, and keep the policy."""
-    from lab import taskfile
-    from lab.lesson import teach_one
+    """One teaching session: learn one sub-task, or a world, with an advisor, and keep the policy."""
+    from lab.lesson import teach_words
     from lab.report import check_out
     from lab.view.progress import RunProgress
     from lab.view.summary import lesson_summary
 
-    loaded = taskfile.load(task)
+    session = teach_words(subtask, task, view)
     if out is not None:
         check_out(out)
     progress = RunProgress(_console())
     teacher = _teacher(toolbox, advisor, seed, progress)
     teacher.toolbox.check()
-    document = teach_one(loaded, subtask, teacher, learner=learner, gate=gate, episodes=episodes, name=save, out=out)
+    document = session(teacher, learner=learner, gate=gate, episodes=episodes, name=save, out=out)
     _show(document, as_json, lesson_summary)
     if document["failure"] is not None:
         _end(document["failure"], 1)
@@ -338,23 +347,41 @@ def toolbox_remove(name: str, toolbox: ToolboxFolder = None, as_json: Json = Fal
 
 @command(task_app, "list", "lab task list")
 def task_list(as_json: Json = False) -> None:
-    """The tasks that ship."""
+    """The tasks and the grid worlds that ship."""
     from lab import taskfile
+    from lab.view.summary import table_of
 
-    _show({"tasks": taskfile.task_names()}, as_json, lambda d: "\n".join(d["tasks"]))
+    kinds = taskfile.shipped()
+    rows = [{"name": name, "kind": kind} for name, kind in kinds.items()]
+    _show({"tasks": list(kinds), "kinds": kinds}, as_json, lambda _: table_of(rows, ("name", "kind")))
 
 
 @command(task_app, "show", "lab task show toast")
 def task_show(task: str, as_json: Json = False) -> None:
-    """The text of a task file: copy it, change it, run it."""
-    from lab import taskfile
+    """The text of a task file, of a task or a world: copy it, change it, use it."""
+    from lab.lesson import describe
 
-    path = taskfile.find(task)
-    loaded = taskfile.load(task)
-    if as_json:
-        print(json.dumps({"file": str(path), **loaded.model_dump(mode="json")}))
-    else:
-        print(path.read_text(encoding="utf-8"), end="")
+    text, document = describe(task)
+    print(json.dumps(document) if as_json else text, end="\n" if as_json else "")
+
+
+@command(task_app, "random", "lab task random 10x10x10 --density 0.06 --seed 7 --out my-world.toml")
+def task_random(
+    shape: Annotated[str, typer.Argument(help="Cells along 2 or 3 axes, each 1 to 100: 12x12, 10x10x10.")],
+    out: Annotated[Path, typer.Option("--out", help="The .toml file to write.")],
+    density: Annotated[float, typer.Option("--density", help="The share of cells that are obstacles, 0 to 0.6.")] = 0.1,
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """Write a random grid world as a task file; a way always leads from its start to its goal."""
+    from lab.lesson import write_random
+
+    def told(d: dict[str, Any]) -> str:
+        return (
+            f"{d['file']}: {d['obstacles']} obstacles, the shortest way takes {d['optimal_steps']} moves (seed {seed})"
+        )
+
+    _show(write_random(shape, density, seed, out), as_json, told)
 
 
 @command(task_app, "check", "lab task check my-toast.toml")
@@ -366,7 +393,7 @@ def task_check(
     seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
-    """Check a task file: its text, its reach, and that a way exists for every sub-task. Exit 2 when it is not sound.
+    """Check a task file: its text, its reach, and that a way exists for every sub-task, or through the world. Exit 2 when not.
 
     With --json the document comes in both cases.
     """

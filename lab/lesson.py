@@ -5,17 +5,33 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput, LabError, unknown
+from lab.gridworld import RANDOM, GridWorld, parse_shape, random_world
 from lab.listener import Listener
-from lab.taskfile import MAX_TOASTS, Task, find, load
-from lab.teaching import Teacher, plain_name
+from lab.mdp import greedy_path, shortest_steps
+from lab.record import read_text, write_whole
+from lab.taskfile import MAX_TOASTS, Task, find, load, load_any, load_world, names_file, world_names
+from lab.teaching import Lesson, Teacher, check_name, plain_name, world_problem
 
 if TYPE_CHECKING:
+    from lab.policy import Policy
     from lab.skills.skill import Problem, Skill
-    from lab.toolbox import Toolbox
+
+
+def teach_words(subtask: str, task: str | None, view: str | None) -> Callable[..., dict[str, Any]]:
+    """What the words of `lab teach` ask for: `teach_one` or `teach_world` with its first arguments. BadInput for bad ones."""
+    if not names_file(subtask):
+        if view is not None:
+            raise BadInput(f"view '{view}' (--view): only a world has one, '{subtask}' is none")
+        return partial(teach_one, load(task or "toast"), subtask)
+    world = load_world(subtask)
+    if task is not None:
+        raise BadInput(f"task '{task}' (--task): the world '{subtask}' belongs to no task: leave --task away")
+    return partial(teach_world, world, view=view or "full")
 
 
 def teach_one(
@@ -35,61 +51,74 @@ def teach_one(
     is also lifted in physics; `failure` says why it was not. BadInput when the policy called `name` is of another
     problem.
     """
-    from lab.advice.gates import GATES
     from lab.crew import Crew
-    from lab.learning.updates import UPDATES
     from lab.line import try_grasp
-    from lab.policy import MAX_NAME_LENGTH, is_name
     from lab.report import draw_value_map
     from lab.run import prepare
     from lab.skills import Grasp, Insert
-    from lab.view.plots import learning_curves
 
-    if learner is not None and learner not in UPDATES:
-        raise unknown("learner", learner, UPDATES, "--learner")
-    if gate is not None and gate not in GATES:
-        raise unknown("gate", gate, GATES, "--gate")
-    if name is not None and not is_name(name):
-        raise BadInput(f"policy name '{name}' (--save): wanted 1 to {MAX_NAME_LENGTH} printable characters")
     toasts = fitting(task, 2)
-    wanted = find_skill(Crew.of(task, toasts).skills, subtask).name  # before the scene is surveyed
-    prepared = prepare(task, toasts, teacher.seed, wanted)
-    skill = prepared.crew.skills[wanted]
-    problem, settings = prepared.problems[skill.name], task.subtask(skill.subtask)
-    if name is not None:
-        _check_free(name, problem, teacher.toolbox)
+    wanted = find_skill(Crew.of(task, toasts).skills, subtask)  # before the scene is surveyed
+    settings = task.subtask(wanted.subtask).changed(learner, gate, episodes)
+    check_name(name)
+    prepared = prepare(task, toasts, teacher.seed, wanted.name)
+    skill, problem = prepared.crew.skills[wanted.name], prepared.problems[wanted.name]
     earlier = teacher.toolbox.find(problem.subtask, problem.mdp.signature, name or plain_name(problem))
-    how = replace(
-        settings.learner, learner=learner or settings.learner.learner, episodes=episodes or settings.learner.episodes
-    )
-    lesson = teacher.teach(
-        problem,
-        how,
-        replace(settings.gate, gate=gate or settings.gate.gate),
-        task.name,
-        unfinished=teacher.unfinished(problem, name),
-        name=name,
-        sessions=1,
-    )
-    result, policy, files = lesson.result, lesson.policy, {}
-    assert result is not None
-    prepared.crew.policies[skill.name] = policy
+    lesson = teacher.one_session(problem, settings, task.name, name)
+    policy = prepared.crew.policies[skill.name] = lesson.policy
     failure = try_grasp(prepared.crew, prepared.surveys, skill) if isinstance(skill, Grasp) else None
     if failure is not None and policy.solved:
         policy = teacher.keep_unsolved(policy, earlier)
+    document = _document(problem, replace(lesson, policy=policy), teacher, failure)
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        files["learning_curve"] = str(out / "learning-curve.png")
-        learning_curves({skill.name: policy}, out / "learning-curve.png")
+        document["files"] = _draw_curve(problem.name, policy, out)
         if isinstance(skill, Insert):
             draw_value_map(skill, policy, out / "insert-value-map.png")
-            files["value_map"] = str(out / "insert-value-map.png")
+            document["files"]["value_map"] = str(out / "insert-value-map.png")
+    return document
+
+
+def teach_world(
+    world: GridWorld,
+    teacher: Teacher,
+    *,
+    view: str = "full",
+    learner: str | None = None,
+    gate: str | None = None,
+    episodes: int | None = None,
+    name: str | None = None,
+    out: Path | None = None,
+) -> dict[str, Any]:
+    """One session in a grid world, as `teach_one`; nothing is simulated. With view "limited" advice comes from the region only.
+
+    Draws the value map of a world with two axes. BadInput for an unknown view, and when the world has no limited one.
+    """
+    if view not in ("full", "limited"):
+        raise unknown("view", view, ("full", "limited"), "--view")
+    if view == "limited" and world.view is None:
+        raise BadInput(f"view 'limited' (--view): the file of world '{world.name}' has no [view]")
+    settings, problem = world.changed(learner, gate, episodes), world_problem(world)
+    check_name(name)
+    teacher = replace(teacher, region=world.region() if view == "limited" else None)
+    lesson = teacher.one_session(problem, settings, world.name, name)
+    document = _document(problem, lesson, teacher, None) | {"view": view}
+    if out is not None:
+        document["files"] = _draw_curve(world.name, lesson.policy, out)
+        if len(world.shape) == 2:
+            document["files"]["value_map"] = _draw_world(world, lesson.policy, out / "value-map.png")
+    return document
+
+
+def _document(problem: "Problem", lesson: Lesson, teacher: Teacher, failure: str | None) -> dict[str, Any]:
+    """The document of `lab teach --json`, before any file is written."""
+    policy, result = lesson.policy, lesson.result
+    assert result is not None
     return {
-        "subtask": skill.subtask,
-        "skill": skill.name,
-        "task": task.name,
-        "learner": how.learner,
-        "gate": gate or settings.gate.gate,
+        "subtask": problem.subtask,
+        "skill": problem.name,
+        "task": policy.task,
+        "learner": policy.learner["learner"],
+        "gate": policy.gate["gate"],
         "advisor": teacher.advisor,
         "seed": teacher.seed,
         "episodes": len(result.steps),
@@ -104,18 +133,34 @@ def teach_one(
         "solved": result.solved and failure is None,
         "failure": failure,
         "saved_as": policy.name,
-        "files": files,
+        "files": {},
     }
 
 
-def _check_free(name: str, problem: "Problem", toolbox: "Toolbox") -> None:
-    """Raises BadInput when the policy of that name was learned in another problem."""
-    for row in toolbox.list():
-        if row["name"] == name and (row["subtask"], row["signature"]) != (problem.subtask, problem.mdp.signature):
-            raise BadInput(
-                f"policy name '{name}' (--save): it is the name of a policy for '{row['subtask']}' in another problem "
-                f"({row['signature'][:8]}): choose another name, or remove that policy"
-            )
+def _draw_curve(name: str, policy: "Policy", out: Path) -> dict[str, str]:
+    from lab.view.plots import learning_curves
+
+    out.mkdir(parents=True, exist_ok=True)
+    learning_curves({name: policy}, out / "learning-curve.png")
+    return {"learning_curve": str(out / "learning-curve.png")}
+
+
+def _draw_world(world: GridWorld, policy: "Policy", path: Path) -> str:
+    """The values of a world with two axes, and the learned way through it."""
+    from lab.view.plots import value_map
+
+    mdp = world.mdp()
+    states, _, _ = greedy_path(policy.q, mdp, mdp.n_states)
+    value_map(
+        policy.q.max(axis=1).reshape(world.shape),
+        None,
+        path,
+        route=[(row, column) for row, column in map(mdp.state_cell, states)],
+        blocked=world.blocked(),
+        start=(world.start[0], world.start[1]),
+        goal=(world.goal[0], world.goal[1]),
+    )
+    return str(path)
 
 
 def find_skill(skills: "dict[str, Skill]", name: str) -> "Skill":
@@ -126,9 +171,11 @@ def find_skill(skills: "dict[str, Skill]", name: str) -> "Skill":
         if skill.subtask == name:
             return skill
     subtasks = sorted({skill.subtask for skill in skills.values()})
-    near = get_close_matches(name, [*subtasks, *skills], n=1)
+    worlds = world_names()
+    near = get_close_matches(name, [*subtasks, *worlds, *skills], n=1)
     hint = f" did you mean '{near[0]}'?" if near else ""
     allowed = f"{', '.join(subtasks)}, or one skill's full name, such as '{next(iter(skills))}'"
+    allowed += f", or a world: {', '.join(worlds)}"
     raise BadInput(f"unknown sub-task '{name}' (SUBTASK):{hint} known: {allowed}")
 
 
@@ -278,18 +325,50 @@ def _wait() -> None:
 
 
 def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
-    """What is wrong with a task file, its scene and its problems for so many toasts; empty when nothing is.
+    """What is wrong with a task file, its scene and its problems for so many toasts, or with a world; empty when nothing is.
 
     Without a number: for 3 toasts, or as many as there is room for.
     """
     from lab.run import prepare
 
-    find(file)
+    if not file.startswith(RANDOM):
+        find(file)
     if toasts is not None:
         _check_number(toasts)
     try:
-        task = load(file)
-        prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
+        task = load_any(file)
+        if isinstance(task, GridWorld):
+            world_problem(task)
+        else:
+            prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
     except LabError as error:
         return [str(error)]
     return []
+
+
+def describe(word: str) -> tuple[str, dict[str, Any]]:
+    """The text of a task or world, and the document of `lab task show --json`; a world drawn at random has no "file"."""
+    found = load_any(word)
+    if isinstance(found, GridWorld) and word.startswith(RANDOM):
+        return found.to_toml(), {"file": None, **found.model_dump(mode="json")}
+    path = find(word)
+    return read_text(path), {"file": str(path), **found.model_dump(mode="json")}
+
+
+def write_random(shape: str, density: float, seed: int, out: Path) -> dict[str, Any]:
+    """Write a random world as a task file; the document of `lab task random --json`."""
+    if out.suffix != ".toml":
+        raise BadInput(f"task file '{out}' (--out): its name must end in .toml")
+    world = random_world(parse_shape(shape, "SHAPE"), density, seed)
+    write_whole(out, world.to_toml())
+    return {
+        "file": str(out),
+        "name": world.name,
+        "shape": list(world.shape),
+        "density": density,
+        "seed": seed,
+        "start": list(world.start),
+        "goal": list(world.goal),
+        "obstacles": len(world.obstacles),
+        "optimal_steps": shortest_steps(world.mdp()),
+    }

@@ -123,6 +123,21 @@ class TabularMDP:
             digest.update(array.astype(code, order="C").tobytes())
         return digest.hexdigest()[:16]
 
+    @cached_property
+    def step_reward(self) -> float:
+        """The reward of every move that enters no terminal state; BadInput when these moves differ."""
+        ordinary = ~self.terminal[:, None] & ~self.terminal[self.successor]
+        return _only(self.reward[ordinary], "the moves that enter no terminal state")
+
+    @cached_property
+    def arrival(self) -> FloatArray:
+        """What entering each terminal state is worth, (S,) float64, 0 elsewhere; BadInput where it depends on the way there."""
+        worth = np.zeros(self.n_states)
+        moves = ~self.terminal[:, None] & self.terminal[self.successor]
+        for state in np.unique(self.successor[moves]).tolist():
+            worth[state] = _only(self.reward[moves & (self.successor == state)], f"the moves into {state}")
+        return worth
+
     def state_cell(self, state: int) -> tuple[int, ...]:
         """The grid cell of a state (of the head in a coverage problem); () when the states are no grid."""
         if self.coverage_shape:
@@ -145,6 +160,13 @@ class TabularMDP:
             covered = self.covered(state)
             return f"{self.state_cell(state)} covered {int(covered.sum())} of {covered.size}"
         return str(self.state_cell(state)) if self.shape else str(state)
+
+
+def _only(values: FloatArray, of: str) -> float:
+    different = np.unique(values)
+    if len(different) > 1:
+        raise BadInput(f"decision problem: {of} have the rewards {different[0]:g} to {different[-1]:g}: wanted one")
+    return float(different[0]) if len(different) else 0.0
 
 
 def _neighbours(shape: tuple[int, ...]) -> IntArray:

@@ -1,71 +1,35 @@
 """Task files: tasks/*.toml -> validated frozen models. The only place where raw text is checked."""
 
 import tomllib
-from dataclasses import asdict
 from itertools import combinations
 from math import hypot
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, cast
+from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    GetCoreSchemaHandler,
-    ValidationError,
-    field_validator,
-    model_validator,
-)
-from pydantic_core import CoreSchema
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from lab.data import tasks_folder
 from lab.errors import BadInput, unknown
-from lab.learning.settings import GateSettings, LearnerSettings
-from lab.mdp import Rewards
+from lab.gridworld import RANDOM, GridWorld, from_text, from_words
+from lab.record import Count, Learned, Name, Record, as_tuple, read_text
 
 MAX_TOASTS = 50
-MAX_REWARD = 1_000_000  # sums of larger ones lose the small ones, and of much larger ones overflow
 RESERVED = ("robot", "table", "insert", "the slice", "carried slice")  # names of other things in the cell
 RESERVED_STARTS = ("slice ", "toast ", "toasted ", "butter ", "robot ")
 RESERVED_ENDS = (" marker", " column", " head")
 SUBTASKS = ("transfer", "grasp", "insert", "butter", "place")
 NEAREST_STATIONS_M = 0.16  # two stations nearer than this overlap: a slice is 0.12 m wide
 
-
-def _tuple(value: object) -> object:
-    return tuple(value) if isinstance(value, list) else value
-
-
+Model = TypeVar("Model", bound=Record)
 Size = Annotated[float, Field(ge=0.001, le=10)]  # the bounds keep a slip of the pen from taking all memory or all day
 Time = Annotated[float, Field(ge=0, le=86_400)]
 Number = Annotated[float, Field(ge=-10, le=10)]
 Off = Annotated[float, Field(ge=0, le=10)]
-Count = Annotated[int, Field(ge=1, le=100)]
-XY = Annotated[tuple[Number, Number], BeforeValidator(_tuple)]
-XYZ = Annotated[tuple[Number, Number, Number], BeforeValidator(_tuple)]
-Above = Annotated[tuple[Number, Number, Size], BeforeValidator(_tuple)]
-Sizes = Annotated[tuple[Size, Size, Size], BeforeValidator(_tuple)]
-Area = Annotated[tuple[Off, Off], BeforeValidator(_tuple)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$")]
-
-
-class Record(BaseModel):
-    """A frozen record that knows its fields and takes no others."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-
-class _FromTable:
-    """Lets a dataclass in a strict record be written as a table; its own fields stay strict."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        schema = handler(source)
-        cast(dict[str, Any], handler.resolve_ref_schema(schema))["strict"] = False
-        return schema
-
-
-FROM_TABLE = _FromTable()
+XY = Annotated[tuple[Number, Number], BeforeValidator(as_tuple)]
+XYZ = Annotated[tuple[Number, Number, Number], BeforeValidator(as_tuple)]
+Above = Annotated[tuple[Number, Number, Size], BeforeValidator(as_tuple)]
+Sizes = Annotated[tuple[Size, Size, Size], BeforeValidator(as_tuple)]
+Area = Annotated[tuple[Off, Off], BeforeValidator(as_tuple)]
 
 
 class RobotSettings(Record):
@@ -82,7 +46,7 @@ class Slices(Record):
 
     mass_kg: Annotated[float, Field(ge=0.001, le=6)] = 0.04
     friction: Annotated[float, Field(ge=0, le=5)] = 0.8
-    area: Annotated[tuple[Off, Off, Off], BeforeValidator(_tuple)] = (0.0, 0.0, 0.0)
+    area: Annotated[tuple[Off, Off, Off], BeforeValidator(as_tuple)] = (0.0, 0.0, 0.0)
 
 
 class Workspace(Record):
@@ -90,7 +54,7 @@ class Workspace(Record):
 
     lower_m: XYZ
     cell_m: Sizes
-    shape: Annotated[tuple[Count, Count, Count], BeforeValidator(_tuple)]
+    shape: Annotated[tuple[Count, Count, Count], BeforeValidator(as_tuple)]
 
 
 class CameraSettings(Record):
@@ -106,7 +70,7 @@ class InsertGrid(Record):
 
     origin_m: XY
     cell_m: Size
-    shape: Annotated[tuple[Count, Count], BeforeValidator(_tuple)] = (12, 12)
+    shape: Annotated[tuple[Count, Count], BeforeValidator(as_tuple)] = (12, 12)
     start_m: XY
     height_m: Size
 
@@ -152,20 +116,8 @@ class Obstacle(Record):
     area: Area = (0.0, 0.0)
 
 
-class Subtask(Record):
+class Subtask(Learned):
     """How a sub-task is learned: rewards, learner and gate."""
-
-    rewards: Annotated[Rewards, FROM_TABLE] = Rewards()
-    learner: Annotated[LearnerSettings, FROM_TABLE] = LearnerSettings()
-    gate: Annotated[GateSettings, FROM_TABLE] = GateSettings()
-
-    @field_validator("rewards")
-    @classmethod
-    def _sums_are_finite(cls, rewards: Rewards) -> Rewards:
-        for field, value in asdict(rewards).items():
-            if abs(value) > MAX_REWARD:
-                raise ValueError(f"{field} = {value}: allowed are -{MAX_REWARD} to {MAX_REWARD}")
-        return rewards
 
 
 class Sequencing(Record):
@@ -189,10 +141,10 @@ class Task(Record):
     workspace: Workspace
     camera: CameraSettings
     insert: InsertGrid
-    stations: Annotated[tuple[Station, ...], BeforeValidator(_tuple), Field(min_length=2)]
-    route: Annotated[tuple[Stage, ...], BeforeValidator(_tuple), Field(min_length=2)]
-    obstacles: Annotated[tuple[Obstacle, ...], BeforeValidator(_tuple)] = ()
-    subtasks: dict[str, Subtask] = {}
+    stations: Annotated[tuple[Station, ...], BeforeValidator(as_tuple), Field(min_length=2)]
+    route: Annotated[tuple[Stage, ...], BeforeValidator(as_tuple), Field(min_length=2)]
+    obstacles: Annotated[tuple[Obstacle, ...], BeforeValidator(as_tuple)] = ()
+    subtasks: dict[str, Subtask] = Field(default={})
     sequencing: Sequencing = Sequencing()
 
     def station(self, name: str) -> Station:
@@ -238,15 +190,10 @@ class Task(Record):
 
     @model_validator(mode="after")
     def _members_known(self) -> Self:
-        from lab.advice.gates import GATES
-        from lab.learning.updates import UPDATES
         from lab.sequencing import SEQUENCERS
 
         for name, subtask in self.subtasks.items():
-            if subtask.learner.learner not in UPDATES:
-                raise unknown("learner", subtask.learner.learner, UPDATES, f"subtasks.{name}.learner")
-            if subtask.gate.gate not in GATES:
-                raise unknown("gate", subtask.gate.gate, GATES, f"subtasks.{name}.gate")
+            subtask.check_members(f"subtasks.{name}.")
         if self.sequencing.method not in SEQUENCERS:
             raise unknown("method", self.sequencing.method, SEQUENCERS, "sequencing.method")
         return self
@@ -256,36 +203,98 @@ def _reserved(name: str) -> bool:
     return name in RESERVED or name.startswith(RESERVED_STARTS) or name.endswith(RESERVED_ENDS)
 
 
+def shipped() -> dict[str, str]:
+    """What ships, by name, and whether it is a "task" or a "world"."""
+    return {name: _kind(_toml(path), path) for name, path in _files().items()}
+
+
+def _files() -> dict[str, Path]:
+    return {path.stem: path for path in sorted(tasks_folder().glob("*.toml"))}
+
+
 def task_names() -> list[str]:
     """The tasks that ship, by name."""
-    return sorted(path.stem for path in tasks_folder().glob("*.toml"))
+    return [name for name, kind in shipped().items() if kind == "task"]
+
+
+def world_names() -> list[str]:
+    """The grid worlds that ship, by name."""
+    return [name for name, kind in shipped().items() if kind == "world"]
+
+
+def names_file(word: str) -> bool:
+    """Whether a word means a world or a task, by path, by name or by chance, and no sub-task."""
+    return word.startswith(RANDOM) or _is_path(word) or word in _files()
+
+
+def _is_path(task: str) -> bool:
+    return Path(task).suffix in (".toml", ".txt") or "/" in task
 
 
 def find(task: str) -> Path:
-    """The file of a task given by name or path; BadInput when there is neither."""
-    path = Path(task)
-    if path.suffix == ".toml" or "/" in task:
-        if path.is_file():
-            return path
+    """The file of a task or world given by name or path; BadInput when there is neither."""
+    if _is_path(task):
+        if Path(task).is_file():
+            return Path(task)
         raise BadInput(
             f"no task file '{task}': give a .toml file that exists or a task that ships: {', '.join(task_names())}"
         )
-    if task not in task_names():
+    files = _files()
+    if task not in files:
         raise unknown("task", task, task_names(), "TASK")
-    return tasks_folder() / f"{task}.toml"
+    return files[task]
 
 
 def load(task: str) -> Task:
     """Read and check a task given by name or path; BadInput names the file, the line or field, the value and what is allowed."""
-    path = find(task)
+    found = load_any(task, "task")
+    assert isinstance(found, Task)
+    return found
+
+
+def load_world(world: str) -> GridWorld:
+    """As `load`: a world by name, by file (.toml, or .txt with a text grid) or by chance ("random:10x10x10:0.06:7")."""
+    found = load_any(world, "world")
+    assert isinstance(found, GridWorld)
+    return found
+
+
+def load_any(word: str, wanted: Literal["task", "world"] | None = None) -> Task | GridWorld:
+    """A task or a world, as `load` and `load_world` read it; BadInput also when it is not the one that is wanted."""
+    drawn = word.startswith(RANDOM)
+    path = Path(word) if drawn else find(word)
+    as_text = path.suffix == ".txt"
+    raw = {"kind": "world"} if drawn or as_text else _toml(path)
+    kind = _kind(raw, path)
+    if wanted == "task" and kind == "world":
+        raise BadInput(f"{word}: it is a world, not a task: learn it with lab teach {word}")
+    if wanted == "world" and kind == "task":
+        raise BadInput(f"{word}: it is a task, not a world: lab run {word}, or lab teach SUBTASK --task {word}")
+    if kind == "task":
+        return _checked(Task, raw, path)
+    if drawn:
+        return from_words(word)
+    return from_text(path) if as_text else _checked(GridWorld, raw, path)
+
+
+def _kind(raw: dict[str, Any], path: Path) -> str:
+    kind = raw.get("kind", "task")
+    if kind not in ("task", "world"):
+        raise unknown("kind", kind, ("world",), str(path))
+    return str(kind)
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    text = read_text(path)
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"{path}: cannot be read: {error}") from None
+        return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # beside TOMLDecodeError: numbers or nests beyond Python's limits
         raise BadInput(f"{path}: not valid TOML: {error}") from None
+
+
+def _checked(model: type[Model], raw: dict[str, Any], path: Path) -> Model:
     try:
-        return Task.model_validate(raw)
+        return model.model_validate(raw)
     except ValidationError as error:
         raise BadInput(f"{path}: {explain(error)}") from None
     except BadInput as error:

@@ -8,12 +8,14 @@ from zlib import crc32
 
 import numpy as np
 
-from lab.advice.advisors import Ask, make_advisor
-from lab.errors import WorkFailed
+from lab.advice.advisors import AdviceRequest, Advisor, Ask, make_advisor
+from lab.errors import BadInput, WorkFailed
+from lab.gridworld import GridWorld
 from lab.learning.session import AdviceEnded, AdviceRejected, Event, SessionResult, run_session, unreached
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.mdp import FloatArray, TabularMDP, greedy_path
-from lab.policy import MAX_NAME_LENGTH, Policy
+from lab.mdp import BoolArray, FloatArray, TabularMDP, greedy_path
+from lab.policy import MAX_NAME_LENGTH, Policy, is_name
+from lab.record import Learned
 from lab.skills.skill import Problem
 from lab.taskfile import Subtask
 from lab.toolbox import Toolbox
@@ -42,7 +44,8 @@ class Lesson:
 class Teacher:
     """How to teach: who advises, with which seed, whom to tell, and where policies are kept.
 
-    `ask` is the prompt behind the advisor 'terminal'; `on_event(problem name, event)` hears of episodes and requests.
+    `ask` is the prompt behind the advisor 'terminal'; `on_event(problem name, event)` hears of episodes and requests;
+    `region` (S,) bool: the states in which the advisor sees the robot and is asked, all by default.
     """
 
     toolbox: Toolbox
@@ -50,6 +53,7 @@ class Teacher:
     seed: int = 0
     ask: Ask | None = None
     on_event: Callable[[str, Event], None] | None = None
+    region: BoolArray | None = None
 
     def find_or_teach(
         self, problem: Problem, settings: Subtask, task: str, known: Mapping[tuple[str, str], Policy]
@@ -74,6 +78,17 @@ class Teacher:
             if found is not None and not found.solved and _belongs(found, problem.mdp):
                 return found
         return None
+
+    def one_session(self, problem: Problem, settings: Learned, task: str, name: str | None) -> Lesson:
+        """One session that goes on from what is unfinished; BadInput when `name` is that of another problem's policy."""
+        for row in self.toolbox.list() if name is not None else ():
+            if row["name"] == name and (row["subtask"], row["signature"]) != (problem.subtask, problem.mdp.signature):
+                raise BadInput(
+                    f"policy name '{name}' (--save): it is the name of a policy for '{row['subtask']}' in another "
+                    f"problem ({row['signature'][:8]}): choose another name, or remove that policy"
+                )
+        found = self.unfinished(problem, name)
+        return self.teach(problem, settings.learner, settings.gate, task, unfinished=found, name=name, sessions=1)
 
     def teach(
         self,
@@ -129,11 +144,15 @@ class Teacher:
             if self.on_event is not None:
                 self.on_event(problem.name, event)
 
+        def advisor() -> Advisor | None:
+            region, episodes = self.region, learner.episodes
+            made = make_advisor(self.advisor, mdp, learner.discount, rng, self.ask, region=region, episodes=episodes)
+            return made if made is None or region is None else _Inside(made, region)
+
         while left:
             left -= 1
-            advisor = None if alone else make_advisor(self.advisor, mdp, learner.discount, rng, self.ask)
             table = None if kept is None else kept.q
-            result = run_session(mdp, learner, gate, advisor, rng, q0=table, on_event=tell)
+            result = run_session(mdp, learner, gate, None if alone else advisor(), rng, q0=table, on_event=tell)
             whole, now = _joined(whole, result), _moves(result.q, mdp)
             if now <= moves:
                 if now < moves == inf:
@@ -184,6 +203,17 @@ class Teacher:
         )
 
 
+class _Inside:
+    """Any advisor, a person too, asked only where the robot is in the region; (S,) bool."""
+
+    def __init__(self, advisor: Advisor, region: BoolArray) -> None:
+        self._advisor, self._region = advisor, region
+
+    def advise(self, request: AdviceRequest) -> int | None:
+        """What the advisor says, nothing outside the region."""
+        return self._advisor.advise(request) if self._region[request.state] else None
+
+
 def fits(q: FloatArray, mdp: TabularMDP) -> bool:
     """Whether greedy steps lead from every start of the problem to its goal."""
     return _moves(q, mdp) < inf
@@ -193,6 +223,17 @@ def _moves(q: FloatArray, mdp: TabularMDP) -> float:
     """The moves of the greedy path from the start; infinite when it, or that from another start, misses the goal."""
     _, actions, reached = greedy_path(q, mdp, mdp.n_states)
     return len(actions) if reached and not unreached(q, mdp) else inf
+
+
+def world_problem(world: GridWorld) -> Problem:
+    """What a grid world sets to learn; BadInput when that cannot be learned (see `GridWorld.check`)."""
+    return Problem(world.name, "world", world.check())
+
+
+def check_name(name: str | None) -> None:
+    """BadInput unless a policy may have the name that a person chose."""
+    if name is not None and not is_name(name):
+        raise BadInput(f"policy name '{name}' (--save): wanted 1 to {MAX_NAME_LENGTH} printable characters")
 
 
 def plain_name(problem: Problem) -> str:

@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lab.advice import advisors, gates
 from lab.errors import WorkFailed
 from lab.learning.session import run_session
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.updates import UPDATES
 from lab.mdp import grid
 from lab.policy import Policy
-from lab.taskfile import load
+from lab.taskfile import load, load_world
 from lab.toolbox import Toolbox
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
@@ -25,7 +27,7 @@ TOML = load("toast")
 COMMANDS = (
     *(["run"], ["teach"], ["sequence"], ["see"], ["view"]),
     *(["toolbox", name] for name in ("list", "show", "verify", "remove")),
-    *(["task", name] for name in ("list", "show", "check")),
+    *(["task", name] for name in ("list", "show", "check", "random")),
 )
 
 
@@ -110,9 +112,10 @@ finally:
 
 # ---- bad input: exit 2, one line, nothing written -----------------------------------------------------------------
 
-TASKS = "known: toast"
-ADVISORS = "known: expert, limited, moderate, none, novice, tau=X, terminal"
-LEARNERS, GATES, METHODS = "known: q, q-lambda, sarsa", "known: always, ccrl, combined, ia, never", "known: exact, fifo"
+TASKS, METHODS = "known: toast", "known: exact, fifo"
+ADVISORS, LEARNERS, GATES = (
+    f"known: {', '.join(sorted(names))}" for names in ([*advisors.ADVISORS, *advisors.FORMS], UPDATES, gates.GATES)
+)
 
 
 @pytest.mark.parametrize(
@@ -156,6 +159,31 @@ LEARNERS, GATES, METHODS = "known: q, q-lambda, sarsa", "known: always, ccrl, co
         ("run toast toast", "got unexpected extra argument"),
         ("toolbox show nothing", "unknown policy 'nothing' (toolbox "),
         ("toolbox remove ../x", "unknown policy '../x' (toolbox "),
+        ("run world-1", "world-1: it is a world, not a task: learn it with lab teach world-1"),
+        ("view world-1", "world-1: it is a world, not a task: learn it with lab teach world-1"),
+        ("teach insert --task world-1", "world-1: it is a world, not a task: learn it with lab teach world-1"),
+        ("teach toast", "toast: it is a task, not a world: lab run toast, or lab teach SUBTASK --task toast"),
+        ("teach wrld-1", "unknown sub-task 'wrld-1' (SUBTASK): did you mean 'world-1'? known: butter, grasp,"),
+        ("teach no.txt", "no task file 'no.txt': give a .toml file that exists or a task that ships: toast"),
+        ("teach world-1 --task toast", "task 'toast' (--task): the world 'world-1' belongs to no task: leave --task"),
+        ("teach world-1 --view half", "unknown view 'half' (--view): known: full, limited"),
+        (
+            "teach world-1 --learner afterstat",
+            f"unknown learner 'afterstat' (--learner): did you mean 'afterstate'? {LEARNERS}",
+        ),
+        ("teach world-1 --save ", "policy name '' (--save): wanted 1 to 100 printable characters"),
+        ("teach insert --view full", "view 'full' (--view): only a world has one, 'insert' is none"),
+        (
+            "teach random:3x3:0:0 --view limited",
+            "view 'limited' (--view): the file of world 'random-3x3-0-0' has no [view]",
+        ),
+        ("teach random:3x3", "world 'random:3x3': wanted random:SHAPE:DENSITY:SEED, such as random:10x10x10:0.06:7"),
+        ("teach random:3x3:0.9:1", "random world 3x3: density 0.9: allowed are 0 to 0.6"),
+        ("task random 10 --out w.toml", "SHAPE: shape 10: allowed are 2 or 3 axes of 1 to 100 cells"),
+        ("task random 10x10 --density nan --out w.toml", "random world 10x10: density nan: allowed are 0 to 0.6"),
+        ("task random 10x10 --out w.txt", "task file 'w.txt' (--out): its name must end in .toml"),
+        ("task random 10x10 --out no/w.toml", "no/w.toml: cannot be written: No such file or directory"),
+        ("task random 10x10", "missing option '--out'"),
         ("see no.png", "no.png: cannot be read: No such file or directory"),
         ("see . --grid 0x3", "grid '0x3' (--grid): wanted ROWSxCOLUMNS, each 1 to 999, such as 12x12"),
     ],
@@ -328,8 +356,10 @@ def test_a_reader_that_leaves_early_is_no_drama(root: Path) -> None:
 
 
 def test_task_list_show_and_check(lab: Lab, folder: Path, toml: str) -> None:
-    assert lab("task", "list").out == "toast\n"
-    assert lab("task", "list", "--json").json == {"tasks": ["toast"]}
+    rows = [line.split() for line in lab("task", "list").out.splitlines()]
+    assert rows[0] == ["name", "kind"]
+    assert [row for row in rows if row[0] in ("toast", "world-1")] == [["toast", "task"], ["world-1", "world"]]
+    assert lab("task", "list", "--json").json == {"tasks": [name for name, _ in rows[1:]], "kinds": dict(rows[1:])}
     assert lab("task", "show", "toast").out == toml
     shown = lab("task", "show", "toast", "--json").json
     assert Path(shown["file"]).name == "toast.toml"
@@ -339,6 +369,56 @@ def test_task_list_show_and_check(lab: Lab, folder: Path, toml: str) -> None:
     ran = lab("task", "check", "far/mine.toml")
     assert (ran.code, ran.out, ran.err) == (0, "far/mine.toml is sound\n", "")
     assert lab("task", "check", "far/mine.toml", "--toasts", "1", "--json").json == {"valid": True, "errors": []}
+
+
+def test_a_world_is_shown_checked_and_learned(lab: Lab, folder: Path, root: Path) -> None:
+    assert lab("task", "show", "world-1").out == (root / "tasks" / "world-1.toml").read_text(encoding="utf-8")
+    shown = lab("task", "show", "world-1", "--json").json
+    assert (shown["kind"], shown["shape"], len(shown["obstacles"])) == ("world", [10, 10, 10], 59)
+    assert lab("task", "check", "world-1").out == "world-1 is sound\n"
+    ran = lab("teach", "world-1", "--view", "limited", "--json")
+    assert (ran.code, ran.err) == (0, "")
+    assert (ran.json["subtask"], ran.json["view"], ran.json["optimal_steps"]) == ("world", "limited", 12)
+    (row,) = lab("toolbox", "list", "--json").json["policies"]
+    assert (row["name"], row["subtask"], row["task"]) == (ran.json["saved_as"], "world", "world-1")
+    assert (folder / "toolbox").is_dir()
+
+
+def test_a_random_world_is_written_checked_and_learned(lab: Lab, folder: Path) -> None:
+    words = ("task", "random", "6x5", "--density", "0.3", "--seed", "2", "--out", "w.toml")
+    ran = lab(*words, "--json")
+    assert (ran.code, ran.json["file"], ran.json["obstacles"]) == (0, "w.toml", 9)
+    text = (folder / "w.toml").read_text(encoding="utf-8")
+    assert lab(*words).out.startswith("w.toml: 9 obstacles, the shortest way takes ")
+    assert (folder / "w.toml").read_text(encoding="utf-8") == text == lab("task", "show", "random:6x5:0.3:2").out
+    assert load_world("w.toml") == load_world("random:6x5:0.3:2")
+    assert lab("task", "show", "random:6x5:0.3:2", "--json").json["file"] is None
+    assert lab("task", "check", "w.toml").out == "w.toml is sound\n"
+    ran = lab("teach", "w.toml", "--out", "pictures", "--json")
+    assert (ran.code, ran.json["solved"]) == (0, True)
+    assert tree(folder / "pictures") == ["learning-curve.png", "value-map.png"]
+
+
+def test_a_world_without_a_way_is_not_sound(lab: Lab, folder: Path) -> None:
+    (folder / "w.txt").write_text("S#.\n##G\n")
+    for words in ("task check w.txt", "teach w.txt"):
+        ran = lab(*words.split())
+        assert (ran.code, ran.out) == (2, "")
+        assert ran.err == "lab: world 'w': no path from (0, 0) to (1, 2): the start is enclosed by (0, 1), (1, 0)\n"
+
+
+def test_learning_a_world_loads_no_simulator(root: Path, folder: Path) -> None:
+    code = """
+import sys
+from lab.cli import main
+sys.argv = ["lab", "teach", "world-1", "--json"]
+try:
+    main()
+finally:
+    print("pybullet" in sys.modules, file=sys.stderr)
+"""
+    ran = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, "False\n")
 
 
 def test_a_task_with_room_for_one_toast_is_sound(lab: Lab, folder: Path, toml: str) -> None:

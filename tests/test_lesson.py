@@ -9,8 +9,11 @@ from urllib.request import urlopen
 import numpy as np
 import pytest
 
+from lab.advice.advisors import AdviceRequest
 from lab.errors import BadInput
-from lab.lesson import check_task, find_skill, fitting, see_picture, sequence_task, show, teach_one
+from lab.gridworld import GridWorld, View
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.lesson import check_task, find_skill, fitting, see_picture, sequence_task, show, teach_one, teach_world
 from lab.listener import Listener
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import SequenceResult
@@ -139,7 +142,12 @@ def test_a_grasp_that_lifts_nothing_is_not_kept_as_solved(
     ("subtask", "options", "reason"),
     [
         ("inser", {}, "unknown sub-task 'inser' .SUBTASK.: did you mean 'insert'. known: butter, grasp, insert, place"),
-        ("grasp at plat", {}, "did you mean 'grasp at plate'. .* or one skill's full name, such as 'grasp at plate'$"),
+        (
+            "grasp at plat",
+            {},
+            "did you mean 'grasp at plate'. .* or one skill's full name, such as 'grasp at plate', or",
+        ),
+        ("wrld-1", {}, "did you mean 'world-1'. .*, or a world: world-1"),
         ("insert", {"learner": "x"}, "unknown learner 'x' .--learner."),
         ("insert", {"gate": "x"}, "unknown gate 'x' .--gate."),
         ("insert", {"name": " "}, "policy name ' ' .--save.: wanted 1 to 100 printable characters"),
@@ -151,6 +159,74 @@ def test_bad_words_are_refused_before_the_scene_is_surveyed(
     monkeypatch.setattr("lab.run.prepare", lambda *_: pytest.fail("surveyed"))
     with pytest.raises(BadInput, match=reason):
         teach_one(task, subtask, teacher, **options)
+    assert not teacher.toolbox.folder.exists()
+
+
+# ---- teach a world ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def world() -> GridWorld:
+    """Five by four cells; the limited view are the two lower rows, with the goal."""
+    return GridWorld(
+        name="small",
+        shape=(5, 4),
+        start=(0, 0),
+        goal=(4, 3),
+        obstacles=((1, 1), (3, 2)),
+        view=View(lower=(3, 0), upper=(4, 3)),
+        learner=LearnerSettings(learner="q", episodes=60, max_steps=60),
+        gate=GateSettings(gate="always"),
+    )
+
+
+def test_a_world_is_learned_and_drawn(world: GridWorld, teacher: Teacher, tmp_path: Path) -> None:
+    document = teach_world(world, teacher, out=tmp_path / "out")
+    assert tuple(document) == (*TEACH_FIELDS, "view")
+    names = ("subtask", "skill", "task", "view", "learner", "gate")
+    assert [document[name] for name in names] == ["world", "small", "small", "full", "q", "always"]
+    assert (document["solved"], document["final_steps"], document["failure"]) == (True, 7, None)
+    assert document["files"].keys() == {"learning_curve", "value_map"}
+    assert all(min(read_picture(Path(path)).shape[:2]) > 200 for path in document["files"].values())
+    (row,) = teacher.toolbox.list()
+    assert (row["name"], row["subtask"], row["solved"]) == (document["saved_as"], "world", True)
+
+
+def test_options_change_how_a_world_is_learned(world: GridWorld, teacher: Teacher) -> None:
+    document = teach_world(world, teacher, learner="sarsa", gate="never", episodes=7, name="mine")
+    changed = [document[name] for name in ("learner", "gate", "episodes", "requests", "saved_as", "files")]
+    assert changed == ["sarsa", "never", 7, 0, "mine", {}]
+    with pytest.raises(BadInput, match=r"policy name 'mine' .--save.: it is the name of a policy for 'world'"):
+        teach_world(world.model_copy(update={"goal": (4, 0)}), teacher, name="mine")
+
+
+def test_with_a_limited_view_a_person_is_asked_inside_it_only(world: GridWorld, tmp_path: Path) -> None:
+    asked: dict[str, set[int]] = {"full": set(), "limited": set()}
+    for view, states in asked.items():
+
+        def ask(request: AdviceRequest, states: set[int] = states) -> int | None:
+            states.add(request.state)
+            return request.learner_action
+
+        teach_world(world, Teacher(Toolbox(tmp_path / view), "terminal", ask=ask), view=view)
+    region = set(np.flatnonzero(world.region()).tolist())
+    assert world.mdp().start in asked["full"]
+    assert asked["limited"] & region == asked["limited"] != set()
+
+
+def test_with_a_limited_view_simulated_advice_helps_less(world: GridWorld, teacher: Teacher) -> None:
+    once = world.changed(None, None, 1)
+    full = teach_world(once, teacher)
+    limited = teach_world(once, teacher, view="limited", name="limited")
+    assert (full["view"], full["helped_steps"]) == ("full", 7)  # the expert leads all the way
+    assert (limited["view"], limited["helped_steps"] < 7) == ("limited", True)
+
+
+def test_a_view_that_is_none(world: GridWorld, teacher: Teacher) -> None:
+    with pytest.raises(BadInput, match=r"^unknown view 'part' .--view.: known: full, limited$"):
+        teach_world(world, teacher, view="part")
+    with pytest.raises(BadInput, match=r"^view 'limited' .--view.: the file of world 'small' has no \[view\]$"):
+        teach_world(world.model_copy(update={"view": None}), teacher, view="limited")
     assert not teacher.toolbox.folder.exists()
 
 
@@ -343,3 +419,15 @@ def test_check_finds_what_is_wrong(tmp_path: Path, root: Path) -> None:
     path.write_text("name =")
     (error,) = check_task(str(path), 3, 0)
     assert error.startswith(f"{path}: not valid TOML: Invalid value (at end of document)")
+
+
+def test_check_finds_what_is_wrong_with_a_world(tmp_path: Path, root: Path) -> None:
+    text = (root / "tasks" / "world-1.toml").read_text(encoding="utf-8")
+    assert check_task("world-1", None, 0) == check_task("random:10x10x10:0.06:7", None, 0) == []
+    path = tmp_path / "w.toml"
+    path.write_text(text.replace("max_steps = 200", "max_steps = 12"))  # the start counts as a step
+    (error,) = check_task(str(path), None, 0)
+    assert error == "world 'world-1': learner.max_steps = 12: the shortest way has 12 moves and needs 13 steps"
+    path.write_text(text.replace("goal = [8, 5, 3]", "goal = [8, 5, 30]"))
+    (error,) = check_task(str(path), None, 0)
+    assert error == f"{path}: goal (8, 5, 30) is outside the world: allowed are 0..9 x 0..9 x 0..9"

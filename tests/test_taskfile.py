@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +14,23 @@ from pydantic import ValidationError
 
 from lab.data import tasks_folder
 from lab.errors import BadInput
-from lab.taskfile import MAX_TOASTS, RESERVED, SUBTASKS, Task, check_toasts, explain, find, load, task_names
+from lab.gridworld import GridWorld
+from lab.taskfile import (
+    MAX_TOASTS,
+    RESERVED,
+    SUBTASKS,
+    Task,
+    check_toasts,
+    explain,
+    find,
+    load,
+    load_any,
+    load_world,
+    names_file,
+    shipped,
+    task_names,
+    world_names,
+)
 
 SHIPPED: dict[str, Any] = tomllib.loads((tasks_folder() / "toast.toml").read_text())
 TEXT = (tasks_folder() / "toast.toml").read_text()
@@ -313,6 +330,105 @@ def test_any_bytes_load_or_are_bad_input(tmp_path_factory: pytest.TempPathFactor
     path = tmp_path_factory.getbasetemp() / "bytes.toml"
     path.write_bytes(raw)
     assert refusal(lambda: load(str(path))).startswith(f"{path}: ")
+
+
+# ---- worlds -------------------------------------------------------------------------------------------------------
+
+WORLD = (tasks_folder() / "world-1.toml").read_text()
+
+
+@pytest.mark.parametrize("name", world_names())
+def test_a_world_that_ships_loads_by_name_and_by_path(name: str) -> None:
+    world = load_world(name)
+    assert world.name == name
+    assert world == load_world(str(tasks_folder() / f"{name}.toml")) == load_any(name)
+    assert world.check().start == np.ravel_multi_index(world.start, world.shape)
+
+
+def test_what_ships_is_a_task_or_a_world() -> None:
+    assert sorted(task_names() + world_names()) == list(shipped())
+    assert (shipped()["toast"], shipped()["world-1"]) == ("task", "world")
+    assert [names_file(word) for word in ("world-1", "toast", "a.txt", "./a", "random:", "insert", "world")] == (
+        [True] * 5 + [False] * 2
+    )
+
+
+@pytest.mark.parametrize("word", ["world-1", str(tasks_folder() / "world-1.toml"), "random:3x3:0.1:0"])
+def test_a_world_is_no_task(word: str) -> None:
+    assert refusal(lambda: load(word)) == f"{word}: it is a world, not a task: learn it with lab teach {word}"
+
+
+def test_a_task_is_no_world(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(TEXT)
+    for word in ("toast", str(path)):
+        said = f"{word}: it is a task, not a world: lab run {word}, or lab teach SUBTASK --task {word}"
+        assert refusal(lambda word=word: load_world(word)) == said  # type: ignore[misc]
+
+
+def test_a_kind_that_there_is_not(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(WORLD.replace('"world"', '"wrold"'))
+    for read in (load, load_world):
+        assert refusal(lambda read=read: read(str(path))) == (  # type: ignore[misc]
+            f"unknown kind 'wrold' ({path}): did you mean 'world'? known: world"
+        )
+
+
+def test_a_text_grid_is_a_world(tmp_path: Path) -> None:
+    path = tmp_path / "my grid.txt"
+    path.write_text("S.#\n..G\n")
+    assert load_world(str(path)) == GridWorld(
+        name="my grid", shape=(2, 3), start=(0, 0), goal=(1, 2), obstacles=((0, 2),)
+    )
+    assert f"{path}: it is a world, not a task" in refusal(lambda: load(str(path)))
+    assert refusal(lambda: load_world("no.txt")).startswith("no task file 'no.txt'")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("shape = [10, 10, 10]", "shape = [10]", "at least 2 items after validation, not 1 (got [10])"),
+        ("shape = [10, 10, 10]", "shape = [10, 10, 10, 10]", "at most 3 items after validation, not 4 (got [10,"),
+        (
+            "shape = [10, 10, 10]",
+            "shape = [10, 10, 101]",
+            "shape.2: Input should be less than or equal to 100 (got 101)",
+        ),
+        ("shape = [10, 10, 10]", "shape = [10, 10, 0]", "shape.2: Input should be greater than or equal to 1 (got 0)"),
+        ("shape = [10, 10, 10]", "shape = [10, 10]", "start (0, 7, 1) has 3 coordinates: 2 are wanted"),
+        ("shape = [10, 10, 10]", "shape = 10", "shape: Input should be a valid tuple (got 10)"),
+        ("start = [0, 7, 1]", "start = [0, 7, 10]", "start (0, 7, 10) is outside the world: allowed are 0..9 x 0..9 x"),
+        ("start = [0, 7, 1]", "start = [0, 7, -1]", "start (0, 7, -1) is outside the world: allowed are 0..9 x 0..9 x"),
+        ("start = [0, 7, 1]", "start = [0, 7, 1.0]", "start.2: Input should be a valid integer (got 1.0)"),
+        ("start = [0, 7, 1]", "start = [0, 0, 0]", "start (0, 0, 0) is blocked by an obstacle: a free cell is wanted"),
+        ("start = [0, 7, 1]", "start = [8, 5, 3]", "start and goal are the same cell (8, 5, 3): two cells are wanted"),
+        ("start = [0, 7, 1]", "", "start: Field required"),
+        ("goal = [8, 5, 3]", "goal = [8, 4, 2]", "goal (8, 4, 2) is blocked by an obstacle: a free cell is wanted"),
+        ("[0, 1, 0]", "[0, 10, 0]", "obstacle (0, 10, 0) is outside the world: allowed are 0..9 x 0..9 x 0..9"),
+        ("[0, 1, 0]", "[0, 1]", "obstacle (0, 1) has 2 coordinates: 3 are wanted"),
+        ("[0, 1, 0]", "[0, 0, 0]", "obstacle (0, 0, 0) stands twice in the file"),
+        ("lower = [5, 2, 2]", "lower = [5, 9, 2]", "view.lower 9 on axis 1 is above view.upper: allowed are 0..8"),
+        ("upper = [9, 8, 7]", "upper = [9, 8, 10]", "view.upper (9, 8, 10) is outside the world: allowed are 0..9 x"),
+        ("upper = [9, 8, 7]", "", "view.upper: Field required"),
+        ("collision = -1.0", "collision = 1.0", "rewards.collision: Input should be less than 0 (got 1.0)"),
+        ("goal = 1.5", "goal = 1e308", "rewards: goal = 1e+308: allowed are -1000000 to 1000000"),
+        ("alpha = 0.95", "alpha = 1.5", "learner.alpha: Input should be less than or equal to 1 (got 1.5)"),
+        ("count_start = true", "count_start = 1", "learner.count_start: Input should be a valid boolean (got 1)"),
+        ('"afterstate"', '"afterstat"', "unknown learner 'afterstat' (learner): did you mean 'afterstate'?"),
+        ('"ccrl"', '"ccl"', "unknown gate 'ccl' (gate): did you mean 'ccrl'?"),
+        ("alpha = 0.95", 'selection = "sftmax"', "unknown selection 'sftmax' (learner): did you mean 'softmax'?"),
+        ('name = "world-1"', 'name = "a/b"', "name: "),
+        ("title =", "titel =", "titel: Extra inputs are not permitted"),
+    ],
+)
+def test_a_bad_world_is_said_with_what_is_allowed(tmp_path: Path, old: str, new: str, said: str) -> None:
+    path = tmp_path / "mine.toml"
+    assert WORLD.count(old) >= 1
+    path.write_text(WORLD.replace(old, new, 1))
+    message = refusal(lambda: load_world(str(path)))
+    assert message.startswith(f"{path}: ")
+    assert said in message
 
 
 @pytest.mark.parametrize("toasts", [0, -1, MAX_TOASTS + 1])

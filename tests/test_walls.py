@@ -18,11 +18,14 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.data",),
     ("lab.overhead", "lab.view.frames", "lab.mdp", "lab.sequencing", "lab.learning.settings"),
     ("lab.vision",),
-    ("lab.learning.updates", "lab.learning.selection", "lab.learning.kernels"),
+    ("lab.learning.selection",),
+    ("lab.learning.updates",),
     ("lab.advice",),
     ("lab.learning",),
     ("lab.policy",),
     ("lab.toolbox",),
+    ("lab.record",),
+    ("lab.gridworld",),
     ("lab.taskfile",),
     ("lab.sim",),
     ("lab.skills", "lab.recorder"),
@@ -42,7 +45,8 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "meshcat": {"lab.view.meshcat"},
     "cv2": {"lab.vision", "lab.sim.camera"},
     "PIL": {"lab.vision", "lab.sim.camera"},
-} | {library: set() for library in ("random", "pickle", "dill", "cloudpickle", "joblib", "shelve", "marshal")}
+    "joblib": {"lab.studies.runner"},  # to work in several processes; its files are pickles, and nobody reads those
+} | {library: set() for library in ("random", "pickle", "dill", "cloudpickle", "shelve", "marshal")}
 NEVER = {  # room -> rooms that it never imports, whatever the layers say
     "lab.mdp": ("lab.sim", "lab.view", "lab.cli"),
     "lab.learning": ("lab.sim", "lab.view", "lab.cli"),

@@ -1,9 +1,17 @@
-"""When a learner asks for advice: per episode (CCRL), per step (introspection), both, always or never."""
+"""When a learner asks for advice, and when it stops: per episode, per step, or both.
+
+The rules that the compiled kernel follows too are plain functions of numbers and arrays, which numba compiles as well.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from lab.learning.selection import Draw
 from lab.learning.settings import GateSettings
+from lab.learning.updates import Update
+
+Values = Sequence[float]
+Steps = Sequence[int]
 
 
 @dataclass(frozen=True)
@@ -15,81 +23,198 @@ class Improvement:
     previous_mean: float
 
 
-def improvement(steps: Sequence[int], window: int) -> Improvement | None:
+def window_mean(steps: Steps, end: int, window: int) -> float:
+    """The mean of the `window` step counts before index `end`."""
+    total = 0
+    for i in range(end - window, end):
+        total += steps[i]
+    return total / window
+
+
+def too_slow(current_mean: float, previous_mean: float, threshold: float) -> bool:
+    """Whether the improvement rate is below Lambda. Source: thesis eqs. 6.1 and 6.2 and the listing's ratio."""
+    return current_mean / previous_mean > 1.0 - threshold
+
+
+def misled(result: int, mean_before: float) -> bool:
+    """Whether an episode was not better than the mean of the K before it. Source: thesis eq. 6.3 and listing."""
+    return result >= mean_before
+
+
+def unsure(width: float, psi: float) -> bool:
+    """Whether the values of a state span at most Psi. Source: Clouse 1996; thesis eq. 9.3 (<), listing (<=)."""
+    return width <= psi
+
+
+def improvement(steps: Steps, window: int) -> Improvement | None:
     """The improvement of the step counts so far; None while fewer than two windows have ended."""
-    if len(steps) < 2 * window:
+    n = len(steps)
+    if n < 2 * window:
         return None
-    current = sum(steps[-window:]) / window
-    previous = sum(steps[-2 * window : -window]) / window
+    current, previous = window_mean(steps, n, window), window_mean(steps, n - window, window)
     return Improvement(1.0 - current / previous, current, previous)
+
+
+def _width(values: Values) -> float:
+    return max(values) - min(values)
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a gate may be built with beside its settings: uniform numbers, and tables that learn as the learner does."""
+
+    draw: Draw
+    learners: Callable[[int], Sequence[Update]]  # so many, each with start values of its own
 
 
 class Gate:
     """The base of all gates, and the gate "always": every step of every episode asks, and nothing is ever rejected.
 
-    A session calls `opens` before each episode, `asks` before each step of an open one, and `judges` after it.
-    `steps` holds the step counts of the finished episodes, a failed one as max_steps + 1.
+    A session calls `opens` before each episode, `asks` before each step of an open one, `saw` after each step (if
+    `watches`), and `judges` after the episode. `steps` holds the step counts of the finished episodes, a failed one as
+    max_steps + 1. `why` says in words why the last question was asked.
     """
 
-    def __init__(self, settings: GateSettings, episodes: int, max_steps: int):
-        self.settings, self.episodes, self.max_steps = settings, episodes, max_steps
+    watches = False
+
+    def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
+        self.settings, self.episodes, self.max_steps, self.around = settings, episodes, max_steps, around
         self.misleads = 0
         self.rejected = False
         self.converged = False
+        self.why = "it asks about every step"
 
-    def opens(self, episode: int, steps: Sequence[int]) -> bool:
+    def opens(self, episode: int, steps: Steps) -> bool:
         """Whether episode n (from 1) may ask for advice."""
         return True
 
-    def asks(self, values: Sequence[float]) -> bool:
-        """Whether the learner asks in a state with these action values."""
+    def asks(self, state: int, values: Values) -> bool:
+        """Whether the learner asks in a state; `values` is what it knows there (`Update.gauge`)."""
         return True
 
-    def judges(self, steps: Sequence[int], helped: bool) -> None:
-        """Assesses the advice of the episode that ended last; may set `rejected`."""
+    def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int) -> None:
+        """Hears of a step that was made."""
+
+    def judges(self, steps: Steps, opened: bool) -> None:
+        """Assesses the episode that ended last, which was open for advice or not; may set `rejected`."""
 
 
 class Never(Gate):
     """Never asks."""
 
-    def opens(self, episode: int, steps: Sequence[int]) -> bool:
+    def opens(self, episode: int, steps: Steps) -> bool:
         """No episode asks."""
         return False
 
 
-class Introspection(Gate):
-    """From episode X on asks in each state whose action values span less than Psi (Clouse 1996; thesis eq. 9.3)."""
+class _PerStep(Gate):
+    """From episode X on, whether to ask is decided at each step."""
 
-    def opens(self, episode: int, steps: Sequence[int]) -> bool:
+    def opens(self, episode: int, steps: Steps) -> bool:
         """Every episode from X on may ask."""
         return episode >= self.settings.first_episode
 
-    def asks(self, values: Sequence[float]) -> bool:
+
+class Introspection(_PerStep):
+    """Asks in each state whose values span at most Psi (Clouse 1996; thesis eq. 9.3)."""
+
+    def asks(self, state: int, values: Values) -> bool:
         """Whether the learner is unsure of its choice."""
-        return max(values) - min(values) < self.settings.psi
+        self.why = f"the values here span {_width(values):.2f}, at most {self.settings.psi:g}"
+        return unsure(_width(values), self.settings.psi)
+
+
+class Importance(_PerStep):
+    """Asks in each state whose values span at least Psi: there a wrong choice costs most (Torrey and Taylor 2013)."""
+
+    def asks(self, state: int, values: Values) -> bool:
+        """Whether much depends on the choice."""
+        self.why = f"the values here span {_width(values):.2f}, at least {self.settings.psi:g}"
+        return _width(values) >= self.settings.psi
+
+
+class Random(_PerStep):
+    """Asks in a random share of the steps: what any rule must beat."""
+
+    def asks(self, state: int, values: Values) -> bool:
+        """Whether chance says so."""
+        assert self.around is not None
+        self.why = f"it asks about {self.settings.rate:.0%} of the steps"
+        return self.around.draw() < self.settings.rate
+
+
+class Uncertainty(_PerStep):
+    """Asks where an ensemble of tables disagrees: their values' standard deviation is at least Psi.
+
+    Each table starts with values of its own within +-0.5 and learns each step with probability 1/2. The deviation is
+    the root of the mean variance over the actions. Source: da Silva et al. 2020 (RCMP), for tables.
+    """
+
+    watches = True
+
+    def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
+        super().__init__(settings, episodes, max_steps, around)
+        self._tables = [] if around is None else around.learners(settings.ensemble)
+
+    def asks(self, state: int, values: Values) -> bool:
+        """Whether the tables disagree about this state."""
+        spread = deviation([table.gauge(state) for table in self._tables])
+        self.why = f"its {len(self._tables)} tables differ by {spread:.2f} here, at least {self.settings.psi:g}"
+        return spread >= self.settings.psi
+
+    def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int) -> None:
+        """Each table learns the step, or not."""
+        assert self.around is not None
+        for table in self._tables:
+            if self.around.draw() < 0.5:
+                table.learn(s_tm1, a_tm1, r_t, discount_t, s_t, 0)
+
+
+def deviation(rows: Sequence[Values]) -> float:
+    """The root of the mean over actions of the variance over tables."""
+    total = 0.0
+    for column in zip(*rows, strict=True):
+        mean = sum(column) / len(column)
+        total += sum([(value - mean) * (value - mean) for value in column]) / len(column)
+    return float((total / len(rows[0])) ** 0.5)
+
+
+class ConstantPerformance(Gate):
+    """Asks for whole episodes while the mean of the last K is above a constant (CQ(lambda): Kartoun et al. 2006)."""
+
+    def opens(self, episode: int, steps: Steps) -> bool:
+        """Whether performance is not good enough yet."""
+        settings = self.settings
+        if episode < settings.first_episode or len(steps) < settings.window:
+            return False
+        mean = window_mean(steps, len(steps), settings.window)
+        self.why = f"the last {settings.window} episodes took {mean:.1f} steps, more than {settings.enough_steps:g}"
+        return mean > settings.enough_steps
 
 
 class Ccrl(Gate):
     """Asks for whole episodes while improvement is too slow, and rejects an advisor that misleads (thesis fig. 6.2).
 
     From episode X on it asks when current/previous mean > 1 - Lambda. It stops for good after more than 2K equal
-    results below the step limit, and never asks in the last episode, which shows what was learned. A helped episode
-    that is not better than the mean of the K before it is a mislead; more than Omega of them reject the advisor.
+    results below the step limit, and never asks in the last episode, which shows what was learned. An episode that
+    was open for advice and is not better than the mean of the K before it is a mislead, also where the advisor's
+    limited view let it say nothing (listing); more than Omega of them reject the advisor.
     """
 
-    def __init__(self, settings: GateSettings, episodes: int, max_steps: int):
-        super().__init__(settings, episodes, max_steps)
+    def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
+        super().__init__(settings, episodes, max_steps, around)
         self._last_result = 0
         self._equal_results = 0
 
-    def opens(self, episode: int, steps: Sequence[int]) -> bool:
+    def opens(self, episode: int, steps: Steps) -> bool:
         """Whether the improvement rate is below Lambda."""
         improved = improvement(steps, self.settings.window)
         if self.rejected or episode < self.settings.first_episode or improved is None:
             return False
         self._watch_convergence(steps[-1])
-        too_slow = improved.current_mean / improved.previous_mean > 1.0 - self.settings.lambda_threshold
-        return too_slow and not self.converged and episode < self.episodes
+        slow = too_slow(improved.current_mean, improved.previous_mean, self.settings.lambda_threshold)
+        self.why = f"its improvement is {improved.rate:+.1%}, below {self.settings.lambda_threshold:.0%}"
+        return slow and not self.converged and episode < self.episodes
 
     def _watch_convergence(self, result: int) -> None:
         if result == self._last_result and result < self.max_steps:
@@ -98,26 +223,30 @@ class Ccrl(Gate):
         else:
             self._last_result, self._equal_results = result, 0
 
-    def judges(self, steps: Sequence[int], helped: bool) -> None:
+    def judges(self, steps: Steps, opened: bool) -> None:
         """Counts a mislead and rejects the advisor after more than Omega (eqs. 6.3 and 6.4)."""
-        window = self.settings.window
-        if helped and not self.rejected and len(steps) > window:
-            self.misleads += steps[-1] >= sum(steps[-1 - window : -1]) / window
+        n, window = len(steps), self.settings.window
+        if opened and not self.rejected and n > window:
+            self.misleads += misled(steps[-1], window_mean(steps, n - 1, window))
             self.rejected = self.misleads > self.settings.omega
 
 
 class Combined(Ccrl):
     """Asks only when both CCRL and introspection would, and rejects as CCRL does (thesis, section 9.6)."""
 
-    def asks(self, values: Sequence[float]) -> bool:
+    def asks(self, state: int, values: Values) -> bool:
         """Whether the learner is unsure of its choice."""
-        return max(values) - min(values) < self.settings.psi
+        return unsure(_width(values), self.settings.psi)
 
 
-GATES: dict[str, Callable[[GateSettings, int, int], Gate]] = {
+GATES: dict[str, Callable[[GateSettings, int, int, Surroundings | None], Gate]] = {
     "ccrl": Ccrl,
     "ia": Introspection,
     "combined": Combined,
+    "cq": ConstantPerformance,
     "always": Gate,
     "never": Never,
+    "random": Random,
+    "importance": Importance,
+    "uncertainty": Uncertainty,
 }

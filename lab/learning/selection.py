@@ -1,62 +1,87 @@
 """How an action is chosen from action values: greedy, epsilon-greedy, softmax, and the schedule 1/n**beta.
 
-A choice takes its uniform numbers in [0, 1) as arguments, so whoever draws them decides on the generator.
+A choice takes its uniform numbers in [0, 1) as arguments, so whoever draws them decides on the generator. What the
+compiled kernel needs too is written in the Python that numba compiles (`exp_of`), so both choose the same actions.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from math import exp, inf
+from math import exp
 
 import numpy as np
 
 COLDEST = 1e-300  # below this a temperature is as good as 0, and dividing by it would overflow
+BELOW_ONE = 1.0 - 2.0**-52  # keeps u * total below the total whatever the rounding
+
+Draw = Callable[[], float]
 
 
-def temperature(episode: int, beta: float) -> float:
-    """tau = n**-beta for episode n >= 1, never 0. Source: thesis eq. 9.2 (eq. 5.1 for epsilon)."""
-    return max(float(episode**-beta), COLDEST)
+def temperature(episode: int, beta: float, scale: float = 1.0) -> float:
+    """tau = scale * n**-beta for episode n >= 1, never 0. Source: thesis eq. 9.2 (eq. 5.1 for epsilon)."""
+    return max(scale * float(episode**-beta), COLDEST)
+
+
+def exp_of(x: float) -> float:
+    """exp(x) for x <= 0, off by less than 2e-8, 0 below -409: a cubic of x/256, squared eight times."""
+    r = x * (1.0 / 256.0)
+    p = max(1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0))), 0.0)
+    p *= p
+    p *= p
+    p *= p
+    p *= p
+    p *= p
+    p *= p
+    p *= p
+    return p * p
 
 
 def softmax(values: Sequence[float], tau: float) -> list[float]:
     """The Boltzmann probabilities exp(Q/tau) / sum: sums to 1, finite for any tau >= 0. Source: thesis eq. 9.1."""
-    weights = _weights(values, tau)
+    top = max(values)
+    tau = max(COLDEST, tau)
+    weights = [exp((value - top) / tau) for value in values]  # at most exp(0): nothing can overflow
     total = sum(weights)
     return [weight / total for weight in weights]
 
 
 def choose_softmax(values: Sequence[float], tau: float, u: float) -> int:
-    """The action that the uniform number u in [0, 1) picks from the softmax probabilities."""
-    weights = _weights(values, tau)
-    mark = u * sum(weights)
-    for action, weight in enumerate(weights):
-        mark -= weight
-        if mark < 0.0:
-            return action
-    return greedy(values)  # u so near to 1 that rounding used up all weights
-
-
-def _weights(values: Sequence[float], tau: float) -> list[float]:
+    """The action that the uniform number u in [0, 1) picks from the softmax probabilities (to 1e-7 each)."""
     top = max(values)
-    tau = max(COLDEST, tau)
-    return [exp((value - top) / tau) for value in values]  # at most exp(0): nothing can overflow
+    per_tau = 1.0 / max(COLDEST, tau)
+    total, sums = 0.0, []
+    for value in values:
+        total += exp_of((value - top) * per_tau)
+        sums.append(total)
+    mark = u * total * BELOW_ONE
+    return sum(below <= mark for below in sums[:-1])
 
 
 def greedy(values: Sequence[float]) -> int:
     """The best action; ties: the lowest index."""
-    best, best_value = 0, -inf
-    for action, value in enumerate(values):
-        if value > best_value:
-            best, best_value = action, value
-    return best
+    return values.index(max(values))
+
+
+def choose_greedy(values: Sequence[float], epsilon: float, u: float) -> int:
+    """The best action; u in [0, 1) decides between equally good ones. `epsilon` is not looked at."""
+    top = max(values)
+    best = [action for action, value in enumerate(values) if value == top]
+    return best[min(int(u * len(best)), len(best) - 1)]
 
 
 def choose_epsilon_greedy(values: Sequence[float], epsilon: float, u: float) -> int:
-    """The best action, or with probability epsilon any one: one uniform number u in [0, 1) decides both."""
+    """The best action, or with probability epsilon any one: one uniform number u in [0, 1) decides all."""
     if u >= epsilon:
-        return greedy(values)
+        return choose_greedy(values, epsilon, (u - epsilon) / (1.0 - epsilon))
     return min(int(u / epsilon * len(values)), len(values) - 1)
 
 
-def uniforms(rng: np.random.Generator, block: int = 1024) -> Callable[[], float]:
+SELECTIONS: dict[str, Callable[[Sequence[float], float, float], int]] = {
+    "softmax": choose_softmax,
+    "epsilon-greedy": choose_epsilon_greedy,
+    "greedy": choose_greedy,
+}
+
+
+def uniforms(rng: np.random.Generator, block: int = 1024) -> Draw:
     """A fast source of uniform numbers in [0, 1): the generator's own stream, drawn in blocks."""
 
     def stream() -> Iterator[float]:
@@ -64,3 +89,23 @@ def uniforms(rng: np.random.Generator, block: int = 1024) -> Callable[[], float]
             yield from rng.random(block).tolist()
 
     return stream().__next__
+
+
+_MASK = (1 << 64) - 1
+
+
+def splitmix(seed: int) -> Draw:
+    """The uniform numbers in [0, 1) that the compiled kernel draws in a session of this seed, 0 <= seed < 2**64.
+
+    Source: Steele, Lea and Flood, Fast splittable pseudorandom number generators, OOPSLA 2014.
+    """
+    state = seed & _MASK
+
+    def draw() -> float:
+        nonlocal state
+        state = (state + 0x9E3779B97F4A7C15) & _MASK
+        z = ((state ^ (state >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
+        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
+        return ((z ^ (z >> 31)) >> 11) * 2.0**-53
+
+    return draw

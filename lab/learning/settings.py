@@ -7,6 +7,8 @@ from annotated_types import Ge, Gt, Le
 
 from lab.errors import BadInput
 
+COMPARE_WINDOWS = ("ccrl", "combined")
+
 
 def _require_allowed(settings: Any) -> None:
     """Raises BadInput for the first field that has the wrong type or lies outside its annotated range."""
@@ -15,7 +17,7 @@ def _require_allowed(settings: Any) -> None:
         hint, value = hints[name], getattr(settings, name)
         kind = getattr(hint, "__origin__", hint)
         allowed_types = (int, float) if kind is float else (kind,)
-        if isinstance(value, bool) or not isinstance(value, allowed_types):
+        if isinstance(value, bool) != (kind is bool) or not isinstance(value, allowed_types):
             raise BadInput(f"{type(settings).__name__}.{name} = {value!r}: it must be {kind.__name__}")
         limits = getattr(hint, "__metadata__", ())
         if not all(_within(value, limit) for limit in limits):
@@ -38,9 +40,11 @@ def _words(limit: Gt | Ge | Le) -> str:
 class LearnerSettings:
     """How a learner learns; the defaults are those of the thesis (sections 8.3 and 9.8).
 
-    learner: a name in UPDATES; alpha: learning rate; discount: gamma; trace: lambda of Q(lambda); beta: the softmax
-    temperature in episode n is n**-beta; episodes: session length N; max_steps: moves after which an episode is
-    broken off.
+    learner: a name in UPDATES; alpha: learning rate; discount: gamma; trace: lambda of the learners with traces;
+    replacing: a trace is set to 1 on each visit instead of growing by 1; selection: a name in SELECTIONS; in episode n
+    its temperature (or epsilon) is exploration * n**-beta, constant with beta 0; episodes: session length N;
+    max_steps: steps after which an episode is broken off; count_start: the start counts as a step, as in the thesis's
+    listing, so that a way of 12 moves has 13 steps.
     Raises BadInput for a value outside its range.
     """
 
@@ -48,9 +52,13 @@ class LearnerSettings:
     alpha: Annotated[float, Gt(0), Le(1)] = 0.95
     discount: Annotated[float, Gt(0), Le(1)] = 0.99
     trace: Annotated[float, Ge(0), Le(1)] = 0.5
+    replacing: bool = False
+    selection: str = "softmax"
+    exploration: Annotated[float, Gt(0), Le(1_000_000)] = 1.0
     beta: Annotated[float, Ge(0), Le(100)] = 1.3
     episodes: Annotated[int, Ge(1), Le(1_000_000)] = 200
     max_steps: Annotated[int, Ge(1), Le(1_000_000)] = 200
+    count_start: bool = False
 
     def __post_init__(self) -> None:
         _require_allowed(self)
@@ -62,9 +70,11 @@ class GateSettings:
 
     gate: a name in GATES; lambda_threshold: Lambda, the improvement rate below which advice is requested; omega:
     Omega, the misleads that are tolerated; first_episode: X, the first episode that may ask; window: K, the
-    episodes in a moving average; psi: Psi, the width below which the action values of a state leave the learner
-    unsure (introspection).
-    Raises BadInput for a value outside its range.
+    episodes in a moving average; psi: Psi, a width of action values that "ia", "combined", "importance" and
+    "uncertainty" compare with; rate: the share of steps that "random" asks for; enough_steps: the mean step count
+    that satisfies "cq"; ensemble: the tables of "uncertainty"; budget: the helped steps that any gate may use in a
+    session.
+    Raises BadInput for a value outside its range, or for X < 2K with a gate that compares moving averages.
     """
 
     gate: str = "ccrl"
@@ -73,6 +83,15 @@ class GateSettings:
     first_episode: Annotated[int, Ge(1), Le(1_000_000)] = 30
     window: Annotated[int, Ge(1), Le(100_000)] = 5
     psi: Annotated[float, Ge(0), Le(1_000_000)] = 1.0
+    rate: Annotated[float, Ge(0), Le(1)] = 0.1
+    enough_steps: Annotated[float, Gt(0), Le(1_000_000)] = 50.0
+    ensemble: Annotated[int, Ge(2), Le(100)] = 5
+    budget: Annotated[int, Ge(0), Le(1_000_000_000)] = 1_000_000_000
 
     def __post_init__(self) -> None:
         _require_allowed(self)
+        if self.gate in COMPARE_WINDOWS and self.first_episode < 2 * self.window:
+            raise BadInput(
+                f"GateSettings.first_episode = {self.first_episode}: the gate '{self.gate}' compares two windows of "
+                f"{self.window} episodes: allowed at least {2 * self.window}"
+            )

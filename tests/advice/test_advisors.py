@@ -1,21 +1,30 @@
 """Advisors: their skill, their names, and who may not be asked."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from lab.advice.advisors import (
     ADVISORS,
     SKILLS,
+    Advice,
     AdviceRequest,
     Advisor,
     AdvisorLeft,
-    SkilledAdvisor,
-    check_advisor,
+    RecordedAdvisor,
+    Recording,
+    TableAdvisor,
+    TerminalAdvisor,
     make_advisor,
+    parse_advisor,
+    read_record,
+    skill,
 )
 from lab.errors import BadInput
 from lab.learning.selection import softmax
-from lab.mdp import TabularMDP, grid, optimal_values, shortest_steps
+from lab.mdp import FloatArray, TabularMDP, grid, optimal_values, shortest_steps
 
 
 def board() -> TabularMDP:
@@ -77,7 +86,8 @@ def test_advice_follows_the_softmax_of_the_optimal_values() -> None:
 
 
 def test_a_frozen_table_never_overflows() -> None:
-    advisor = SkilledAdvisor(np.array([[1e9, -1e9, 1e9]]), 1e-12, np.random.default_rng(0))
+    advice = Advice.of(skill(np.array([[1e9, -1e9, 1e9]]), 1e-12))
+    advisor = TableAdvisor(advice, np.random.default_rng(0).random)
     assert {advisor.advise(request(board(), 0)) for _ in range(50)} == {0, 2}
 
 
@@ -103,10 +113,83 @@ def test_a_person_may_leave() -> None:
 
 
 def test_names_are_checked() -> None:
-    assert [check_advisor(name) for name in ADVISORS] == [None] * len(ADVISORS)
-    assert check_advisor("tau=0.25") == 0.25
+    for name in (*ADVISORS, "tau=0.25", "tau=1..0.01", "recorded:some/file"):
+        assert callable(parse_advisor(name))
     with pytest.raises(BadInput, match=r"unknown advisor 'exprt' \(--advisor\): did you mean 'expert'\?.*tau=X"):
-        check_advisor("exprt", "--advisor")
-    for bad in ("tau=", "tau=x", "tau=0", "tau=-1", "tau=nan", "tau=inf"):
+        parse_advisor("exprt", "--advisor")
+    for bad in ("tau=", "tau=x", "tau=0", "tau=-1", "tau=nan", "tau=inf", "tau=1..", "tau=1..0"):
         with pytest.raises(BadInput, match="tau must be a number above 0"):
-            check_advisor(bad)
+            parse_advisor(bad)
+
+
+def test_an_advisor_with_a_limited_view_says_nothing_outside_it() -> None:
+    mdp = board()
+    region = np.arange(16) >= 8
+    advisor = make_advisor("expert", mdp, 0.99, np.random.default_rng(0), region=region)
+    assert advisor is not None
+    assert [advisor.advise(request(mdp, state)) is None for state in (0, 7, 8, 15)] == [True, True, False, False]
+
+
+def test_an_advisor_may_learn_or_tire_over_the_episodes() -> None:
+    q = np.array([[0.0, 1.0]])
+    novice_to_expert = TableAdvisor(Advice.of(skill(q, [100.0, 0.01])), np.random.default_rng(0).random)
+    asked = [replace(request(board(), 0), episode=n) for n in (1, 2, 9)]
+    shares = [np.mean([novice_to_expert.advise(one) for _ in range(500)]) for one in asked]
+    assert 0.4 < shares[0] < 0.6
+    assert shares[1:] == [1.0, 1.0]  # the last skill stays
+    assert isinstance(made("tau=1..0.01", board()), TableAdvisor)
+
+
+def test_a_wrong_advisor_takes_the_worst_for_the_best() -> None:
+    mdp = board()
+    worst = optimal_values(mdp, 0.99).min(axis=1)
+    for state in (0, 3, 12):
+        action = made("wrong", mdp).advise(request(mdp, state))
+        assert action is not None
+        assert optimal_values(mdp, 0.99)[state, action] == worst[state]
+
+
+@pytest.mark.parametrize(
+    "chances", [np.full((2, 2), 0.4), np.array([[1.5, -0.5]]), np.array([[np.nan, 1.0]]), np.ones(2)]
+)
+def test_advice_is_made_of_chances(chances: FloatArray) -> None:
+    with pytest.raises(BadInput, match="advice: "):
+        Advice.of(chances)
+
+
+@pytest.mark.parametrize("tau", [0.0, -1.0, float("nan"), float("inf"), [0.1, 0.0]])
+def test_a_skill_needs_a_tau_above_zero(tau: float | list[float]) -> None:
+    with pytest.raises(BadInput, match="tau above 0"):
+        skill(np.zeros((2, 2)), tau)
+
+
+def test_recorded_advice_is_said_again_by_state(tmp_path: Path) -> None:
+    mdp, file = board(), tmp_path / "advice.jsonl"
+    person = Recording(TerminalAdvisor(lambda asked: asked.step % 4), file)
+    for state, step in ((3, 1), (5, 2), (3, 3)):
+        person.advise(replace(request(mdp, state), step=step))
+    with file.open("a") as cut:
+        cut.write('{"signature": "ab')  # the last line was cut off
+    said = read_record(file, mdp)
+    assert said == {3: 3, 5: 2}
+    advisor = RecordedAdvisor(said)
+    assert [advisor.advise(request(mdp, state)) for state in (3, 4, 5)] == [3, None, 2]
+    assert isinstance(made(f"recorded:{file}", mdp), RecordedAdvisor)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("nonsense\n{}\n", "line 1 is no record"),
+        ('{"signature": "SIG", "state": 99, "action": 0}\n', "line 1: state 99, action 0 do not exist"),
+        ('{"signature": "other", "state": 0, "action": 0}\n', "no advice about this problem .* 1 lines"),
+        ("", "no advice about this problem"),
+    ],
+)
+def test_a_record_that_does_not_fit(text: str, message: str, tmp_path: Path) -> None:
+    file = tmp_path / "advice.jsonl"
+    file.write_text(text.replace("SIG", board().signature))
+    with pytest.raises(BadInput, match=message):
+        read_record(file, board())
+    with pytest.raises(BadInput, match="cannot be read"):
+        read_record(tmp_path / "none", board())

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from lab.advice.advisors import make_advisor
-from lab.advice.gates import GATES, Gate, improvement
+from lab.advice.gates import GATES, Gate, Surroundings, deviation, improvement
+from lab.errors import BadInput
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.updates import UPDATES, Update
 from lab.mdp import grid
 
 LIMIT = 200
@@ -17,7 +19,7 @@ SETTINGS = GateSettings(first_episode=5, window=2, omega=1, lambda_threshold=0.0
 
 
 def gate(name: str, settings: GateSettings = SETTINGS, episodes: int = 100) -> Gate:
-    return GATES[name](settings, episodes, LIMIT)
+    return GATES[name](settings, episodes, LIMIT, None)
 
 
 def opened(one: Gate, steps: Sequence[int]) -> list[int]:
@@ -41,7 +43,8 @@ def test_ccrl_asks_while_the_ratio_of_the_means_exceeds_one_minus_lambda(name: s
 def test_ccrl_waits_for_episode_x_and_for_two_windows() -> None:
     flat = [FAILED] * 12
     assert opened(gate("ccrl", GateSettings(first_episode=8, window=2)), flat) == [8, 9, 10, 11, 12, 13]
-    assert opened(gate("ccrl", GateSettings(first_episode=1, window=5)), flat) == [11, 12, 13]
+    with pytest.raises(BadInput, match=r"first_episode = 9: the gate 'ccrl' compares two windows of 5.*at least 10"):
+        GateSettings(first_episode=9, window=5)
 
 
 def test_ccrl_leaves_the_last_episode_to_the_learner() -> None:
@@ -65,13 +68,13 @@ def test_ccrl_never_calls_failure_convergence() -> None:
 @pytest.mark.parametrize("name", ["ccrl", "combined"])
 def test_a_helped_episode_that_is_not_better_is_a_mislead(name: str) -> None:
     one = gate(name)
-    one.judges([10, 10, 9], helped=True)
+    one.judges([10, 10, 9], opened=True)
     assert one.misleads == 0
-    one.judges([10, 10, 10], helped=True)  # equal is not better
+    one.judges([10, 10, 10], opened=True)  # equal is not better
     assert (one.misleads, one.rejected) == (1, False)
-    one.judges([10, 10, 11], helped=False)
+    one.judges([10, 10, 11], opened=False)
     assert (one.misleads, one.rejected) == (1, False)
-    one.judges([10, 20, 16], helped=True)
+    one.judges([10, 20, 16], opened=True)
     assert (one.misleads, one.rejected) == (2, True)
     assert not one.opens(50, [FAILED] * 49)
 
@@ -79,22 +82,21 @@ def test_a_helped_episode_that_is_not_better_is_a_mislead(name: str) -> None:
 @pytest.mark.parametrize("name", ["ia", "combined"])
 def test_introspection_asks_where_the_values_lie_close(name: str) -> None:
     one = gate(name)
-    assert one.asks([0.0, 0.0, 0.0])
-    assert one.asks([0.0, 0.4])
-    assert not one.asks([0.0, 0.5])
-    assert not gate(name, GateSettings(psi=0.0)).asks([0.0, 0.0])
+    assert one.asks(0, [0.0, 0.0, 0.0])
+    assert one.asks(0, [0.0, 0.5])
+    assert not one.asks(0, [0.0, 0.51])
 
 
 def test_introspection_begins_at_episode_x_and_never_rejects() -> None:
     one = gate("ia")
     assert [episode for episode in range(1, 8) if one.opens(episode, [])] == [5, 6, 7]
-    one.judges([1, 1, 9], helped=True)
+    one.judges([1, 1, 9], opened=True)
     assert not one.rejected
 
 
 def test_always_and_never() -> None:
     assert opened(gate("always"), [20] * 3) == [1, 2, 3, 4]
-    assert gate("always").asks([0.0, 9.0])
+    assert gate("always").asks(0, [0.0, 9.0])
     assert opened(gate("never"), [FAILED] * 20) == []
 
 
@@ -102,7 +104,8 @@ def taught(name: str, advisor: str, seed: int) -> SessionResult:
     blocked = np.zeros((6, 6), bool)
     blocked[1:5, 2] = blocked[2, 4] = True
     mdp = grid((6, 6), blocked, (2, 0), (3, 5))
-    settings = GateSettings(name, first_episode=10, window=3, omega=2)
+    psi = 0.1 if name == "uncertainty" else 1.0
+    settings = GateSettings(name, first_episode=10, window=3, omega=2, psi=psi, rate=0.3)
     adviser = make_advisor(advisor, mdp, 0.99, np.random.default_rng([seed, 1]))
     return run_session(mdp, LearnerSettings("q", episodes=80), settings, adviser, np.random.default_rng(seed))
 
@@ -122,3 +125,46 @@ def test_experts_and_novices_at_every_gate(name: str) -> None:
         assert all(result.solved for result in experts)
         late = [np.mean([result.steps[9:40] for result in results]) for results in (experts, novices)]
         assert late[0] < late[1]
+
+
+def test_cq_asks_while_the_mean_is_above_a_constant() -> None:
+    one = gate("cq", GateSettings("cq", first_episode=3, window=2, enough_steps=10.0))
+    assert opened(one, [FAILED, 11, 10, 10, 9, 12]) == [3, 4, 7]  # means before 3..7: 106, 10.5, 10, 9.5, 10.5
+    assert "the last 2 episodes took 10.5 steps, more than 10" in one.why
+
+
+def test_importance_asks_where_the_values_lie_far_apart() -> None:
+    one = gate("importance")
+    assert [one.asks(0, values) for values in ([0.0, 0.4], [0.0, 0.5], [0.5, 0.0])] == [False, True, True]
+
+
+def test_random_asks_at_its_rate() -> None:
+    draws = iter([0.05, 0.5, 0.15, 0.0])
+    around = Surroundings(draws.__next__, lambda count: [])
+    one = GATES["random"](GateSettings(rate=0.1), 10, LIMIT, around)
+    assert [one.asks(0, [0.0]) for _ in range(4)] == [True, False, False, True]
+
+
+def test_the_deviation_of_tables_by_hand() -> None:
+    # action 0: values 0 and 2, variance 1; action 1: 3 and 3, variance 0; the root of their mean
+    assert deviation([[0.0, 3.0], [2.0, 3.0]]) == 0.5**0.5
+
+
+def test_uncertainty_falls_where_the_learner_has_been() -> None:
+    mdp = grid((1, 6), np.zeros((1, 6), bool), (0, 0), (0, 5))
+    rng = np.random.default_rng(0)
+
+    def tables(count: int) -> list[Update]:
+        made = [UPDATES["q"](np.zeros((6, 4)).tolist(), LearnerSettings("q"), mdp) for _ in range(count)]
+        for table in made:
+            table.scatter(rng.random)
+        return made
+
+    one = GATES["uncertainty"](GateSettings(psi=0.05), 10, LIMIT, Surroundings(rng.random, tables))
+    assert one.asks(3, [])
+    for _ in range(40):
+        for action in range(4):
+            entered = int(mdp.successor[3, action])
+            one.saw(3, action, -0.1, 0.0, entered)
+    assert not one.asks(3, [])
+    assert one.asks(2, [])

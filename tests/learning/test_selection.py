@@ -1,13 +1,23 @@
 """Choices and schedules, with the probabilities worked out by hand."""
 
-from math import e, isclose
+from math import e, exp, isclose
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.learning.selection import choose_epsilon_greedy, choose_softmax, greedy, softmax, temperature, uniforms
+from lab.learning.selection import (
+    choose_epsilon_greedy,
+    choose_greedy,
+    choose_softmax,
+    exp_of,
+    greedy,
+    softmax,
+    splitmix,
+    temperature,
+    uniforms,
+)
 
 values_of_a_state = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=8)
 
@@ -54,3 +64,33 @@ def test_the_schedule_by_hand() -> None:
 def test_uniforms_are_the_generators_own_stream() -> None:
     draw = uniforms(np.random.default_rng(3), block=4)
     np.testing.assert_array_equal([draw() for _ in range(8)], np.random.default_rng(3).random(8))
+
+
+def test_equally_good_actions_are_drawn() -> None:
+    assert [choose_greedy([1.0, 3.0, 3.0], 0.0, u) for u in (0.0, 0.49, 0.5, 0.99)] == [1, 1, 2, 2]
+    assert [choose_epsilon_greedy([3.0, 3.0], 0.5, u) for u in (0.0, 0.26, 0.5, 0.74, 0.76)] == [0, 1, 0, 0, 1]
+
+
+@given(st.floats(-1e308, 0.0))
+def test_the_quick_exponential_is_good_to_2e_8(x: float) -> None:
+    assert abs(exp_of(x) - exp(x)) < 2e-8
+    assert exp_of(0.0) == 1.0
+    assert exp_of(-1e300) == 0.0
+
+
+@given(st.lists(st.floats(-2.0, 2.0), min_size=2, max_size=6), st.floats(1e-3, 1.0))
+def test_the_choice_has_the_softmax_probabilities(values: list[float], tau: float) -> None:
+    # the chance of an action is the width of the numbers u that pick it: its end lies where the softmax sums say
+    ends = np.cumsum(softmax(values, tau))
+    for action, end in enumerate(ends[:-1]):
+        if end + 1e-6 < 1.0:
+            assert choose_softmax(values, tau, end + 1e-6) > action
+        if end > 1e-6:
+            assert choose_softmax(values, tau, end - 1e-6) <= action
+
+
+def test_splitmix_is_the_published_stream() -> None:
+    # the first outputs of the reference program for seed 1234567, as 53-bit fractions
+    published = (6457827717110365317, 3203168211198807973, 9817491932198370423)
+    draw = splitmix(1234567)
+    assert [draw() for _ in range(3)] == [(number >> 11) * 2.0**-53 for number in published]

@@ -16,9 +16,13 @@ def test_the_defaults_are_those_of_the_thesis() -> None:
         "alpha": 0.95,
         "discount": 0.99,
         "trace": 0.5,
+        "replacing": False,
+        "selection": "softmax",
+        "exploration": 1.0,
         "beta": 1.3,
         "episodes": 200,
         "max_steps": 200,
+        "count_start": False,
     }
     assert asdict(GateSettings()) == {
         "gate": "ccrl",
@@ -27,6 +31,10 @@ def test_the_defaults_are_those_of_the_thesis() -> None:
         "first_episode": 30,
         "window": 5,
         "psi": 1.0,
+        "rate": 0.1,
+        "enough_steps": 50.0,
+        "ensemble": 5,
+        "budget": 1_000_000_000,
     }
 
 
@@ -41,11 +49,16 @@ BAD = [
     (LearnerSettings, "episodes", 2.5),
     (LearnerSettings, "max_steps", -1),
     (LearnerSettings, "learner", 3),
+    (LearnerSettings, "exploration", 0.0),
     (GateSettings, "lambda_threshold", 1.5),
     (GateSettings, "omega", -1),
     (GateSettings, "first_episode", 0),
     (GateSettings, "window", 0),
     (GateSettings, "psi", -0.5),
+    (GateSettings, "rate", 1.1),
+    (GateSettings, "enough_steps", 0.0),
+    (GateSettings, "ensemble", 1),
+    (GateSettings, "budget", -1),
 ]
 
 

@@ -1,0 +1,456 @@
+"""Whole sessions compiled with numba, many at once: what studies run.
+
+Sixteen sessions walk side by side: one alone waits for its memory and its exponentials, sixteen keep the processor busy.
+Each has uniform numbers of its own (`selection.splitmix`), so its result depends on its seed and on nothing else, and
+equals that of `session.run_session` with the same numbers. Rules come from `selection`, `updates` and `advice.gates`.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from lab.advice import gates
+from lab.advice.advisors import Advice
+from lab.errors import BadInput, unknown
+from lab.learning import selection, updates
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.mdp import FloatArray, TabularMDP
+
+LANES = 24
+LEARNERS = ("afterstate", "q")  # those that chapter 9 needs
+GATE_CODES = {name: code for code, name in enumerate(gates.GATES)}
+_NEVER, _CCRL, _COMBINED, _IA, _CQ, _RANDOM, _IMPORTANCE, _UNCERTAINTY = (
+    GATE_CODES[name] for name in ("never", "ccrl", "combined", "ia", "cq", "random", "importance", "uncertainty")
+)
+
+_BELOW_ONE = selection.BELOW_ONE
+_exp_of: Any = njit(selection.exp_of)
+_window_mean: Any = njit(gates.window_mean)
+_too_slow: Any = njit(gates.too_slow)
+_misled: Any = njit(gates.misled)
+_unsure: Any = njit(gates.unsure)
+_towards: Any = njit(updates.towards)
+_afterstate_value: Any = njit(updates.afterstate_value)
+
+
+class Batch(NamedTuple):
+    """What N sessions of E episodes came to, in the order of their seeds.
+
+    steps (N, E) int32, a failed episode as max_steps + 1; guided (N, E) bool: at least one helped step; requests,
+    helped_steps, misleads (N,) int64, as in `SessionResult`; rejected_at_episode (N,) int64, 0 where none was;
+    moves (N,) int64: all that were made; q (N, S, A) float64, of no sessions unless asked for.
+    """
+
+    steps: NDArray[np.int32]
+    guided: NDArray[np.bool_]
+    requests: NDArray[np.int64]
+    helped_steps: NDArray[np.int64]
+    misleads: NDArray[np.int64]
+    rejected_at_episode: NDArray[np.int64]
+    moves: NDArray[np.int64]
+    q: FloatArray
+
+
+class _Problem(NamedTuple):
+    """The problem as flat arrays; `ends`: 0 goes on, 1 goal, 2 another terminal state."""
+
+    successor: NDArray[np.int32]
+    reward: FloatArray
+    arrival: FloatArray
+    ends: NDArray[np.uint8]
+    starts: NDArray[np.int64]
+    step_reward: float
+
+
+class _Rules(NamedTuple):
+    """Learner and gate as plain numbers."""
+
+    afterstate: bool
+    alpha: float
+    discount: float
+    max_moves: int
+    max_steps: int
+    count_start: int
+    gate: int
+    threshold: float
+    omega: int
+    first_episode: int
+    window: int
+    psi: float
+    rate: float
+    enough: float
+    ensemble: int
+    budget: int
+
+
+# What each of the sessions under way remembers; session -1: none. `converged` as in `gates.Ccrl`.
+_LANE = np.dtype(
+    [(name, np.int64) for name in ("session", "episode", "is_open", "asked", "helped", "left")]
+    + [(name, np.int64) for name in ("last_result", "equal_results", "converged")]
+)
+_COUNTS = np.dtype(
+    [(name, np.int64) for name in ("requests", "helped_steps", "misleads", "rejected_at_episode", "moves")]
+)
+
+
+@njit(inline="always")
+def _draw(rng: Any, lane: int) -> float:
+    """selection.splitmix for one lane."""
+    rng[lane] += np.uint64(0x9E3779B97F4A7C15)
+    z = rng[lane]
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+
+
+@njit
+def _gauge(problem: Any, rules: Any, table: Any, state: int, action: int) -> float:
+    """`Update.gauge` of one action in a flat table."""
+    actions = problem.successor.shape[1]
+    if rules.afterstate:
+        return float(table[problem.successor[state, action]])
+    return float(table[state * actions + action])
+
+
+@njit
+def _learn(problem: Any, rules: Any, table: Any, state: int, action: int) -> None:
+    """`Update.learn` of one step in a flat table."""
+    actions = problem.successor.shape[1]
+    entered = problem.successor[state, action]
+    over = problem.ends[entered] != 0
+    if rules.afterstate:
+        target = _afterstate_value(problem.step_reward, rules.discount, table[entered])
+        table[state] = _towards(table[state], target, rules.alpha)
+        if over:
+            table[entered] = problem.arrival[entered]
+        return
+    best = table[entered * actions]
+    for a in range(1, actions):
+        best = max(best, table[entered * actions + a])
+    target = problem.reward[state, action] + (0.0 if over else rules.discount) * best
+    at = state * actions + action
+    table[at] = _towards(table[at], target, rules.alpha)
+
+
+@njit
+def _deviation(problem: Any, rules: Any, tables: Any, state: int) -> float:
+    """gates.deviation of the ensemble's values in a state."""
+    actions, count = problem.successor.shape[1], len(tables)
+    total = 0.0
+    for a in range(actions):
+        summed = 0.0
+        for k in range(count):
+            summed += _gauge(problem, rules, tables[k], state, a)
+        mean, squares = summed / count, 0.0
+        for k in range(count):
+            off = _gauge(problem, rules, tables[k], state, a) - mean
+            squares += off * off
+        total += squares / count
+    return float((total / actions) ** 0.5)
+
+
+@njit
+def _opens(rules: Any, lane: Any, steps: Any, rejected: bool) -> bool:
+    """`Gate.opens`: whether the episode that begins in a lane may ask; steps (E,) are those of its session."""
+    gate, episode = rules.gate, lane.episode
+    if gate in (_IA, _RANDOM, _IMPORTANCE, _UNCERTAINTY):
+        return bool(episode >= rules.first_episode)
+    if gate == _CQ:
+        enough = episode >= rules.first_episode and episode > rules.window
+        return bool(enough and _window_mean(steps, episode - 1, rules.window) > rules.enough)
+    if gate not in (_CCRL, _COMBINED):
+        return bool(gate != _NEVER)
+    if rejected or episode < rules.first_episode or episode <= 2 * rules.window:
+        return False
+    result = steps[episode - 2]
+    if result == lane.last_result and result < rules.max_steps:
+        lane.equal_results += 1
+        if lane.equal_results > 2 * rules.window:
+            lane.converged = 1
+    else:
+        lane.last_result, lane.equal_results = result, 0
+    current = _window_mean(steps, episode - 1, rules.window)
+    previous = _window_mean(steps, episode - 1 - rules.window, rules.window)
+    slow = _too_slow(current, previous, rules.threshold)
+    return bool(slow and lane.converged == 0 and episode < len(steps))
+
+
+@njit
+def _begin_episode(rules: Any, lane: Any, steps: Any, counts: Any) -> None:
+    """The next episode of a lane's session, its gate open or closed."""
+    lane.episode += 1
+    lane.asked, lane.helped = 0, 0
+    lane.left = rules.budget - counts[lane.session].helped_steps
+    lane.is_open = rules.gate != _NEVER and _opens(
+        rules, lane, steps[lane.session], counts[lane.session].rejected_at_episode > 0
+    )
+
+
+@njit
+def _end_episode(rules: Any, lane: Any, moves: int, reached: bool, steps: Any, guided: Any, counts: Any) -> None:
+    """Books the episode that is over, and judges its advice (`Ccrl.judges`)."""
+    n, episode, window = lane.session, lane.episode, rules.window
+    steps[n, episode - 1] = moves + rules.count_start if reached else rules.max_steps + 1
+    guided[n, episode - 1] = lane.helped > 0
+    count = counts[n]
+    count.requests += lane.asked
+    count.helped_steps += lane.helped
+    count.moves += moves
+    judged = rules.gate in (_CCRL, _COMBINED) and lane.is_open and count.rejected_at_episode == 0
+    if judged and episode > window and _misled(steps[n, episode - 1], _window_mean(steps[n], episode - 1, window)):
+        count.misleads += 1
+        if count.misleads > rules.omega:
+            count.rejected_at_episode = episode
+
+
+@njit
+def _begin_session(lane: Any, j: int, n: int, seed: Any, tables: Any, others: Any, rng: Any) -> None:
+    """Clears a lane for session n."""
+    lane.session, lane.episode, rng[j] = n, 0, seed
+    lane.last_result, lane.equal_results, lane.converged = 0, 0, 0
+    tables[j, :] = 0.0
+    for k in range(others.shape[1]):
+        for i in range(others.shape[2]):
+            others[j, k, i] = _draw(rng, j) - 0.5
+
+
+@njit
+def _choose(
+    values: Any, reward: float, discount: float, per_tau: Any, rng: Any, actions: Any, chosen: Any, widths: Any
+) -> None:
+    """`selection.choose_softmax` in every lane at once; values (A * LANES,) are used up, the rest is (LANES,).
+
+    The values become rewards + discount * value; `widths` is how far those before that span. `actions` is a tuple of A
+    numbers: its length is known to the compiler, which keeps all of one action's lanes in registers.
+    """
+    for j in range(LANES):
+        top = low = values[j]
+        for a in range(1, len(actions)):
+            top, low = max(top, values[a * LANES + j]), min(low, values[a * LANES + j])
+        widths[j] = top - low
+        top = reward + discount * top
+        total = 0.0
+        for a in range(len(actions)):
+            x = (reward + discount * values[a * LANES + j] - top) * per_tau[j]
+            total += _exp_of(x)
+            values[a * LANES + j] = total
+    for j in range(LANES):
+        rng[j] += np.uint64(0x9E3779B97F4A7C15)
+        z = rng[j]
+        z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        u = float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+        mark = u * values[(len(actions) - 1) * LANES + j] * _BELOW_ONE
+        action = np.int64(0)
+        for a in range(len(actions) - 1):
+            action += np.int64(values[a * LANES + j] <= mark)
+        chosen[j] = action
+
+
+@njit(cache=True, nogil=True)
+def _run(
+    problem: Any,
+    rules: Any,
+    advice: Any,
+    region: Any,
+    seeds: Any,
+    temperatures: Any,
+    actions: Any,
+    all_tables: Any,
+    others: Any,
+    steps: Any,
+    guided: Any,
+    counts: Any,
+    kept: Any,
+) -> None:
+    """All sessions: each lane takes the next one when its own is over. Scratch: all_tables (LANES, size), others.
+
+    What is done in every step is written out here over plain arrays: a call that hands on a record of arrays counts
+    references, which costs more than the step itself.
+    """
+    A, episodes, sessions = len(actions), steps.shape[1], len(seeds)
+    successor, ends, reward, arrival = problem.successor.ravel(), problem.ends, problem.reward.ravel(), problem.arrival
+    afterstate, alpha, discount, step_reward = rules.afterstate, rules.alpha, rules.discount, problem.step_reward
+    offset, factor = (step_reward, discount) if afterstate else (0.0, 1.0)
+    gate, psi, max_moves, starts = rules.gate, rules.psi, rules.max_moves, problem.starts
+    tables, size, ensemble = all_tables.ravel(), np.uint64(all_tables.shape[1]), others.shape[1]
+    lanes, rng, per_tau, fresh = (
+        np.zeros(LANES, _LANE),
+        np.zeros(LANES, np.uint64),
+        np.zeros(LANES),
+        np.ones(LANES, np.bool_),
+    )
+    values, widths, chosen = np.zeros(A * LANES), np.zeros(LANES), np.zeros(LANES, np.int64)
+    states, moves, is_open = np.zeros(LANES, np.uint64), np.zeros(LANES, np.int64), np.zeros(LANES, np.bool_)
+    following = over_all = 0
+    for j in range(LANES):
+        lanes[j].session, lanes[j].episode = -1, episodes
+    some_fresh = True
+    while over_all < sessions:
+        if some_fresh:
+            some_fresh = False
+            for j in range(LANES):
+                if fresh[j]:
+                    fresh[j], moves[j], states[j] = False, 0, starts[0]
+                    if lanes[j].episode == episodes:
+                        lanes[j].session = -1  # a lane without a session walks on, and nobody looks
+                        if following < sessions:
+                            _begin_session(lanes[j], j, following, seeds[following], all_tables, others, rng)
+                            following += 1
+                    if lanes[j].session >= 0:
+                        _begin_episode(rules, lanes[j], steps, counts)
+                        per_tau[j], is_open[j] = temperatures[lanes[j].episode - 1], lanes[j].is_open
+                        if len(starts) > 1:
+                            states[j] = starts[int(_draw(rng, j) * len(starts))]
+        for j in range(LANES):
+            base, at = np.uint64(j) * size, states[j] * np.uint64(A)
+            for a in range(A):
+                i = at + np.uint64(a)
+                values[a * LANES + j] = tables[base + (np.uint64(successor[i]) if afterstate else i)]
+        _choose(values, offset, factor, per_tau, rng, actions, chosen, widths)
+        for j in range(LANES):
+            state, action, base = states[j], np.uint64(chosen[j]), np.uint64(j) * size
+            if is_open[j] and lanes[j].helped < lanes[j].left:
+                if gate in (_IA, _COMBINED):
+                    asks = _unsure(widths[j], psi)
+                elif gate == _IMPORTANCE:
+                    asks = widths[j] >= psi
+                elif gate == _RANDOM:
+                    asks = _draw(rng, j) < rules.rate
+                elif gate == _UNCERTAINTY:
+                    asks = _deviation(problem, rules, others[j], np.int64(state)) >= psi
+                else:
+                    asks = True
+                if asks:
+                    lane = lanes[j]
+                    lane.asked = 1
+                    if region[state]:
+                        lane.helped += 1
+                        row = min(lane.episode, advice.shape[0]) - 1
+                        mark, action = _draw(rng, j) * advice[row, state, A - 1], np.uint64(0)
+                        for a in range(A - 1):
+                            action += np.uint64(advice[row, state, a] <= mark)
+            step = state * np.uint64(A) + action
+            entered = np.uint64(successor[step])
+            over = ends[entered]
+            if afterstate:
+                target = _afterstate_value(step_reward, discount, tables[base + entered])
+                tables[base + state] = _towards(tables[base + state], target, alpha)
+                if over:
+                    tables[base + entered] = arrival[entered]
+            else:
+                best = tables[base + entered * np.uint64(A)]
+                for a in range(1, A):
+                    best = max(best, tables[base + entered * np.uint64(A) + np.uint64(a)])
+                target = reward[step] + (0.0 if over else discount) * best
+                tables[base + step] = _towards(tables[base + step], target, alpha)
+            for k in range(ensemble):
+                if _draw(rng, j) < 0.5:
+                    _learn(problem, rules, others[j, k], np.int64(state), np.int64(action))
+            states[j] = entered
+            moves[j] += 1
+            if over or moves[j] == max_moves:
+                fresh[j] = some_fresh = True
+                if lanes[j].session >= 0:
+                    _end_episode(rules, lanes[j], moves[j], over == 1, steps, guided, counts)
+                    if lanes[j].episode == episodes:
+                        over_all, is_open[j] = over_all + 1, False
+                        if len(kept):
+                            kept[lanes[j].session] = all_tables[j]
+
+
+def run_sessions(
+    mdp: TabularMDP,
+    learner: LearnerSettings,
+    gate: GateSettings,
+    advice: Advice | None,
+    seeds: NDArray[np.uint64],
+    *,
+    keep_tables: bool = False,
+) -> Batch:
+    """Learns a table in each of N sessions, seeds (N,) uint64; advice None: nobody to ask.
+
+    The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix(seed)` and
+    a `TableAdvisor` on the same draws. Raises BadInput for a learner outside LEARNERS, a selection other than softmax,
+    an unknown gate, or advice of another shape.
+    """
+    if learner.learner not in LEARNERS:
+        raise unknown("learner", learner.learner, LEARNERS, "compiled sessions")
+    if learner.selection != "softmax":
+        raise unknown("selection", learner.selection, ["softmax"], "compiled sessions")
+    if gate.gate not in GATE_CODES:
+        raise unknown("gate", gate.gate, GATE_CODES, "gate settings")
+    if advice is not None and advice.thresholds.shape[1:] != mdp.successor.shape:
+        raise BadInput(f"advice of shape {advice.thresholds.shape}: the problem has {mdp.successor.shape}")
+    rules, problem = _rules(learner, gate, advice is not None), _problem(mdp, learner.learner == "afterstate")
+    size = mdp.n_states if rules.afterstate else mdp.n_states * mdp.n_actions
+    sessions, episodes = len(seeds), learner.episodes
+    steps, guided = np.zeros((sessions, episodes), np.int32), np.zeros((sessions, episodes), np.bool_)
+    counts, kept = np.zeros(sessions, _COUNTS), np.zeros((sessions if keep_tables else 0, size))
+    temperatures = [selection.temperature(n, learner.beta, learner.exploration) for n in range(1, episodes + 1)]
+    thresholds = np.zeros((1, 1, mdp.n_actions)) if advice is None else advice.thresholds
+    region = np.zeros(mdp.n_states, np.bool_) if advice is None else advice.region
+    others = np.zeros((LANES, rules.ensemble if rules.gate == _UNCERTAINTY else 0, size))
+    _run(
+        problem,
+        rules,
+        thresholds,
+        region,
+        np.asarray(seeds, np.uint64),
+        1.0 / np.array(temperatures),
+        (0,) * mdp.n_actions,
+        np.zeros((LANES, size)),
+        others,
+        steps,
+        guided,
+        counts,
+        kept,
+    )
+    return Batch(
+        steps, guided, **{name: counts[name] for name in _COUNTS.names or ()}, q=_action_values(mdp, rules, kept)
+    )
+
+
+def _problem(mdp: TabularMDP, afterstate: bool) -> _Problem:
+    ends = np.where(mdp.goal, 1, np.where(mdp.terminal, 2, 0)).astype(np.uint8)
+    starts = np.array(mdp.starts or (mdp.start,), np.int64)
+    arrival = mdp.arrival if afterstate else np.zeros(1)
+    return _Problem(
+        mdp.successor.copy(), mdp.reward.copy(), arrival, ends, starts, mdp.step_reward if afterstate else 0.0
+    )
+
+
+def _rules(learner: LearnerSettings, gate: GateSettings, somebody: bool) -> _Rules:
+    return _Rules(
+        learner.learner == "afterstate",
+        float(learner.alpha),
+        float(learner.discount),
+        learner.max_steps - learner.count_start,
+        learner.max_steps,
+        int(learner.count_start),
+        GATE_CODES[gate.gate] if somebody else _NEVER,
+        float(gate.lambda_threshold),
+        gate.omega,
+        gate.first_episode,
+        gate.window,
+        float(gate.psi),
+        float(gate.rate),
+        float(gate.enough_steps),
+        gate.ensemble,
+        gate.budget,
+    )
+
+
+def _action_values(mdp: TabularMDP, rules: _Rules, tables: FloatArray) -> FloatArray:
+    """Tables as (N, S, A) action values, zeros in terminal states."""
+    if not rules.afterstate:
+        return tables.reshape(-1, *mdp.successor.shape)
+    q = (
+        mdp.step_reward + rules.discount * tables[:, mdp.successor]
+        if len(tables)
+        else np.zeros((0, *mdp.successor.shape))
+    )
+    q[:, mdp.terminal] = 0.0
+    return q

@@ -1,0 +1,102 @@
+"""What task files are made of: frozen records of checked fields, names, and how a problem is learned."""
+
+import os
+from dataclasses import asdict, replace
+from pathlib import Path
+from secrets import token_hex
+from typing import Annotated, Any, Self, cast
+
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, field_validator
+from pydantic_core import CoreSchema
+
+from lab.errors import BadInput, unknown
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.mdp import Rewards
+
+MAX_REWARD = 1_000_000  # sums of larger ones lose the small ones, and of much larger ones overflow
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$")]
+Count = Annotated[int, Field(ge=1, le=100)]
+
+
+def as_tuple(value: object) -> object:
+    """A list as a tuple, for a strict field; anything else as it is."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+class Record(BaseModel):
+    """A frozen record that knows its fields and takes no others."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class _FromTable:
+    """Lets a dataclass in a strict record be written as a table; its own fields stay strict."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        schema = handler(source)
+        cast(dict[str, Any], handler.resolve_ref_schema(schema))["strict"] = False
+        return schema
+
+
+FROM_TABLE = _FromTable()
+
+
+class Learned(Record):
+    """How something is learned: rewards, learner and gate."""
+
+    rewards: Annotated[Rewards, FROM_TABLE] = Rewards()
+    learner: Annotated[LearnerSettings, FROM_TABLE] = LearnerSettings()
+    gate: Annotated[GateSettings, FROM_TABLE] = GateSettings()
+
+    @field_validator("rewards")
+    @classmethod
+    def _sums_are_finite(cls, rewards: Rewards) -> Rewards:
+        for field, value in asdict(rewards).items():
+            if abs(value) > MAX_REWARD:
+                raise ValueError(f"{field} = {value}: allowed are -{MAX_REWARD} to {MAX_REWARD}")
+        return rewards
+
+    def check_members(self, where: str = "") -> None:
+        """Raises BadInput for an unknown learner, selection or gate; `where` comes before the names of the tables."""
+        from lab.advice.gates import GATES
+        from lab.learning.selection import SELECTIONS
+        from lab.learning.updates import UPDATES
+
+        if self.learner.learner not in UPDATES:
+            raise unknown("learner", self.learner.learner, UPDATES, f"{where}learner")
+        if self.learner.selection not in SELECTIONS:
+            raise unknown("selection", self.learner.selection, SELECTIONS, f"{where}learner")
+        if self.gate.gate not in GATES:
+            raise unknown("gate", self.gate.gate, GATES, f"{where}gate")
+
+    def changed(self, learner: str | None, gate: str | None, episodes: int | None) -> Self:
+        """With what the options of a command say, None for what they leave; BadInput for an unknown learner or gate."""
+        own, when = self.learner, self.gate
+        own = replace(own, learner=own.learner if learner is None else learner, episodes=episodes or own.episodes)
+        when = replace(when, gate=when.gate if gate is None else gate)
+        other = self.model_copy(update={"learner": own, "gate": when})
+        other.check_members("--")
+        return other
+
+
+def read_text(path: Path) -> str:
+    """A file's text; raises BadInput when it cannot be read or is no UTF-8."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInput(f"{path}: cannot be read: {error}") from None
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Writes a text file whole or not at all, replacing one that is there; raises BadInput when it cannot be written."""
+    beside = path.with_name(f".{path.name}.{token_hex(4)}.tmp")
+    try:
+        try:
+            beside.write_text(text, encoding="utf-8")
+            os.replace(beside, path)
+        except BaseException:
+            beside.unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written: {error.strerror or error}") from error

@@ -1,0 +1,231 @@
+"""Runs the sessions that a study asks for: in this process, in several, or on a Dask cluster, always the same ones.
+
+The chance of a session depends on the study's seed and on its own setting only. What is done is written to a file at
+once, a line a setting, and not done again.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache, partial
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput, WorkFailed
+from lab.gridworld import GridWorld
+from lab.learning.settings import GateSettings
+from lab.mdp import FloatArray, TabularMDP, optimal_values, shortest_steps
+
+FORMAT = 1  # of what is stored; another one is computed anew
+STORE = "sessions.jsonl"
+Progress = Callable[[int, int], None]  # settings done, of how many
+Count = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One cell of a table: a world, who advises there, and when the learner asks.
+
+    tau None: nobody advises. lambda_threshold, omega and psi are those of the gates that have them. advisor_table:
+    "exact" optimal values, or "learned" (see `learned_values`). beta None: the world's own.
+    """
+
+    world: str
+    view: Literal["full", "limited"] = "full"
+    gate: str = "never"
+    tau: float | None = None
+    lambda_threshold: float | None = None
+    omega: int | None = None
+    psi: float | None = None
+    beta: float | None = None
+    advisor_table: Literal["exact", "learned"] = "learned"
+    learner: str | None = None
+
+    def key(self, sessions: int, seed: int) -> str:
+        """What names this setting's results among all that are stored."""
+        whole = [FORMAT, asdict(self), sessions, seed, world(self.world).mdp().signature]
+        return sha256(json.dumps(whole).encode()).hexdigest()[:24]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What N sessions came to, one number each (N,): whether the last episode took the shortest way; advice given."""
+
+    success: NDArray[np.bool_]
+    helped_steps: Count
+    requests: Count
+
+    def to_json(self) -> dict[str, list[int]]:
+        """Plain lists."""
+        return {name: np.asarray(getattr(self, name), np.int64).tolist() for name in _FIELDS}
+
+    @classmethod
+    def from_json(cls, record: dict[str, list[int]]) -> "Outcome":
+        """What `to_json` wrote. Raises KeyError, TypeError or ValueError for anything else."""
+        success, helped, requests = (np.array(record[name], np.int64) for name in _FIELDS)
+        return cls(success.astype(bool), helped, requests)
+
+
+_FIELDS = ("success", "helped_steps", "requests")
+
+
+@dataclass(frozen=True)
+class Job:
+    """How a study is run: sessions a setting, the seed, by how many processes or on which cluster, and where it is kept."""
+
+    sessions: int = 500
+    seed: int = 0
+    workers: int = 1
+    dask: str | None = None
+    folder: Path | None = None
+    progress: Progress = lambda done, total: None
+
+    def run(self, settings: Sequence[Setting]) -> dict[Setting, Outcome]:
+        """The outcome of every setting; those that the folder holds are read, the others computed and kept there.
+
+        Raises WorkFailed when the folder cannot be written or the cluster cannot be reached. After Ctrl-C all that is
+        finished is kept.
+        """
+        wanted = list(dict.fromkeys(settings))
+        keys = {setting.key(self.sessions, self.seed): setting for setting in wanted}
+        done = {keys[key]: found for key, found in self._stored() if key in keys and len(found.success) == self.sessions}
+        left = [setting for setting in wanted if setting not in done]
+        self.progress(len(done), len(wanted))
+        for setting, outcome in self._computed(left):
+            done[setting] = outcome
+            self._keep(setting, outcome)
+            self.progress(len(done), len(wanted))
+        return {setting: done[setting] for setting in wanted}
+
+    def _computed(self, settings: list[Setting]) -> Iterator[tuple[Setting, Outcome]]:
+        work = partial(sessions_of, sessions=self.sessions, seed=self.seed)
+        if self.dask is not None:
+            yield from _on_cluster(work, settings, self.dask)
+        elif self.workers == 1 or len(settings) <= 1:
+            yield from ((setting, work(setting)) for setting in settings)
+        else:
+            from joblib import Parallel, delayed
+
+            results = Parallel(self.workers, return_as="generator", batch_size=4)(delayed(work)(s) for s in settings)
+            yield from zip(settings, results, strict=True)
+
+    def _stored(self) -> Iterator[tuple[str, Outcome]]:
+        path = None if self.folder is None else self.folder / STORE
+        if path is None or not path.is_file():
+            return
+        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+            try:
+                entry = json.loads(line)
+                yield entry["key"], Outcome.from_json(entry)
+            except (ValueError, KeyError, TypeError, OverflowError):
+                continue  # cut off, or not ours: computed anew
+
+    def _keep(self, setting: Setting, outcome: Outcome) -> None:
+        if self.folder is None:
+            return
+        line = {"key": setting.key(self.sessions, self.seed), "setting": asdict(setting), **outcome.to_json()}
+        path = self.folder / STORE
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            cut = path.is_file() and not path.read_bytes().endswith(b"\n")
+            with path.open("a", encoding="utf-8") as file:
+                file.write(("\n" if cut else "") + json.dumps(line) + "\n")
+        except OSError as error:
+            raise WorkFailed(f"output folder '{self.folder}' (--out) cannot be written: {error.strerror}") from error
+
+
+def _on_cluster(
+    work: Callable[[Setting], Outcome], settings: list[Setting], address: str
+) -> Iterator[tuple[Setting, Outcome]]:
+    try:
+        from distributed import Client, as_completed
+    except ImportError:
+        raise BadInput(f"--dask {address}: Dask is not installed: pip install 'teaching-lab[dask]'") from None
+    try:
+        client = Client(address, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise WorkFailed(f"--dask {address}: no cluster answers there: {error}") from None
+    with client:
+        tasks = {client.submit(work, setting, pure=False): setting for setting in settings}
+        for task in as_completed(tasks):
+            yield tasks[task], task.result()
+
+
+def world(name: str) -> GridWorld:
+    """The world of that name or file, read once."""
+    return _world(name)
+
+
+@lru_cache(maxsize=64)
+def _world(name: str) -> GridWorld:
+    from lab.taskfile import load_world
+
+    return load_world(name)
+
+
+@lru_cache(maxsize=64)
+def _problem(name: str) -> TabularMDP:
+    return world(name).mdp()
+
+
+LEARNED_EPISODES, LEARNED_BETA, LEARNED_SEED = 1500, 0.5, 3
+
+
+@lru_cache(maxsize=64)
+def learned_values(name: str) -> FloatArray:
+    """The advisor's table as the thesis may have had it: learned alone, in 1500 episodes that begin in any free cell.
+
+    (S, A) float64. The thesis loads a table and does not say where it came from; this recipe was the best of those
+    that the study `readings` compares.
+    """
+    from lab.learning.kernels import run_sessions
+
+    mdp = _problem(name)
+    anywhere = replace(mdp, starts=tuple(np.flatnonzero(~mdp.terminal).tolist()))
+    learner = replace(world(name).learner, episodes=LEARNED_EPISODES, beta=LEARNED_BETA, count_start=False)
+    seeds = np.array([LEARNED_SEED], np.uint64)
+    table: FloatArray = run_sessions(anywhere, learner, GateSettings("never"), None, seeds, keep_tables=True).q[0]
+    return table
+
+
+@lru_cache(maxsize=64)
+def _exact_values(name: str) -> FloatArray:
+    return optimal_values(_problem(name), world(name).learner.discount)
+
+
+def seeds_of(setting: Setting, sessions: int, seed: int) -> NDArray[np.uint64]:
+    """The seeds (N,) of a setting's sessions: its own, whoever runs it."""
+    digest = sha256(json.dumps(asdict(setting)).encode()).digest()
+    rng = np.random.default_rng([seed, int.from_bytes(digest[:8], "big")])
+    return rng.integers(2**64, size=sessions, dtype=np.uint64)
+
+
+def sessions_of(setting: Setting, sessions: int, seed: int) -> Outcome:
+    """Learns so many sessions of one setting."""
+    from lab.advice.advisors import Advice, skill
+    from lab.learning.kernels import run_sessions
+
+    place, mdp = world(setting.world), _problem(setting.world)
+    changes = {name: getattr(setting, name) for name in ("beta", "learner") if getattr(setting, name) is not None}
+    learner = replace(place.learner, **changes)
+    advice = None
+    if setting.tau is not None:
+        table = learned_values(setting.world) if setting.advisor_table == "learned" else _exact_values(setting.world)
+        advice = Advice.of(skill(table, setting.tau), place.region() if setting.view == "limited" else None)
+    batch = run_sessions(mdp, learner, gate_of(setting, place.gate), advice, seeds_of(setting, sessions, seed))
+    shortest = shortest_steps(mdp) + learner.count_start
+    return Outcome(batch.steps[:, -1] == shortest, batch.helped_steps, batch.requests)
+
+
+def gate_of(setting: Setting, gate: GateSettings) -> GateSettings:
+    """The world's gate with what the setting says."""
+    changes: dict[str, Any] = {
+        name: getattr(setting, name)
+        for name in ("gate", "lambda_threshold", "omega", "psi")
+        if getattr(setting, name) is not None
+    }
+    return replace(gate, **changes)

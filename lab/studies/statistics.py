@@ -1,0 +1,235 @@
+"""What studies compute from sessions: intervals, the score of chapter 9, comparisons of methods, agreement with print."""
+
+import warnings
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import sqrt
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lab.errors import BadInput
+
+FloatArray = NDArray[np.float64]
+Range = tuple[float, float]
+
+PERCENT_POINTS = 5.0  # a percentage agrees with the printed one when it is this near [points]
+RELATIVE = 0.15  # any other figure when it is this near, as a fraction of the printed one
+NOISE = 1e-12  # differences below this fraction of the largest value are rounding, not variation
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Several groups compared.
+
+    means: of each group; f, p: one-way ANOVA; tukey: p of each pair, in the groups' order; normality: p of each group
+    (Kolmogorov-Smirnov), None for a constant one; levene: p of equal variances; ranks: "1" is best, groups that do
+    not differ share one, "1-2" differs from neither of two that do.
+    """
+
+    means: dict[str, float]
+    f: float
+    p: float
+    tukey: dict[tuple[str, str], float]
+    normality: dict[str, float | None]
+    levene: float
+    ranks: dict[str, str]
+
+
+def interval(values: ArrayLike, level: float = 0.95) -> tuple[float, float, float]:
+    """Mean, low and high end of the t interval of the mean of values (n,), one a session, in their unit.
+
+    Raises BadInput for fewer than two values, for one that is not finite, and for a level outside (0, 1).
+    """
+    from scipy.stats import t
+
+    sample = _sample(values, "interval")
+    mean = _mean(sample)
+    error = sqrt(np.square(sample - mean).sum() / (len(sample) - 1) / len(sample))
+    half = float(t.isf(_tail(level), len(sample) - 1)) * error
+    return mean, mean - half, mean + half
+
+
+def proportion_interval(successes: int, n: int, level: float = 0.95) -> tuple[float, float, float]:
+    """Share of successful sessions, low and high end of its interval, all in percent.
+
+    Raises BadInput unless 0 <= successes <= n and n >= 1. Source: E. B. Wilson, JASA 22 (1927), 209-212.
+    """
+    from scipy.special import ndtri
+
+    if not 0 <= successes <= n or n < 1:
+        raise BadInput(f"interval of a proportion: {successes} successes of {n}; needed: 0 <= successes <= n, n >= 1")
+    z2 = float(ndtri(_tail(level))) ** 2
+    share = successes / n
+    middle = (share + z2 / (2 * n)) / (1 + z2 / n)
+    half = sqrt(z2 * (share * (1 - share) + z2 / (4 * n)) / n) / (1 + z2 / n)
+    low = 0.0 if successes == 0 else middle - half  # Wilson's ends are exact here, floats are not
+    high = 1.0 if successes == n else middle + half
+    return 100 * share, 100 * low, 100 * high
+
+
+@overload
+def score(sp: float, hs: float, sp_range: Range, hs_range: Range, weight: float = 0.5) -> float: ...
+@overload
+def score(sp: FloatArray, hs: FloatArray, sp_range: Range, hs_range: Range, weight: float = 0.5) -> FloatArray: ...
+def score(
+    sp: float | FloatArray, hs: float | FloatArray, sp_range: Range, hs_range: Range, weight: float = 0.5
+) -> float | FloatArray:
+    """How good a combination is: 1 with the highest success percentage and the fewest helped steps, 0 with neither.
+
+    sp [%] and hs [steps] are numbers or arrays of one shape; the ranges are those of `ranges`, or of the printed
+    combinations (then a score may leave [0, 1]); `weight` is that of the success percentage. Where all have the
+    same, all are best. Raises BadInput for a range upside down and for a weight outside [0, 1].
+    Source: thesis eq. 9.4.
+    """
+    if not 0 <= weight <= 1:
+        raise BadInput(f"score: weight {weight}: allowed 0 to 1")
+    for name, (low, high) in (("SP", sp_range), ("HS", hs_range)):
+        if not low <= high:
+            raise BadInput(f"score: the {name} range {low} to {high} is upside down")
+    sp_span, hs_span = sp_range[1] - sp_range[0], hs_range[1] - hs_range[0]
+    sp_part = 1 + (sp - sp_range[1]) / (sp_span or np.inf)
+    hs_part = 1 + (hs_range[0] - hs) / (hs_span or np.inf)
+    return weight * sp_part + (1 - weight) * hs_part
+
+
+def ranges(sp: ArrayLike, hs: ArrayLike) -> tuple[Range, Range]:
+    """Smallest and largest SP [%] and HS [steps] over all combinations of one world and view, for `score`.
+
+    Raises BadInput for nothing, and for values that are not finite.
+    """
+    percents, steps = _sample(sp, "range of SP", 1), _sample(hs, "range of HS", 1)
+    return (float(percents.min()), float(percents.max())), (float(steps.min()), float(steps.max()))
+
+
+def compare(groups: Mapping[str, ArrayLike], level: float = 0.95, lowest_is_best: bool = False) -> Comparison:
+    """One-way ANOVA, Tukey's HSD, the tests of their assumptions, and ranks; groups name -> values (n,).
+
+    Ranks follow Tukey's test, which counts only after a significant F-test; sizes may differ (Tukey-Kramer).
+    Differences that are rounding (`NOISE`) never count, so that constant groups can be compared: F stays finite.
+    Normality is tested as SPSS does, with the sample's own mean and deviation and the asymptotic distribution: lenient.
+    Raises BadInput for fewer than two groups, fewer than two values in one, and values that are not finite.
+    Source: thesis, Appendix II; tables 9.2-9.5.
+    """
+    if len(groups) < 2:
+        raise BadInput(f"comparison of {', '.join(groups) or 'nothing'}: at least two groups are needed")
+    samples = {name: _sample(values, f"comparison, group '{name}'") for name, values in groups.items()}
+    means = {name: _mean(sample) for name, sample in samples.items()}
+    unit = max(float(np.abs(sample).max()) for sample in samples.values()) or 1.0
+    scaled = {name: sample / unit for name, sample in samples.items()}  # no test here depends on the unit
+    f, p, mean_square = _anova(list(scaled.values()))
+    tukey = _tukey(scaled, mean_square)
+    alpha = 2 * _tail(level)
+    differ = [pair for pair, pair_p in tukey.items() if pair_p < alpha] if p < alpha else []
+    order = sorted(means, key=lambda name: means[name], reverse=not lowest_is_best)
+    return Comparison(
+        means=means,
+        f=f,
+        p=p,
+        tukey=tukey,
+        normality={name: _normality(sample) for name, sample in scaled.items()},
+        levene=_anova([np.abs(sample - _mean(sample)) for sample in scaled.values()])[1],
+        ranks=ranks(order, differ),
+    )
+
+
+def ranks(order: Sequence[str], differ: Collection[tuple[str, str]]) -> dict[str, str]:
+    """Ranks of groups, best first in `order`, from the pairs that differ significantly.
+
+    Each largest set of groups of which no two differ is one rank; a group in several has them all: "1-2", or "1,3".
+    Source: thesis tables 9.2-9.5; the sets are found as in H.-P. Piepho, J. Comput. Graph. Stat. 13 (2004), 456-466.
+    """
+    alike = [frozenset(order)]
+    for pair in differ:
+        parts = {
+            part for whole in alike for part in ([whole - {name} for name in pair] if {*pair} <= whole else [whole])
+        }
+        alike = [part for part in parts if not any(part < other for other in parts)]
+    alike.sort(key=lambda part: [place for place, name in enumerate(order) if name in part])
+    found = {name: [number for number, part in enumerate(alike, start=1) if name in part] for name in order}
+    return {
+        name: f"{n[0]}-{n[-1]}" if len(n) > 1 and n[-1] - n[0] == len(n) - 1 else ",".join(map(str, n))
+        for name, n in found.items()
+    }
+
+
+def allowed(thesis: float, measure: str) -> float:
+    """How far from the printed figure still agrees with it: 5 points for `..._percent`, else 15 % of it."""
+    return PERCENT_POINTS if measure.endswith("_percent") else RELATIVE * abs(thesis)
+
+
+def within(value: float, ci: Sequence[float] | None, thesis: float, measure: str) -> bool:
+    """Whether a measured value agrees with the printed one: its interval (low, high) holds it, or it is near enough.
+
+    Without an interval only nearness counts; see `allowed`.
+    """
+    if ci is not None and ci[0] <= thesis <= ci[1]:
+        return True
+    return bool(abs(value - thesis) <= allowed(thesis, measure) + NOISE * max(abs(value), abs(thesis)))
+
+
+def _sample(values: ArrayLike, what: str, at_least: int = 2) -> FloatArray:
+    sample = np.asarray(values, dtype=np.float64)
+    if sample.ndim != 1 or len(sample) < at_least or not np.isfinite(sample).all():
+        raise BadInput(f"{what}: shape {sample.shape}; needed: at least {at_least} finite values in one row")
+    return sample
+
+
+def _tail(level: float) -> float:
+    if not 0 < level < 1:
+        raise BadInput(f"level {level} of an interval or a test: allowed between 0 and 1")
+    return (1 - level) / 2
+
+
+def _mean(sample: FloatArray) -> float:
+    """The mean, exact when all values are equal."""
+    return float(sample[0] + (sample - sample[0]).mean())
+
+
+def _anova(samples: Sequence[FloatArray]) -> tuple[float, float, float]:
+    """F, p and the mean square within groups; samples (n,) of a unit in which the largest value is about 1."""
+    from scipy.stats import f as f_distribution
+
+    sizes, means = np.array([len(sample) for sample in samples]), np.array([_mean(sample) for sample in samples])
+    grand = means[0] + np.average(means - means[0], weights=sizes)
+    between_df, within_df = len(samples) - 1, int(sizes.sum()) - len(samples)
+    between = float((sizes * np.square(means - grand)).sum()) / between_df
+    squares = sum(float(np.square(sample - mean).sum()) for sample, mean in zip(samples, means, strict=True))
+    mean_square = max(squares / within_df, NOISE**2)
+    f = between / mean_square
+    return f, float(f_distribution.sf(f, between_df, within_df)), mean_square
+
+
+def _tukey(samples: Mapping[str, FloatArray], mean_square: float) -> dict[tuple[str, str], float]:
+    """p of each pair by the studentized range; harmonic mean of the two sizes (Tukey-Kramer).
+
+    For thousands of values and nearly equal means scipy warns that its integral converges slowly; p is right there, 1.
+    """
+    from scipy.integrate import IntegrationWarning
+    from scipy.stats import studentized_range
+
+    df = sum(map(len, samples.values())) - len(samples)
+    found = {}
+    for one, other in combinations(samples, 2):
+        error = sqrt(mean_square / 2 * (1 / len(samples[one]) + 1 / len(samples[other])))
+        q = abs(_mean(samples[one]) - _mean(samples[other])) / error
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", IntegrationWarning)
+            found[one, other] = float(studentized_range.sf(q, len(samples), df))
+    return found
+
+
+def _normality(sample: FloatArray) -> float | None:
+    """p of the Kolmogorov-Smirnov test of a sample (n,) against the normal distribution of its mean and deviation."""
+    from scipy.special import kolmogorov, ndtr
+
+    deviation = float(np.std(sample, ddof=1))
+    if deviation <= NOISE:
+        return None
+    expected = ndtr((np.sort(sample) - sample.mean()) / deviation)
+    n = len(sample)
+    steps = np.arange(n + 1) / n
+    distance = max(float((steps[1:] - expected).max()), float((expected - steps[:-1]).max()))
+    return float(kolmogorov(sqrt(n) * distance))
