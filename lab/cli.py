@@ -23,7 +23,9 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_
 toolbox_app = typer.Typer(no_args_is_help=True, help="The policies that were learned.")
 task_app = typer.Typer(no_args_is_help=True, help="Task files.")
 app.add_typer(toolbox_app, name="toolbox")
+study_app = typer.Typer(no_args_is_help=True, help="The thesis's tables and figures again, and comparisons of our own.")
 app.add_typer(task_app, name="task")
+app.add_typer(study_app, name="study")
 
 STOPPED = "stopped by Ctrl-C; what was learned is kept"
 MAX_EPISODES = 1_000_000
@@ -382,6 +384,65 @@ def task_random(
         )
 
     _show(write_random(shape, density, seed, out), as_json, told)
+
+
+@command(task_app, "reconstruct", "lab task reconstruct --seed 0 --out world-2.toml")
+def task_reconstruct(
+    out: Annotated[Path, typer.Option("--out", help="The .toml file to write.")], seed: Seed = 0, as_json: Json = False
+) -> None:
+    """Look for a world like the thesis's world II, of which only a picture is printed; takes a few minutes."""
+    from lab.study import reconstruct_world
+    from lab.view.progress import counting
+
+    with counting(_console(), "layouts and views compared") as progress:
+        document = reconstruct_world(seed, out, progress)
+    _show(document, as_json, lambda d: f"{d['file']}: {d['title']}")
+
+
+@command(study_app, "list", "lab study list")
+def study_list(as_json: Json = False) -> None:
+    """The studies that can be run."""
+    from lab.studies import STUDIES
+    from lab.view.summary import table_of
+
+    rows = [{"name": name, "title": study.title} for name, study in STUDIES.items()]
+    _show({"studies": rows}, as_json, lambda d: table_of(d["studies"], ("name", "title")))
+
+
+@command(study_app, "run", "lab study run table-9.2 --workers 2")
+def study_run(
+    name: Annotated[str, typer.Argument(help="A study; lab study list names them.")],
+    sessions: Annotated[
+        int, typer.Option("--sessions", min=10, max=1_000_000, help="Learning sessions for each cell of a table.")
+    ] = 500,
+    workers: Annotated[int, typer.Option("--workers", min=1, max=256, help="Processes; the rows are the same.")] = 1,
+    dask: Annotated[str | None, typer.Option("--dask", help="The address of a Dask scheduler to work on.")] = None,
+    advisor_table: Annotated[
+        str | None, typer.Option("--advisor-table", help="What advisors know: learned (default) or exact values.")
+    ] = None,
+    seed: Seed = 0,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for report, rows and sessions; default: NAME-study.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run a study and write its report; what a folder already holds is not run again."""
+    from lab.study import run_study
+    from lab.view.progress import counting
+    from lab.view.summary import study_summary
+
+    with counting(_console(), f"cells of {name}") as progress:
+        document = run_study(
+            name,
+            sessions=sessions,
+            seed=seed,
+            workers=workers,
+            dask=dask,
+            advisor_table=advisor_table,
+            out=out or Path(f"{name}-study"),
+            progress=progress,
+        )
+    _show(document, as_json, study_summary)
 
 
 @command(task_app, "check", "lab task check my-toast.toml")

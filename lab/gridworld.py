@@ -141,10 +141,11 @@ class GridWorld(Learned):
             )
         return mdp
 
-    def to_toml(self) -> str:
-        """The text of a task file that holds this world."""
+    def to_toml(self, comment: str = "") -> str:
+        """The text of a task file that holds this world, after a comment of any lines."""
         head = ("name", "kind", "title", "shape", "start", "goal")
-        lines = [f"{key} = {json.dumps(getattr(self, key))}" for key in head]
+        lines = [f"# {line}" for line in comment.splitlines()]
+        lines += [f"{key} = {json.dumps(getattr(self, key))}" for key in head]
         lines += ["obstacles = [", *(f"  {json.dumps(cell)}," for cell in self.obstacles), "]"]
         tables = {"view": self.view.model_dump()} if self.view is not None else {}
         tables |= {"rewards": asdict(self.rewards), "learner": asdict(self.learner), "gate": asdict(self.gate)}

@@ -35,7 +35,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.view",),
     ("lab.report",),
     ("lab.run", "lab.studies", "lab.gym"),
-    ("lab.lesson",),
+    ("lab.lesson", "lab.study"),
     ("lab.cli",),
 )
 ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it

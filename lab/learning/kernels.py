@@ -83,6 +83,7 @@ class _Rules(NamedTuple):
     enough: float
     ensemble: int
     budget: int
+    judge_unhelped: bool
 
 
 # What each of the sessions under way remembers; session -1: none. `converged` as in `gates.Ccrl`.
@@ -199,6 +200,7 @@ def _end_episode(rules: Any, lane: Any, moves: int, reached: bool, steps: Any, g
     count.helped_steps += lane.helped
     count.moves += moves
     judged = rules.gate in (_CCRL, _COMBINED) and lane.is_open and count.rejected_at_episode == 0
+    judged = judged and (rules.judge_unhelped or lane.helped > 0)
     if judged and episode > window and _misled(steps[n, episode - 1], _window_mean(steps[n], episode - 1, window)):
         count.misleads += 1
         if count.misleads > rules.omega:
@@ -440,6 +442,7 @@ def _rules(learner: LearnerSettings, gate: GateSettings, somebody: bool) -> _Rul
         float(gate.enough_steps),
         gate.ensemble,
         gate.budget,
+        gate.judge_unhelped,
     )
 
 

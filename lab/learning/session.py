@@ -186,7 +186,7 @@ class _Session:
         self.steps.append(steps)
         self.guided.append(helped > 0)
         self.improved = improvement(self.steps, self.gate_settings.window)
-        self.gate.judges(self.steps, is_open)
+        self.gate.judges(self.steps, is_open and (helped > 0 or self.gate_settings.judge_unhelped))
         rate = self.improved.rate if self.improved else None
         self.tell(EpisodeEnded(episode, steps, helped > 0, helped, rate, moves is not None))
         if self.gate.rejected and self.rejected_at is None:

@@ -73,7 +73,8 @@ class GateSettings:
     episodes in a moving average; psi: Psi, a width of action values that "ia", "combined", "importance" and
     "uncertainty" compare with; rate: the share of steps that "random" asks for; enough_steps: the mean step count
     that satisfies "cq"; ensemble: the tables of "uncertainty"; budget: the helped steps that any gate may use in a
-    session.
+    session; judge_unhelped: an episode that was open for advice and got none, as in a limited view, is judged too
+    (the listing), or not (the text's words).
     Raises BadInput for a value outside its range, or for X < 2K with a gate that compares moving averages.
     """
 
@@ -87,6 +88,7 @@ class GateSettings:
     enough_steps: Annotated[float, Gt(0), Le(1_000_000)] = 50.0
     ensemble: Annotated[int, Ge(2), Le(100)] = 5
     budget: Annotated[int, Ge(0), Le(1_000_000_000)] = 1_000_000_000
+    judge_unhelped: bool = True
 
     def __post_init__(self) -> None:
         _require_allowed(self)

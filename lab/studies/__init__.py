@@ -1,1 +1,71 @@
 """Studies: the tables and figures of the thesis measured again, and comparisons of our own."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from lab.studies.runner import Job
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a study came to: rows as `lab study run --json` gives them, a summary, pictures by caption, remarks."""
+
+    rows: list[dict[str, Any]]
+    summary: dict[str, Any]
+    figures: Mapping[str, bytes] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+Run = Callable[["Job", Mapping[str, Any]], Findings]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study: its title, and what runs it with a job and a reading (changes to the settings of chapter 9)."""
+
+    title: str
+    run: Run
+
+
+def _chapter9(name: str) -> Run:
+    def run(job: "Job", reading: Mapping[str, Any]) -> Findings:
+        from lab.studies import chapter9_parts
+
+        findings: Findings = getattr(chapter9_parts, name)(job, reading)
+        return findings
+
+    return run
+
+
+def _table(name: str) -> Run:
+    def run(job: "Job", reading: Mapping[str, Any]) -> Findings:
+        from lab.studies.chapter9_parts import best_scores
+
+        return best_scores(job, reading, name)
+
+    return run
+
+
+def _speed(job: "Job", reading: Mapping[str, Any]) -> Findings:
+    from lab.studies.speed import speed
+
+    return speed(job)
+
+
+STUDIES: dict[str, Study] = {
+    "table-9.2": Study("Table 9.2: best scores in world I with full view", _table("table-9.2")),
+    "table-9.3": Study("Table 9.3: best scores in world I with limited view", _table("table-9.3")),
+    "table-9.4": Study("Table 9.4: best scores in world II with full view", _table("table-9.4")),
+    "table-9.5": Study("Table 9.5: best scores in world II with limited view", _table("table-9.5")),
+    "appendix-v": Study(
+        "Appendix V: all methods, parameters and advisors in both worlds and views", _chapter9("all_cells")
+    ),
+    "figure-9.4": Study("Figure 9.4: learning alone with several decay factors", _chapter9("decay_factors")),
+    "chapter-9": Study("Chapter 9: its tables, Appendix V and figures", _chapter9("whole")),
+    "readings": Study(
+        "Readings of chapter 9: what the thesis leaves open, and what comes nearest", _chapter9("readings")
+    ),
+    "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
+}

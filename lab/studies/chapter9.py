@@ -1,7 +1,7 @@
 """Chapter 9 again: tables 9.2-9.5 and Appendix V cell by cell, the sweep of beta, and the figures."""
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -18,6 +18,7 @@ View = Literal["full", "limited"]
 FloatArray = NDArray[np.float64]
 
 PRINTED = Path(__file__).parent / "printed"
+FILES = ("appendix-v.csv", "tables-9.2-9.5.csv")
 GATES = {"CCRL": "ccrl", "IA": "ia", "combined": "combined"}
 WORLDS = {"I": "world-1", "II": "world-2"}
 TABLES: dict[str, tuple[str, View]] = {
@@ -77,19 +78,24 @@ def _cell(line: dict[str, str]) -> Cell:
     return Cell(setting, average, sp, hs, points, line.get("rank"))
 
 
-class Grid:
-    """All printed combinations of one world and view, measured."""
+def _is_at(cell: Cell, place: str, view: View) -> bool:
+    return (cell.setting.world, cell.setting.view) == (place, view)
 
-    def __init__(self, job: Job, place: str, view: View, advisor_table: str):
-        self.advisor_table = cast(Literal["exact", "learned"], advisor_table)
-        self.cells = [c for c in printed("appendix-v.csv") if (c.setting.world, c.setting.view) == (place, view)]
-        self.outcomes = job.run([setting for cell in self.cells for setting in self._settings(cell)])
+
+class Grid:
+    """All printed combinations of one world and view, measured; `reading`: changes to all settings."""
+
+    def __init__(self, job: Job, place: str, view: View, reading: Mapping[str, Any]):
+        self.reading = reading
+        self.cells, self.best = ([c for c in printed(file) if _is_at(c, place, view)] for file in FILES)
+        settings = [setting for cell in (*self.cells, *self.best) for setting in self._settings(cell)]
+        self.outcomes = job.run(settings)  # one combination of table 9.3 is not in Appendix V
         sp = [_percent(outcome) for outcome in self.outcomes.values()]
         hs = [float(outcome.helped_steps.mean()) for outcome in self.outcomes.values()]
         self.sp_range, self.hs_range = ranges(sp, hs)
 
     def _asked(self, setting: Setting) -> Setting:
-        return replace(setting, advisor_table=self.advisor_table)
+        return replace(setting, **self.reading)
 
     def _settings(self, cell: Cell) -> list[Setting]:
         taus = TAUS if cell.average else [cell.setting.tau]
@@ -101,7 +107,9 @@ class Grid:
 
     def scores(self, cell: Cell) -> FloatArray:
         """The score of each of five replications, averaged over the cell's advisors; eq. 9.4."""
-        return np.mean([_replicated_scores(outcome, self.sp_range, self.hs_range) for outcome in self.of(cell)], axis=0)
+        scores = [_replicated_scores(outcome, self.sp_range, self.hs_range) for outcome in self.of(cell)]
+        means: FloatArray = np.mean(scores, axis=0)
+        return means
 
     def rows(self, cell: Cell) -> list[Row]:
         """SP, HS and score of a cell beside the printed ones; for CCRL its requests, which are not printed."""
@@ -155,24 +163,23 @@ def row(named: Row, measure: str, value: float, ci: Sequence[float] | None, thes
     return {**named, "measure": measure, "value": float(value), "ci95": ends, "thesis": thesis, "within": agrees}
 
 
-def appendix(job: Job, places: Iterable[tuple[str, View]], advisor_table: str) -> list[Row]:
+def appendix(job: Job, places: Iterable[tuple[str, View]], reading: Mapping[str, Any]) -> list[Row]:
     """Every line of Appendix V for these worlds and views."""
     rows: list[Row] = []
     for place, view in places:
-        grid = Grid(job, place, view, advisor_table)
+        grid = Grid(job, place, view, reading)
         for cell in grid.cells:
             rows += grid.rows(cell)
     return rows
 
 
-def table(job: Job, name: str, advisor_table: str) -> list[Row]:
+def table(job: Job, name: str, reading: Mapping[str, Any]) -> list[Row]:
     """One of the tables 9.2-9.5: the printed best combinations, with our ranks of the methods for each advisor."""
     place, view = TABLES[name]
-    grid = Grid(job, place, view, advisor_table)
-    cells = [c for c in printed("tables-9.2-9.5.csv") if (c.setting.world, c.setting.view) == (place, view)]
+    grid = Grid(job, place, view, reading)
     rows: list[Row] = []
     for tau in (*TAUS, None):
-        chosen = [cell for cell in cells if cell.setting.tau == tau]
+        chosen = [cell for cell in grid.best if cell.setting.tau == tau]
         found = compare({cell.setting.gate: grid.scores(cell) for cell in chosen}).ranks
         for cell in chosen:
             ranked = {"rank": found[cell.setting.gate], "thesis_rank": cell.rank}
@@ -187,9 +194,7 @@ def by_beta(job: Job, places: Iterable[str] = ("world-1", "world-2")) -> list[Ro
     for setting, outcome in job.run(settings).items():
         share, low, high = proportion_interval(int(outcome.success.sum()), len(outcome.success))
         best, percent = BEST_BETA[setting.world]
-        rows.append(
-            row(describe(setting), "SP_percent", share, (low, high), percent if setting.beta == best else None)
-        )
+        rows.append(row(describe(setting), "SP_percent", share, (low, high), percent if setting.beta == best else None))
     return rows
 
 

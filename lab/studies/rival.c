@@ -44,7 +44,7 @@ static inline int choose(const double *value, const uint16_t *t, double sharpnes
     for (int a = 0; a < PADDED; a++)
         v[a] = value[t[a]];
     const double top = larger(larger(larger(v[0], v[1]), larger(v[2], v[3])), larger(v[4], v[5]));
-#pragma GCC unroll 1
+#pragma GCC unroll 1 /* kept a loop, gcc makes vectors of it; unrolled, it does not */
     for (int a = 0; a < PADDED; a++)
         w[a] = exp_of((v[a] - top) * sharpness);
     const double c1 = w[0] + w[1], c2 = c1 + w[2], c3 = c1 + (w[2] + w[3]), c4 = c3 + w[4];

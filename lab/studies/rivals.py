@@ -262,9 +262,8 @@ def _measure_jax(job: _Job, sessions: int, seed: int) -> Measured:
     rng = np.random.default_rng(seed)
     streams = [rng.integers(0, 2**64, lanes, np.uint64) for lanes in _batches(sessions, JAX_LANES)]
     began = perf_counter()
-    programs = {
-        len(s): jax.jit(_jax_program(job, len(s))).lower(s).compile() for s in {len(s): s for s in streams}.values()
-    }
+    sizes = {len(stream): stream for stream in streams}
+    programs = {lanes: jax.jit(_jax_program(job, lanes)).lower(stream).compile() for lanes, stream in sizes.items()}
     compiled = perf_counter()
     ended = [[int(number) for number in programs[len(stream)](stream)] for stream in streams]
     seconds = perf_counter() - compiled
@@ -340,25 +339,18 @@ def _mixed(z: Any) -> Any:
 
 def c_scalar(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
     """One session after another in C (rival.c), compiled for this very processor."""
-    job = _job(mdp, settings, sessions)
+    job, rng = _job(mdp, settings, sessions), np.random.default_rng(seed)
     began = perf_counter()
     learn = _compiled_c()
     compiled = perf_counter()
-    won = ctypes.c_int64()
+    near = np.pad(job.successor, ((0, 0), (0, 2)), "edge").astype(np.uint16)
     ends = np.where(job.goal, 1, np.where(job.terminal, 2, 0)).astype(np.uint8)
-    arrays = {
-        "near": np.pad(job.successor, ((0, 0), (0, 2)), "edge").astype(np.uint16),
-        "stream": np.random.default_rng(seed).integers(0, 2**64, 4, np.uint64),
-        "table": np.empty(job.states),
-    }
-    at = {name: array.ctypes.data for name, array in arrays.items()}
-    began_learning = perf_counter()
-    moves = learn(
-        job.states, at["near"], job.arrival.ctypes.data, ends.ctypes.data, job.start, job.loss, job.discount, job.alpha,
-        job.episodes, job.sharpness.ctypes.data, job.max_moves, job.optimal, sessions, at["stream"], at["table"],
-        ctypes.byref(won),
-    )  # fmt: skip
-    seconds = perf_counter() - began_learning
+    stream, table = rng.integers(0, 2**64, 4, np.uint64), np.empty(job.states)
+    rules = (job.start, job.loss, job.discount, job.alpha, job.episodes, job.sharpness, job.max_moves, job.optimal)
+    won = ctypes.c_int64()
+    ready = perf_counter()
+    moves = learn(job.states, near, job.arrival, ends, *rules, sessions, stream, table, ctypes.byref(won))
+    seconds = perf_counter() - ready
     return Measured(moves, seconds, 100.0 * won.value / sessions, compiled - began)
 
 
@@ -377,11 +369,11 @@ def _compiled_c() -> Any:
             learn = ctypes.CDLL(str(library)).learn
         except OSError as error:
             raise Missing(f"cc or what it made cannot be run: {error}") from None
-    long, real, address = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
-    learn.restype = long
-    learn.argtypes = [
-        long, address, address, address, long, real, real, real, long, address, long, long, long, address, address, address,
-    ]  # fmt: skip
+    whole, real, reals = ctypes.c_int64, ctypes.c_double, np.ctypeslib.ndpointer(np.float64)
+    problem = (whole, np.ctypeslib.ndpointer(np.uint16), reals, np.ctypeslib.ndpointer(np.uint8))
+    rules = (whole, real, real, real, whole, reals, whole, whole)
+    learn.argtypes = (*problem, *rules, whole, np.ctypeslib.ndpointer(np.uint64), reals, ctypes.POINTER(whole))
+    learn.restype = whole
     return learn
 
 

@@ -10,15 +10,18 @@ from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed
 from lab.gridworld import GridWorld
-from lab.learning.settings import GateSettings
+from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray, TabularMDP, optimal_values, shortest_steps
+
+if TYPE_CHECKING:
+    from lab.learning.kernels import Batch
 
 FORMAT = 1  # of what is stored; another one is computed anew
 STORE = "sessions.jsonl"
@@ -31,7 +34,8 @@ class Setting:
     """One cell of a table: a world, who advises there, and when the learner asks.
 
     tau None: nobody advises. lambda_threshold, omega and psi are those of the gates that have them. advisor_table:
-    "exact" optimal values, or "learned" (see `learned_values`). beta None: the world's own.
+    "exact" optimal values, or "learned" (see `learned_values`). beta and learner None: the world's own. judge_unhelped:
+    see GateSettings. success: the "last" episode took the shortest way, or "any" did. table_seed: another learned table.
     """
 
     world: str
@@ -44,16 +48,20 @@ class Setting:
     beta: float | None = None
     advisor_table: Literal["exact", "learned"] = "learned"
     learner: str | None = None
+    judge_unhelped: bool | None = None
+    success: Literal["last", "any"] = "last"
+    table_seed: int | None = None
 
     def key(self, sessions: int, seed: int) -> str:
         """What names this setting's results among all that are stored."""
-        whole = [FORMAT, asdict(self), sessions, seed, world(self.world).mdp().signature]
+        place = world(self.world).model_dump(mode="json")
+        whole = [FORMAT, asdict(self), sessions, seed, place, LEARNED_EPISODES, LEARNED_BETA, LEARNED_SEED]
         return sha256(json.dumps(whole).encode()).hexdigest()[:24]
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What N sessions came to, one number each (N,): whether the last episode took the shortest way; advice given."""
+    """What N sessions came to, one number each (N,): whether they succeeded (see `Setting`), and the advice in them."""
 
     success: NDArray[np.bool_]
     helped_steps: Count
@@ -92,7 +100,9 @@ class Job:
         """
         wanted = list(dict.fromkeys(settings))
         keys = {setting.key(self.sessions, self.seed): setting for setting in wanted}
-        done = {keys[key]: found for key, found in self._stored() if key in keys and len(found.success) == self.sessions}
+        done = {
+            keys[key]: found for key, found in self._stored() if key in keys and len(found.success) == self.sessions
+        }
         left = [setting for setting in wanted if setting not in done]
         self.progress(len(done), len(wanted))
         for setting, outcome in self._computed(left):
@@ -146,12 +156,12 @@ def _on_cluster(
     except ImportError:
         raise BadInput(f"--dask {address}: Dask is not installed: pip install 'teaching-lab[dask]'") from None
     try:
-        client = Client(address, timeout="10s")
+        client = Client(address, timeout="10s")  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise WorkFailed(f"--dask {address}: no cluster answers there: {error}") from None
     with client:
         tasks = {client.submit(work, setting, pure=False): setting for setting in settings}
-        for task in as_completed(tasks):
+        for task in as_completed(tasks):  # type: ignore[no-untyped-call]
             yield tasks[task], task.result()
 
 
@@ -172,22 +182,27 @@ def _problem(name: str) -> TabularMDP:
     return world(name).mdp()
 
 
-LEARNED_EPISODES, LEARNED_BETA, LEARNED_SEED = 1500, 0.5, 3
+LEARNED_EPISODES, LEARNED_BETA, LEARNED_SEED = 1000, 0.7, 14
 
 
 @lru_cache(maxsize=64)
-def learned_values(name: str) -> FloatArray:
-    """The advisor's table as the thesis may have had it: learned alone, in 1500 episodes that begin in any free cell.
+def learned_values(name: str, seed: int) -> FloatArray:
+    """`learned_table` of the world of that name or file."""
+    return learned_table(world(name), seed)
 
-    (S, A) float64. The thesis loads a table and does not say where it came from; this recipe was the best of those
-    that the study `readings` compares.
+
+def learned_table(place: GridWorld, seed: int = LEARNED_SEED) -> FloatArray:
+    """The advisor's table as the thesis may have had it: learned alone, in 1000 episodes that begin in any free cell.
+
+    (S, A) float64. The thesis loads a table and does not say where it came from; this recipe came nearest to its
+    figures among those that the study `readings` compares.
     """
     from lab.learning.kernels import run_sessions
 
-    mdp = _problem(name)
+    mdp = place.mdp()
     anywhere = replace(mdp, starts=tuple(np.flatnonzero(~mdp.terminal).tolist()))
-    learner = replace(world(name).learner, episodes=LEARNED_EPISODES, beta=LEARNED_BETA, count_start=False)
-    seeds = np.array([LEARNED_SEED], np.uint64)
+    learner = replace(place.learner, episodes=LEARNED_EPISODES, beta=LEARNED_BETA, count_start=False)
+    seeds = np.array([seed], np.uint64)
     table: FloatArray = run_sessions(anywhere, learner, GateSettings("never"), None, seeds, keep_tables=True).q[0]
     return table
 
@@ -206,26 +221,53 @@ def seeds_of(setting: Setting, sessions: int, seed: int) -> NDArray[np.uint64]:
 
 def sessions_of(setting: Setting, sessions: int, seed: int) -> Outcome:
     """Learns so many sessions of one setting."""
+    batch, learner = _learned(setting, seeds_of(setting, sessions, seed))
+    shortest = shortest_steps(_problem(setting.world)) + learner.count_start
+    shown = batch.steps[:, -1] if setting.success == "last" else batch.steps.min(axis=1)
+    return Outcome(shown == shortest, batch.helped_steps, batch.requests)
+
+
+def example(setting: Setting, seed: int) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """Steps and guided episodes (E,) of the first session of a setting that ends on the shortest way, of 100."""
+    batch, learner = _learned(setting, seeds_of(setting, 100, seed))
+    shortest = shortest_steps(_problem(setting.world)) + learner.count_start
+    n = int(np.argmax(batch.steps[:, -1] == shortest))
+    return batch.steps[n], batch.guided[n]
+
+
+def walk_of_advisor(place: GridWorld, table: FloatArray, tau: float, walks: int = 1000) -> NDArray[np.int32]:
+    """The steps (walks,) of an advisor who walks by own advice alone; max_steps + 1 where it does not arrive (fig. 9.1)."""
     from lab.advice.advisors import Advice, skill
     from lab.learning.kernels import run_sessions
 
-    place, mdp = world(setting.world), _problem(setting.world)
+    learner = replace(place.learner, episodes=1)
+    advice = Advice.of(skill(table, tau))
+    seeds = np.arange(walks, dtype=np.uint64)
+    return run_sessions(place.mdp(), learner, GateSettings("always"), advice, seeds).steps[:, 0]
+
+
+def _learned(setting: Setting, seeds: NDArray[np.uint64]) -> tuple["Batch", LearnerSettings]:
+    from lab.advice.advisors import Advice, skill
+    from lab.learning.kernels import run_sessions
+
+    place = world(setting.world)
     changes = {name: getattr(setting, name) for name in ("beta", "learner") if getattr(setting, name) is not None}
     learner = replace(place.learner, **changes)
     advice = None
     if setting.tau is not None:
-        table = learned_values(setting.world) if setting.advisor_table == "learned" else _exact_values(setting.world)
+        learned = setting.advisor_table == "learned"
+        seed = LEARNED_SEED if setting.table_seed is None else setting.table_seed
+        table = learned_values(setting.world, seed) if learned else _exact_values(setting.world)
         advice = Advice.of(skill(table, setting.tau), place.region() if setting.view == "limited" else None)
-    batch = run_sessions(mdp, learner, gate_of(setting, place.gate), advice, seeds_of(setting, sessions, seed))
-    shortest = shortest_steps(mdp) + learner.count_start
-    return Outcome(batch.steps[:, -1] == shortest, batch.helped_steps, batch.requests)
+    gate = gate_of(setting, place.gate)
+    return run_sessions(_problem(setting.world), learner, gate, advice, seeds), learner
 
 
 def gate_of(setting: Setting, gate: GateSettings) -> GateSettings:
     """The world's gate with what the setting says."""
     changes: dict[str, Any] = {
         name: getattr(setting, name)
-        for name in ("gate", "lambda_threshold", "omega", "psi")
+        for name in ("gate", "lambda_threshold", "omega", "psi", "judge_unhelped")
         if getattr(setting, name) is not None
     }
     return replace(gate, **changes)

@@ -1,7 +1,7 @@
 """How a run goes on, written to a console: phases, each skill's learning curve, when it asked and what came of it."""
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from statistics import mean
@@ -31,6 +31,15 @@ _INDENT = 12
 _LONGEST_LIST = 8
 _SHOWN_MOVES = 24
 _UNLIMITED = 1000
+
+
+@contextmanager
+def counting(console: Console, what: str) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on a terminal, nothing elsewhere; yields what is told (done, total)."""
+    columns = (TextColumn("{task.description}"), BarColumn(30), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 class RunProgress(Listener):

@@ -7,6 +7,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+_STUDY_ROWS = 30
+
 
 def run_summary(report: Mapping[str, Any]) -> RenderableType:
     """The end of `lab run`, from its JSON document."""
@@ -99,6 +101,35 @@ def table_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> Table
     for row in rows:
         table.add_row(*(Text(str(row[column])) for column in columns))
     return table
+
+
+def study_summary(study: Mapping[str, Any]) -> RenderableType:
+    """What `lab study run` shows, from its JSON document: up to 30 rows; the report has all."""
+    from rich.console import Group
+
+    shown = ("measure", "value", "ci95", "thesis", "within", "lab_version")
+    settings = list(dict.fromkeys(key for row in study["rows"] for key in row if key not in shown))
+    varied = [key for key in settings if len({str(row.get(key)) for row in study["rows"]}) > 1]
+    rows = [
+        {key: "" if row.get(key) is None else row[key] for key in varied}
+        | {
+            "measure": row["measure"],
+            "value": f"{row['value']:.4g}",
+            "95 %": "" if row["ci95"] is None else f"{row['ci95'][0]:.4g} to {row['ci95'][1]:.4g}",
+            "printed": "" if row["thesis"] is None else f"{row['thesis']:g}",
+            "inside": {True: "yes", False: "no", None: ""}[row["within"]],
+        }
+        for row in study["rows"][:_STUDY_ROWS]
+    ]
+    more = len(study["rows"]) - len(rows)
+    lines = [f"{key}: {_number(value)}" for key, value in study["summary"].items()]
+    lines += [f"... and {more} more rows"] * (more > 0) + [f"{key}: {path}" for key, path in study["files"].items()]
+    columns = (*varied, "measure", "value", "95 %", "printed", "inside")
+    return Group(table_of(rows, columns), Text(""), *(Text(line) for line in (*lines, "", *study["notes"])))
+
+
+def _number(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def toolbox_summary(box: Mapping[str, Any]) -> RenderableType:

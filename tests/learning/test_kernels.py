@@ -61,6 +61,16 @@ def test_compiled_and_interactive_sessions_are_the_same(learner: str, gate: str)
     assert (batch.helped_steps.sum() > 0) == (gate != "never")
 
 
+def test_unhelped_episodes_may_be_left_unjudged() -> None:
+    mdp, blind = board(), advice(board(), 0.2, np.zeros(25, bool))
+    for judged in (True, False):
+        how = replace(EAGER, judge_unhelped=judged, lambda_threshold=1.0)
+        batch = run_sessions(mdp, SHORT, how, blind, np.array([3], np.uint64))
+        one = alone(mdp, SHORT, how, blind, 3)
+        assert batch.misleads[0] == one.misleads
+        assert (one.misleads > 0) == judged
+
+
 def test_episodes_may_begin_anywhere() -> None:
     mdp = board()
     anywhere = replace(mdp, starts=tuple(np.flatnonzero(~mdp.terminal).tolist()))

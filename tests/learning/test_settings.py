@@ -35,6 +35,7 @@ def test_the_defaults_are_those_of_the_thesis() -> None:
         "enough_steps": 50.0,
         "ensemble": 5,
         "budget": 1_000_000_000,
+        "judge_unhelped": True,
     }
 
 

@@ -1,0 +1,73 @@
+"""The commands about studies: run one and write what it found, look for world II."""
+
+from pathlib import Path
+from typing import Any
+
+from lab.errors import BadInput, unknown
+from lab.record import write_whole
+from lab.report import check_out
+from lab.studies import STUDIES
+from lab.studies.runner import STORE, Job, Progress
+
+TABLES = ("learned", "exact")
+
+
+def run_study(
+    name: str,
+    *,
+    sessions: int,
+    seed: int,
+    workers: int,
+    dask: str | None,
+    advisor_table: str | None,
+    out: Path,
+    progress: Progress,
+) -> dict[str, Any]:
+    """Run a study and write its report, rows and sessions to `out`; the document of `lab study run --json`.
+
+    BadInput for an unknown study or advisor table and for a folder that cannot be; WorkFailed when it cannot be written.
+    """
+    if name not in STUDIES:
+        raise unknown("study", name, STUDIES, "STUDY")
+    if advisor_table is not None and advisor_table not in TABLES:
+        raise unknown("advisor table", advisor_table, TABLES, "--advisor-table")
+    check_out(out)
+    from lab.studies.report import write_report, write_rows
+
+    study = STUDIES[name]
+    job = Job(sessions, seed, workers, dask, out, progress)
+    try:
+        found = study.run(job, {} if advisor_table is None else {"advisor_table": advisor_table})
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            f"stopped by Ctrl-C; '{out}' keeps what is done, and the same command goes on"
+        ) from None
+    summary = {"sessions": sessions, "seed": seed, **found.summary}
+    files = {"report": str(out / "report.html"), "rows": str(out / "rows.csv")}
+    out.mkdir(parents=True, exist_ok=True)
+    write_rows(out / "rows.csv", found.rows)
+    write_report(out / "report.html", study.title, name, found.rows, summary, found.figures, found.notes)
+    if (out / STORE).is_file():
+        files["sessions"] = str(out / STORE)
+    notes = list(found.notes)
+    return {
+        "study": name,
+        "seed": seed,
+        "sessions": sessions,
+        "rows": found.rows,
+        "summary": summary,
+        "notes": notes,
+        "files": files,
+    }
+
+
+def reconstruct_world(seed: int, out: Path, progress: Progress) -> dict[str, Any]:
+    """Look for a world like world II and write it as a task file; the document of `lab task reconstruct --json`."""
+    from lab.studies.reconstruct import COMMENT, reconstruct
+
+    if out.suffix != ".toml":
+        raise BadInput(f"task file '{out}' (--out): its name must end in .toml")
+    check_out(out.parent)
+    world = reconstruct(seed, progress)
+    write_whole(out, world.to_toml(COMMENT.format(seed=seed, file=out.name)))
+    return {"file": str(out), "seed": seed, **world.model_dump(mode="json")}
