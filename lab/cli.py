@@ -4,6 +4,7 @@ import json
 import os
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from functools import wraps
 from io import TextIOWrapper
 from pathlib import Path
@@ -38,7 +39,12 @@ ToolboxFolder = Annotated[
     typer.Option("--toolbox", envvar="LAB_TOOLBOX", help="Where policies are kept; default: your data folder."),
 ]
 AdvisorName = Annotated[
-    str, typer.Option("--advisor", help="Who advises: expert, moderate, limited, novice, tau=X, terminal, none.")
+    str,
+    typer.Option(
+        "--advisor",
+        help="Who advises: expert, moderate, limited, novice, tau=X, tau=X..Y (changing over the episodes), wrong, "
+        "terminal, recorded:FILE, none.",
+    ),
 ]
 Toasts = Annotated[int, typer.Option("--toasts", "-n", help="How many slices, 1 to 50.")]
 
@@ -184,9 +190,19 @@ def teach(
     task: Annotated[
         str | None, typer.Option("--task", help="A task that ships, or a .toml file; default: toast. None for a world.")
     ] = None,
-    learner: Annotated[str | None, typer.Option("--learner", help="q, sarsa, q-lambda; default: the task's.")] = None,
+    learner: Annotated[
+        str | None,
+        typer.Option(
+            "--learner",
+            help="q, sarsa, q-lambda, sarsa-lambda, monte-carlo, afterstate; default: the task's.",
+        ),
+    ] = None,
     gate: Annotated[
-        str | None, typer.Option("--gate", help="ccrl, ia, combined, always, never; default: the task's.")
+        str | None,
+        typer.Option(
+            "--gate",
+            help="When it asks: ccrl, ia, combined, cq, always, never, random, importance, uncertainty; default: the task's.",
+        ),
     ] = None,
     advisor: AdvisorName = "expert",
     episodes: Annotated[
@@ -197,6 +213,9 @@ def teach(
     view: Annotated[
         str | None,
         typer.Option("--view", help="Of a world: full, or limited to the region that its file gives; default: full."),
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option("--record", help="A file that the advice is added to, for recorded:FILE.")
     ] = None,
     seed: Seed = 0,
     toolbox: ToolboxFolder = None,
@@ -215,7 +234,7 @@ def teach(
     if out is not None:
         check_out(out)
     progress = RunProgress(_console())
-    teacher = _teacher(toolbox, advisor, seed, progress)
+    teacher = replace(_teacher(toolbox, advisor, seed, progress), record=record)
     teacher.toolbox.check()
     document = session(teacher, learner=learner, gate=gate, episodes=episodes, name=save, out=out)
     _show(document, as_json, lesson_summary)

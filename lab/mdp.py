@@ -132,11 +132,14 @@ class TabularMDP:
     @cached_property
     def arrival(self) -> FloatArray:
         """What entering each terminal state is worth, (S,) float64, 0 elsewhere; BadInput where it depends on the way there."""
-        worth = np.zeros(self.n_states)
         moves = ~self.terminal[:, None] & self.terminal[self.successor]
-        for state in np.unique(self.successor[moves]).tolist():
-            worth[state] = _only(self.reward[moves & (self.successor == state)], f"the moves into {state}")
-        return worth
+        entered, rewards = self.successor[moves], self.reward[moves]
+        lowest, highest = np.full(self.n_states, np.inf), np.full(self.n_states, -np.inf)
+        np.minimum.at(lowest, entered, rewards)
+        np.maximum.at(highest, entered, rewards)
+        for state in np.flatnonzero(lowest < highest)[:1].tolist():
+            _only(rewards[entered == state], f"the moves into {self.state_label(state)}")
+        return np.where(np.isfinite(lowest), lowest, 0.0)
 
     def state_cell(self, state: int) -> tuple[int, ...]:
         """The grid cell of a state (of the head in a coverage problem); () when the states are no grid."""

@@ -3,12 +3,13 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import inf
+from pathlib import Path
 from typing import Literal
 from zlib import crc32
 
 import numpy as np
 
-from lab.advice.advisors import AdviceRequest, Advisor, Ask, make_advisor
+from lab.advice.advisors import Advisor, Ask, Recording, make_advisor
 from lab.errors import BadInput, WorkFailed
 from lab.gridworld import GridWorld
 from lab.learning.session import AdviceEnded, AdviceRejected, Event, SessionResult, run_session, unreached
@@ -45,7 +46,8 @@ class Teacher:
     """How to teach: who advises, with which seed, whom to tell, and where policies are kept.
 
     `ask` is the prompt behind the advisor 'terminal'; `on_event(problem name, event)` hears of episodes and requests;
-    `region` (S,) bool: the states in which the advisor sees the robot and is asked, all by default.
+    `region` (S,) bool: the states in which the advisor sees the robot and is asked, all by default; `record`: the file
+    that advice is added to.
     """
 
     toolbox: Toolbox
@@ -54,6 +56,7 @@ class Teacher:
     ask: Ask | None = None
     on_event: Callable[[str, Event], None] | None = None
     region: BoolArray | None = None
+    record: Path | None = None
 
     def find_or_teach(
         self, problem: Problem, settings: Subtask, task: str, known: Mapping[tuple[str, str], Policy]
@@ -147,7 +150,7 @@ class Teacher:
         def advisor() -> Advisor | None:
             region, episodes = self.region, learner.episodes
             made = make_advisor(self.advisor, mdp, learner.discount, rng, self.ask, region=region, episodes=episodes)
-            return made if made is None or region is None else _Inside(made, region)
+            return made if made is None or self.record is None else Recording(made, self.record)
 
         while left:
             left -= 1
@@ -201,17 +204,6 @@ class Teacher:
             advisor=self.advisor,
             seed=self.seed,
         )
-
-
-class _Inside:
-    """Any advisor, a person too, asked only where the robot is in the region; (S,) bool."""
-
-    def __init__(self, advisor: Advisor, region: BoolArray) -> None:
-        self._advisor, self._region = advisor, region
-
-    def advise(self, request: AdviceRequest) -> int | None:
-        """What the advisor says, nothing outside the region."""
-        return self._advisor.advise(request) if self._region[request.state] else None
 
 
 def fits(q: FloatArray, mdp: TabularMDP) -> bool:

@@ -186,6 +186,17 @@ class TerminalAdvisor:
         return self._ask(request)
 
 
+class LimitedView:
+    """Any advisor, a person too, who is heard only where the robot is in a region; (S,) bool."""
+
+    def __init__(self, advisor: Advisor, region: BoolArray):
+        self._advisor, self._region = advisor, region
+
+    def advise(self, request: AdviceRequest) -> int | None:
+        """What the advisor says, nothing outside the region."""
+        return self._advisor.advise(request) if self._region[request.state] else None
+
+
 @dataclass(frozen=True)
 class Workbench:
     """What an advisor is made from: the problem, the learner's discount and episodes, what the advisor sees."""
@@ -269,8 +280,11 @@ def make_advisor(
 ) -> Advisor | None:
     """The advisor of that name for a problem, None for "none".
 
-    Simulated advisors know the problem's exact optimal values for `discount` and, given a `region` (S,), speak only
-    in its states; `episodes` is the session's length; `ask` is the prompt behind "terminal".
+    Simulated advisors know the problem's exact optimal values for `discount`; given a `region` (S,), nobody speaks
+    outside it; `episodes` is the session's length; `ask` is the prompt behind "terminal".
     Raises BadInput for an unknown name, for "terminal" without `ask`, and for a record that does not fit.
     """
-    return parse_advisor(name)(Workbench(mdp, discount, rng, ask, region, episodes))
+    advisor = parse_advisor(name)(Workbench(mdp, discount, rng, ask, region, episodes))
+    if advisor is None or region is None or isinstance(advisor, TableAdvisor):
+        return advisor
+    return LimitedView(advisor, region)

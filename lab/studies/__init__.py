@@ -1,24 +1,15 @@
 """Studies: the tables and figures of the thesis measured again, and comparisons of our own."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from lab.studies.findings import Findings
     from lab.studies.runner import Job
 
 
-@dataclass(frozen=True)
-class Findings:
-    """What a study came to: rows as `lab study run --json` gives them, a summary, pictures by caption, remarks."""
-
-    rows: list[dict[str, Any]]
-    summary: dict[str, Any]
-    figures: Mapping[str, bytes] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
-
-
-Run = Callable[["Job", Mapping[str, Any]], Findings]
+Run = Callable[["Job", Mapping[str, Any]], "Findings"]
 
 
 @dataclass(frozen=True)
@@ -30,7 +21,7 @@ class Study:
 
 
 def _chapter9(name: str) -> Run:
-    def run(job: "Job", reading: Mapping[str, Any]) -> Findings:
+    def run(job: "Job", reading: Mapping[str, Any]) -> "Findings":
         from lab.studies import chapter9_parts
 
         findings: Findings = getattr(chapter9_parts, name)(job, reading)
@@ -40,7 +31,7 @@ def _chapter9(name: str) -> Run:
 
 
 def _table(name: str) -> Run:
-    def run(job: "Job", reading: Mapping[str, Any]) -> Findings:
+    def run(job: "Job", reading: Mapping[str, Any]) -> "Findings":
         from lab.studies.chapter9_parts import best_scores
 
         return best_scores(job, reading, name)
@@ -48,7 +39,7 @@ def _table(name: str) -> Run:
     return run
 
 
-def _speed(job: "Job", reading: Mapping[str, Any]) -> Findings:
+def _speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.speed import speed
 
     return speed(job)

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from lab.studies import Findings
 from lab.studies.chapter9 import (
     BEST_BETA,
     TABLES,
@@ -20,6 +19,7 @@ from lab.studies.chapter9 import (
     table,
 )
 from lab.studies.figures import bars, convergence, scores, success_by_beta
+from lab.studies.findings import Findings
 from lab.studies.runner import LEARNED_SEED, Job, Setting, example, learned_table, walk_of_advisor, world
 from lab.studies.statistics import interval, proportion_interval
 

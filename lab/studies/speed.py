@@ -10,8 +10,8 @@ import numpy as np
 from lab.advice.advisors import Advice, skill
 from lab.learning.kernels import run_sessions
 from lab.learning.settings import GateSettings
-from lab.studies import Findings
 from lab.studies.chapter9 import Row, row
+from lab.studies.findings import Findings
 from lab.studies.rivals import RIVALS, Missing
 from lab.studies.runner import Job, learned_table, world
 

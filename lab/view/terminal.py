@@ -160,6 +160,8 @@ class TeachingPrompt:
         self._say("Moves: " + "   ".join(self._named(mdp, action) for action in range(mdp.n_actions)))
         self._say(f"The learner itself would go {self._named(mdp, request.learner_action)}{_consequence(request)}.")
         self._say(_progress(request), "dim")
+        if request.why:
+            self._say(f"It asks because {request.why}.", "dim")
 
 
 def _consequence(request: AdviceRequest) -> str:
