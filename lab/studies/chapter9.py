@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.studies.runner import Job, Outcome, Setting, world
-from lab.studies.statistics import Range, compare, interval, proportion_interval, ranges, score, within
+from lab.studies.statistics import Comparison, Range, compare, interval, proportion_interval, ranges, score, within
 
 Row = dict[str, Any]
 View = Literal["full", "limited"]
@@ -114,7 +114,7 @@ class Grid:
     def rows(self, cell: Cell) -> list[Row]:
         """SP, HS and score of a cell beside the printed ones; for CCRL its requests, which are not printed."""
         outcomes, setting = self.of(cell), self._asked(cell.setting)
-        named = describe(setting) | ({"tau": "all"} if cell.average else {})
+        named = describe(setting, "all" if cell.average else setting.tau)
         if len(outcomes) == 1:
             share, low, high = proportion_interval(int(outcomes[0].success.sum()), len(outcomes[0].success))
         else:
@@ -146,14 +146,14 @@ def _replicated_scores(outcome: Outcome, sp_range: Range, hs_range: Range) -> Fl
     return score(sp, hs, sp_range, hs_range)
 
 
-def describe(setting: Setting) -> Row:
-    """A setting under the names that rows use, only what applies to it."""
+def describe(setting: Setting, tau: float | str | None = None) -> Row:
+    """A setting under the names that rows use, only what applies to it; `tau` is its own unless said otherwise."""
+    own = {"tau": setting.tau if tau is None else tau, "beta": setting.beta or world(setting.world).learner.beta}
     names = ("world", "view", "gate", "tau", "lambda_threshold", "omega", "psi", "beta")
-    said = {name: getattr(setting, name) for name in names if getattr(setting, name) is not None}
-    said.setdefault("beta", world(setting.world).learner.beta)
-    if setting.tau is not None or setting.gate != "never":
+    said = {name: own.get(name, getattr(setting, name)) for name in names}
+    if said["tau"] is not None:
         said["advisor_table"] = setting.advisor_table
-    return said
+    return {name: value for name, value in said.items() if value is not None}
 
 
 def row(named: Row, measure: str, value: float, ci: Sequence[float] | None, thesis: float | None) -> Row:
@@ -178,13 +178,25 @@ def table(job: Job, name: str, reading: Mapping[str, Any]) -> list[Row]:
     place, view = TABLES[name]
     grid = Grid(job, place, view, reading)
     rows: list[Row] = []
+    tests: list[Row] = []
     for tau in (*TAUS, None):
         chosen = [cell for cell in grid.best if cell.setting.tau == tau]
-        found = compare({cell.setting.gate: grid.scores(cell) for cell in chosen}).ranks
+        found = compare({cell.setting.gate: grid.scores(cell) for cell in chosen})
         for cell in chosen:
-            ranked = {"rank": found[cell.setting.gate], "thesis_rank": cell.rank}
-            rows += [{**one, **(ranked if one["measure"] == "score" else {})} for one in grid.rows(cell)]
-    return rows
+            ranked = {"rank": found.ranks[cell.setting.gate], "thesis_rank": cell.rank}
+            rows += [{**one, **ranked} for one in grid.rows(cell)]
+        about = {"table": "comparison of scores", "world": place, "view": view, "tau": "all" if tau is None else tau}
+        tests += _tests(about, found)
+    return rows + tests
+
+
+def _tests(named: Row, found: Comparison) -> list[Row]:
+    """The tests behind the ranks: their p values (Appendix II)."""
+    rows = [row(named, "ANOVA_p", found.p, None, None), row(named, "Levene_p", found.levene, None, None)]
+    for (one, other), p in found.tukey.items():
+        rows.append(row({**named, "gate": f"{one} - {other}"}, "Tukey_p", p, None, None))
+    normal = [(gate, p) for gate, p in found.normality.items() if p is not None]
+    return rows + [row({**named, "gate": gate}, "KS_p", p, None, None) for gate, p in normal]
 
 
 def by_beta(job: Job, places: Iterable[str] = ("world-1", "world-2")) -> list[Row]:
@@ -205,7 +217,7 @@ def agreement(rows: Sequence[Row]) -> Row:
     for measure in dict.fromkeys(one["measure"] for one in compared):
         of = [one["within"] for one in compared if one["measure"] == measure]
         summary[f"{measure} cells"], summary[f"{measure} within"] = len(of), sum(of)
-    ranked = [one for one in rows if "rank" in one and one["thesis_rank"]]
+    ranked = [one for one in rows if one["measure"] == "score" and one.get("thesis_rank")]
     if ranked:
         summary["ranks"] = len(ranked)
         summary["ranks as printed"] = sum(one["rank"] == one["thesis_rank"] for one in ranked)
