@@ -1,5 +1,6 @@
 """The commands about studies: run one and write what it found, look for world II."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,10 @@ def run_study(
     out.mkdir(parents=True, exist_ok=True)
     write_rows(out / "rows.csv", found.rows)
     write_report(out / "report.html", study.title, name, found.rows, summary, found.figures, found.notes)
+    for number, (caption, picture) in enumerate(found.figures.items(), start=1):
+        path = out / f"{number:02}-{re.sub(r'[^a-z0-9.]+', '-', caption.lower()).strip('-')[:60]}.svg"
+        write_whole(path, picture.decode())
+        files[caption] = str(path)
     if (out / STORE).is_file():
         files["sessions"] = str(out / STORE)
     notes = list(found.notes)

@@ -54,7 +54,7 @@ class Batch(NamedTuple):
 
 
 class _Problem(NamedTuple):
-    """The problem as flat arrays; `ends`: 0 goes on, 1 goal, 2 another terminal state."""
+    """The problem as arrays; `ends`: 0 goes on, 1 goal, 2 another terminal state."""
 
     successor: NDArray[np.int32]
     reward: FloatArray
@@ -96,6 +96,24 @@ _COUNTS = np.dtype(
 )
 
 
+class _Scratch(NamedTuple):
+    """What the sessions under way use in every step, (LANES,) each but values (A * LANES,).
+
+    Made here and not in the kernel, where numba would compile all of np.zeros along.
+    """
+
+    lanes: NDArray[np.void]
+    values: FloatArray
+    widths: FloatArray
+    per_tau: FloatArray
+    chosen: NDArray[np.int64]
+    moves: NDArray[np.int64]
+    states: NDArray[np.uint64]
+    rng: NDArray[np.uint64]
+    fresh: NDArray[np.bool_]
+    is_open: NDArray[np.bool_]
+
+
 @njit(inline="always")
 def _draw(rng: Any, lane: int) -> float:
     """selection.splitmix for one lane."""
@@ -130,8 +148,8 @@ def _learn(problem: Any, rules: Any, table: Any, state: int, action: int) -> Non
     best = table[entered * actions]
     for a in range(1, actions):
         best = max(best, table[entered * actions + a])
-    target = problem.reward[state, action] + (0.0 if over else rules.discount) * best
     at = state * actions + action
+    target = problem.reward[state, action] + (0.0 if over else rules.discount) * best
     table[at] = _towards(table[at], target, rules.alpha)
 
 
@@ -212,7 +230,8 @@ def _begin_session(lane: Any, j: int, n: int, seed: Any, tables: Any, others: An
     """Clears a lane for session n."""
     lane.session, lane.episode, rng[j] = n, 0, seed
     lane.last_result, lane.equal_results, lane.converged = 0, 0, 0
-    tables[j, :] = 0.0
+    for i in range(tables.shape[1]):
+        tables[j, i] = 0.0
     for k in range(others.shape[1]):
         for i in range(others.shape[2]):
             others[j, k, i] = _draw(rng, j) - 0.5
@@ -260,6 +279,7 @@ def _run(
     seeds: Any,
     temperatures: Any,
     actions: Any,
+    scratch: Any,
     all_tables: Any,
     others: Any,
     steps: Any,
@@ -267,7 +287,7 @@ def _run(
     counts: Any,
     kept: Any,
 ) -> None:
-    """All sessions: each lane takes the next one when its own is over. Scratch: all_tables (LANES, size), others.
+    """All sessions: each lane takes the next one when its own is over; all_tables (LANES, size), others: their tables.
 
     What is done in every step is written out here over plain arrays: a call that hands on a record of arrays counts
     references, which costs more than the step itself.
@@ -278,17 +298,10 @@ def _run(
     offset, factor = (step_reward, discount) if afterstate else (0.0, 1.0)
     gate, psi, max_moves, starts = rules.gate, rules.psi, rules.max_moves, problem.starts
     tables, size, ensemble = all_tables.ravel(), np.uint64(all_tables.shape[1]), others.shape[1]
-    lanes, rng, per_tau, fresh = (
-        np.zeros(LANES, _LANE),
-        np.zeros(LANES, np.uint64),
-        np.zeros(LANES),
-        np.ones(LANES, np.bool_),
-    )
-    values, widths, chosen = np.zeros(A * LANES), np.zeros(LANES), np.zeros(LANES, np.int64)
-    states, moves, is_open = np.zeros(LANES, np.uint64), np.zeros(LANES, np.int64), np.zeros(LANES, np.bool_)
+    lanes, rng, per_tau, fresh = scratch.lanes, scratch.rng, scratch.per_tau, scratch.fresh
+    values, widths, chosen = scratch.values, scratch.widths, scratch.chosen
+    states, moves, is_open = scratch.states, scratch.moves, scratch.is_open
     following = over_all = 0
-    for j in range(LANES):
-        lanes[j].session, lanes[j].episode = -1, episodes
     some_fresh = True
     while over_all < sessions:
         if some_fresh:
@@ -360,7 +373,8 @@ def _run(
                     if lanes[j].episode == episodes:
                         over_all, is_open[j] = over_all + 1, False
                         if len(kept):
-                            kept[lanes[j].session] = all_tables[j]
+                            for i in range(all_tables.shape[1]):
+                                kept[lanes[j].session, i] = all_tables[j, i]
 
 
 def run_sessions(
@@ -403,6 +417,7 @@ def run_sessions(
         np.asarray(seeds, np.uint64),
         1.0 / np.array(temperatures),
         (0,) * mdp.n_actions,
+        _scratch(mdp.n_actions, episodes),
         np.zeros((LANES, size)),
         others,
         steps,
@@ -415,13 +430,29 @@ def run_sessions(
     )
 
 
+def _scratch(actions: int, episodes: int) -> _Scratch:
+    lanes = np.zeros(LANES, _LANE)
+    lanes["session"], lanes["episode"] = -1, episodes
+    return _Scratch(
+        lanes=lanes,
+        values=np.zeros(actions * LANES),
+        widths=np.zeros(LANES),
+        per_tau=np.zeros(LANES),
+        chosen=np.zeros(LANES, np.int64),
+        moves=np.zeros(LANES, np.int64),
+        states=np.zeros(LANES, np.uint64),
+        rng=np.zeros(LANES, np.uint64),
+        fresh=np.ones(LANES, np.bool_),
+        is_open=np.zeros(LANES, np.bool_),
+    )
+
+
 def _problem(mdp: TabularMDP, afterstate: bool) -> _Problem:
     ends = np.where(mdp.goal, 1, np.where(mdp.terminal, 2, 0)).astype(np.uint8)
     starts = np.array(mdp.starts or (mdp.start,), np.int64)
     arrival = mdp.arrival if afterstate else np.zeros(1)
-    return _Problem(
-        mdp.successor.copy(), mdp.reward.copy(), arrival, ends, starts, mdp.step_reward if afterstate else 0.0
-    )
+    reward = 0.0 if not afterstate else mdp.step_reward
+    return _Problem(mdp.successor.copy(), mdp.reward.copy(), arrival, ends, starts, reward)
 
 
 def _rules(learner: LearnerSettings, gate: GateSettings, somebody: bool) -> _Rules:
