@@ -293,7 +293,7 @@ def see(
     as_json: Json = False,
 ) -> None:
     """Picture to grid: find the gripper (magenta), the toaster (cyan) and the obstacles (green)."""
-    from lab.lesson import see_picture
+    from lab.look import see_picture
     from lab.view.summary import grid_summary
 
     _show(see_picture(image, grid, task, out), as_json, grid_summary)
@@ -310,7 +310,7 @@ def view(
     as_json: Json = False,
 ) -> None:
     """Look at a task's scene or at a run's replay, on a page on 127.0.0.1, until Ctrl-C."""
-    from lab.lesson import show
+    from lab.look import show
 
     def tell(url: str, hint: str) -> None:
         if as_json:
@@ -380,7 +380,7 @@ def task_list(as_json: Json = False) -> None:
 @command(task_app, "show", "lab task show toast")
 def task_show(task: str, as_json: Json = False) -> None:
     """The text of a task file, of a task or a world: copy it, change it, use it."""
-    from lab.lesson import describe
+    from lab.task import describe
 
     text, document = describe(task)
     print(json.dumps(document) if as_json else text, end="\n" if as_json else "")
@@ -395,7 +395,7 @@ def task_random(
     as_json: Json = False,
 ) -> None:
     """Write a random grid world as a task file; a way always leads from its start to its goal."""
-    from lab.lesson import write_random
+    from lab.task import write_random
 
     def told(d: dict[str, Any]) -> str:
         return (
@@ -410,7 +410,7 @@ def task_reconstruct(
     out: Annotated[Path, typer.Option("--out", help="The .toml file to write.")], seed: Seed = 0, as_json: Json = False
 ) -> None:
     """Look for a world like the thesis's world II, of which only a picture is printed; takes a few minutes."""
-    from lab.study import reconstruct_world
+    from lab.task import reconstruct_world
     from lab.view.progress import counting
 
     with counting(_console(), "layouts and views compared") as progress:
@@ -477,7 +477,7 @@ def task_check(
 
     With --json the document comes in both cases.
     """
-    from lab.lesson import check_task
+    from lab.task import check_task
 
     errors = check_task(file, toasts, seed)
     if as_json or not errors:

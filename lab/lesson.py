@@ -1,7 +1,5 @@
-"""What single commands do: one teaching session, the high level alone, a picture to a grid, a look at a scene."""
+"""Single commands about lessons: one teaching session in a sub-task or a world, the order alone."""
 
-import re
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from difflib import get_close_matches
@@ -9,12 +7,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lab.errors import BadInput, LabError, unknown
-from lab.gridworld import RANDOM, GridWorld, parse_shape, random_world
+from lab.errors import BadInput, unknown
+from lab.gridworld import GridWorld
 from lab.listener import Listener
-from lab.mdp import greedy_path, shortest_steps
-from lab.record import read_text, write_whole
-from lab.taskfile import MAX_TOASTS, Task, find, load, load_any, load_world, names_file, world_names
+from lab.mdp import greedy_path
+from lab.taskfile import Task, load, load_world, names_file, world_names
 from lab.teaching import Lesson, Teacher, check_name, plain_name, world_problem
 
 if TYPE_CHECKING:
@@ -236,139 +233,4 @@ def sequence_task(
         "final_success_percent": 100.0 * sum(settled) / sessions if settled else None,
         "mean_best_s": sum(result.makespan_s for result in found) / sessions,
         "files": {} if plot is None else {"plot": str(plot)},
-    }
-
-
-def see_picture(image: Path, grid: str | None, task: str | None, out: Path | None) -> dict[str, Any]:
-    """A picture's markers as a grid, the document of `lab see --json`: '.' free, 'S' start, 'G' goal, '#' an obstacle's marker.
-
-    With a task the grid is the one of its overhead camera; without, the frame is the grid, 12 x 12 unless `grid` says so.
-    """
-    from lab.vision import draw, read_picture, see, write_picture
-
-    match = re.fullmatch(r"([1-9]\d{0,2})x([1-9]\d{0,2})", "12x12" if grid is None else grid)
-    if match is None:
-        raise BadInput(f"grid '{grid}' (--grid): wanted ROWSxCOLUMNS, each 1 to 999, such as 12x12")
-    shape = (int(match[1]), int(match[2]))
-    picture = read_picture(image)
-    camera = None
-    if task is not None:
-        from lab.skills.surveys import camera_view
-
-        height, width = picture.shape[:2]
-        if height != width:
-            raise BadInput(f"{image}: {width} x {height} pixels: the task's camera takes square pictures")
-        camera = camera_view(load(task), height)
-        if grid is not None and shape != camera.shape:
-            own = f"{camera.shape[0]}x{camera.shape[1]}"
-            raise BadInput(f"grid '{grid}' (--grid): the grid of the task's camera is {own}; leave --grid away")
-        shape = camera.shape
-    seen = see(picture, camera, shape=shape, where=str(image))
-    cells = [["." for _ in range(shape[1])] for _ in range(shape[0])]
-    for i, j in seen.obstacles:
-        cells[i][j] = "#"
-    cells[seen.start[0]][seen.start[1]], cells[seen.goal[0]][seen.goal[1]] = "S", "G"
-    if out is not None:
-        write_picture(out, draw(picture, seen))
-    return {
-        "grid": ["".join(row) for row in cells],
-        "start": list(seen.start),
-        "goal": list(seen.goal),
-        "obstacles": [list(cell) for cell in seen.obstacles],
-        "markers": [
-            {
-                "kind": m.kind,
-                "pixel": [float(v) for v in m.pixel],
-                "world_m": [float(v) for v in m.world_m],
-                "cell": list(m.cell),
-            }
-            for m in seen.markers
-        ],
-        "files": {} if out is None else {"picture": str(out)},
-    }
-
-
-def show(what: str, toasts: int, seed: int, port: int, tell: Callable[[str, str], None]) -> None:
-    """Serve a run's replay, or a task's scene, on 127.0.0.1 until interrupted; `tell(url, hint)` once it is there."""
-    from lab.view.meshcat import LiveView
-
-    folder = Path(what)
-    if folder.is_dir():
-        replay = folder / "replay.html"
-        if not replay.is_file():
-            raise BadInput(f"'{what}' holds no replay.html: give the folder of a run (--out of lab run) or a task")
-        with LiveView(port, replay=replay) as page:
-            tell(page.url, page.hint)
-            _wait()
-    _check_number(toasts)
-    task = load(what)
-    import numpy as np
-
-    from lab.recorder import show_scene
-    from lab.sim.scene import check_scene, draw_layout
-
-    check_scene(task)
-    with LiveView(port) as live:
-        show_scene(task, toasts, draw_layout(task, toasts, np.random.default_rng([seed, 1])), live)
-        tell(live.url, live.hint)
-        _wait()
-
-
-def _check_number(toasts: int) -> None:
-    if not 1 <= toasts <= MAX_TOASTS:
-        raise BadInput(f"{toasts} toasts (--toasts): allowed are 1 to {MAX_TOASTS}")
-
-
-def _wait() -> None:
-    while True:
-        time.sleep(3600)
-
-
-def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
-    """What is wrong with a task file, its scene and its problems for so many toasts, or with a world; empty when nothing is.
-
-    Without a number: for 3 toasts, or as many as there is room for.
-    """
-    from lab.run import prepare
-
-    if not file.startswith(RANDOM):
-        find(file)
-    if toasts is not None:
-        _check_number(toasts)
-    try:
-        task = load_any(file)
-        if isinstance(task, GridWorld):
-            world_problem(task)
-        else:
-            prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
-    except LabError as error:
-        return [str(error)]
-    return []
-
-
-def describe(word: str) -> tuple[str, dict[str, Any]]:
-    """The text of a task or world, and the document of `lab task show --json`; a world drawn at random has no "file"."""
-    found = load_any(word)
-    if isinstance(found, GridWorld) and word.startswith(RANDOM):
-        return found.to_toml(), {"file": None, **found.model_dump(mode="json")}
-    path = find(word)
-    return read_text(path), {"file": str(path), **found.model_dump(mode="json")}
-
-
-def write_random(shape: str, density: float, seed: int, out: Path) -> dict[str, Any]:
-    """Write a random world as a task file; the document of `lab task random --json`."""
-    if out.suffix != ".toml":
-        raise BadInput(f"task file '{out}' (--out): its name must end in .toml")
-    world = random_world(parse_shape(shape, "SHAPE"), density, seed)
-    write_whole(out, world.to_toml())
-    return {
-        "file": str(out),
-        "name": world.name,
-        "shape": list(world.shape),
-        "density": density,
-        "seed": seed,
-        "start": list(world.start),
-        "goal": list(world.goal),
-        "obstacles": len(world.obstacles),
-        "optimal_steps": shortest_steps(world.mdp()),
     }

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from lab.errors import BadInput, unknown
+from lab.errors import unknown
 from lab.record import write_whole
 from lab.report import check_out
 from lab.studies import STUDIES
@@ -64,15 +64,3 @@ def run_study(
         "notes": notes,
         "files": files,
     }
-
-
-def reconstruct_world(seed: int, out: Path, progress: Progress) -> dict[str, Any]:
-    """Look for a world like world II and write it as a task file; the document of `lab task reconstruct --json`."""
-    from lab.studies.reconstruct import COMMENT, reconstruct
-
-    if out.suffix != ".toml":
-        raise BadInput(f"task file '{out}' (--out): its name must end in .toml")
-    check_out(out.parent)
-    world = reconstruct(seed, progress)
-    write_whole(out, world.to_toml(COMMENT.format(seed=seed, file=out.name)))
-    return {"file": str(out), "seed": seed, **world.model_dump(mode="json")}

@@ -312,10 +312,15 @@ def explain(error: ValidationError) -> str:
     return f"{where + ': ' if where else ''}{message}{shown}{more}"
 
 
-def check_toasts(toasts: int, task: Task) -> None:
-    """BadInput unless 1 <= toasts <= 50 and both ends of the route hold that many."""
+def check_number(toasts: int) -> None:
+    """BadInput unless 1 <= toasts <= 50."""
     if not 1 <= toasts <= MAX_TOASTS:
         raise BadInput(f"{toasts} toasts (--toasts): allowed are 1 to {MAX_TOASTS}")
+
+
+def check_toasts(toasts: int, task: Task) -> None:
+    """BadInput unless 1 <= toasts <= 50 and both ends of the route hold that many."""
+    check_number(toasts)
     for stage in (task.route[0], task.route[-1]):
         capacity = task.station(stage.station).capacity
         if toasts > capacity:

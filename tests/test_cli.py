@@ -328,6 +328,7 @@ def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: 
 
     monkeypatch.setattr("lab.run.prepare", stop)
     monkeypatch.setattr("lab.lesson.load", stop)
+    monkeypatch.setattr("lab.look.load", stop)
     ran = lab(*words.split(), "--json")
     assert (ran.code, ran.out, ran.err) == (130, "", f"lab: stopped by Ctrl-C{said}\n")
 

@@ -1,10 +1,8 @@
-"""Single commands: a teaching session, the order alone, a picture, a look at a scene, a checked file."""
+"""Single commands: a teaching session in a sub-task or a world, the order alone."""
 
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ from lab.advice.advisors import AdviceRequest
 from lab.errors import BadInput
 from lab.gridworld import GridWorld, View
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.lesson import check_task, find_skill, fitting, see_picture, sequence_task, show, teach_one, teach_world
+from lab.lesson import find_skill, fitting, sequence_task, teach_one, teach_world
 from lab.listener import Listener
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import SequenceResult
@@ -22,7 +20,7 @@ from lab.skills import Butter, Grasp, Skill
 from lab.taskfile import Task, load
 from lab.teaching import Interrupted, Teacher
 from lab.toolbox import Toolbox
-from lab.vision import MARKERS, read_picture, write_picture
+from lab.vision import read_picture
 
 
 @pytest.fixture(scope="module")
@@ -307,127 +305,3 @@ def test_the_same_seed_gives_the_same_order(task: Task, teacher: Teacher) -> Non
         return sequence_task(task, 4, teacher, method="srl", episodes=5, sessions=1, plot=None, listener=Listener())
 
     assert found() == found()
-
-
-# ---- see ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def picture(tmp_path: Path) -> Callable[..., Path]:
-    """Draws a grid of 4 x 6 cells of 40 pixels with round markers in the middle of cells."""
-
-    def draw(**cells: list[tuple[int, int]]) -> Path:
-        image = np.full((160, 240, 3), 200, np.uint8)
-        down, right = np.mgrid[:160, :240]
-        for kind, places in cells.items():
-            for i, j in places:
-                disc = np.hypot(down - (40 * i + 19.5), right - (40 * j + 19.5)) < 14
-                image[disc] = MARKERS[kind].rgb
-        path = tmp_path / "picture.png"
-        write_picture(path, image)
-        return path
-
-    return draw
-
-
-def test_a_picture_becomes_a_grid(picture: Callable[..., Path], tmp_path: Path) -> None:
-    path = picture(gripper=[(0, 0)], toaster=[(3, 5)], obstacle=[(1, 1), (2, 3)])
-    document = see_picture(path, "4x6", None, tmp_path / "seen.png")
-    assert document["grid"] == ["S.....", ".#....", "...#..", ".....G"]
-    assert (document["start"], document["goal"]) == ([0, 0], [3, 5])
-    assert document["obstacles"] == [[1, 1], [2, 3]]
-    assert [marker["kind"] for marker in document["markers"]] == ["gripper", "obstacle", "obstacle", "toaster"]
-    assert document["markers"][0]["pixel"] == pytest.approx([19.5, 19.5], abs=0.5)
-    assert document["files"] == {"picture": str(tmp_path / "seen.png")}
-    assert read_picture(tmp_path / "seen.png").shape == (160, 240, 3)
-
-
-@pytest.mark.parametrize(
-    ("markers", "reason"),
-    [
-        ({}, "no round coloured marker found"),
-        ({"gripper": [(0, 0)]}, "no toaster marker: wanted exactly one round cyan spot"),
-        ({"gripper": [(0, 0)], "toaster": [(1, 1), (3, 5)]}, "2 toaster markers at pixels"),
-    ],
-)
-def test_pictures_without_start_or_goal(
-    picture: Callable[..., Path], tmp_path: Path, markers: dict[str, Any], reason: str
-) -> None:
-    path = picture(**markers)
-    with pytest.raises(BadInput, match=f"^{path}: {reason}"):
-        see_picture(path, "4x6", None, tmp_path / "seen.png")
-    assert not (tmp_path / "seen.png").exists()
-
-
-@pytest.mark.parametrize("grid", ["", "12", "0x3", "3x0", "-1x3", "1000x3", "3x3x3", "axb", "3X3"])
-def test_grids_that_are_none(tmp_path: Path, grid: str) -> None:
-    with pytest.raises(BadInput, match=r"--grid.: wanted ROWSxCOLUMNS"):
-        see_picture(tmp_path / "none.png", grid, None, None)
-
-
-# ---- view ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def looked_at(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    """The page is read once, then Ctrl-C is pressed."""
-    told: list[str] = []
-
-    def look() -> None:
-        with urlopen(told[0], timeout=10) as page:
-            told.append(page.read().decode())
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("lab.lesson._wait", look)
-    return told  # type: ignore[return-value]
-
-
-def test_a_scene_is_shown_on_this_computer_only(looked_at: list[str]) -> None:
-    with pytest.raises(KeyboardInterrupt):
-        show("toast", 1, 0, 0, lambda url, hint: looked_at.append(url))
-    url, page = looked_at
-    assert url.startswith("http://127.0.0.1:")
-    assert "<canvas" in page or "<script" in page
-    with pytest.raises(OSError, match="refused"):
-        urlopen(url, timeout=10)
-
-
-def test_a_runs_replay_is_served(looked_at: list[str], tmp_path: Path) -> None:
-    (tmp_path / "replay.html").write_text('<p>replay</p><script id="lab-data"></script>')
-    with pytest.raises(KeyboardInterrupt):
-        show(str(tmp_path), 3, 0, 0, lambda url, hint: looked_at.append(url))
-    assert looked_at[1].startswith("<p>replay</p>")
-
-
-def test_what_is_neither_a_task_nor_a_run(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r"holds no replay.html: give the folder of a run"):
-        show(str(tmp_path), 3, 0, 0, lambda url, hint: None)
-    with pytest.raises(BadInput, match=r"^51 toasts"):
-        show("toast", 51, 0, 0, lambda url, hint: None)
-
-
-# ---- check --------------------------------------------------------------------------------------------------------
-
-
-def test_check_finds_what_is_wrong(tmp_path: Path, root: Path) -> None:
-    text = (root / "tasks" / "toast.toml").read_text(encoding="utf-8")
-    path = tmp_path / "t.toml"
-    path.write_text(text.replace("capacity = 50", "capacity = 2"))
-    assert check_task(str(path), None, 0) == []
-    (error,) = check_task(str(path), 3, 0)
-    assert error == "3 toasts (--toasts) do not fit on 'plate': its capacity in the task file is 2"
-    path.write_text("name =")
-    (error,) = check_task(str(path), 3, 0)
-    assert error.startswith(f"{path}: not valid TOML: Invalid value (at end of document)")
-
-
-def test_check_finds_what_is_wrong_with_a_world(tmp_path: Path, root: Path) -> None:
-    text = (root / "tasks" / "world-1.toml").read_text(encoding="utf-8")
-    assert check_task("world-1", None, 0) == check_task("random:10x10x10:0.06:7", None, 0) == []
-    path = tmp_path / "w.toml"
-    path.write_text(text.replace("max_steps = 200", "max_steps = 12"))  # the start counts as a step
-    (error,) = check_task(str(path), None, 0)
-    assert error == "world 'world-1': learner.max_steps = 12: the shortest way has 12 moves and needs 13 steps"
-    path.write_text(text.replace("goal = [8, 5, 3]", "goal = [8, 5, 30]"))
-    (error,) = check_task(str(path), None, 0)
-    assert error == f"{path}: goal (8, 5, 30) is outside the world: allowed are 0..9 x 0..9 x 0..9"

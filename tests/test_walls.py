@@ -35,7 +35,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.view",),
     ("lab.report",),
     ("lab.run", "lab.studies", "lab.gym"),
-    ("lab.lesson", "lab.study"),
+    ("lab.lesson", "lab.study", "lab.look"),
+    ("lab.task",),
     ("lab.cli",),
 )
 ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it

@@ -1,6 +1,6 @@
 """Whole sessions compiled with numba, many at once: what studies run.
 
-Sixteen sessions walk side by side: one alone waits for its memory and its exponentials, sixteen keep the processor busy.
+Many sessions walk side by side: one alone waits for its memory and its exponentials, 24 keep the processor busy.
 Each has uniform numbers of its own (`selection.splitmix`), so its result depends on its seed and on nothing else, and
 equals that of `session.run_session` with the same numbers. Rules come from `selection`, `updates` and `advice.gates`.
 """

@@ -1,0 +1,76 @@
+"""The commands about task files: check one, describe it, write a random world."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from lab.errors import BadInput, LabError
+from lab.gridworld import RANDOM, GridWorld, parse_shape, random_world
+from lab.lesson import fitting
+from lab.mdp import shortest_steps
+from lab.record import read_text, write_whole
+from lab.report import check_out
+from lab.taskfile import check_number, find, load_any
+from lab.teaching import world_problem
+
+
+def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
+    """What is wrong with a task file, its scene and its problems for so many toasts, or with a world; empty when nothing is.
+
+    Without a number: for 3 toasts, or as many as there is room for.
+    """
+    from lab.run import prepare
+
+    if not file.startswith(RANDOM):
+        find(file)
+    if toasts is not None:
+        check_number(toasts)
+    try:
+        task = load_any(file)
+        if isinstance(task, GridWorld):
+            world_problem(task)
+        else:
+            prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
+    except LabError as error:
+        return [str(error)]
+    return []
+
+
+def describe(word: str) -> tuple[str, dict[str, Any]]:
+    """The text of a task or world, and the document of `lab task show --json`; a world drawn at random has no "file"."""
+    found = load_any(word)
+    if isinstance(found, GridWorld) and word.startswith(RANDOM):
+        return found.to_toml(), {"file": None, **found.model_dump(mode="json")}
+    path = find(word)
+    return read_text(path), {"file": str(path), **found.model_dump(mode="json")}
+
+
+def write_random(shape: str, density: float, seed: int, out: Path) -> dict[str, Any]:
+    """Write a random world as a task file; the document of `lab task random --json`."""
+    if out.suffix != ".toml":
+        raise BadInput(f"task file '{out}' (--out): its name must end in .toml")
+    world = random_world(parse_shape(shape, "SHAPE"), density, seed)
+    write_whole(out, world.to_toml())
+    return {
+        "file": str(out),
+        "name": world.name,
+        "shape": list(world.shape),
+        "density": density,
+        "seed": seed,
+        "start": list(world.start),
+        "goal": list(world.goal),
+        "obstacles": len(world.obstacles),
+        "optimal_steps": shortest_steps(world.mdp()),
+    }
+
+
+def reconstruct_world(seed: int, out: Path, progress: Callable[[int, int], None]) -> dict[str, Any]:
+    """Look for a world like world II and write it as a task file; the document of `lab task reconstruct --json`."""
+    from lab.studies.reconstruct import COMMENT, reconstruct
+
+    if out.suffix != ".toml":
+        raise BadInput(f"task file '{out}' (--out): its name must end in .toml")
+    check_out(out.parent)
+    world = reconstruct(seed, progress)
+    write_whole(out, world.to_toml(COMMENT.format(seed=seed, file=out.name)))
+    return {"file": str(out), "seed": seed, **world.model_dump(mode="json")}
