@@ -241,7 +241,11 @@ def teach(
     if document["failure"] is not None:
         _end(document["failure"], 1)
     if document["final_steps"] is None:
-        _end(f"'{document['skill']}' does not reach its goal after {document['episodes']} episodes", 1)
+        _end(
+            f"'{document['skill']}' does not reach its goal after {document['episodes']} episodes: "
+            "try another advisor, more --episodes or another --learner",
+            1,
+        )
 
 
 @command(app, "sequence", "lab sequence toast --toasts 4 --method srl")

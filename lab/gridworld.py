@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from math import prod
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ ACTIONS = {  # of worlds with 2 and 3 axes, as `lab.mdp.grid` orders them: -axis
     3: ("left", "right", "backward", "forward", "down", "up"),  # x, y, z as seen from above
 }
 _TRIES = 10  # at scattering obstacles that leave a way
+_ALONE: dict[str, Any] = {"learner": "afterstate", "beta": 1.0, "episodes": 500}
 _ROOM = 4  # an episode of a drawn world may take so many times the shortest way
 _WANTED = "wanted random:SHAPE:DENSITY:SEED, such as random:10x10x10:0.06:7"
 
@@ -193,6 +194,8 @@ def from_text(path: Path) -> GridWorld:
     These are the rows that `lab see --json` calls "grid". Raises BadInput with file, line and column, and NoPath.
     """
     rows = [row.removesuffix("\r") for row in read_text(path).rstrip("\r\n").split("\n")]
+    if rows == [""]:
+        raise BadInput(f"{path}: it is empty: wanted rows of . # S G")
     cells: dict[str, list[Coordinates]] = {"#": [], "S": [], "G": []}
     for i, row in enumerate(rows):
         for j, mark in enumerate(row):
@@ -292,10 +295,10 @@ def _staircase(start: Ints, goal: Ints, rng: np.random.Generator) -> Ints:
 
 
 def _fitted(world: GridWorld) -> GridWorld:
-    """The world with episodes long enough for its shortest way and, where that is long, collisions that cost more than it."""
+    """The world with a learner that mostly finds a way alone and, where ways are long, collisions that cost more than they."""
     moves, rewards, learner = shortest_steps(world.mdp()), world.rewards, world.learner
     if world.worth(moves, rewards.goal) <= rewards.collision:
         endless = rewards.step / (1.0 - learner.discount)
         rewards = replace(rewards, collision=round(endless - 1.0, 6))
-    learner = replace(learner, max_steps=max(learner.max_steps, _ROOM * moves))
+    learner = replace(learner, **_ALONE, max_steps=max(learner.max_steps, _ROOM * moves))
     return world.model_copy(update={"rewards": rewards, "learner": learner})

@@ -129,6 +129,7 @@ def _document(problem: "Problem", lesson: Lesson, teacher: Teacher, failure: str
         "final_steps": result.final_steps,
         "solved": result.solved and failure is None,
         "failure": failure,
+        "source": lesson.source,
         "saved_as": policy.name,
         "files": {},
     }

@@ -13,6 +13,11 @@ from lab.report import check_out
 from lab.taskfile import check_number, find, load_any
 from lab.teaching import world_problem
 
+AXES = """\
+Drawn at random. Cells are counted from 0; with two axes they are [row, column], row 0 on top, with three [x, y, z], y
+away from you and z up.
+"""
+
 
 def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
     """What is wrong with a task file, its scene and its problems for so many toasts, or with a world; empty when nothing is.
@@ -50,7 +55,9 @@ def write_random(shape: str, density: float, seed: int, out: Path) -> dict[str, 
     if out.suffix != ".toml":
         raise BadInput(f"task file '{out}' (--out): its name must end in .toml")
     world = random_world(parse_shape(shape, "SHAPE"), density, seed)
-    write_whole(out, world.to_toml())
+    if out.exists():
+        raise BadInput(f"task file '{out}' (--out): there is one already: choose another name, or remove it")
+    write_whole(out, world.to_toml(AXES))
     return {
         "file": str(out),
         "name": world.name,

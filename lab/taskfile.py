@@ -236,12 +236,11 @@ def find(task: str) -> Path:
     if _is_path(task):
         if Path(task).is_file():
             return Path(task)
-        raise BadInput(
-            f"no task file '{task}': give a .toml file that exists or a task that ships: {', '.join(task_names())}"
-        )
+        known = ", ".join(_files())
+        raise BadInput(f"no task file '{task}': give a file that exists, .toml or a .txt grid, or what ships: {known}")
     files = _files()
     if task not in files:
-        raise unknown("task", task, task_names(), "TASK")
+        raise unknown("task", task, files, "TASK")
     return files[task]
 
 

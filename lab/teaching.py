@@ -1,7 +1,7 @@
 """Find a skill in the toolbox, or teach it: learning sessions with a gate and an advisor, kept whatever happens."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from math import inf
 from pathlib import Path
 from typing import Literal
@@ -83,7 +83,10 @@ class Teacher:
         return None
 
     def one_session(self, problem: Problem, settings: Learned, task: str, name: str | None) -> Lesson:
-        """One session that goes on from what is unfinished; BadInput when `name` is that of another problem's policy."""
+        """One session that goes on from what was broken off, or left unsolved by the same learner, gate and advisor.
+
+        BadInput when `name` is that of another problem's policy.
+        """
         for row in self.toolbox.list() if name is not None else ():
             if row["name"] == name and (row["subtask"], row["signature"]) != (problem.subtask, problem.mdp.signature):
                 raise BadInput(
@@ -91,7 +94,16 @@ class Teacher:
                     f"problem ({row['signature'][:8]}): choose another name, or remove that policy"
                 )
         found = self.unfinished(problem, name)
+        if found is not None and not self._same(found, settings):
+            found = None  # another learner, gate or advisor begins anew, so that they can be compared
         return self.teach(problem, settings.learner, settings.gate, task, unfinished=found, name=name, sessions=1)
+
+    def _same(self, policy: Policy, settings: Learned) -> bool:
+        """Whether a policy was learned in this way, or broken off before anything can be said of its gate and advisor."""
+        length = {"episodes": 0}
+        broken_off = len(policy.curve) < policy.learner.get("episodes", 0)
+        alike = (policy.gate, policy.advisor) == (asdict(settings.gate), self.advisor)
+        return policy.learner | length == asdict(settings.learner) | length and (alike or broken_off)
 
     def teach(
         self,

@@ -2,9 +2,10 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -77,6 +78,23 @@ def test_every_command_has_help_with_an_example(lab: Lab, words: list[str]) -> N
     assert "--json" in ran.out
 
 
+@pytest.mark.parametrize(
+    ("option", "following", "members"),
+    [
+        ("--learner", "--gate", UPDATES),
+        ("--gate", "--advisor", gates.GATES),
+        ("--advisor", "--episodes", [*advisors.ADVISORS, *advisors.FORMS]),
+    ],
+)
+def test_the_help_of_teach_names_all_members(lab: Lab, option: str, following: str, members: Iterable[str]) -> None:
+    """It is written by hand, as help loads no table: each list stands in its option's help, and nothing else does."""
+    text = " ".join(lab("teach", "--help").out.replace("│", " ").split())
+    told = re.sub(r" \([^)]*\)", "", text[text.index(f" {option} ") : text.index(f" {following} ")])
+    listed = re.search(r"(\S+, )+\S+", told)
+    assert listed is not None
+    assert {name.strip(";.") for name in listed[0].split(", ")} == {*members}
+
+
 def test_no_words_give_help(lab: Lab) -> None:
     for words in ([], ["toolbox"], ["task"]):
         ran = lab(*words)
@@ -127,7 +145,10 @@ ADVISORS, LEARNERS, GATES = (
         ("view toas", f"unknown task 'toas' (TASK): did you mean 'toast'? {TASKS}"),
         ("task show toas", f"unknown task 'toas' (TASK): did you mean 'toast'? {TASKS}"),
         ("task check toas", f"unknown task 'toas' (TASK): did you mean 'toast'? {TASKS}"),
-        ("run no/task.toml", "no task file 'no/task.toml': give a .toml file that exists or a task that ships: toast"),
+        (
+            "run no/task.toml",
+            "no task file 'no/task.toml': give a file that exists, .toml or a .txt grid, or what ships: toast",
+        ),
         ("run a\nb\x1b[31m", rf"unknown task 'a\nb\x1b[31m' (TASK): {TASKS}"),
         ("run --advisor exprt", f"unknown advisor 'exprt' (--advisor): did you mean 'expert'? {ADVISORS}"),
         ("teach insert --advisor x", f"unknown advisor 'x' (--advisor): {ADVISORS}"),
@@ -164,7 +185,7 @@ ADVISORS, LEARNERS, GATES = (
         ("teach insert --task world-1", "world-1: it is a world, not a task: learn it with lab teach world-1"),
         ("teach toast", "toast: it is a task, not a world: lab run toast, or lab teach SUBTASK --task toast"),
         ("teach wrld-1", "unknown sub-task 'wrld-1' (SUBTASK): did you mean 'world-1'? known: butter, grasp,"),
-        ("teach no.txt", "no task file 'no.txt': give a .toml file that exists or a task that ships: toast"),
+        ("teach no.txt", "no task file 'no.txt': give a file that exists, .toml or a .txt grid, or what ships: toast"),
         ("teach world-1 --task toast", "task 'toast' (--task): the world 'world-1' belongs to no task: leave --task"),
         ("teach world-1 --view half", "unknown view 'half' (--view): known: full, limited"),
         (
@@ -379,7 +400,7 @@ def test_a_world_is_shown_checked_and_learned(lab: Lab, folder: Path, root: Path
     assert lab("task", "check", "world-1").out == "world-1 is sound\n"
     ran = lab("teach", "world-1", "--view", "limited", "--json")
     assert (ran.code, ran.err) == (0, "")
-    assert (ran.json["subtask"], ran.json["view"], ran.json["optimal_steps"]) == ("world", "limited", 12)
+    assert (ran.json["subtask"], ran.json["view"], ran.json["optimal_steps"]) == ("world", "limited", 13)
     (row,) = lab("toolbox", "list", "--json").json["policies"]
     assert (row["name"], row["subtask"], row["task"]) == (ran.json["saved_as"], "world", "world-1")
     assert (folder / "toolbox").is_dir()
@@ -390,8 +411,13 @@ def test_a_random_world_is_written_checked_and_learned(lab: Lab, folder: Path) -
     ran = lab(*words, "--json")
     assert (ran.code, ran.json["file"], ran.json["obstacles"]) == (0, "w.toml", 9)
     text = (folder / "w.toml").read_text(encoding="utf-8")
-    assert lab(*words).out.startswith("w.toml: 9 obstacles, the shortest way takes ")
-    assert (folder / "w.toml").read_text(encoding="utf-8") == text == lab("task", "show", "random:6x5:0.3:2").out
+    again = lab(*words)
+    assert (again.code, again.out) == (2, "")
+    assert "w.toml' (--out): there is one already: choose another name, or remove it" in again.err
+    assert lab(*words[:-1], "v.toml").out.startswith("v.toml: 9 obstacles, the shortest way takes ")
+    assert (folder / "v.toml").read_text(encoding="utf-8") == text
+    assert text.endswith(lab("task", "show", "random:6x5:0.3:2").out)
+    assert text.startswith("# Drawn at random. Cells are counted from 0; with two axes they are [row, column]")
     assert load_world("w.toml") == load_world("random:6x5:0.3:2")
     assert lab("task", "show", "random:6x5:0.3:2", "--json").json["file"] is None
     assert lab("task", "check", "w.toml").out == "w.toml is sound\n"

@@ -129,6 +129,12 @@ class Recording:
 
     def __init__(self, advisor: Advisor, path: Path):
         self._advisor, self._path = advisor, path
+        try:
+            first = path.read_bytes().splitlines()[:1] if path.exists() else []
+        except OSError as error:
+            raise BadInput(f"record '{path}' (--record): cannot be read: {error.strerror or error}") from error
+        if first and not first[0].startswith(b'{"signature"'):
+            raise BadInput(f"record '{path}' (--record): the file holds something else than advice: choose another one")
 
     def advise(self, request: AdviceRequest) -> int | None:
         """The advisor's answer, written down when there is one."""
@@ -256,6 +262,8 @@ def parse_advisor(name: str, where: str = "advisor") -> Callable[[Workbench], Ad
         return ADVISORS[name]
     if name.startswith("recorded:"):
         path = Path(name.removeprefix("recorded:"))
+        if not path.name:
+            raise BadInput(f"advisor '{name}' ({where}): it names no file: wanted recorded:FILE")
         return lambda bench: RecordedAdvisor(read_record(path, bench.mdp))
     if not name.startswith("tau="):
         raise unknown("advisor", name, [*ADVISORS, *FORMS], where)

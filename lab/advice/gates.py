@@ -144,7 +144,7 @@ class Random(_PerStep):
 
 
 class Uncertainty(_PerStep):
-    """Asks where an ensemble of tables disagrees: their values' standard deviation is at least Psi.
+    """Asks where an ensemble of tables disagrees: their values' standard deviation is at least `spread`.
 
     Each table starts with values of its own within +-0.5 and learns each step with probability 1/2. The deviation is
     the root of the mean variance over the actions. Source: da Silva et al. 2020 (RCMP), for tables.
@@ -159,8 +159,8 @@ class Uncertainty(_PerStep):
     def asks(self, state: int, values: Values) -> bool:
         """Whether the tables disagree about this state."""
         spread = deviation([table.gauge(state) for table in self._tables])
-        self.why = f"its {len(self._tables)} tables differ by {spread:.2f} here, at least {self.settings.psi:g}"
-        return spread >= self.settings.psi
+        self.why = f"its {len(self._tables)} tables differ by {spread:.2f} here, at least {self.settings.spread:g}"
+        return spread >= self.settings.spread
 
     def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int) -> None:
         """Each table learns the step, or not."""

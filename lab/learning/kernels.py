@@ -79,6 +79,7 @@ class _Rules(NamedTuple):
     first_episode: int
     window: int
     psi: float
+    spread: float
     rate: float
     enough: float
     ensemble: int
@@ -335,7 +336,7 @@ def _run(
                 elif gate == _RANDOM:
                     asks = _draw(rng, j) < rules.rate
                 elif gate == _UNCERTAINTY:
-                    asks = _deviation(problem, rules, others[j], np.int64(state)) >= psi
+                    asks = _deviation(problem, rules, others[j], np.int64(state)) >= rules.spread
                 else:
                     asks = True
                 if asks:
@@ -469,6 +470,7 @@ def _rules(learner: LearnerSettings, gate: GateSettings, somebody: bool) -> _Rul
         gate.first_episode,
         gate.window,
         float(gate.psi),
+        float(gate.spread),
         float(gate.rate),
         float(gate.enough_steps),
         gate.ensemble,

@@ -69,9 +69,9 @@ class SessionResult:
     q (S, A) float64, visits (S, A) int64; steps (episodes,) int64, a failed episode as max_steps + 1; guided
     (episodes,) bool: at least one advised step; requests: episodes in which the learner asked; helped_steps:
     advised steps that were carried out; misleads and rejected_at_episode: see lab/advice/gates.py; final_steps:
-    moves of the greedy path from the start, None if it does not reach the goal; solved: final_steps ==
-    optimal_steps, or, in a problem with several `starts`, the greedy path reaches the goal from each of them;
-    interrupted: stopped by Ctrl-C, only finished episodes count.
+    those of the greedy path from the start, None if it does not reach the goal, optimal_steps: the fewest, both
+    counted as in `steps`; solved: they are the same, or, in a problem with several `starts`, the greedy path reaches
+    the goal from each of them; interrupted: stopped by Ctrl-C, only finished episodes count.
     """
 
     q: FloatArray
@@ -139,7 +139,7 @@ class _Session:
             raise unknown("gate", gate.gate, GATES, "gate settings")
         self.mdp, self.settings, self.gate_settings = mdp, learner, gate
         self.advisor, self.tell = advisor, on_event
-        self.optimal_steps = shortest_steps(mdp)
+        self.optimal_steps = shortest_steps(mdp) + learner.count_start
         self.update = UPDATES[learner.learner](_start_values(mdp, q0).tolist(), learner, mdp)
         self.q = self.update.q
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
@@ -256,7 +256,7 @@ class _Session:
         q = np.array(list(self.q), np.float64)
         finished = len(self.guided)
         _, actions, reached = greedy_path(q, self.mdp, self.settings.max_steps)
-        final_steps = len(actions) if reached else None
+        final_steps = len(actions) + self.settings.count_start if reached else None
         return SessionResult(
             q=q,
             visits=np.array(self.visits, np.int64),

@@ -70,11 +70,11 @@ class GateSettings:
 
     gate: a name in GATES; lambda_threshold: Lambda, the improvement rate below which advice is requested; omega:
     Omega, the misleads that are tolerated; first_episode: X, the first episode that may ask; window: K, the
-    episodes in a moving average; psi: Psi, a width of action values that "ia", "combined", "importance" and
-    "uncertainty" compare with; rate: the share of steps that "random" asks for; enough_steps: the mean step count
-    that satisfies "cq"; ensemble: the tables of "uncertainty"; budget: the helped steps that any gate may use in a
-    session; judge_unhelped: an episode that was open for advice and got none, as in a limited view, is judged too
-    (the listing), or not (the text's words).
+    episodes in a moving average; psi: Psi, a width of action values that "ia", "combined" and "importance" compare
+    with; spread: the deviation of its tables that lets "uncertainty" ask; rate: the share of steps that "random" asks
+    for; enough_steps: the mean step count that satisfies "cq"; ensemble: the tables of "uncertainty"; budget: the
+    helped steps that any gate may use in a session; judge_unhelped: an episode that was open for advice and got none,
+    as in a limited view, is judged too (the listing), or not (the text's words).
     Raises BadInput for a value outside its range, or for X < 2K with a gate that compares moving averages.
     """
 
@@ -84,6 +84,7 @@ class GateSettings:
     first_episode: Annotated[int, Ge(1), Le(1_000_000)] = 30
     window: Annotated[int, Ge(1), Le(100_000)] = 5
     psi: Annotated[float, Ge(0), Le(1_000_000)] = 1.0
+    spread: Annotated[float, Ge(0), Le(1_000_000)] = 0.1
     rate: Annotated[float, Ge(0), Le(1)] = 0.1
     enough_steps: Annotated[float, Gt(0), Le(1_000_000)] = 50.0
     ensemble: Annotated[int, Ge(2), Le(100)] = 5

@@ -206,7 +206,8 @@ def by_beta(job: Job, places: Iterable[str] = ("world-1", "world-2")) -> list[Ro
     for setting, outcome in job.run(settings).items():
         share, low, high = proportion_interval(int(outcome.success.sum()), len(outcome.success))
         best, percent = BEST_BETA[setting.world]
-        rows.append(row(describe(setting), "SP_percent", share, (low, high), percent if setting.beta == best else None))
+        named = {"table": "Figure 9.4", **describe(setting)}
+        rows.append(row(named, "SP_percent", share, (low, high), percent if setting.beta == best else None))
     return rows
 
 

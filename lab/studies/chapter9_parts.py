@@ -24,9 +24,16 @@ from lab.studies.runner import LEARNED_SEED, Job, Setting, example, learned_tabl
 from lab.studies.statistics import interval, proportion_interval
 
 Reading = Mapping[str, Any]
+AGREEMENT = "Each value is the share of Appendix V's cells of world I that agree with the printed ones under a reading."
 SKILLS = {0.01: "expert", 0.1: "moderate", 0.3: "limited", 1.0: "novice"}
 METHODS = {"ccrl": "CCRL", "ia": "IA", "combined": "combined"}
 NEVER_REJECTS = 1_000_000  # Omega: nobody misleads so often
+SYMBOLS = (
+    "SP: sessions whose last episode takes the shortest way; HS: steps of a session in which advice was followed; AR: episodes "
+    "in which advice was asked for; score: eq. 9.4, success against effort. β: how fast the learner's softmax cools; τ: the "
+    "advisor's temperature, .01 an expert, 1 a novice; Λ: the improvement below which CCRL asks; Ω: the misleads that it "
+    "tolerates; Ψ: the width of values below which IA asks."
+)
 RECONSTRUCTED = (
     "World II is printed only as a picture: tasks/world-2.toml is a reconstruction, chosen by what learning alone does "
     "there and by helped steps (lab task reconstruct). Differences there say little about the methods."
@@ -62,14 +69,15 @@ def whole(job: Job, reading: Reading) -> Findings:
     """All of it: Appendix V, the four tables' ranks, and the figures; cells that several need are run once."""
     cells, alone = appendix(job, TABLES.values(), reading), by_beta(job)
     figures = {"Figure 9.4 (bands: 95 % intervals)": _beta_picture(alone)}
-    rows, summary = cells + alone, agreement(cells + alone)
+    rows, ranks = cells + alone, dict[str, Any]()
     for name in TABLES:
         best = table(job, name, reading)
         figures[f"{name}: scores and ranks"] = _scores(best)
-        ranks = agreement(best)
-        summary[f"{name} ranks"] = f"{ranks['ranks as printed']} of {ranks['ranks']} as printed"
+        found = agreement(best)
+        ranks[f"{name} ranks"] = f"{found['ranks as printed']} of {found['ranks']} as printed"
     more, pictures = _figures(job, reading)
-    return Findings(rows + more, summary, pictures | figures, _notes(BEST_BETA))
+    rows += more
+    return Findings(rows, agreement(rows) | ranks, pictures | figures, _notes(BEST_BETA))
 
 
 def readings(job: Job, reading: Reading) -> Findings:
@@ -81,16 +89,9 @@ def readings(job: Job, reading: Reading) -> Findings:
             for measure in ("SP_percent", "HS_steps", "score"):
                 of = [one["within"] for one in cells if (one["view"], one["measure"]) == (view, measure)]
                 share, low, high = proportion_interval(sum(of), len(of))
-                rows.append(
-                    row(
-                        {"reading": name, "world": "world-1", "view": view},
-                        f"{measure} cells within_percent",
-                        share,
-                        (low, high),
-                        None,
-                    )
-                )
-    return Findings(rows, {"readings": len(READINGS)}, {}, (ADVISOR,))
+                named = {"reading": name, "world": "world-1", "view": view}
+                rows.append(row(named, f"{measure.split('_')[0]}_agreement_percent", share, (low, high), None))
+    return Findings(rows, {"readings": len(READINGS)}, {}, (AGREEMENT, SYMBOLS, ADVISOR))
 
 
 READINGS: dict[str, dict[str, Any]] = {
@@ -104,7 +105,7 @@ READINGS: dict[str, dict[str, Any]] = {
 
 
 def _notes(places: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
-    return (ADVISOR, RECONSTRUCTED) if "world-2" in places else (ADVISOR,)
+    return (SYMBOLS, ADVISOR, RECONSTRUCTED) if "world-2" in places else (SYMBOLS, ADVISOR)
 
 
 def _beta_picture(rows: Sequence[Row]) -> bytes:
@@ -147,7 +148,8 @@ def _figures(job: Job, reading: Reading) -> tuple[list[Row], dict[str, bytes]]:
                 for setting in line.values():
                     asked = replace(setting, **reading)
                     found = _measured(measure, outcomes[asked])
-                    values.setdefault(name, []).append(row(describe(asked), measure, found[0], found[1:], None))
+                    named = {"table": caption, **describe(asked)}
+                    values.setdefault(name, []).append(row(named, measure, found[0], found[1:], None))
             rows += [one for line in values.values() for one in line]
             pictures[f"{caption}: {what}"] = bars(
                 list(next(iter(settings.values()))),
@@ -155,6 +157,9 @@ def _figures(job: Job, reading: Reading) -> tuple[list[Row], dict[str, bytes]]:
                 [[one["value"] for one in line] for line in values.values()],
                 [[one["ci95"] for one in line] for line in values.values()],
                 what,
+                xlabel=next(
+                    (symbol for word, symbol in {"by Lambda": "Λ", "by Psi": "Ψ"}.items() if word in caption), ""
+                ),
             )
     return rows, pictures
 
@@ -207,7 +212,7 @@ def _advisors(rows: list[Row]) -> bytes:
     shares = [proportion_interval(int((steps == 13).sum()), len(steps)) for steps in walked]
     means = [interval(steps) for steps in walked]
     for tau, share, mean in zip(taus, shares, means, strict=True):
-        named = {"world": "world-1", "advisor": "alone", "tau": tau}
+        named = {"table": "Figure 9.1", "world": "world-1", "advisor": "alone", "tau": tau}
         rows.append(row(named, "SP_percent", share[0], share[1:], 100.0 if tau == 0.01 else None))
         rows.append(row(named, "mean_steps", mean[0], mean[1:], {0.01: 13.0, 1.0: 178.0}.get(tau)))
     ends = [[share[1:] for share in shares], [mean[1:] for mean in means]]

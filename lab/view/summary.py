@@ -55,6 +55,7 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
         f"{lesson['skill']}: {lesson['episodes']} episodes   {sparkline(lesson['steps_per_episode'], 40)}",
         f"learned way: {final}, the shortest takes {lesson['optimal_steps']}: {_verdict(lesson)}",
         _advice(lesson),
+        *(["it went on from what was left unfinished"] if lesson["source"] == "continued" else []),
         f"saved as '{lesson['saved_as']}' (seed {lesson['seed']})",
         *lesson["files"].values(),
     ]
@@ -66,7 +67,10 @@ def _verdict(lesson: Mapping[str, Any]) -> str:
         return f"not solved in physics: {lesson['failure']}"
     if lesson["solved"]:
         return "solved"
-    return "not solved" if lesson["final_steps"] is None else "not solved, it is longer or not there from every start"
+    if lesson["final_steps"] is None:
+        return "not solved"
+    longer = lesson["final_steps"] > lesson["optimal_steps"]
+    return "not solved, it is longer" if longer else "not solved, it is not there from every start"
 
 
 def _advice(lesson: Mapping[str, Any]) -> str:
@@ -122,10 +126,11 @@ def study_summary(study: Mapping[str, Any]) -> RenderableType:
         for row in study["rows"][:_STUDY_ROWS]
     ]
     more = len(study["rows"]) - len(rows)
-    lines = [f"{key}: {_number(value)}" for key, value in study["summary"].items()]
-    lines += [f"... and {more} more rows"] * (more > 0) + [f"{key}: {path}" for key, path in study["files"].items()]
+    lines = [f"... and {more} more rows"] * (more > 0) + [""]
+    lines += [f"{key}: {_number(value)}" for key, value in study["summary"].items()]
+    lines += [f"{key}: {path}" for key, path in study["files"].items()]
     columns = (*varied, "measure", "value", "95 %", "printed", "inside")
-    return Group(table_of(rows, columns), Text(""), *(Text(line) for line in (*lines, "", *study["notes"])))
+    return Group(table_of(rows, columns), *(Text(line) for line in (*lines, "", *study["notes"])))
 
 
 def _number(value: Any) -> str:

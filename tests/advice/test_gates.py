@@ -104,8 +104,7 @@ def taught(name: str, advisor: str, seed: int) -> SessionResult:
     blocked = np.zeros((6, 6), bool)
     blocked[1:5, 2] = blocked[2, 4] = True
     mdp = grid((6, 6), blocked, (2, 0), (3, 5))
-    psi = 0.1 if name == "uncertainty" else 1.0
-    settings = GateSettings(name, first_episode=10, window=3, omega=2, psi=psi, rate=0.3)
+    settings = GateSettings(name, first_episode=10, window=3, omega=2, rate=0.3)
     adviser = make_advisor(advisor, mdp, 0.99, np.random.default_rng([seed, 1]))
     return run_session(mdp, LearnerSettings("q", episodes=80), settings, adviser, np.random.default_rng(seed))
 
@@ -160,7 +159,7 @@ def test_uncertainty_falls_where_the_learner_has_been() -> None:
             table.scatter(rng.random)
         return made
 
-    one = GATES["uncertainty"](GateSettings(psi=0.05), 10, LIMIT, Surroundings(rng.random, tables))
+    one = GATES["uncertainty"](GateSettings(spread=0.05), 10, LIMIT, Surroundings(rng.random, tables))
     assert one.asks(3, [])
     for _ in range(40):
         for action in range(4):

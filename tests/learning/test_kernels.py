@@ -16,7 +16,7 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid, optimal_values
 
 SHORT = LearnerSettings("afterstate", episodes=40, max_steps=40, count_start=True)
-EAGER = GateSettings(first_episode=6, window=3, omega=1, psi=0.4, rate=0.3, enough_steps=12.0, budget=60)
+EAGER = GateSettings(first_episode=6, window=3, omega=1, psi=0.4, spread=0.2, rate=0.3, enough_steps=12.0, budget=60)
 
 
 def board() -> TabularMDP:
