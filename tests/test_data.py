@@ -49,7 +49,13 @@ def test_wheel_and_sdist_take_both_folders(project: dict[str, Any], root: Path) 
 
 def test_every_file_that_ships_has_an_expected_kind() -> None:
     assert {p.suffix for p in data.tasks_folder().rglob("*") if p.is_file()} == {".toml"}
-    assert {p.suffix for p in data.assets_folder().rglob("*") if p.is_file()} <= {".urdf", ".obj", ".mtl", ".png", ".svg"}
+    assert {p.suffix for p in data.assets_folder().rglob("*") if p.is_file()} <= {
+        ".urdf",
+        ".obj",
+        ".mtl",
+        ".png",
+        ".svg",
+    }
 
 
 def test_dependencies_have_lower_bounds_and_no_upper_ones(project: dict[str, Any]) -> None:

@@ -113,11 +113,14 @@ def stop_after(count: int, monkeypatch: pytest.MonkeyPatch) -> list[Setting]:
     return done
 
 
-def test_ctrl_c_says_where_to_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    stop_after(0, monkeypatch)
+@pytest.mark.parametrize(
+    ("done", "said"), [(0, "nothing is kept"), (1, "'mine' keeps what is done, and the same command goes on")]
+)
+def test_ctrl_c_says_where_to_go_on(monkeypatch: pytest.MonkeyPatch, done: int, said: str) -> None:
+    stop_after(done, monkeypatch)
     with pytest.raises(KeyboardInterrupt) as stopped:
         study(out="mine")
-    assert str(stopped.value) == "stopped by Ctrl-C; 'mine' keeps what is done, and the same command goes on"
+    assert str(stopped.value) == f"stopped by Ctrl-C; {said}"
 
 
 def test_the_same_command_goes_on(lab: Lab, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -259,3 +262,9 @@ def test_a_record_grows_and_is_of_one_problem(lab: Lab, folder: Path) -> None:
     ran = lab("teach", "other.txt", "--advisor", "recorded:said.jsonl")
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.startswith("lab: advisor 'recorded:said.jsonl': it holds no advice about this problem (")
+
+
+def test_an_advisor_table_where_there_is_none_to_choose(folder: Path) -> None:
+    with pytest.raises(BadInput, match=r"--advisor-table\): the study 'figure-9.4' has none to choose"):
+        study(advisor_table="exact")
+    assert tree(folder) == []

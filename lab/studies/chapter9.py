@@ -148,7 +148,9 @@ def _replicated_scores(outcome: Outcome, sp_range: Range, hs_range: Range) -> Fl
 
 def describe(setting: Setting, tau: float | str | None = None) -> Row:
     """A setting under the names that rows use, only what applies to it; `tau` is its own unless said otherwise."""
-    own = {"tau": setting.tau if tau is None else tau, "beta": setting.beta or world(setting.world).learner.beta}
+    own = {"tau": setting.tau if tau is None else tau, "beta": setting.beta}
+    if setting.beta is None:
+        own["beta"] = world(setting.world).learner.beta
     names = ("world", "view", "gate", "tau", "lambda_threshold", "omega", "psi", "beta")
     said = {name: own.get(name, getattr(setting, name)) for name in names}
     if said["tau"] is not None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from lab.mdp import optimal_values
 from lab.studies.chapter9 import (
     BEST_BETA,
     TABLES,
@@ -36,8 +37,9 @@ SYMBOLS = (
 )
 RECONSTRUCTED = (
     "World II is printed only as a picture: tasks/world-2.toml is a reconstruction, chosen by what learning alone does "
-    "there and by helped steps (lab task reconstruct). Differences there say little about the methods."
+    "there, by success and by helped steps (lab task reconstruct). Differences there say little about the methods."
 )
+EXACT = "Advisors know the exact optimal values; without --advisor-table exact they know a learned table."
 ADVISOR = (
     "The advisor's table is learned by an autonomous session of 1000 episodes that begin anywhere (beta .7, seed "
     f"{LEARNED_SEED}, chosen among 60 seeds by how near world I comes to the printed figures, one choice for all cells); "
@@ -48,13 +50,14 @@ ADVISOR = (
 def best_scores(job: Job, reading: Reading, name: str) -> Findings:
     """One of the tables 9.2-9.5, with a picture of its scores and ranks."""
     rows = table(job, name, reading)
-    return Findings(rows, agreement(rows), {f"{name}: scores and ranks": _scores(rows)}, _notes([TABLES[name][0]]))
+    notes = _notes([TABLES[name][0]], reading)
+    return Findings(rows, agreement(rows), {f"{name}: scores and ranks": _scores(rows)}, notes)
 
 
 def all_cells(job: Job, reading: Reading) -> Findings:
     """Appendix V."""
     rows = appendix(job, TABLES.values(), reading)
-    return Findings(rows, agreement(rows), {}, _notes(BEST_BETA))
+    return Findings(rows, agreement(rows), {}, _notes(BEST_BETA, reading))
 
 
 def decay_factors(job: Job, reading: Reading) -> Findings:
@@ -66,7 +69,7 @@ def decay_factors(job: Job, reading: Reading) -> Findings:
 
 
 def whole(job: Job, reading: Reading) -> Findings:
-    """All of it: Appendix V, the four tables' ranks, and the figures; cells that several need are run once."""
+    """All of it: Appendix V, the four tables' ranks, and the figures; with a folder, cells that several need are run once."""
     cells, alone = appendix(job, TABLES.values(), reading), by_beta(job)
     figures = {"Figure 9.4 (bands: 95 % intervals)": _beta_picture(alone)}
     rows, ranks = cells + alone, dict[str, Any]()
@@ -77,7 +80,7 @@ def whole(job: Job, reading: Reading) -> Findings:
         ranks[f"{name} ranks"] = f"{found['ranks as printed']} of {found['ranks']} as printed"
     more, pictures = _figures(job, reading)
     rows += more
-    return Findings(rows, agreement(rows) | ranks, pictures | figures, _notes(BEST_BETA))
+    return Findings(rows, agreement(rows) | ranks, pictures | figures, _notes(BEST_BETA, reading))
 
 
 def readings(job: Job, reading: Reading) -> Findings:
@@ -91,7 +94,7 @@ def readings(job: Job, reading: Reading) -> Findings:
                 share, low, high = proportion_interval(sum(of), len(of))
                 named = {"reading": name, "world": "world-1", "view": view}
                 rows.append(row(named, f"{measure.split('_')[0]}_agreement_percent", share, (low, high), None))
-    return Findings(rows, {"readings": len(READINGS)}, {}, (AGREEMENT, SYMBOLS, ADVISOR))
+    return Findings(rows, {"readings": len(READINGS)} | agreement(rows), {}, (AGREEMENT, SYMBOLS, ADVISOR))
 
 
 READINGS: dict[str, dict[str, Any]] = {
@@ -104,8 +107,9 @@ READINGS: dict[str, dict[str, Any]] = {
 }
 
 
-def _notes(places: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
-    return (SYMBOLS, ADVISOR, RECONSTRUCTED) if "world-2" in places else (SYMBOLS, ADVISOR)
+def _notes(places: Sequence[str] | Mapping[str, Any], reading: Reading) -> tuple[str, ...]:
+    advisor = EXACT if reading.get("advisor_table") == "exact" else ADVISOR
+    return (SYMBOLS, advisor, RECONSTRUCTED) if "world-2" in places else (SYMBOLS, advisor)
 
 
 def _beta_picture(rows: Sequence[Row]) -> bytes:
@@ -131,7 +135,7 @@ def _scores(rows: Sequence[Row]) -> bytes:
 def _figures(job: Job, reading: Reading) -> tuple[list[Row], dict[str, bytes]]:
     """Figures 9.1, 9.3 and 9.5-9.13: their cells and pictures."""
     rows: list[Row] = []
-    pictures = {"Figure 9.1: an advisor's own way by tau": _advisors(rows)}
+    pictures = {"Figure 9.1: an advisor's own way by tau": _advisors(rows, reading)}
     alone, guided = Setting("world-1"), Setting("world-1", gate="ccrl", tau=0.01, lambda_threshold=0.05, omega=1)
     optimum = 13
     for caption, setting, threshold in (
@@ -204,15 +208,17 @@ def _series() -> dict[str, dict[str, dict[str, Setting]]]:
     }
 
 
-def _advisors(rows: list[Row]) -> bytes:
+def _advisors(rows: list[Row], reading: Reading) -> bytes:
     """Figure 9.1: how often advisors of several skills take the shortest way themselves, and in how many steps they arrive."""
     taus = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
     place = world("world-1")
-    walked = [walk_of_advisor(place, learned_table(place), tau) for tau in taus]
+    known = reading.get("advisor_table", "learned")
+    table = learned_table(place) if known == "learned" else optimal_values(place.mdp(), place.learner.discount)
+    walked = [walk_of_advisor(place, table, tau) for tau in taus]
     shares = [proportion_interval(int((steps == 13).sum()), len(steps)) for steps in walked]
     means = [interval(steps) for steps in walked]
     for tau, share, mean in zip(taus, shares, means, strict=True):
-        named = {"table": "Figure 9.1", "world": "world-1", "advisor": "alone", "tau": tau}
+        named = {"table": "Figure 9.1", "world": "world-1", "advisor": "alone", "tau": tau, "advisor_table": known}
         rows.append(row(named, "SP_percent", share[0], share[1:], 100.0 if tau == 0.01 else None))
         rows.append(row(named, "mean_steps", mean[0], mean[1:], {0.01: 13.0, 1.0: 178.0}.get(tau)))
     ends = [[share[1:] for share in shares], [mean[1:] for mean in means]]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.errors import BadInput, WorkFailed
+from lab.errors import BadInput, LabError, WorkFailed
 from lab.gridworld import GridWorld
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray, TabularMDP, optimal_values, shortest_steps
@@ -52,6 +52,11 @@ class Setting:
     success: Literal["last", "any"] = "last"
     table_seed: int | None = None
 
+    def __post_init__(self) -> None:
+        for name in ("tau", "lambda_threshold", "psi", "beta"):  # 1 and 1.0 are the same setting
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, float(getattr(self, name)))
+
     def key(self, sessions: int, seed: int) -> str:
         """What names this setting's results among all that are stored."""
         place = world(self.world).model_dump(mode="json")
@@ -75,6 +80,8 @@ class Outcome:
     def from_json(cls, record: dict[str, list[int]]) -> "Outcome":
         """What `to_json` wrote. Raises KeyError, TypeError or ValueError for anything else."""
         success, helped, requests = (np.array(record[name], np.int64) for name in _FIELDS)
+        if not success.shape == helped.shape == requests.shape == (len(success),):
+            raise ValueError("three lists of one length are wanted")
         return cls(success.astype(bool), helped, requests)
 
 
@@ -130,9 +137,10 @@ class Job:
         for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
             try:
                 entry = json.loads(line)
-                yield entry["key"], Outcome.from_json(entry)
-            except (ValueError, KeyError, TypeError, OverflowError):
+                key, outcome = str(entry["key"]), Outcome.from_json(entry)
+            except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
                 continue  # cut off, or not ours: computed anew
+            yield key, outcome
 
     def _keep(self, setting: Setting, outcome: Outcome) -> None:
         if self.folder is None:
@@ -157,12 +165,20 @@ def _on_cluster(
         raise BadInput(f"--dask {address}: Dask is not installed: pip install 'teaching-lab[dask]'") from None
     try:
         client = Client(address, timeout="10s")  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, TypeError, RuntimeError) as error:
         raise WorkFailed(f"--dask {address}: no cluster answers there: {error}") from None
     with client:
+        if not client.scheduler_info()["workers"]:
+            raise WorkFailed(f"--dask {address}: the cluster has no workers")
         tasks = {client.submit(work, setting, pure=False): setting for setting in settings}
         for task in as_completed(tasks):  # type: ignore[no-untyped-call]
-            yield tasks[task], task.result()
+            try:
+                found = task.result()
+            except LabError:
+                raise
+            except Exception as error:  # whatever a lost worker or scheduler comes to; what is done is kept
+                raise WorkFailed(f"--dask {address}: the cluster gave up: {type(error).__name__}: {error}") from None
+            yield tasks[task], found
 
 
 def world(name: str) -> GridWorld:

@@ -151,7 +151,10 @@ def test_an_outcome_comes_back_from_json() -> None:
     assert back.to_json() == record
 
 
-@pytest.mark.parametrize("record", [{}, {"success": [1], "helped_steps": [1]}, [1], None, {"success": ["yes"]}])
+UNEVEN = {"success": [1, 1], "helped_steps": [1], "requests": [[1]]}
+
+
+@pytest.mark.parametrize("record", [{}, {"success": [1], "helped_steps": [1]}, [1], None, {"success": ["yes"]}, UNEVEN])
 def test_what_is_no_outcome(record: Any) -> None:
     with pytest.raises((KeyError, TypeError, ValueError)):
         Outcome.from_json(record)
@@ -354,6 +357,9 @@ def test_other_sessions_and_another_seed_are_computed(
 
 
 FOREIGN = [
+    '{"key": [], "success": [1], "helped_steps": [1], "requests": [1]}',
+    "[" * 200_000,
+    '{"key": "KEY", "success": [1, 1, 1, 1, 1], "helped_steps": [1], "requests": [1]}',
     "",
     "not JSON",
     "3",
