@@ -253,7 +253,8 @@ def sequence(
     task: Annotated[str, typer.Argument(help="A task that ships, or a .toml file.")],
     toasts: Toasts = 3,
     method: Annotated[
-        str | None, typer.Option("--method", help="srl, exact, fifo, random; default: the task's.")
+        str | None,
+        typer.Option("--method", help="srl (as printed), srl-time, exact, fifo, random; default: the task's."),
     ] = None,
     episodes: Annotated[
         int | None,

@@ -196,8 +196,8 @@ def sequence_task(
     """The order of a task's transfers over the durations measured in simulation; the document of `lab sequence --json`."""
     from lab.run import prepare, sequence, teach_all
     from lab.sequencing import SEQUENCERS
+    from lab.sequencing.events import LearnedSequence
     from lab.sequencing.exact import optimum
-    from lab.sequencing.srl import SrlResult
     from lab.view.canvas import check_png
     from lab.view.plots import sequence_plot
 
@@ -214,7 +214,9 @@ def sequence_task(
         listener.sequenced(found[-1], proven)
     best = min(found, key=lambda result: result.makespan_s)
     hits = [result.makespan_s <= proven.bound_s + 1e-6 for result in found]
-    settled = [result.final_makespan_s <= proven.bound_s + 1e-6 for result in found if isinstance(result, SrlResult)]
+    settled = [
+        result.final_makespan_s <= proven.bound_s + 1e-6 for result in found if isinstance(result, LearnedSequence)
+    ]
     if plot is not None:
         sequence_plot(found[0].episode_makespans_s, proven.optimal_s, plot)
     return {

@@ -10,6 +10,7 @@ from lab.sequencing.events import EpisodeSequenced, SequenceResult
 from lab.sequencing.exact import optimum
 from lab.sequencing.rivals import fifo, random_search
 from lab.sequencing.srl import srl as learn
+from lab.sequencing.srl_time import srl_time
 
 OnEpisode = Callable[[EpisodeSequenced], None]
 Sequencer = Callable[[Cell, int, np.random.Generator, OnEpisode | None], SequenceResult]
@@ -37,5 +38,5 @@ def _reported(result: SequenceResult, on_episode: OnEpisode | None) -> SequenceR
 
 # name -> function(cell, episodes, rng, on_episode); "fifo" and "exact" need neither episodes nor chance.
 SEQUENCERS: Mapping[str, Sequencer] = MappingProxyType(
-    {"srl": _srl, "exact": _exact, "random": random_search, "fifo": _fifo}
+    {"srl": _srl, "srl-time": srl_time, "exact": _exact, "random": random_search, "fifo": _fifo}
 )

@@ -116,6 +116,13 @@ class SequenceResult:
     episode_makespans_s: tuple[float, ...]
 
 
+@dataclass(frozen=True)
+class LearnedSequence(SequenceResult):
+    """What a learning sequencer returns beside: the makespan of its greedy policy at the end."""
+
+    final_makespan_s: float
+
+
 @dataclass
 class Run:
     """One pass through a cell, decision by decision: where toasts and robot are, and at what time.

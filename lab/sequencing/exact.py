@@ -1,19 +1,17 @@
 """The proven optimum of a cell: best-first search over its decision states, with alike toasts merged."""
 
 import heapq
-import math
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from operator import le
 from typing import NamedTuple
 
+from lab.sequencing.bound import TICKS_PER_S, RobotWork, ticks
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import simulate
 from lab.sequencing.rivals import fifo
 
-# Times are searched as whole nanoseconds: equal states then compare equal, whatever the order of additions was.
-TICKS_PER_S = 1e9
 MAX_EXPANDED = 1_000_000
 
 
@@ -91,18 +89,20 @@ class _Search:
 
     def __init__(self, cell: Cell) -> None:
         self.cell = cell
-        self.empty = [_ticks(row) for row in cell.empty_s.tolist()]
-        self.loaded = [_ticks(row) for row in cell.loaded_s.tolist()]
+        self.empty = [ticks(row) for row in cell.empty_s.tolist()]
+        self.loaded = [ticks(row) for row in cell.loaded_s.tolist()]
         self.processing = [round(station.processing_s * TICKS_PER_S) for station in cell.stations]
         self.is_machine = [station.kind == "machine" for station in cell.stations]
         self.origins = [place for place, ahead in enumerate(cell.ahead) if ahead is not None]
+        self.work = RobotWork(cell)
         for place in range(len(cell.stations)):
             self.empty[place][place] = 0
         counts = tuple(cell.counts(cell.start_locations()))
         self.start = _State(0, counts, cell.index(cell.robot_start), ((),) * len(counts))
-        self.approach = [0] * len(counts)
-        self.rest = [0] * len(counts)
-        self._measure_rest()
+
+    def bound(self, state: _State) -> int:
+        """Ticks that the robot still needs at least."""
+        return self.work.left(state.counts, state.robot)
 
     def successors(self, state: _State) -> Iterator[_State]:
         """The states after each possible move: one a station, since its toasts are alike."""
@@ -124,46 +124,6 @@ class _Search:
             # A toast that finished earlier is ready now: forgetting since when lets more states be equal.
             ready = tuple(tuple(max(tick, now) for tick in ticks) if ticks else () for ticks in finish)
             yield _State(now, tuple(counts), target, ready, origin, state)
-
-    def bound(self, state: _State) -> int:
-        """Ticks that the robot still needs at least, if it never waited and always came from nearby."""
-        ahead = sum(count * rest for count, rest in zip(state.counts, self.rest, strict=True))
-        return ahead - (self.approach[state.robot] if state.counts[state.robot] else 0)
-
-    def _measure_rest(self) -> None:
-        """`rest`: least robot ticks to bring a toast from a station to the end; `approach`: of these, to get to it.
-
-        The robot gets to a toast from another station, or it stayed there, having dropped one. With room for only one
-        that is the toast itself, which has to be processed first; and a toast dropped in a buffer cannot go on at once.
-        """
-        cell = self.cell
-        choices = {origin: _targets(cell, origin) for origin in self.origins}
-        drops = {target for targets in choices.values() for target in targets}
-        for origin in sorted(self.origins, key=lambda place: -_stage_number(cell, place)):
-            ways = [self.empty[drop][origin] for drop in drops if drop != origin]
-            if origin in drops and cell.stations[origin].kind != "buffer":
-                ways.append(self.processing[origin] if cell.capacities[origin] == 1 else 0)
-            # None is a trip that no sequence needs.
-            self.approach[origin] = min((way for way in ways if way >= 0), default=0)
-            carries = [self.loaded[origin][target] + self.rest[target] for target in choices[origin]]
-            self.rest[origin] = self.approach[origin] + min(carries)
-
-
-def _ticks(row: list[float]) -> list[int]:
-    """Seconds to ticks; -1 for NaN, a move that is never made."""
-    return [-1 if math.isnan(seconds) else round(seconds * TICKS_PER_S) for seconds in row]
-
-
-def _targets(cell: Cell, origin: int) -> list[int]:
-    return [target for target in (cell.ahead[origin], cell.fallback[origin]) if target is not None]
-
-
-def _stage_number(cell: Cell, place: int) -> float:
-    """Position on the route; a buffer lies half a stage before its station."""
-    name = cell.names[place]
-    stages = [stage.station for stage in cell.route]
-    buffers = [stage.buffer for stage in cell.route]
-    return stages.index(name) if name in stages else buffers.index(name) - 0.5
 
 
 def _times(state: _State) -> tuple[int, ...]:

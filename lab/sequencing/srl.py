@@ -9,7 +9,7 @@ import numpy as np
 
 from lab.errors import BadInput, unknown
 from lab.sequencing.cell import Cell
-from lab.sequencing.events import EpisodeSequenced, Run, SequenceResult
+from lab.sequencing.events import EpisodeSequenced, LearnedSequence, Run
 
 Locations = tuple[int, ...]
 Table = dict[Locations, dict[int, float]]
@@ -20,7 +20,7 @@ FACTOR_A_FLOOR = 0.8
 
 
 @dataclass(frozen=True)
-class SrlResult(SequenceResult):
+class SrlResult(LearnedSequence):
     """A sequencer's result, and what SRL learned.
 
     `makespan_s` and `sequence` are the best found in any episode; `final_makespan_s` is the greedy policy's at the end.
@@ -29,7 +29,6 @@ class SrlResult(SequenceResult):
     floats would all be 0 and the choice between them a draw.
     """
 
-    final_makespan_s: float
     log_q: Table
 
     @property

@@ -20,7 +20,7 @@ def run(name: str, cell: Cell, seed: int, seen: list[EpisodeSequenced] | None = 
 
 
 def test_the_table() -> None:
-    assert NAMES == ["exact", "fifo", "random", "srl"]
+    assert NAMES == ["exact", "fifo", "random", "srl", "srl-time"]
 
 
 @pytest.mark.parametrize("name", NAMES)
