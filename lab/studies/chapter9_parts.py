@@ -42,7 +42,7 @@ RECONSTRUCTED = (
 EXACT = "Advisors know the exact optimal values; without --advisor-table exact they know a learned table."
 ADVISOR = (
     "The advisor's table is learned by an autonomous session of 1000 episodes that begin anywhere (beta .7, seed "
-    f"{LEARNED_SEED}, chosen among 60 seeds by how near world I comes to the printed figures, one choice for all cells); "
+    f"{LEARNED_SEED}, chosen among 36 seeds by how near world I comes to the printed figures, one choice for all cells); "
     "--advisor-table exact takes the exact optimal values. The study 'readings' compares these and other readings."
 )
 
