@@ -198,29 +198,12 @@ def _opens(rules: Any, lane: Any, steps: Any, rejected: bool) -> bool:
 
 
 @njit
-def _begin_episode(rules: Any, lane: Any, steps: Any, counts: Any) -> None:
-    """The next episode of a lane's session, its gate open or closed."""
-    lane.episode += 1
-    lane.asked, lane.helped = 0, 0
-    lane.left = rules.budget - counts[lane.session].helped_steps
-    lane.is_open = rules.gate != _NEVER and _opens(
-        rules, lane, steps[lane.session], counts[lane.session].rejected_at_episode > 0
-    )
-
-
-@njit
-def _end_episode(rules: Any, lane: Any, moves: int, reached: bool, steps: Any, guided: Any, counts: Any) -> None:
-    """Books the episode that is over, and judges its advice (`Ccrl.judges`)."""
-    n, episode, window = lane.session, lane.episode, rules.window
-    steps[n, episode - 1] = moves + rules.count_start if reached else rules.max_steps + 1
-    guided[n, episode - 1] = lane.helped > 0
-    count = counts[n]
-    count.requests += lane.asked
-    count.helped_steps += lane.helped
-    count.moves += moves
-    judged = rules.gate in (_CCRL, _COMBINED) and lane.is_open and count.rejected_at_episode == 0
-    judged = judged and (rules.judge_unhelped or lane.helped > 0)
-    if judged and episode > window and _misled(steps[n, episode - 1], _window_mean(steps[n], episode - 1, window)):
+def _judge(rules: Any, lane: Any, steps: Any, count: Any) -> None:
+    """`Ccrl.judges`: whether the episode that is over was misled; steps (E,) are those of its session."""
+    episode, window = lane.episode, rules.window
+    if count.rejected_at_episode > 0 or episode <= window or not (rules.judge_unhelped or lane.helped > 0):
+        return
+    if _misled(steps[episode - 1], _window_mean(steps, episode - 1, window)):
         count.misleads += 1
         if count.misleads > rules.omega:
             count.rejected_at_episode = episode
@@ -298,6 +281,7 @@ def _run(
     afterstate, alpha, discount, step_reward = rules.afterstate, rules.alpha, rules.discount, problem.step_reward
     offset, factor = (step_reward, discount) if afterstate else (0.0, 1.0)
     gate, psi, max_moves, starts = rules.gate, rules.psi, rules.max_moves, problem.starts
+    max_steps, count_start = rules.max_steps, rules.count_start
     tables, size, ensemble = all_tables.ravel(), np.uint64(all_tables.shape[1]), others.shape[1]
     lanes, rng, per_tau, fresh = scratch.lanes, scratch.rng, scratch.per_tau, scratch.fresh
     values, widths, chosen = scratch.values, scratch.widths, scratch.chosen
@@ -316,7 +300,11 @@ def _run(
                             _begin_session(lanes[j], j, following, seeds[following], all_tables, others, rng)
                             following += 1
                     if lanes[j].session >= 0:
-                        _begin_episode(rules, lanes[j], steps, counts)
+                        lane = lanes[j]
+                        n, lane.episode, lane.asked, lane.helped = lane.session, lane.episode + 1, 0, 0
+                        if gate != _NEVER:
+                            lane.left = rules.budget - counts[n].helped_steps
+                            lane.is_open = _opens(rules, lane, steps[n], counts[n].rejected_at_episode > 0)
                         per_tau[j], is_open[j] = temperatures[lanes[j].episode - 1], lanes[j].is_open
                         if len(starts) > 1:
                             states[j] = starts[int(_draw(rng, j) * len(starts))]
@@ -370,7 +358,15 @@ def _run(
             if over or moves[j] == max_moves:
                 fresh[j] = some_fresh = True
                 if lanes[j].session >= 0:
-                    _end_episode(rules, lanes[j], moves[j], over == 1, steps, guided, counts)
+                    lane = lanes[j]
+                    n, episode = lane.session, lane.episode
+                    steps[n, episode - 1] = moves[j] + count_start if over == 1 else max_steps + 1
+                    guided[n, episode - 1] = lane.helped > 0
+                    counts[n].requests += lane.asked
+                    counts[n].helped_steps += lane.helped
+                    counts[n].moves += moves[j]
+                    if lane.is_open and gate in (_CCRL, _COMBINED):
+                        _judge(rules, lane, steps[n], counts[n])
                     if lanes[j].episode == episodes:
                         over_all, is_open[j] = over_all + 1, False
                         if len(kept):
