@@ -98,6 +98,7 @@ def value_map(
         axes.set_aspect("equal")
         if picture is None:
             axes.set(ylim=(down.max(), down.min()), xlabel="column", ylabel="row")
+            axes.locator_params(integer=True)
         else:
             axes.set_axis_off()
         axes.set_title(title)
