@@ -52,6 +52,18 @@ def test_values_never_exceed_the_truth_and_only_rise(
     assert all(min(table[start].values()) <= best_s + 1e-6 for table in tables)
 
 
+@pytest.mark.parametrize(("case", "optimal_s"), [("I", 63 + 150 * 20), ("II", 100 + 200 * 20), ("III", 110 + 295 * 20)])
+def test_what_few_toasts_teach_serves_many(toast_cell: Callable[..., Cell], case: str, optimal_s: float) -> None:
+    result = learned(toast_cell(case, 20), 1000)
+    assert result.makespan_s == pytest.approx(optimal_s, rel=0.01)
+    assert len(result.episode_makespans_s) == 1000 - 3 * 200  # practice with fewer toasts has makespans of its own
+
+
+def test_few_episodes_for_many_toasts(toast_cell: Callable[..., Cell]) -> None:
+    for episodes in (1, 4, 19, 20):
+        assert 1 <= len(learned(toast_cell("I", 9), episodes).episode_makespans_s) <= episodes
+
+
 def test_alike_toasts_are_one(toast_cell: Callable[..., Cell]) -> None:
     result = learned(toast_cell("I", 4), 50)
     assert len(result.q) < 200  # by toast there are thousands
