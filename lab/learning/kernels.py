@@ -2,7 +2,8 @@
 
 Many sessions walk side by side: one alone waits for its memory and its exponentials, 24 keep the processor busy.
 Each has uniform numbers of its own (`selection.splitmix`), so its result depends on its seed and on nothing else, and
-equals that of `session.run_session` with the same numbers. Rules come from `selection`, `updates` and `advice.gates`.
+equals that of `session.run_session` with the same numbers. Rules come from `selection`, `updates` and `advice.gates`;
+numba's cache knows changes of this file only, so whoever changes a rule there deletes `__pycache__` here.
 """
 
 from typing import Any, NamedTuple
