@@ -1,14 +1,13 @@
 """What task files are made of: frozen records of checked fields, names, and how a problem is learned."""
 
-import os
 from dataclasses import asdict, replace
 from pathlib import Path
-from secrets import token_hex
 from typing import Annotated, Any, Self, cast
 
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, field_validator
 from pydantic_core import CoreSchema
 
+from lab import files
 from lab.errors import BadInput, unknown
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import Rewards
@@ -90,13 +89,7 @@ def read_text(path: Path) -> str:
 
 def write_whole(path: Path, text: str) -> None:
     """Writes a text file whole or not at all, replacing one that is there; raises BadInput when it cannot be written."""
-    beside = path.with_name(f".{path.name}.{token_hex(4)}.tmp")
     try:
-        try:
-            beside.write_text(text, encoding="utf-8")
-            os.replace(beside, path)
-        except BaseException:
-            beside.unlink(missing_ok=True)
-            raise
+        files.write_whole(path, text.encode())
     except OSError as error:
         raise BadInput(f"{path}: cannot be written: {error.strerror or error}") from error

@@ -11,6 +11,7 @@ from typing import Any
 from lab.composer import Outcome
 from lab.crew import Crew, Durations
 from lab.errors import BadInput, WorkFailed
+from lab.files import nearest
 from lab.policy import Policy
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import SequenceResult, simulate
@@ -130,10 +131,8 @@ def _skill_row(name: str, lesson: Lesson) -> dict[str, Any]:
 
 def check_out(out: Path) -> None:
     """BadInput unless `out` is a folder that can be written, or can be made; makes nothing."""
-    place = out
     try:
-        while not place.exists() and place != place.parent:
-            place = place.parent
+        place = nearest(out)
     except OSError as error:
         raise BadInput(f"output folder '{out}' (--out): {error.strerror}") from None
     if not place.is_dir():

@@ -10,11 +10,11 @@ from contextlib import suppress
 from dataclasses import fields
 from datetime import datetime
 from pathlib import Path
-from secrets import token_hex
 from typing import Any
 
 import numpy as np
 
+from lab import files
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.policy import Policy
 
@@ -60,10 +60,8 @@ class Toolbox:
 
     def check(self) -> None:
         """Raises BadInput unless policies can be saved here; makes nothing."""
-        place = self.folder
         try:
-            while not place.exists() and place != place.parent:
-                place = place.parent
+            place = files.nearest(self.folder)
         except OSError as error:
             raise BadInput(f"toolbox {self.folder}: {error.strerror}") from error
         if not place.is_dir():
@@ -194,19 +192,9 @@ def _refused(verb: str, path: Path, error: OSError) -> BadInput | WorkFailed:
 
 
 def _write_whole(path: Path, content: bytes) -> Path:
-    """Writes beside the target, then renames: readers see the old file or the new one, never half of one."""
-    beside = path.with_name(f".{path.name}.{token_hex(4)}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            with beside.open("xb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(beside, path)
-        except BaseException:
-            beside.unlink(missing_ok=True)
-            raise
+        files.write_whole(path, content)
     except OSError as error:
         raise _refused("write", path, error) from error
     return path

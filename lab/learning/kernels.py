@@ -13,14 +13,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from lab.advice import gates
-from lab.advice.advisors import Advice
-from lab.errors import BadInput, unknown
 from lab.learning import selection, updates
-from lab.learning.settings import GateSettings, LearnerSettings
-from lab.mdp import FloatArray, TabularMDP
+from lab.mdp import FloatArray
 
 LANES = 24
-LEARNERS = ("afterstate", "q")  # those that chapter 9 needs
 GATE_CODES = {name: code for code, name in enumerate(gates.GATES)}
 _NEVER, _CCRL, _COMBINED, _IA, _CQ, _RANDOM, _IMPORTANCE, _UNCERTAINTY = (
     GATE_CODES[name] for name in ("never", "ccrl", "combined", "ia", "cq", "random", "importance", "uncertainty")
@@ -36,25 +32,7 @@ _towards: Any = njit(updates.towards)
 _afterstate_value: Any = njit(updates.afterstate_value)
 
 
-class Batch(NamedTuple):
-    """What N sessions of E episodes came to, in the order of their seeds.
-
-    steps (N, E) int32, a failed episode as max_steps + 1; guided (N, E) bool: at least one helped step; requests,
-    helped_steps, misleads (N,) int64, as in `SessionResult`; rejected_at_episode (N,) int64, 0 where none was;
-    moves (N,) int64: all that were made; q (N, S, A) float64, of no sessions unless asked for.
-    """
-
-    steps: NDArray[np.int32]
-    guided: NDArray[np.bool_]
-    requests: NDArray[np.int64]
-    helped_steps: NDArray[np.int64]
-    misleads: NDArray[np.int64]
-    rejected_at_episode: NDArray[np.int64]
-    moves: NDArray[np.int64]
-    q: FloatArray
-
-
-class _Problem(NamedTuple):
+class Problem(NamedTuple):
     """The problem as arrays; `ends`: 0 goes on, 1 goal, 2 another terminal state."""
 
     successor: NDArray[np.int32]
@@ -65,7 +43,7 @@ class _Problem(NamedTuple):
     step_reward: float
 
 
-class _Rules(NamedTuple):
+class Rules(NamedTuple):
     """Learner and gate as plain numbers."""
 
     afterstate: bool
@@ -89,16 +67,16 @@ class _Rules(NamedTuple):
 
 
 # What each of the sessions under way remembers; session -1: none. `converged` as in `gates.Ccrl`.
-_LANE = np.dtype(
+LANE = np.dtype(
     [(name, np.int64) for name in ("session", "episode", "is_open", "asked", "helped", "left")]
     + [(name, np.int64) for name in ("last_result", "equal_results", "converged")]
 )
-_COUNTS = np.dtype(
+COUNTS = np.dtype(
     [(name, np.int64) for name in ("requests", "helped_steps", "misleads", "rejected_at_episode", "moves")]
 )
 
 
-class _Scratch(NamedTuple):
+class Scratch(NamedTuple):
     """What the sessions under way use in every step, (LANES,) each but values (A * LANES,).
 
     Made here and not in the kernel, where numba would compile all of np.zeros along.
@@ -256,7 +234,7 @@ def _choose(
 
 
 @njit(cache=True, nogil=True)
-def _run(
+def run(
     problem: Any,
     rules: Any,
     advice: Any,
@@ -373,117 +351,3 @@ def _run(
                         if len(kept):
                             for i in range(all_tables.shape[1]):
                                 kept[lanes[j].session, i] = all_tables[j, i]
-
-
-def run_sessions(
-    mdp: TabularMDP,
-    learner: LearnerSettings,
-    gate: GateSettings,
-    advice: Advice | None,
-    seeds: NDArray[np.uint64],
-    *,
-    keep_tables: bool = False,
-) -> Batch:
-    """Learns a table in each of N sessions, seeds (N,) uint64; advice None: nobody to ask.
-
-    The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix(seed)` and
-    a `TableAdvisor` on the same draws. Raises BadInput for a learner outside LEARNERS, a selection other than softmax,
-    an unknown gate, or advice of another shape.
-    """
-    if learner.learner not in LEARNERS:
-        raise unknown("learner", learner.learner, LEARNERS, "compiled sessions")
-    if learner.selection != "softmax":
-        raise unknown("selection", learner.selection, ["softmax"], "compiled sessions")
-    if gate.gate not in GATE_CODES:
-        raise unknown("gate", gate.gate, GATE_CODES, "gate settings")
-    if advice is not None and advice.thresholds.shape[1:] != mdp.successor.shape:
-        raise BadInput(f"advice of shape {advice.thresholds.shape}: the problem has {mdp.successor.shape}")
-    rules, problem = _rules(learner, gate, advice is not None), _problem(mdp, learner.learner == "afterstate")
-    size = mdp.n_states if rules.afterstate else mdp.n_states * mdp.n_actions
-    sessions, episodes = len(seeds), learner.episodes
-    steps, guided = np.zeros((sessions, episodes), np.int32), np.zeros((sessions, episodes), np.bool_)
-    counts, kept = np.zeros(sessions, _COUNTS), np.zeros((sessions if keep_tables else 0, size))
-    temperatures = [selection.temperature(n, learner.beta, learner.exploration) for n in range(1, episodes + 1)]
-    thresholds = np.zeros((1, 1, mdp.n_actions)) if advice is None else advice.thresholds
-    region = np.zeros(mdp.n_states, np.bool_) if advice is None else advice.region
-    others = np.zeros((LANES, rules.ensemble if rules.gate == _UNCERTAINTY else 0, size))
-    _run(
-        problem,
-        rules,
-        thresholds,
-        region,
-        np.asarray(seeds, np.uint64),
-        1.0 / np.array(temperatures),
-        (0,) * mdp.n_actions,
-        _scratch(mdp.n_actions, episodes),
-        np.zeros((LANES, size)),
-        others,
-        steps,
-        guided,
-        counts,
-        kept,
-    )
-    return Batch(
-        steps, guided, **{name: counts[name] for name in _COUNTS.names or ()}, q=_action_values(mdp, rules, kept)
-    )
-
-
-def _scratch(actions: int, episodes: int) -> _Scratch:
-    lanes = np.zeros(LANES, _LANE)
-    lanes["session"], lanes["episode"] = -1, episodes
-    return _Scratch(
-        lanes=lanes,
-        values=np.zeros(actions * LANES),
-        widths=np.zeros(LANES),
-        per_tau=np.zeros(LANES),
-        chosen=np.zeros(LANES, np.int64),
-        moves=np.zeros(LANES, np.int64),
-        states=np.zeros(LANES, np.uint64),
-        rng=np.zeros(LANES, np.uint64),
-        fresh=np.ones(LANES, np.bool_),
-        is_open=np.zeros(LANES, np.bool_),
-    )
-
-
-def _problem(mdp: TabularMDP, afterstate: bool) -> _Problem:
-    ends = np.where(mdp.goal, 1, np.where(mdp.terminal, 2, 0)).astype(np.uint8)
-    starts = np.array(mdp.starts or (mdp.start,), np.int64)
-    arrival = mdp.arrival if afterstate else np.zeros(1)
-    reward = 0.0 if not afterstate else mdp.step_reward
-    return _Problem(mdp.successor.copy(), mdp.reward.copy(), arrival, ends, starts, reward)
-
-
-def _rules(learner: LearnerSettings, gate: GateSettings, somebody: bool) -> _Rules:
-    return _Rules(
-        learner.learner == "afterstate",
-        float(learner.alpha),
-        float(learner.discount),
-        learner.max_steps - learner.count_start,
-        learner.max_steps,
-        int(learner.count_start),
-        GATE_CODES[gate.gate] if somebody else _NEVER,
-        float(gate.lambda_threshold),
-        gate.omega,
-        gate.first_episode,
-        gate.window,
-        float(gate.psi),
-        float(gate.spread),
-        float(gate.rate),
-        float(gate.enough_steps),
-        gate.ensemble,
-        gate.budget,
-        gate.judge_unhelped,
-    )
-
-
-def _action_values(mdp: TabularMDP, rules: _Rules, tables: FloatArray) -> FloatArray:
-    """Tables as (N, S, A) action values, zeros in terminal states."""
-    if not rules.afterstate:
-        return tables.reshape(-1, *mdp.successor.shape)
-    q = (
-        mdp.step_reward + rules.discount * tables[:, mdp.successor]
-        if len(tables)
-        else np.zeros((0, *mdp.successor.shape))
-    )
-    q[:, mdp.terminal] = 0.0
-    return q

@@ -184,12 +184,14 @@ def _series() -> dict[str, dict[str, dict[str, Setting]]]:
     def skills(setting: Setting) -> dict[str, Setting]:
         return {name: replace(setting, tau=tau) for name, tau in by_skill.items()}
 
+    def by_threshold(setting: Setting) -> dict[str, Setting]:
+        return {f"{value:g}": replace(setting, lambda_threshold=value) for value in (0.01, 0.05, 0.1, 0.3, 0.5, 0.9)}
+
     both = Setting("world-2", "limited", "combined", 0.01, 0.05, 5, 1.0)
     return {
         "Figure 9.7: CCRL by Lambda, expert, world II, limited view": {
-            "Omega 7": {
-                f"{value:g}": replace(two, lambda_threshold=value) for value in (0.01, 0.05, 0.1, 0.3, 0.5, 0.9)
-            }
+            "never rejects": by_threshold(replace(two, omega=NEVER_REJECTS)),
+            "Omega 7": by_threshold(two),
         },
         "Figures 9.8 and 9.9: CCRL without and with the assessment of advice, world I, limited view": {
             "never rejects": skills(replace(one, omega=NEVER_REJECTS)),

@@ -146,7 +146,7 @@ def _learns_alike(mdp: TabularMDP) -> bool:
 
 
 def _alone(mdp: TabularMDP, beta: float, sessions: int) -> float:
-    from lab.learning.kernels import run_sessions
+    from lab.learning.batch import run_sessions
 
     seeds = np.arange(sessions, dtype=np.uint64)
     batch = run_sessions(mdp, replace(LEARNER, beta=beta), GateSettings("never"), None, seeds)
@@ -156,7 +156,7 @@ def _alone(mdp: TabularMDP, beta: float, sessions: int) -> float:
 def _distance(world: GridWorld, table: FloatArray, cells: Sequence[Cell]) -> float:
     """How far success and helped steps are from the printed ones; 1: on average just what counts as agreeing."""
     from lab.advice.advisors import Advice, skill
-    from lab.learning.kernels import run_sessions
+    from lab.learning.batch import run_sessions
 
     mdp, region, far = world.mdp(), world.region(), 0.0
     for cell in cells:

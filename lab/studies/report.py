@@ -2,17 +2,15 @@
 
 import csv
 import json
-import os
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from io import StringIO
 from math import inf, isfinite
 from pathlib import Path
-from secrets import token_hex
 from typing import Any
 
-from lab import __version__
+from lab import __version__, files
 from lab.errors import BadInput, WorkFailed
 from lab.studies.statistics import PERCENT_POINTS, RELATIVE, allowed
 
@@ -154,14 +152,9 @@ def _value(text: str) -> Any:
 
 
 def _write_whole(path: Path, text: str) -> None:
-    beside = path.with_name(f".{path.name}.{token_hex(4)}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            beside.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
-            os.replace(beside, path)
-        finally:
-            beside.unlink(missing_ok=True)
+        files.write_whole(path, text.encode(errors="backslashreplace"))
     except OSError as error:
         raise WorkFailed(f"study report '{path}' cannot be written: {error.strerror or error}") from None
 

@@ -21,7 +21,7 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray, TabularMDP, optimal_values, shortest_steps
 
 if TYPE_CHECKING:
-    from lab.learning.kernels import Batch
+    from lab.learning.batch import Batch
 
 FORMAT = 1  # of what is stored; another one is computed anew
 STORE = "sessions.jsonl"
@@ -213,7 +213,7 @@ def learned_table(place: GridWorld, seed: int = LEARNED_SEED) -> FloatArray:
     (S, A) float64. The thesis loads a table and does not say where it came from; this recipe came nearest to its
     figures among those that the study `readings` compares.
     """
-    from lab.learning.kernels import run_sessions
+    from lab.learning.batch import run_sessions
 
     mdp = place.mdp()
     anywhere = replace(mdp, starts=tuple(np.flatnonzero(~mdp.terminal).tolist()))
@@ -254,7 +254,7 @@ def example(setting: Setting, seed: int) -> tuple[NDArray[np.int32], NDArray[np.
 def walk_of_advisor(place: GridWorld, table: FloatArray, tau: float, walks: int = 1000) -> NDArray[np.int32]:
     """The steps (walks,) of an advisor who walks by own advice alone; max_steps + 1 where it does not arrive (fig. 9.1)."""
     from lab.advice.advisors import Advice, skill
-    from lab.learning.kernels import run_sessions
+    from lab.learning.batch import run_sessions
 
     learner = replace(place.learner, episodes=1)
     advice = Advice.of(skill(table, tau))
@@ -264,7 +264,7 @@ def walk_of_advisor(place: GridWorld, table: FloatArray, tau: float, walks: int 
 
 def _learned(setting: Setting, seeds: NDArray[np.uint64]) -> tuple["Batch", LearnerSettings]:
     from lab.advice.advisors import Advice, skill
-    from lab.learning.kernels import run_sessions
+    from lab.learning.batch import run_sessions
 
     place = world(setting.world)
     changes = {name: getattr(setting, name) for name in ("beta", "learner") if getattr(setting, name) is not None}

@@ -8,7 +8,7 @@ from statistics import median
 import numpy as np
 
 from lab.advice.advisors import Advice, skill
-from lab.learning.kernels import run_sessions
+from lab.learning.batch import run_sessions
 from lab.learning.settings import GateSettings
 from lab.studies.chapter9 import Row, agreement, row
 from lab.studies.findings import Findings

@@ -9,7 +9,8 @@ import pytest
 from lab.advice.advisors import Advice, TableAdvisor, skill
 from lab.advice.gates import GATES
 from lab.errors import BadInput
-from lab.learning.kernels import LANES, LEARNERS, run_sessions
+from lab.learning.batch import LEARNERS, run_sessions
+from lab.learning.kernels import LANES
 from lab.learning.selection import splitmix
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings

@@ -11,8 +11,8 @@ import pytest
 from lab.advice.advisors import Advice
 from lab.errors import WorkFailed
 from lab.gridworld import GridWorld
-from lab.learning import kernels
-from lab.learning.kernels import Batch
+from lab.learning import batch as compiled
+from lab.learning.batch import Batch
 from lab.learning.settings import GateSettings
 from lab.mdp import grid, shortest_steps
 from lab.studies import reconstruct as module
@@ -177,6 +177,6 @@ def test_how_far_a_world_is(monkeypatch: pytest.MonkeyPatch, percent: int, helpe
         counts = np.full(100, helped)
         return Batch(steps, steps < 0, counts, counts, counts, counts, counts, np.zeros(0))
 
-    monkeypatch.setattr(kernels, "run_sessions", made_up)
+    monkeypatch.setattr(compiled, "run_sessions", made_up)
     cell = Cell(Setting("world-2", "limited", "ia", 0.01, psi=0.3), False, sp=40.0, hs=100.0, score=0.5)
     assert module._distance(world, np.zeros((1000, 6)), [cell] * 3) == pytest.approx(expected)

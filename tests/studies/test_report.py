@@ -292,7 +292,7 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path, name: str, monke
         raise OSError(28, "No space left on device")
 
     (tmp_path / "file").write_text("old")
-    monkeypatch.setattr("lab.studies.report.os.replace", full)
+    monkeypatch.setattr("lab.files.os.replace", full)
     with pytest.raises(WorkFailed, match="No space left"):
         WRITERS[name](tmp_path / "file")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -13,8 +13,8 @@ import pytest
 
 from lab.errors import BadInput, WorkFailed
 from lab.gridworld import GridWorld
-from lab.learning import kernels
-from lab.learning.kernels import Batch
+from lab.learning import batch as compiled
+from lab.learning.batch import Batch
 from lab.learning.settings import GateSettings
 from lab.mdp import optimal_values
 from lab.studies import runner
@@ -167,7 +167,7 @@ def test_success_is_the_shortest_way_with_its_start(
     """Three made-up sessions: one ends with the 5 steps of the shortest way, one had them before, one never did."""
     counts, steps = np.array([3, 2, 1]), np.array([[9, 5], [5, 9], [6, 41]], np.int32)
     made_up = Batch(steps, steps < 0, counts + 1, counts, counts, counts, counts, np.zeros(0))
-    monkeypatch.setattr(kernels, "run_sessions", lambda *_, **__: made_up)
+    monkeypatch.setattr(compiled, "run_sessions", lambda *_, **__: made_up)
     outcome = sessions_of(Setting(small, success=success), 3, 0)
     assert outcome.success.tolist() == expected
     assert (outcome.helped_steps.tolist(), outcome.requests.tolist()) == ([3, 2, 1], [4, 3, 2])
@@ -198,8 +198,8 @@ def test_a_setting_is_what_the_kernel_gets(small: str, monkeypatch: pytest.Monke
         calls.append(arguments)
         return kernels_run(*arguments)
 
-    kernels_run = kernels.run_sessions
-    monkeypatch.setattr(kernels, "run_sessions", spied)
+    kernels_run = compiled.run_sessions
+    monkeypatch.setattr(compiled, "run_sessions", spied)
     place = runner.world(small)
     sessions_of(Setting(small), 2, 0)
     mdp, learner, gate, advice, seeds = calls[0]
@@ -283,7 +283,7 @@ def test_the_example_is_a_session_that_succeeds(small: str) -> None:
     steps, guided = runner.example(setting, 0)
     place = runner.world(small)
     learner, seeds = replace(place.learner, beta=0.5), seeds_of(setting, 100, 0)
-    batch = kernels.run_sessions(place.mdp(), learner, GateSettings("never"), None, seeds)
+    batch = compiled.run_sessions(place.mdp(), learner, GateSettings("never"), None, seeds)
     first = np.flatnonzero(batch.steps[:, -1] == STEPS)[0]
     assert first > 0  # or it would be the first of all
     assert steps.tolist() == batch.steps[first].tolist()
