@@ -248,39 +248,65 @@ def teach(
         )
 
 
-@command(app, "sequence", "lab sequence toast --toasts 4 --method srl")
+@command(app, "sequence", "lab sequence toast --case II --toasts 4 --gantt order.svg")
 def sequence(
-    task: Annotated[str, typer.Argument(help="A task that ships, or a .toml file.")],
-    toasts: Toasts = 3,
+    task: Annotated[str, typer.Argument(help="A task or a cell that ships, or a .toml file.")],
+    case: Annotated[
+        str | None,
+        typer.Option("--case", help="toast: I, II or III of the thesis. A cell: its order by initials, such as RSR."),
+    ] = None,
+    toasts: Annotated[int | None, typer.Option("--toasts", help="How many parts of the only product.")] = None,
     method: Annotated[
         str | None,
-        typer.Option("--method", help="srl (as printed), srl-time, exact, fifo, random; default: the task's."),
+        typer.Option("--method", help="srl (as printed), srl-time, mc, random, fifo, ga, exact, ...; default: the file's."),
+    ] = None,
+    objective: Annotated[
+        str | None,
+        typer.Option(
+            "--objective", help="makespan, mean-tardiness, tardy-parts, robot-idle, machine-idle; default: the file's."
+        ),
     ] = None,
     episodes: Annotated[
         int | None,
-        typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the task's."),
+        typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the file's."),
     ] = None,
     sessions: Annotated[
         int, typer.Option("--sessions", min=1, max=MAX_SESSIONS, help="How many sessions, each with its own chance.")
     ] = 1,
-    plot: Annotated[Path | None, typer.Option("--plot", help="A .png file for the makespans of the episodes.")] = None,
+    stochastic: Annotated[
+        bool,
+        typer.Option("--stochastic", help="Draw processing times (and arrivals): the list as it is, and reacting."),
+    ] = False,
+    advisor: Annotated[
+        str,
+        typer.Option(
+            "--advisor", help="Who srl may ask which part to move: expert, moderate, limited, novice, tau=X, wrong, terminal."
+        ),
+    ] = "none",
+    gate: Annotated[str, typer.Option("--gate", help="When srl asks: ccrl, always, never.")] = "ccrl",
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="A .png or .svg file for the costs of the episodes.")
+    ] = None,
+    gantt: Annotated[Path | None, typer.Option("--gantt", help="A .png or .svg file for the Gantt chart.")] = None,
     seed: Seed = 0,
     toolbox: ToolboxFolder = None,
     as_json: Json = False,
 ) -> None:
     """The high level alone: the order of the robot's transfers, beside the proven optimum."""
-    from lab import taskfile
-    from lab.lesson import sequence_task
+    from lab.sequence import Wanted, sequence_named
+    from lab.view.order_prompt import OrderPrompt
     from lab.view.progress import RunProgress
     from lab.view.summary import sequence_summary
 
-    loaded = taskfile.load(task)
     progress = RunProgress(_console())
     teacher = _teacher(toolbox, "expert", seed, progress)
     teacher.toolbox.check()
+    ask = OrderPrompt(progress.console) if advisor == "terminal" else None
+    wanted = Wanted(method, episodes, objective, sessions, seed, stochastic, advisor, gate, ask)
+    files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
     with progress:
-        document = sequence_task(
-            loaded, toasts, teacher, method=method, episodes=episodes, sessions=sessions, plot=plot, listener=progress
+        document = sequence_named(
+            task, case, toasts, wanted, teacher=teacher, listener=progress, files=files
         )
     _show(document, as_json, sequence_summary)
 
@@ -373,7 +399,7 @@ def toolbox_remove(name: str, toolbox: ToolboxFolder = None, as_json: Json = Fal
 
 @command(task_app, "list", "lab task list")
 def task_list(as_json: Json = False) -> None:
-    """The tasks and the grid worlds that ship."""
+    """The tasks, the cells for lab sequence and the grid worlds that ship."""
     from lab import taskfile
     from lab.view.summary import table_of
 
@@ -384,7 +410,7 @@ def task_list(as_json: Json = False) -> None:
 
 @command(task_app, "show", "lab task show toast")
 def task_show(task: str, as_json: Json = False) -> None:
-    """The text of a task file, of a task or a world: copy it, change it, use it."""
+    """The text of a task file, of a task, a cell or a world: copy it, change it, use it."""
     from lab.task import describe
 
     text, document = describe(task)
@@ -473,14 +499,17 @@ def study_run(
 def task_check(
     file: str,
     toasts: Annotated[
-        int | None, typer.Option("--toasts", "-n", help="How many slices, 1 to 50; default: 3, if they fit.")
+        int | None,
+        typer.Option(
+            "--toasts", "-n", help="How many slices, 1 to 50; default: 3, if they fit. Of a cell: parts, 1 to 200."
+        ),
     ] = None,
     seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
     """Check a task file: its text, its reach, and that a way exists for every sub-task, or through the world. Exit 2 when not.
 
-    With --json the document comes in both cases.
+    Of a cell: that its order can be made, with the line of what is wrong. With --json the document comes in both cases.
     """
     from lab.task import check_task
 

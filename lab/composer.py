@@ -9,6 +9,7 @@ from lab.line import Line, aimed
 from lab.recorder import Viewer
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import Move, Schedule
+from lab.sequencing.run import Run
 from lab.sim.scene import Layout, Spot, spots
 from lab.sim.world import World
 from lab.skills import Butter, Grasp, Insert, Skill
@@ -55,9 +56,10 @@ class Production:
 
     def __post_init__(self) -> None:
         cell, crew = self.cell, self.line.crew
-        self.locations = list(cell.start_locations())
+        self.plan = Run(cell)  # where toasts are and may go; its times are the predicted ones
         self.place = cell.robot_start
-        self.spot_of: dict[int, Spot] = dict(enumerate(spots(crew.task.station(cell.names[cell.first])), start=1))
+        first = cell.names[cell.positions[cell.starts[0]].station]
+        self.spot_of: dict[int, Spot] = dict(enumerate(spots(crew.task.station(first)), start=1))
 
     def carry_out(self, sequence: Sequence[int]) -> str | None:
         """Carry the whole sequence out; None, or which toast could not be brought on, where and why."""
@@ -70,32 +72,31 @@ class Production:
 
     def done(self) -> list[int]:
         """The toasts that reached the last station."""
-        return [toast for toast, at in enumerate(self.locations, start=1) if at == self.cell.last]
+        return [toast for toast, end_s in enumerate(self.plan.finished_s, start=1) if end_s is not None]
 
     def _bring_on(self, toast: int) -> None:
         """One decision: go to the toast, wait for its machine, carry it one stage on, start the machine there."""
-        line, cell, names = self.line, self.cell, self.cell.names
-        at = self.locations[toast - 1]
-        to = cell.destination(self.locations, toast)
-        if to is None:
-            raise _Stopped(f"toast {toast} at '{names[at]}' has nowhere to go")
-        origin, target, start, leave_s = names[at], names[to], self.place, line.now_s
+        line, names = self.line, self.cell.names
+        option = self.plan.option(toast)
+        if option is None:
+            raise _Stopped(self.plan.refusal(toast))
+        origin, target, start, leave_s = names[option.origin], names[option.target], self.place, line.now_s
         if start != origin:
             self._try(toast, origin, line.crew.empty(start, origin))
         reach_s = line.now_s
         self._await(toast, origin)
         pick_s = line.now_s
-        spot = self._free_spot(target, to)
+        spot = self._free_spot(target)
         self._carry(toast, origin, target, spot)
-        self.locations[toast - 1], self.place, self.spot_of[toast] = to, target, spot
-        self.moves.append(Move(toast, start, origin, target, leave_s, reach_s, pick_s, line.now_s))
+        self.place, self.spot_of[toast] = target, spot
+        process_s = self.plan.move(toast).process_s
+        self.moves.append(Move(toast, start, origin, target, leave_s, reach_s, pick_s, line.now_s, process_s))
         self._start_machine(toast, target)
         if self.on_move is not None:
             self.on_move(self.moves[-1])
 
-    def _free_spot(self, station: str, number: int) -> Spot:
-        taken = [self.spot_of[t] for t, at in enumerate(self.locations, start=1) if at == number]
-        return next(spot for spot in spots(self.line.crew.task.station(station)) if spot not in taken)
+    def _free_spot(self, station: str) -> Spot:
+        return next(s for s in spots(self.line.crew.task.station(station)) if s not in self.spot_of.values())
 
     def _carry(self, toast: int, origin: str, target: str, spot: Spot) -> None:
         """Grasp, carry, set down; what fails is tried again from the state reached, at most twice."""
@@ -212,7 +213,7 @@ def carry_out(
     A toast is delivered when its slice stands on the last station at the end; dropped when it is nowhere upright.
     """
     with World() as world:
-        line = Line(world, crew, layout, cell.toasts, film=True, viewer=viewer)
+        line = Line(world, crew, layout, cell.parts, film=True, viewer=viewer)
         line.at(cell.robot_start, surveys)
         line.restart_clock()
         work = Production(line, cell, surveys, on_move, on_retry)
@@ -220,7 +221,7 @@ def carry_out(
         failure = work.carry_out(sequence)
         line.recorder.take()  # type: ignore[union-attr]
         delivered = tuple(t for t in work.done() if line.bench.stands(_slice(t), work.spot_of[t].grasp(), DELIVERED_M))
-        fallen = (t for t in range(1, cell.toasts + 1) if t not in delivered and line.bench.held != _slice(t))
+        fallen = (t for t in range(1, cell.parts + 1) if t not in delivered and line.bench.held != _slice(t))
         dropped = tuple(t for t in fallen if line.bench.upright(_slice(t)) < UPRIGHT)
         schedule = Schedule.from_moves(cell, work.moves)
         outcome = Outcome(

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lab.policy import Policy
-from lab.sequencing.cell import Cell, Moves, Stage, Station, needed_moves
+from lab.sequencing.cell import Cell, Product, Route, Stage, Station, needed_moves
+from lab.sequencing.positions import Moves
 from lab.skills import Butter, Grasp, Insert, Place, Skill, Transfer
 from lab.skills.surveys import INSERT_START
 from lab.taskfile import Task
@@ -56,7 +57,7 @@ class Crew:
 
         What is set down at the last station may have to be taken up again there, when setting it down failed.
         """
-        moves = needed_moves(stations(task, {}), route(task), task.robot.start, toasts)
+        moves = needed_moves(stations(task, {}), (Product("toast", (route(task),)),), task.robot.start, toasts)
         skills: list[Skill] = []
         for origin, target in moves.loaded:
             skills += [Grasp(origin), Transfer(origin, _entry(task, target), loaded=True), _arrival(task, target)]
@@ -97,7 +98,7 @@ def stations(task: Task, process_s: Mapping[str, float]) -> tuple[Station, ...]:
     return tuple(Station(s.name, s.kind, s.capacity, times[s.name] or 0.0) for s in task.stations)
 
 
-def route(task: Task) -> tuple[Stage, ...]:
+def route(task: Task) -> Route:
     """The task's route as the sequencer knows it."""
     return tuple(Stage(stage.station, stage.buffer) for stage in task.route)
 
@@ -112,4 +113,4 @@ def cell_of(task: Task, durations: Durations, toasts: int) -> Cell:
         for (origin, target), seconds in times.items():
             table[names.index(origin), names.index(target)] = seconds
         tables.append(table)
-    return Cell(places, route(task), tables[0], tables[1], task.robot.start, toasts)
+    return Cell.alike(places, route(task), tables[0], tables[1], task.robot.start, toasts)

@@ -2,7 +2,7 @@
 
 from lab.learning.session import Event
 from lab.sequencing.events import Move, SequenceResult
-from lab.sequencing.exact import Optimum
+from lab.sequencing.search import Reference
 from lab.teaching import Lesson
 
 
@@ -24,7 +24,7 @@ class Listener:
     def measured(self, name: str, seconds: float) -> None:
         """A move was timed."""
 
-    def sequenced(self, best: SequenceResult, proven: Optimum) -> None:
+    def sequenced(self, best: SequenceResult, known: Reference) -> None:
         """An order was found."""
 
     def moved(self, move: Move) -> None:

@@ -14,8 +14,9 @@ from lab.errors import BadInput, WorkFailed
 from lab.files import nearest
 from lab.policy import Policy
 from lab.sequencing.cell import Cell
-from lab.sequencing.events import SequenceResult, simulate
+from lab.sequencing.events import SequenceResult
 from lab.sequencing.exact import Optimum
+from lab.sequencing.run import simulate
 from lab.sim.scene import Layout
 from lab.skills import Insert
 from lab.skills.skill import Problem
@@ -83,7 +84,7 @@ class Report:
     @property
     def gap(self) -> float:
         """How much longer the used sequence takes than the proven optimum (or the bound), as a fraction of it."""
-        return self.proven.gap(self.sequenced.makespan_s)
+        return self.proven.gap(self.sequenced.cost)
 
     def to_json(self) -> dict[str, Any]:
         """The document of `lab run --json`."""
@@ -99,7 +100,7 @@ class Report:
             "retries": list(outcome.retries),
             "skills": [_skill_row(name, lesson) for name, lesson in self.lessons.items()],
             "sequence": list(self.sequenced.sequence),
-            "predicted_makespan_s": self.sequenced.makespan_s,
+            "predicted_makespan_s": self.sequenced.cost,
             "measured_makespan_s": outcome.schedule.makespan_s if self.success else None,
             "optimal_makespan_s": self.proven.optimal_s,
             "bound_s": self.proven.bound_s,
@@ -208,8 +209,8 @@ def _curves(prepared: Prepared, lessons: dict[str, Lesson]) -> dict[str, Policy]
 def _sequence_document(taught: Taught, report: Report) -> dict[str, Any]:
     return {
         "sequence": list(report.sequenced.sequence),
-        "makespan_s": report.sequenced.makespan_s,
-        "episode_makespans_s": list(report.sequenced.episode_makespans_s),
+        "makespan_s": report.sequenced.cost,
+        "episode_makespans_s": list(report.sequenced.episode_costs),
         "optimal_s": report.proven.optimal_s,
         "optimal_sequence": list(report.proven.sequence),
         "durations": taught.durations.to_json(),

@@ -2,7 +2,6 @@
 
 import hashlib
 import time
-from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
 
@@ -10,17 +9,14 @@ import numpy as np
 
 from lab.composer import carry_out
 from lab.crew import Crew, Durations, cell_of
-from lab.errors import unknown
 from lab.line import measure
 from lab.listener import Listener
 from lab.policy import Policy
 from lab.recorder import Viewer, show_scene
 from lab.report import Prepared, Report, Taught, write_files
-from lab.sequencing import SEQUENCERS
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import EpisodeSequenced, SequenceResult
+from lab.sequence import find_sequence, search_for
 from lab.sequencing.exact import optimum
-from lab.sequencing.srl import srl
+from lab.sequencing.search import Reference
 from lab.sim.scene import Layout, check_apart, draw_layout
 from lab.skills.surveys import Surveys
 from lab.taskfile import Task, check_toasts
@@ -106,36 +102,6 @@ def _fingerprint(task: Task, layout: Layout, crew: Crew) -> str:
     return digest.hexdigest()[:24]
 
 
-def sequence(
-    task: Task,
-    cell: Cell,
-    seed: int,
-    *,
-    method: str | None = None,
-    episodes: int | None = None,
-    session: int = 0,
-    on_episode: Callable[[EpisodeSequenced], None] | None = None,
-) -> SequenceResult:
-    """The best sequence that a method finds, by default the task's own with its settings. BadInput for an unknown method."""
-    settings = task.sequencing
-    name, count = method or settings.method, episodes or settings.episodes
-    rng = np.random.default_rng([seed, 2, session])
-    if name not in SEQUENCERS:
-        raise unknown("method", name, SEQUENCERS, "--method")
-    if name != "srl":
-        return SEQUENCERS[name](cell, count, rng, on_episode)
-    return srl(
-        cell,
-        count,
-        rng,
-        alpha=settings.alpha,
-        discount=settings.discount,
-        beta=settings.beta,
-        factor=settings.reward_factor,
-        on_episode=on_episode,
-    )
-
-
 def run(
     prepared: Prepared, teacher: Teacher, out: Path, *, listener: Listener | None = None, viewer: Viewer | None = None
 ) -> Report:
@@ -146,8 +112,10 @@ def run(
         show_scene(prepared.task, prepared.toasts, prepared.layout, viewer)
     taught = teach_all(prepared, teacher, listener)
     listener.phase("sequence", 1)
-    found, proven = sequence(prepared.task, taught.cell, prepared.seed), optimum(taught.cell)
-    listener.sequenced(found, proven)
+    settings = prepared.task.sequencing
+    found = find_sequence(taught.cell, settings.method, search_for(settings), prepared.seed)
+    proven = optimum(taught.cell)
+    listener.sequenced(found, Reference(proven.bound_s, proven.proven, "A*"))
     listener.phase("carry out", len(found.sequence))
     outcome, recording = carry_out(
         prepared.crew,

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from lab.cellfile import CellFile
 from lab.errors import BadInput, LabError
 from lab.gridworld import RANDOM, GridWorld, parse_shape, random_world
 from lab.lesson import fitting
@@ -20,21 +21,27 @@ away from you and z up.
 
 
 def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
-    """What is wrong with a task file, its scene and its problems for so many toasts, or with a world; empty when nothing is.
+    """What is wrong with a task file, its scene and its problems for so many toasts, or with a cell or a world; or nothing.
 
-    Without a number: for 3 toasts, or as many as there is room for.
+    Without a number: a task for 3 toasts, or as many as there is room for; a cell for its own order.
+    Raises BadInput for a file that is not there, and for a number that this kind of file never takes.
     """
-    from lab.run import prepare
-
     if not file.startswith(RANDOM):
         find(file)
-    if toasts is not None:
-        check_number(toasts)
     try:
         task = load_any(file)
+    except LabError as error:
+        return [str(error)]
+    if toasts is not None:
+        task.ordered(toasts) if isinstance(task, CellFile) else check_number(toasts)
+    try:
         if isinstance(task, GridWorld):
             world_problem(task)
+        elif isinstance(task, CellFile):
+            task.cell(toasts)
         else:
+            from lab.run import prepare
+
             prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
     except LabError as error:
         return [str(error)]
@@ -42,7 +49,7 @@ def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
 
 
 def describe(word: str) -> tuple[str, dict[str, Any]]:
-    """The text of a task or world, and the document of `lab task show --json`; a world drawn at random has no "file"."""
+    """The text of a task, a cell or a world, and the document of `lab task show --json`; a drawn world has no "file"."""
     found = load_any(word)
     if isinstance(found, GridWorld) and word.startswith(RANDOM):
         return found.to_toml(), {"file": None, **found.model_dump(mode="json")}

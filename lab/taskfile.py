@@ -1,17 +1,19 @@
 """Task files: tasks/*.toml -> validated frozen models. The only place where raw text is checked."""
 
-import tomllib
 from itertools import combinations
 from math import hypot
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Literal, Self, TypeVar, cast, get_args
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
+from lab.cellfile import CellFile
+from lab.cellparts import Sequencing
 from lab.data import tasks_folder
 from lab.errors import BadInput, unknown
 from lab.gridworld import RANDOM, GridWorld, from_text, from_words
 from lab.record import Count, Learned, Name, Record, as_tuple, read_text
+from lab.tomltext import TomlText, explain
 
 MAX_TOASTS = 50
 RESERVED = ("robot", "table", "insert", "the slice", "carried slice")  # names of other things in the cell
@@ -20,6 +22,7 @@ RESERVED_ENDS = (" marker", " column", " head")
 SUBTASKS = ("transfer", "grasp", "insert", "butter", "place")
 NEAREST_STATIONS_M = 0.16  # two stations nearer than this overlap: a slice is 0.12 m wide
 
+Kind = Literal["task", "cell", "world"]  # of what a file holds
 Model = TypeVar("Model", bound=Record)
 Size = Annotated[float, Field(ge=0.001, le=10)]  # the bounds keep a slip of the pen from taking all memory or all day
 Time = Annotated[float, Field(ge=0, le=86_400)]
@@ -120,17 +123,6 @@ class Subtask(Learned):
     """How a sub-task is learned: rewards, learner and gate."""
 
 
-class Sequencing(Record):
-    """How the order of the robot's transfers is found."""
-
-    method: str = "srl"
-    episodes: Annotated[int, Field(ge=1, le=1_000_000)] = 400
-    alpha: Annotated[float, Field(gt=0, le=1)] = 0.05
-    discount: Annotated[float, Field(gt=0, le=1)] = 0.9
-    beta: Annotated[float, Field(ge=0, le=100)] = 1.0
-    reward_factor: Literal["A", "B"] = "B"
-
-
 class Task(Record):
     """A whole task file, checked."""
 
@@ -190,12 +182,10 @@ class Task(Record):
 
     @model_validator(mode="after")
     def _members_known(self) -> Self:
-        from lab.sequencing import SEQUENCERS
-
         for name, subtask in self.subtasks.items():
             subtask.check_members(f"subtasks.{name}.")
-        if self.sequencing.method not in SEQUENCERS:
-            raise unknown("method", self.sequencing.method, SEQUENCERS, "sequencing.method")
+        for _, error in self.sequencing.faults(due=False):
+            raise error
         return self
 
 
@@ -204,8 +194,8 @@ def _reserved(name: str) -> bool:
 
 
 def shipped() -> dict[str, str]:
-    """What ships, by name, and whether it is a "task" or a "world"."""
-    return {name: _kind(_toml(path), path) for name, path in _files().items()}
+    """What ships, by name, and whether it is a "task", a "cell" or a "world"."""
+    return {name: _kind(_toml(path)) for name, path in _files().items()}
 
 
 def _files() -> dict[str, Path]:
@@ -217,13 +207,18 @@ def task_names() -> list[str]:
     return [name for name, kind in shipped().items() if kind == "task"]
 
 
+def cell_names() -> list[str]:
+    """The cells for the sequencer that ship, by name."""
+    return [name for name, kind in shipped().items() if kind == "cell"]
+
+
 def world_names() -> list[str]:
     """The grid worlds that ship, by name."""
     return [name for name, kind in shipped().items() if kind == "world"]
 
 
 def names_file(word: str) -> bool:
-    """Whether a word means a world or a task, by path, by name or by chance, and no sub-task."""
+    """Whether a word means a world, a cell or a task, by path, by name or by chance, and no sub-task."""
     return word.startswith(RANDOM) or _is_path(word) or word in _files()
 
 
@@ -232,7 +227,7 @@ def _is_path(task: str) -> bool:
 
 
 def find(task: str) -> Path:
-    """The file of a task or world given by name or path; BadInput when there is neither."""
+    """The file of a task, cell or world given by name or path; BadInput when there is none."""
     if _is_path(task):
         if Path(task).is_file():
             return Path(task)
@@ -251,6 +246,13 @@ def load(task: str) -> Task:
     return found
 
 
+def load_cell(cell: str) -> CellFile:
+    """As `load`: a cell for the sequencer alone, by name or by file; BadInput names file and line."""
+    found = load_any(cell, "cell")
+    assert isinstance(found, CellFile)
+    return found
+
+
 def load_world(world: str) -> GridWorld:
     """As `load`: a world by name, by file (.toml, or .txt with a text grid) or by chance ("random:10x10x10:0.06:7")."""
     found = load_any(world, "world")
@@ -258,57 +260,51 @@ def load_world(world: str) -> GridWorld:
     return found
 
 
-def load_any(word: str, wanted: Literal["task", "world"] | None = None) -> Task | GridWorld:
-    """A task or a world, as `load` and `load_world` read it; BadInput also when it is not the one that is wanted."""
+def load_any(word: str, wanted: Kind | None = None) -> Task | CellFile | GridWorld:
+    """A task, a cell or a world, as `load`, `load_cell` and `load_world` read it; BadInput also when another is wanted."""
     drawn = word.startswith(RANDOM)
     path = Path(word) if drawn else find(word)
-    as_text = path.suffix == ".txt"
-    raw = {"kind": "world"} if drawn or as_text else _toml(path)
-    kind = _kind(raw, path)
-    if wanted == "task" and kind == "world":
-        raise BadInput(f"{word}: it is a world, not a task: learn it with lab teach {word}")
-    if wanted == "world" and kind == "task":
-        raise BadInput(f"{word}: it is a task, not a world: lab run {word}, or lab teach SUBTASK --task {word}")
-    if kind == "task":
-        return _checked(Task, raw, path)
-    if drawn:
-        return from_words(word)
-    return from_text(path) if as_text else _checked(GridWorld, raw, path)
+    if drawn or path.suffix == ".txt":
+        _check_wanted(word, "world", wanted)
+        return from_words(word) if drawn else from_text(path)
+    toml = _toml(path)
+    kind = _kind(toml)
+    _check_wanted(word, kind, wanted)
+    if kind == "cell":
+        return CellFile.checked(toml)
+    return _checked(Task, toml) if kind == "task" else _checked(GridWorld, toml)
 
 
-def _kind(raw: dict[str, Any], path: Path) -> str:
-    kind = raw.get("kind", "task")
-    if kind not in ("task", "world"):
-        raise unknown("kind", kind, ("world",), str(path))
-    return str(kind)
+def _check_wanted(word: str, kind: Kind, wanted: Kind | None) -> None:
+    if wanted is None or kind == wanted:
+        return
+    instead = {
+        "task": f"lab run {word}, or lab teach SUBTASK --task {word}",
+        "cell": f"sequence it with lab sequence {word}",
+        "world": f"learn it with lab teach {word}",
+    }
+    raise BadInput(f"{word}: it is a {kind}, not a {wanted}: {instead[kind]}")
 
 
-def _toml(path: Path) -> dict[str, Any]:
-    text = read_text(path)
+def _kind(toml: TomlText) -> Kind:
+    kind = toml.raw.get("kind", "task")
+    for known in get_args(Kind):
+        if kind == known:
+            return cast(Kind, known)
+    raise toml.refusal(("kind",), str(unknown("kind", kind, ("cell", "world"), "of task file")))
+
+
+def _toml(path: Path) -> TomlText:
+    return TomlText.parsed(path, read_text(path))
+
+
+def _checked(model: type[Model], toml: TomlText) -> Model:
     try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # beside TOMLDecodeError: numbers or nests beyond Python's limits
-        raise BadInput(f"{path}: not valid TOML: {error}") from None
-
-
-def _checked(model: type[Model], raw: dict[str, Any], path: Path) -> Model:
-    try:
-        return model.model_validate(raw)
+        return model.model_validate(toml.raw)
     except ValidationError as error:
-        raise BadInput(f"{path}: {explain(error)}") from None
+        raise BadInput(f"{toml.path}: {explain(error)}") from None
     except BadInput as error:
-        raise BadInput(f"{path}: {error}") from None
-
-
-def explain(error: ValidationError) -> str:
-    """The first finding of a validation as one line: the field, the bad value, what is allowed; and how many more there are."""
-    findings = error.errors()
-    first = findings[0]
-    where = ".".join(str(part) for part in first["loc"])
-    message = first["msg"].removeprefix("Value error, ")
-    shown = "" if isinstance(first["input"], dict) or not where else f" (got {first['input']!r})"
-    more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
-    return f"{where + ': ' if where else ''}{message}{shown}{more}"
+        raise BadInput(f"{toml.path}: {error}") from None
 
 
 def check_number(toasts: int) -> None:

@@ -11,7 +11,8 @@ from lab.crew import Crew, Durations, cell_of
 from lab.errors import WorkFailed
 from lab.line import Line, measure, try_grasp
 from lab.sequencing.cell import Cell
-from lab.sequencing.events import Move, simulate
+from lab.sequencing.events import Move
+from lab.sequencing.run import simulate
 from lab.sim.scene import Layout, spots
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Butter, Grasp
@@ -217,7 +218,7 @@ class Ground:
     """A line with a production on it, begun at the robot's start."""
 
     def __init__(self, world: World, crew: Crew, surveys: Surveys, layout: Layout, cell: Cell) -> None:
-        self.line = Line(world, crew, layout, cell.toasts)
+        self.line = Line(world, crew, layout, cell.parts)
         self.line.at(cell.robot_start, surveys)
         self.line.restart_clock()
         self.work = Production(self.line, cell, surveys)
@@ -308,7 +309,8 @@ def test_a_machine_that_goes_on_failing_stops_the_run(
     clueless("butter at butter_applier")
     work = ground.work
     ground.line.bench.held = None
-    work.locations = [work.cell.index("butter_applier")]
+    for decision in (1, 1):  # plate to toaster, toaster to butter_applier
+        work.plan.move(decision)
     ground.put("slice 1", 0.80, -0.52, 0.0805)
     ground.line.at("butter_applier", surveys)
     work.place = "butter_applier"
@@ -320,16 +322,16 @@ def test_a_machine_that_goes_on_failing_stops_the_run(
 
 
 def test_each_toast_gets_a_free_spot(task: Task, ground: Ground) -> None:
-    work, last = ground.work, ground.work.cell.last
-    places = spots(task.station("finished_plate"))
-    assert work._free_spot("finished_plate", last) == places[0]
-    work.locations, work.spot_of = [last, last, work.cell.first], {1: places[0], 2: places[2], 3: places[1]}
-    assert work._free_spot("finished_plate", last) == places[1]
+    work, places = ground.work, spots(task.station("finished_plate"))
+    assert work._free_spot("finished_plate") == places[0]
+    work.spot_of = {1: places[0], 2: places[2], 3: spots(task.station("plate"))[1]}
+    assert work._free_spot("finished_plate") == places[1]
 
 
 def test_a_toast_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None:
-    ground.work.locations = [ground.work.cell.last]
-    assert ground.work.carry_out((1,)) == "toast 1 at 'finished_plate' has nowhere to go"
+    for decision in (1, 1, 1):
+        ground.work.plan.move(decision)
+    assert ground.work.carry_out((1,)) == "toast 1 is already at 'finished_plate'"
     assert ground.work.done() == [1]
 
 

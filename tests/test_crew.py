@@ -86,7 +86,7 @@ def test_the_cell_holds_the_measured_times_and_nothing_else(task: Task) -> None:
     crew = Crew.of(task, 2)
     measured = durations(crew)
     cell = cell_of(task, measured, 2)
-    assert cell.toasts == 2
+    assert cell.order == ("toast", "toast")
     assert cell.robot_start == task.robot.start
     for table, times in ((cell.empty_s, measured.empty_s), (cell.loaded_s, measured.loaded_s)):
         found = {

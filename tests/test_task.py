@@ -1,8 +1,14 @@
 """The commands about task files."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from lab.task import check_task
+import pytest
+
+from lab.errors import BadInput
+from lab.task import check_task, describe
+from lab.taskfile import cell_names
 
 
 def test_check_finds_what_is_wrong(tmp_path: Path, root: Path) -> None:
@@ -27,3 +33,42 @@ def test_check_finds_what_is_wrong_with_a_world(tmp_path: Path, root: Path) -> N
     path.write_text(text.replace("goal = [8, 5, 3]", "goal = [8, 5, 30]"))
     (error,) = check_task(str(path), None, 0)
     assert error == f"{path}: goal (8, 5, 30) is outside the world: allowed are 0..9 x 0..9 x 0..9"
+
+
+@pytest.mark.parametrize("name", cell_names())
+def test_the_cells_that_ship_are_sound(name: str, root: Path) -> None:
+    assert check_task(name, None, 0) == []
+    text, document = describe(name)
+    assert text == (root / "tasks" / f"{name}.toml").read_text(encoding="utf-8")
+    assert (document["name"], document["kind"], document["file"]) == (
+        name,
+        "cell",
+        str(root / "tasks" / f"{name}.toml"),
+    )
+
+
+def test_check_finds_what_is_wrong_with_a_cell(tmp_path: Path, root: Path) -> None:
+    text = (root / "tasks" / "toast-case-1.toml").read_text(encoding="utf-8")
+    path = tmp_path / "c.toml"
+    path.write_text(text.replace("capacity = 50", "capacity = 3"))
+    assert check_task(str(path), None, 0) == check_task(str(path), 3, 0) == []
+    (error,) = check_task(str(path), 4, 0)
+    assert error == f"{path}: line 17: station 'finished_plate': capacity 3 cannot hold all 4 parts"
+    path.write_text(text.replace('"butter_buffer" },', '"buter_buffer" },'))
+    (error,) = check_task(str(path), None, 0)
+    assert error.startswith(f"{path}: line 28: unknown station 'buter_buffer' (stage 3 of the route): did you mean")
+    with pytest.raises(BadInput, match="an order of 201 parts: allowed are 1 to 200"):
+        check_task("toast-case-1", 201, 0)
+    with pytest.raises(BadInput, match=r"cell 'fms' makes several products: give their order with --case, such as RSR"):
+        check_task("fms", 3, 0)
+
+
+def test_a_bad_cell_ends_the_command_with_2_and_one_line(tmp_path: Path, root: Path, lab: Callable[..., Any]) -> None:
+    path = tmp_path / "c.toml"
+    text = (root / "tasks" / "fms.toml").read_text(encoding="utf-8")
+    path.write_text(text.replace("service_s = 240", "service_s = nan"))
+    ran = lab("task", "check", str(path))
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith(f"lab: {path}: line 63: products.1.routes.0.2.service_s: Input should be a finite number")
+    assert ran.err.count("\n") == 1
+    assert lab("task", "check", "fms").out == "fms is sound\n"

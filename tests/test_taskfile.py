@@ -19,17 +19,19 @@ from lab.taskfile import (
     RESERVED,
     SUBTASKS,
     Task,
+    cell_names,
     check_toasts,
-    explain,
     find,
     load,
     load_any,
+    load_cell,
     load_world,
     names_file,
     shipped,
     task_names,
     world_names,
 )
+from lab.tomltext import explain
 
 SHIPPED: dict[str, Any] = tomllib.loads((tasks_folder() / "toast.toml").read_text())
 TEXT = (tasks_folder() / "toast.toml").read_text()
@@ -142,7 +144,7 @@ def test_a_file_that_is_not_there_is_said(task: str) -> None:
 def test_an_unknown_task_lists_the_known(task: str) -> None:
     message = refusal(lambda: load(task))
     assert message.startswith("unknown task '")
-    assert message.endswith("known: toast, world-1, world-2")
+    assert message.endswith("known: fms, toast, toast-case-1, toast-case-2, toast-case-3, world-1, world-2")
     assert ("did you mean 'toast'?" in message) == (task in ("toats", "Toast", "toast\0"))
 
 
@@ -209,7 +211,22 @@ def test_what_is_no_text_is_said(tmp_path: Path) -> None:
             "unknown learner 'q-lamda' (subtasks.transfer.learner): did you",
         ),
         ('gate = "ccrl"', 'gate = "crcl"', "unknown gate 'crcl' (subtasks.transfer.gate): did you mean 'ccrl'?"),
-        ('method = "srl"', 'method = "slr"', "unknown method 'slr' (sequencing.method): did you mean 'srl'?"),
+        ('method = "srl-time"', 'method = "slr"', "unknown method 'slr' (sequencing.method): did you mean 'srl'?"),
+        (
+            'method = "srl-time"',
+            'objective = "makespn"',
+            "unknown objective 'makespn' (sequencing.objective): did you mean",
+        ),
+        (
+            'method = "srl-time"',
+            'objective = "tardy-parts"',
+            "objective 'tardy-parts' needs due times, and there are none",
+        ),
+        (
+            'method = "srl-time"',
+            'state = "robot"',
+            "sequencing.state: Input should be 'parts' or 'stations' (got 'robot')",
+        ),
         ("[subtasks.insert]", "[subtasks.insrt]", "unknown sub-task 'insrt' (subtasks): did you mean 'insert'?"),
         ("alpha = 0.95", "alpha = 1.5", "subtasks.transfer.learner.alpha: Input should be less than or equal to 1"),
         ("omega = 7", "omega = -1", "subtasks.transfer.gate.omega: Input should be greater than or equal to 0"),
@@ -344,17 +361,26 @@ def test_a_world_that_ships_loads_by_name_and_by_path(name: str) -> None:
     assert world.check().start == np.ravel_multi_index(world.start, world.shape)
 
 
-def test_what_ships_is_a_task_or_a_world() -> None:
-    assert sorted(task_names() + world_names()) == list(shipped())
-    assert (shipped()["toast"], shipped()["world-1"]) == ("task", "world")
-    assert [names_file(word) for word in ("world-1", "toast", "a.txt", "./a", "random:", "insert", "world")] == (
-        [True] * 5 + [False] * 2
+def test_what_ships_is_a_task_a_cell_or_a_world() -> None:
+    assert sorted(task_names() + cell_names() + world_names()) == sorted(shipped())
+    assert (shipped()["toast"], shipped()["fms"], shipped()["world-1"]) == ("task", "cell", "world")
+    assert [names_file(word) for word in ("world-1", "toast", "fms", "a.txt", "./a", "random:", "insert", "world")] == (
+        [True] * 6 + [False] * 2
     )
 
 
 @pytest.mark.parametrize("word", ["world-1", str(tasks_folder() / "world-1.toml"), "random:3x3:0.1:0"])
-def test_a_world_is_no_task(word: str) -> None:
+def test_a_world_is_no_task_and_no_cell(word: str) -> None:
     assert refusal(lambda: load(word)) == f"{word}: it is a world, not a task: learn it with lab teach {word}"
+    assert refusal(lambda: load_cell(word)) == f"{word}: it is a world, not a cell: learn it with lab teach {word}"
+
+
+@pytest.mark.parametrize("word", ["fms", str(tasks_folder() / "fms.toml")])
+def test_a_cell_is_no_task_and_no_world(word: str) -> None:
+    assert load_cell(word) == load_any(word) == load_cell("fms")
+    for read, kind in ((load, "task"), (load_world, "world")):
+        said = f"{word}: it is a cell, not a {kind}: sequence it with lab sequence {word}"
+        assert refusal(lambda read=read: read(word)) == said  # type: ignore[misc]
 
 
 def test_a_task_is_no_world(tmp_path: Path) -> None:
@@ -363,6 +389,7 @@ def test_a_task_is_no_world(tmp_path: Path) -> None:
     for word in ("toast", str(path)):
         said = f"{word}: it is a task, not a world: lab run {word}, or lab teach SUBTASK --task {word}"
         assert refusal(lambda word=word: load_world(word)) == said  # type: ignore[misc]
+        assert refusal(lambda word=word: load_cell(word)) == said.replace("not a world", "not a cell")  # type: ignore[misc]
 
 
 def test_a_kind_that_there_is_not(tmp_path: Path) -> None:
@@ -370,7 +397,7 @@ def test_a_kind_that_there_is_not(tmp_path: Path) -> None:
     path.write_text(WORLD.replace('"world"', '"wrold"'))
     for read in (load, load_world):
         assert refusal(lambda read=read: read(str(path))) == (  # type: ignore[misc]
-            f"unknown kind 'wrold' ({path}): did you mean 'world'? known: world"
+            f"{path}: line 7: unknown kind 'wrold' (of task file): did you mean 'world'? known: cell, world"
         )
 
 

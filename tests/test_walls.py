@@ -15,17 +15,19 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors",),
-    ("lab.data", "lab.files"),
+    ("lab.data", "lab.files", "lab.tomltext"),
     ("lab.overhead", "lab.view.frames", "lab.mdp", "lab.sequencing", "lab.learning.settings"),
     ("lab.vision",),
     ("lab.learning.selection",),
     ("lab.learning.updates",),
     ("lab.advice",),
-    ("lab.learning",),
+    ("lab.learning", "lab.sequencing.advised"),  # SRL that asks: the one sequencer that knows advice
     ("lab.policy",),
     ("lab.toolbox",),
     ("lab.record",),
-    ("lab.gridworld",),
+    ("lab.gridworld", "lab.cellparts"),
+    ("lab.cellfaults",),
+    ("lab.cellfile",),
     ("lab.taskfile",),
     ("lab.sim",),
     ("lab.skills", "lab.recorder"),
@@ -35,7 +37,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.view",),
     ("lab.report",),
     ("lab.run", "lab.studies", "lab.gym"),
-    ("lab.lesson", "lab.study", "lab.look"),
+    ("lab.lesson", "lab.study", "lab.look", "lab.sequence"),
     ("lab.task",),
     ("lab.cli",),
 )
@@ -46,6 +48,8 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "meshcat": {"lab.view.meshcat"},
     "cv2": {"lab.vision", "lab.sim.camera"},
     "PIL": {"lab.vision", "lab.sim.camera"},
+    "ortools": {"lab.sequencing.cpsat"},
+    "pymoo": {"lab.sequencing.genetic"},
     "joblib": {"lab.studies.runner"},  # to work in several processes; its files are pickles, and nobody reads those
 } | {library: set() for library in ("random", "pickle", "dill", "cloudpickle", "shelve", "marshal")}
 NEVER = {  # room -> rooms that it never imports, whatever the layers say
@@ -56,6 +60,7 @@ NEVER = {  # room -> rooms that it never imports, whatever the layers say
     "lab.sim": ("lab.learning", "lab.sequencing"),
 }
 HEAVY = ("numpy", "pydantic", "scipy", "trimesh", "matplotlib", "numba", "meshcat", "cv2", "pybullet", "safetensors")
+HEAVY += ("ortools", "pymoo")
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 
 
@@ -137,6 +142,8 @@ def code_faults(module: str, tree: ast.Module) -> Iterator[str]:
                 yield f"{line} prints: only the CLI does"
             if called in ("__import__", "import_module", "importlib.import_module"):
                 yield f"{line} imports by a string, which no wall can see"
+            if called.rpartition(".")[2] in GENERATORS and not (node.args or node.keywords):
+                yield f"{line} calls {called}() without a seed"
             if any(word.arg == "allow_pickle" and ast.unparse(word.value) != "False" for word in node.keywords):
                 yield f"{line} allows pickles"
         elif isinstance(node, ast.Attribute):
@@ -233,6 +240,8 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.view.plots", "from meshcat.geometry import Box", "allowed in ['lab.view.meshcat']"),
         ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.sim.camera', 'lab.vision']"),
         ("lab.view.plots", "from PIL import Image", "allowed in ['lab.sim.camera', 'lab.vision']"),
+        ("lab.sequencing.exact", "from ortools.sat.python import cp_model", "allowed in ['lab.sequencing.cpsat']"),
+        ("lab.sequencing.rivals", "def f():\n    import pymoo", "allowed in ['lab.sequencing.genetic']"),
         ("lab.mdp", "import random", "allowed in no module"),
         ("lab.toolbox", "import pickle", "allowed in no module"),
         ("lab.mdp", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import lab.sim.world", "never does"),
@@ -240,6 +249,9 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.learning.session", "from ..view import meshcat", "imports lab.view.meshcat: lab.learning never does"),
         ("lab.advice.gates", "from lab import cli", "imports lab.cli: lab.advice never does"),
         ("lab.advice.gates", "from lab.learning.session import x", "runs back up"),
+        ("lab.sequencing.srl", "from lab.advice.gates import GATES", "runs back up"),
+        ("lab.sequencing.srl", "def f():\n    from lab.sequencing.advised import advised_srl", "runs back up"),
+        ("lab.sequencing.advised", "from lab.view.terminal import ReadLine", "lab.sequencing never does"),
         ("lab.sim.robot", "from ..learning import session", "imports lab.learning.session: lab.sim never does"),
         ("lab.sim.world", "from lab.sequencing.cell import Cell", "lab.sim never does"),
         ("lab.composer", "from .cli import main", "runs back up"),
@@ -247,6 +259,8 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.mdp", "print('x')", "prints"),
         ("lab.mdp", "import numpy as np\nx = np.random.rand()", "uses np.random.rand"),
         ("lab.mdp", "from numpy.random import shuffle, default_rng", "imports numpy.random.shuffle"),
+        ("lab.mdp", "import numpy as np\nrng = np.random.default_rng()", "without a seed"),
+        ("lab.sequencing.batch", "from numpy.random import SeedSequence\nx = SeedSequence()", "without a seed"),
         ("lab.toolbox", "np.load(path, allow_pickle=True)", "allows pickles"),
         ("lab.skills.grasp", "import_module('pybullet')", "no wall can see"),
     ],
@@ -265,6 +279,8 @@ def test_a_broken_wall_is_seen(module: str, source: str, fault: str) -> None:
         ("lab.learning.session", "from lab.advice.gates import GATES\nfrom .settings import GateSettings"),
         ("lab.sim.world", "from lab.view.frames import Frame"),
         ("lab.mdp", "import numpy as np\ndef f(rng: np.random.Generator): return np.random.default_rng(1)"),
+        ("lab.sequencing.advised", "from lab.advice.gates import GATES\nfrom lab.sequencing.srl import Srl"),
+        ("lab.sequencing.batch", "from numpy.random import SeedSequence\nx = SeedSequence(1)"),
     ],
 )
 def test_what_is_allowed_passes(module: str, source: str) -> None:

@@ -11,7 +11,7 @@ from lab.learning.settings import GateSettings
 from lab.learning.updates import Update
 
 Values = Sequence[float]
-Steps = Sequence[int]
+Steps = Sequence[float]  # whole numbers, unless the high level compares makespans
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Improvement:
 
 def window_mean(steps: Steps, end: int, window: int) -> float:
     """The mean of the `window` step counts before index `end`."""
-    total = 0
+    total: float = 0
     for i in range(end - window, end):
         total += steps[i]
     return total / window
@@ -36,7 +36,7 @@ def too_slow(current_mean: float, previous_mean: float, threshold: float) -> boo
     return current_mean / previous_mean > 1.0 - threshold
 
 
-def misled(result: int, mean_before: float) -> bool:
+def misled(result: float, mean_before: float) -> bool:
     """Whether an episode was not better than the mean of the K before it. Source: thesis eq. 6.3 and listing."""
     return result >= mean_before
 
@@ -203,7 +203,7 @@ class Ccrl(Gate):
 
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
         super().__init__(settings, episodes, max_steps, around)
-        self._last_result = 0
+        self._last_result: float = 0
         self._equal_results = 0
 
     def opens(self, episode: int, steps: Steps) -> bool:
@@ -216,7 +216,7 @@ class Ccrl(Gate):
         self.why = f"its improvement is {improved.rate:+.1%}, below {self.settings.lambda_threshold:.0%}"
         return slow and not self.converged and episode < self.episodes
 
-    def _watch_convergence(self, result: int) -> None:
+    def _watch_convergence(self, result: float) -> None:
         if result == self._last_result and result < self.max_steps:
             self._equal_results += 1
             self.converged = self.converged or self._equal_results > 2 * self.settings.window

@@ -1,42 +1,103 @@
-"""The high level: in which order the robot serves the toasts."""
+"""The high level: in which order one robot serves the parts of a cell."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
 
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import EpisodeSequenced, SequenceResult
-from lab.sequencing.exact import optimum
-from lab.sequencing.rivals import fifo, random_search
-from lab.sequencing.srl import srl as learn
-from lab.sequencing.srl_time import srl_time
+    from lab.sequencing.cell import Cell
+    from lab.sequencing.events import SequenceResult
+    from lab.sequencing.search import Search
 
-OnEpisode = Callable[[EpisodeSequenced], None]
-Sequencer = Callable[[Cell, int, np.random.Generator, OnEpisode | None], SequenceResult]
+Sequencer = Callable[["Cell", "Search", "np.random.Generator"], "SequenceResult"]
 
-
-def _srl(cell: Cell, episodes: int, rng: np.random.Generator, on_episode: OnEpisode | None) -> SequenceResult:
-    return learn(cell, episodes, rng, on_episode=on_episode)
+# Each sequencer is imported when it is used: numba and OR-Tools take their time.
 
 
-def _fifo(cell: Cell, _episodes: int, _rng: np.random.Generator, on_episode: OnEpisode | None) -> SequenceResult:
-    return _reported(fifo(cell), on_episode)
+def _srl(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+    from lab.sequencing.srl import srl
+
+    return srl(cell, search, rng)
 
 
-def _exact(cell: Cell, _episodes: int, _rng: np.random.Generator, on_episode: OnEpisode | None) -> SequenceResult:
-    best = optimum(cell)
-    return _reported(SequenceResult(best.sequence, best.makespan_s, (best.makespan_s,)), on_episode)
+def _srl_time(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+    from lab.sequencing.srl_time import srl_time
+
+    return srl_time(cell, search, rng)
 
 
-def _reported(result: SequenceResult, on_episode: OnEpisode | None) -> SequenceResult:
-    """A result that took no learning, shown to the callback as one episode."""
-    if on_episode is not None:
-        on_episode(EpisodeSequenced(1, result.makespan_s, result.makespan_s))
-    return result
+def _monte_carlo(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+    from lab.sequencing.monte_carlo import monte_carlo
+
+    return monte_carlo(cell, search, rng)
 
 
-# name -> function(cell, episodes, rng, on_episode); "fifo" and "exact" need neither episodes nor chance.
+def _random(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+    from lab.sequencing.rivals import random_search
+
+    return random_search(cell, search, rng)
+
+
+def _fifo(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+    from lab.sequencing.rivals import fifo
+
+    return fifo(cell, search, rng)
+
+
+def _genetic(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+    from lab.sequencing.genetic import genetic
+
+    return genetic(cell, search, rng)
+
+
+def _exact(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+    """A*, which knows makespans only; CP-SAT for the other objectives. One sequence, by the mean times."""
+    from lab.sequencing.events import SequenceResult
+    from lab.sequencing.exact import optimum
+    from lab.sequencing.objectives import MAKESPAN
+    from lab.sequencing.search import Log
+
+    if search.objective != MAKESPAN:
+        return _cp_sat(cell, search, rng)
+    best, log = optimum(cell), Log(search)
+    log.note(best.sequence, best.cost)
+    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+
+
+def _cp_sat(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+    from lab.sequencing.cpsat import cp_sat_sequencer
+
+    return cp_sat_sequencer(cell, search, rng)
+
+
+def _rule(name: str) -> Sequencer:
+    def sequencer(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+        from lab.sequencing.rules import RULES, dispatched
+
+        return dispatched(cell, RULES[name], search)
+
+    return sequencer
+
+
+# name -> function(cell, search, rng); the last ones are dispatching rules, one sequence each.
 SEQUENCERS: Mapping[str, Sequencer] = MappingProxyType(
-    {"srl": _srl, "srl-time": srl_time, "exact": _exact, "random": random_search, "fifo": _fifo}
+    {
+        "srl": _srl,
+        "srl-time": _srl_time,
+        "mc": _monte_carlo,
+        "random": _random,
+        "fifo": _fifo,
+        "ga": _genetic,
+        "exact": _exact,
+        "cp-sat": _cp_sat,
+        "shortest-move": _rule("shortest-move"),
+        "longest-remaining-work": _rule("longest-remaining-work"),
+        "most-urgent-machine": _rule("most-urgent-machine"),
+        "nearest-ready": _rule("nearest-ready"),
+        "earliest-due": _rule("earliest-due"),
+    }
 )
+# Methods that, where chance is asked for, look in drawn times; the others look with the means.
+DRAWN = ("srl", "mc", "random")

@@ -1,80 +1,83 @@
-"""A cell: stations, a route through them, one transfer robot, and the rules that say which toast may move."""
+"""A cell: stations, products with their routes, an order of parts, and one transfer robot. What is to be sequenced."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput, unknown
+from lab.sequencing.layout import MAX_S, check_seconds, is_count
+from lab.sequencing.layout import ROBOT as ROBOT
+from lab.sequencing.layout import STATION_KINDS as STATION_KINDS
+from lab.sequencing.layout import Arrivals as Arrivals
+from lab.sequencing.layout import Product as Product
+from lab.sequencing.layout import Route as Route
+from lab.sequencing.layout import Stage as Stage
+from lab.sequencing.layout import Station as Station
+from lab.sequencing.layout import check_layout as check_layout
+from lab.sequencing.positions import Moves, Position, moves_between, positions_of
 
-MAX_TOASTS = 50
-MAX_S = 1e9  # one time; far above any cell, far below where sums lose their nanoseconds
-ROBOT = "robot"
-STATION_KINDS = ("storage", "buffer", "machine")
-
-
-@dataclass(frozen=True)
-class Station:
-    """A place for toasts. `capacity` in toasts; `processing_s` in seconds, above 0 only for machines."""
-
-    name: str
-    kind: Literal["storage", "buffer", "machine"]
-    capacity: int
-    processing_s: float = 0.0
-
-
-@dataclass(frozen=True)
-class Stage:
-    """A step of the route: the station to reach, and the buffer before it for when it is full (None: no buffer)."""
-
-    station: str
-    buffer: str | None = None
-
-
-@dataclass(frozen=True)
-class Moves:
-    """The (origin, target) station names between which the robot may have to travel empty, and carry a toast."""
-
-    empty: tuple[tuple[str, str], ...]
-    loaded: tuple[tuple[str, str], ...]
+MAX_PARTS = 200
+BUFFER_USES = ("busy", "free")
+ARRIVALS_AFTER = ("clock", "pick")
 
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """What is to be sequenced: `toasts` alike toasts along one route, moved by one robot.
+    """What is to be sequenced: the parts of an order along the routes of their products, moved by one robot.
 
-    `empty_s` and `loaded_s`: (n, n) seconds from station row to station column, in the order of `stations`; NaN: no
-    such move. Staying takes 0 s. All toasts start at the first stage and end at the last. Toasts are numbered from 1;
-    a `locations` tuple holds a station index for each, toast 1 first.
-    Raises BadInput for what cannot be a cell, and for a missing time that the route needs (see `needed_moves`).
-    Source: thesis ch. 7 (rules), tables 7.1 and 7.2 (times).
+    order: a product's name for each part. Parts are numbered from 1. empty_s and loaded_s: (n, n) seconds from station
+    row to station column, in the order of `stations`; NaN: no such move; staying takes 0 s. arrivals None: all parts
+    wait at their first station, and may be taken in any order; else they come, and are taken, in their order. buffers:
+    "busy", a buffer is used only when the station ahead is full; "free", the robot chooses. due_s: when each part is
+    wanted [s].
+    Raises BadInput for what cannot be a cell, and for a missing time that a route needs (see `needed_moves`).
+    Source: thesis ch. 7 (rules), tables 7.1 and 7.2 (times); App. III (pallets, arrivals, vacuuming).
     """
 
     stations: tuple[Station, ...]
-    route: tuple[Stage, ...]
+    products: tuple[Product, ...]
+    order: tuple[str, ...]
     empty_s: NDArray[np.float64]
     loaded_s: NDArray[np.float64]
     robot_start: str
-    toasts: int
+    arrivals: Arrivals | None = None
+    buffers: Literal["busy", "free"] = "busy"
+    due_s: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        _check_stations(self.stations)
-        _check_route(self.stations, self.route)
+        check_layout(self.stations, self.products)
         if self.robot_start not in self.names:
             raise unknown("station", self.robot_start, self.names, "start of the robot")
-        if not _is_count(self.toasts) or self.toasts > MAX_TOASTS:
-            raise BadInput(f"toasts = {self.toasts!r}: allowed are 1 to {MAX_TOASTS}")
-        for stage in (self.route[0], self.route[-1]):
-            room = self.stations[self.index(stage.station)].capacity
-            if room < self.toasts:
-                raise BadInput(f"station '{stage.station}': capacity {room} cannot hold all {self.toasts} toasts")
-        moves = needed_moves(self.stations, self.route, self.robot_start, self.toasts)
-        for field, needed in (("empty_s", moves.empty), ("loaded_s", moves.loaded)):
+        if self.buffers not in BUFFER_USES:
+            raise unknown("use of buffers", self.buffers, BUFFER_USES, "cell")
+        self._check_order()
+        self._check_times()
+        for field, needed in (("empty_s", self.needed.empty), ("loaded_s", self.needed.loaded)):
             object.__setattr__(self, field, _checked_table(field, getattr(self, field), self.names, needed))
+
+    @classmethod
+    def alike(
+        cls,
+        stations: tuple[Station, ...],
+        route: Route,
+        empty_s: NDArray[np.float64],
+        loaded_s: NDArray[np.float64],
+        robot_start: str,
+        parts: int,
+        product: str = "toast",
+    ) -> "Cell":
+        """A cell of so many alike parts along one route, all there at the start. BadInput as for any cell."""
+        check_parts(parts)
+        return cls(stations, (Product(product, (route,)),), (product,) * parts, empty_s, loaded_s, robot_start)
+
+    @property
+    def parts(self) -> int:
+        """How many parts are ordered."""
+        return len(self.order)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -82,31 +85,34 @@ class Cell:
         return tuple(station.name for station in self.stations)
 
     @cached_property
-    def first(self) -> int:
-        """Index of the station where all toasts start."""
-        return self.index(self.route[0].station)
-
-    @cached_property
-    def last(self) -> int:
-        """Index of the station where all toasts end."""
-        return self.index(self.route[-1].station)
-
-    @cached_property
     def capacities(self) -> tuple[int, ...]:
-        """Room for toasts, by station index."""
+        """Room for parts, by station index."""
         return tuple(station.capacity for station in self.stations)
 
     @cached_property
-    def ahead(self) -> tuple[int | None, ...]:
-        """The next stage's station, by station index; None where nothing lies ahead."""
-        links = {origin: target for origin, target, _ in _links(self.route)}
-        return tuple(self.index(links[name]) if name in links else None for name in self.names)
+    def positions(self) -> tuple[Position, ...]:
+        """Every place on a route where a part of the order may stand between two moves."""
+        return positions_of(self.stations, self.products, self.buffers)
 
     @cached_property
-    def fallback(self) -> tuple[int | None, ...]:
-        """The buffer to use when the station ahead is full, by station index; None where there is none."""
-        links = {origin: buffer for origin, _, buffer in _links(self.route) if buffer is not None}
-        return tuple(self.index(links[name]) if name in links else None for name in self.names)
+    def starts(self) -> tuple[int, ...]:
+        """The position in which each part begins, part 1 first."""
+        first = {place.product: index for index, place in reversed([*enumerate(self.positions)])}
+        return tuple(first[[product.name for product in self.products].index(name)] for name in self.order)
+
+    @cached_property
+    def needed(self) -> Moves:
+        """The moves that some allowed sequence may contain (see `needed_moves`)."""
+        return needed_moves(self.stations, self.products, self.robot_start, self.parts, self.buffers)
+
+    @cached_property
+    def longest_s(self) -> float:
+        """A time that no sequence exceeds: everything slowest, one after the other [s]."""
+        slowest_s = sum(float(np.nanmax(table, initial=0.0)) for table in (self.empty_s, self.loaded_s))
+        service_s = max((option.service_s for place in self.positions for option in place.options), default=0.0)
+        process_s = sum(place.processing_s or 0.0 for place in self.positions)
+        come_s = sum(self.arrivals.interval_s) if self.arrivals else 0.0
+        return self.parts * (len(self.positions) * (slowest_s + service_s) + process_s) + come_s
 
     def index(self, name: str) -> int:
         """Index of a station by its name; BadInput when unknown."""
@@ -115,136 +121,75 @@ class Cell:
         except ValueError:
             raise unknown("station", name, self.names, "cell") from None
 
-    def start_locations(self) -> tuple[int, ...]:
-        """Every toast at the first stage."""
-        return (self.first,) * self.toasts
+    def part_name(self, part: int) -> str:
+        """What a part is called in pictures and schedules: its product and its number."""
+        return f"{self.order[part - 1]} {part}"
 
-    def counts(self, locations: Sequence[int]) -> list[int]:
-        """Toasts at each station (n,)."""
-        counts = [0] * len(self.stations)
-        for station in locations:
-            counts[station] += 1
-        return counts
+    def _check_order(self) -> None:
+        check_parts(len(self.order))
+        known = [product.name for product in self.products]
+        for number, name in enumerate(self.order, 1):
+            if name not in known:
+                raise unknown("product", name, known, f"part {number} of the order")
+        for name in self.names:
+            if any(name == self.part_name(part) for part in range(1, self.parts + 1)):
+                raise BadInput(f"station '{name}': a part has that name; call the station something else")
+        for end in self._ends() if self.arrivals is None else ():
+            room = self.stations[self.index(end)].capacity
+            most = sum(self.order.count(product.name) for product in self.products if end in _ends_of(product))
+            if room < most:
+                raise BadInput(f"station '{end}': capacity {room} cannot hold all {most} parts")
 
-    def target(self, counts: Sequence[int], origin: int) -> int | None:
-        """Where a toast at `origin` would be carried, given toasts per station; None: it cannot move now.
+    def _ends(self) -> list[str]:
+        return sorted({end for product in self.products for end in _ends_of(product)})
 
-        The station ahead if it has room, else the buffer before that station if it has room. A toast in a buffer has no
-        second choice.
-        """
-        for choice in (self.ahead[origin], self.fallback[origin]):
-            if choice is not None and counts[choice] < self.capacities[choice]:
-                return choice
-        return None
-
-    def destination(self, locations: Sequence[int], toast: int) -> int | None:
-        """Station index to which toast (1..toasts) would be carried; None: it cannot move now."""
-        return self.target(self.counts(locations), locations[toast - 1])
-
-    def allowed(self, locations: Sequence[int]) -> tuple[int, ...]:
-        """The toasts that may be picked, ascending; empty only when all are at the last stage.
-
-        It cannot deadlock: ahead of the most advanced unfinished toast every station is empty, or is the last, which
-        holds them all.
-        """
-        return self.movable(self.counts(locations), locations)
-
-    def movable(self, counts: Sequence[int], locations: Sequence[int]) -> tuple[int, ...]:
-        """`allowed` for a caller that keeps the counts itself."""
-        can_leave = [self.target(counts, origin) is not None for origin in range(len(self.stations))]
-        return tuple(toast for toast, origin in enumerate(locations, 1) if can_leave[origin])
-
-    def refusal(self, locations: Sequence[int], toast: int) -> str | None:
-        """Why the toast may not be picked now, in words; None when it may."""
-        if not 1 <= toast <= self.toasts:
-            return f"there is no toast {toast}, only 1 to {self.toasts}"
-        origin = locations[toast - 1]
-        if origin == self.last:
-            return f"toast {toast} is already at '{self.names[origin]}'"
-        counts = self.counts(locations)
-        if self.target(counts, origin) is not None:
-            return None
-        tried = [self.names[choice] for choice in (self.ahead[origin], self.fallback[origin]) if choice is not None]
-        full = " and ".join(f"'{name}'" for name in tried)
-        return f"toast {toast} at '{self.names[origin]}' cannot move on: {full} full"
+    def _check_times(self) -> None:
+        if self.arrivals is not None:
+            if self.arrivals.after not in ARRIVALS_AFTER:
+                raise unknown("arrivals after", self.arrivals.after, ARRIVALS_AFTER, "cell")
+            _check_one_each("arrivals", self.arrivals.interval_s, self.parts)
+        if self.due_s is None:
+            return
+        _check_one_each("due_s", self.due_s, self.parts)
+        came_s = 0.0
+        for part, due_s in enumerate(self.due_s, 1):
+            came_s += self.arrivals.interval_s[part - 1] if self.arrivals else 0.0
+            if due_s < came_s:
+                raise BadInput(f"due_s of part {part} = {due_s:g} s, but it only arrives at {came_s:g} s")
 
 
-def needed_moves(stations: Sequence[Station], route: Sequence[Stage], robot_start: str, toasts: int) -> Moves:
+def _ends_of(product: Product) -> set[str]:
+    return {stage.station for route in product.routes for stage in (route[0], route[-1])}
+
+
+def needed_moves(
+    stations: Sequence[Station],
+    products: Sequence[Product],
+    robot_start: str,
+    parts: int,
+    buffers: Literal["busy", "free"] = "busy",
+) -> Moves:
     """Every move that some allowed sequence of this cell may contain: what must be measured before a Cell can be built.
 
-    Loaded: along the route, directly and through the buffers. Empty: from the start to the first stage, and from where
-    a toast was dropped to where another may be picked. Left out are a return to a one-toast station that has just been
-    emptied and a trip to the buffer of a machine that has just been filled. Staying is never listed. For few toasts the
-    list may be longer than strictly needed. Raises BadInput as Cell does for stations and route.
+    Loaded: along the routes, directly and through the buffers. Empty: from the start to the first stations, and from
+    where something was dropped to where something may be picked next. Staying is never listed. For few parts the list
+    may be longer than strictly needed. Raises BadInput as Cell does for stations and routes.
     """
-    _check_stations(stations)
-    _check_route(stations, route)
-    capacity = {station.name: station.capacity for station in stations}
-    loaded: list[tuple[str, str]] = []
-    for origin, target, buffer in _links(route):
-        loaded += [(origin, target)] + ([(origin, buffer)] if buffer is not None else [])
-    buffer_of = {stage.station: stage.buffer for stage in route}
-    pick_places = dict.fromkeys(origin for origin, _ in loaded)
-    empty = dict.fromkeys([(robot_start, route[0].station)])
-    for left, dropped in loaded if toasts > 1 else ():
-        for pick in pick_places:
-            just_emptied = pick == left and capacity[pick] == 1
-            just_filled = pick == buffer_of.get(dropped) and capacity[dropped] == 1
-            if not just_emptied and not just_filled:
-                empty[dropped, pick] = None
-    return Moves(tuple(pair for pair in empty if pair[0] != pair[1]), tuple(loaded))
+    check_layout(stations, products)
+    return moves_between(stations, positions_of(stations, products, buffers), robot_start, parts)
 
 
-def _links(route: Sequence[Stage]) -> Iterator[tuple[str, str, str | None]]:
-    """(origin, station ahead, buffer to use when that is full) for every place that a toast can leave."""
-    for here, following in pairwise(route):
-        yield here.station, following.station, following.buffer
-        if following.buffer is not None:
-            yield following.buffer, following.station, None
+def check_parts(parts: object) -> None:
+    """BadInput unless it is a whole number from 1 to MAX_PARTS."""
+    if not is_count(parts) or int(parts) > MAX_PARTS:  # type: ignore[call-overload]
+        raise BadInput(f"parts = {parts!r}: allowed are 1 to {MAX_PARTS}")
 
 
-def _check_stations(stations: Sequence[Station]) -> None:
-    seen: set[str] = set()
-    for station in stations:
-        where = f"station '{station.name}'"
-        if station.name in seen:
-            raise BadInput(f"{where}: the name is used twice; every station needs its own")
-        seen.add(station.name)
-        if station.name == ROBOT or station.name.startswith("toast "):
-            raise BadInput(f"{where}: 'robot' and 'toast ...' name other rows of a schedule; call it something else")
-        if station.kind not in STATION_KINDS:
-            raise unknown("kind", station.kind, STATION_KINDS, where)
-        if not _is_count(station.capacity):
-            raise BadInput(f"{where}: capacity = {station.capacity!r}; allowed are whole numbers from 1")
-        if not 0 <= station.processing_s <= MAX_S:
-            raise BadInput(f"{where}: processing_s = {station.processing_s}; allowed are 0 to {MAX_S:g} s")
-        if station.kind != "machine" and station.processing_s > 0:
-            raise BadInput(f"{where}: processing_s = {station.processing_s}, but only a machine processes")
-
-
-def _check_route(stations: Sequence[Station], route: Sequence[Stage]) -> None:
-    kinds = {station.name: station.kind for station in stations}
-    if len(route) < 2:
-        raise BadInput(f"the route has {len(route)} stages; it needs at least 2, a start and an end")
-    if route[0].buffer is not None:
-        raise BadInput(f"stage 1 of the route ('{route[0].station}'): buffer '{route[0].buffer}' before the start")
-    visited: set[str] = set()
-    for number, stage in enumerate(route, 1):
-        where = f"stage {number} of the route"
-        for name, is_buffer in ((stage.station, False), (stage.buffer, True)):
-            if name is None:
-                continue
-            if name not in kinds:
-                raise unknown("station", name, kinds, where)
-            if name in visited:
-                raise BadInput(f"{where}: station '{name}' is on the route twice; once is allowed")
-            visited.add(name)
-            if (kinds[name] == "buffer") != is_buffer:
-                raise BadInput(f"{where}: '{name}' is a {kinds[name]}; {'a buffer' if is_buffer else 'no buffer'} fits")
-        if number in (1, len(route)) and kinds[stage.station] != "storage":
-            raise BadInput(
-                f"{where}: '{stage.station}' is a {kinds[stage.station]}; a route starts and ends in storage"
-            )
+def _check_one_each(field: str, given: Sequence[float], parts: int) -> None:
+    if len(given) != parts:
+        raise BadInput(f"{field} has {len(given)} times; {parts} parts need {parts}")
+    for part, seconds in enumerate(given, 1):
+        check_seconds(f"{field} of part {part}", seconds)
 
 
 def _checked_table(
@@ -261,12 +206,10 @@ def _checked_table(
     for name, stay in zip(names, np.diag(table), strict=True):
         if not (np.isnan(stay) or stay == 0):
             raise BadInput(f"{field} '{name}' -> '{name}' = {stay}; staying takes 0 s")
-    for origin, target in needed:
-        if np.isnan(table[names.index(origin), names.index(target)]):
-            raise BadInput(f"{field} '{origin}' -> '{target}' is missing, but the route needs it")
+    missing = [pair for pair in needed if np.isnan(table[names.index(pair[0]), names.index(pair[1])])]
+    for origin, target in missing:
+        ways = [pair for pair in needed if pair[1] == target]
+        never = "; no time leads there: it cannot be reached" if len(ways) > 1 and set(ways) <= set(missing) else ""
+        raise BadInput(f"{field} '{origin}' -> '{target}' is missing, but the route needs it{never}")
     table.setflags(write=False)
     return table
-
-
-def _is_count(value: object) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool) and int(value) >= 1

@@ -1,28 +1,35 @@
-"""The proven optimum of a cell: best-first search over its decision states, with alike toasts merged."""
+"""The proven optimum of a cell: best-first search over its decision states, with alike parts merged."""
 
 import heapq
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import accumulate, chain
 from operator import le
 from typing import NamedTuple
 
-from lab.sequencing.bound import TICKS_PER_S, RobotWork, ticks
+import numpy as np
+
+from lab.errors import BadInput
+from lab.sequencing.bound import TICKS_PER_S, Least, LeastLeft, Way, ticks, ways_of
 from lab.sequencing.cell import Cell
-from lab.sequencing.events import simulate
-from lab.sequencing.rivals import fifo
+from lab.sequencing.positions import entry
+from lab.sequencing.run import Run, simulate
 
 MAX_EXPANDED = 1_000_000
+_BITS = 8  # a count in the code of all counts; MAX_PARTS fits
+_LOW = (1 << _BITS) - 1
 
 
 @dataclass(frozen=True)
 class Optimum:
     """The best sequence known, and what is proven: no sequence is shorter than `bound_s`.
 
-    `proven`: the sequence is optimal (to a nanosecond a move) and `bound_s` is its makespan. `expanded`: states opened.
+    cost: its makespan [s]. `proven`: the sequence is optimal (to a nanosecond a move) and `bound_s` is its makespan.
+    `expanded`: states opened.
     """
 
-    makespan_s: float
+    cost: float
     sequence: tuple[int, ...]
     proven: bool
     bound_s: float
@@ -31,126 +38,249 @@ class Optimum:
     @property
     def optimal_s(self) -> float | None:
         """The makespan when it is proven to be optimal, else None [s]."""
-        return self.makespan_s if self.proven else None
+        return self.cost if self.proven else None
 
-    def gap(self, makespan_s: float) -> float:
+    def gap(self, cost: float) -> float:
         """How much longer a makespan is than the proven optimum, or than the bound when there is none; a fraction."""
-        return makespan_s / self.bound_s - 1.0
+        return cost / self.bound_s - 1.0
 
 
-class _State(NamedTuple):
-    """Between two moves, in ticks: toasts per station, robot's station, when the toasts of each machine are finished.
+class State(NamedTuple):
+    """Between two moves, in ticks: how many parts stand in each position, the robot's station, what is waited for.
 
-    Which toast stands where is left out: they are alike, and at each station the one that came first goes first.
+    Which part stands where is left out: those of one product in one position are alike, and the first that came goes
+    first. waits: by slot (see `Moves`), when each part there is finished, ascending, never before `now`.
     """
 
     now: int
-    counts: tuple[int, ...]
+    counts: int
     robot: int
-    finish: tuple[tuple[int, ...], ...]  # by station, ascending, never before `now`
-    left: int = 0
-    parent: "_State | None" = None
+    waits: tuple[tuple[int, ...], ...]
+    way: Way | None = None
+    parent: "State | None" = None
+
+
+class Moves:
+    """The cell in ticks, and the states that follow one another.
+
+    slots: by position where something is waited for, where the state has it in `waits`; after these, where parts arrive
+    one after the pick of the other, the slot of the next one.
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        self.cell = cell
+        self._empty = [ticks(row) for row in cell.empty_s.tolist()]
+        for place in range(len(self._empty)):
+            self._empty[place][place] = 0
+        process = [place.processing_s for place in cell.positions]
+        self._loaded = [ticks(row) for row in cell.loaded_s.tolist()]
+        self._process = [None if seconds is None else round(seconds * TICKS_PER_S) for seconds in process]
+        timed = [place for place, seconds in enumerate(process) if seconds is None or seconds > 0]
+        self.slots = {place: slot for slot, place in enumerate(timed)}
+        self._picked = len(timed) if cell.arrivals is not None and cell.arrivals.after == "pick" else None
+        self._intervals = ticks(cell.arrivals.interval_s) if cell.arrivals is not None else []
+        self._came = list(accumulate(self._intervals))
+        self._starts = sorted(set(cell.starts))
+        self._ways: list[list[Way]] = [[] for _ in cell.positions]
+        for way in ways_of(cell):
+            self._ways[way.place].append(way)
+        self._least = LeastLeft(cell, self.slots, self._picked)
+        self._known: dict[int, tuple[tuple[Way, ...], Least]] = {}
+
+    def start(self) -> State:
+        """Where all begins."""
+        counts = sum(1 << _BITS * place for place in self.cell.starts)
+        waits: tuple[tuple[int, ...], ...] = ((),) * len(self.slots)
+        if self._picked is not None:
+            waits = (*waits, (self._intervals[0],))
+        return State(0, counts, self.cell.index(self.cell.robot_start), waits)
+
+    def done(self, state: State) -> bool:
+        """Whether all parts are finished."""
+        return all(not self._ways[place] for place, count in enumerate(self.counted(state.counts)) if count)
+
+    def left(self, state: State) -> int:
+        """Ticks still needed at least."""
+        return self._here(state.counts)[1].left(state.now, state.robot, state.waits)
+
+    def successors(self, state: State) -> Iterator[State]:
+        """The states after each possible move: one an option of a position, since its parts are alike."""
+        for way in self._here(state.counts)[0]:
+            yield self._after(state, way)
+
+    def counted(self, counts: int) -> list[int]:
+        """The parts in each position."""
+        return [counts >> _BITS * place & _LOW for place in range(len(self._ways))]
+
+    def _here(self, counts: int) -> tuple[tuple[Way, ...], Least]:
+        """What depends on the counts only: the ways that may be taken, and the bounds."""
+        known = self._known.get(counts)
+        if known is None:
+            counted = self.counted(counts)
+            known = self._known[counts] = self._allowed(counted), self._least.of(counted)
+        return known
+
+    def _allowed(self, counted: list[int]) -> tuple[Way, ...]:
+        cell = self.cell
+        occupied = [0] * len(cell.stations)
+        for count, place in zip(counted, cell.positions, strict=True):
+            for station in place.holds:
+                occupied[station] += count
+        room = [occupied[station] < most for station, most in enumerate(cell.capacities)]
+        waiting = sum(counted[place] for place in self._starts)
+        in_turn = cell.starts[cell.parts - waiting] if waiting and cell.arrivals is not None else None
+        return tuple(
+            way
+            for place, count in enumerate(counted)
+            if count and (in_turn in (None, place) or place not in self._starts)
+            for way in self._ways[place]
+            if all(room[station] for station in way.option.needs)
+            and (way.option.if_full is None or not room[way.option.if_full])
+        )
+
+    def _after(self, state: State, way: Way) -> State:
+        place, option, work = way
+        waits = list(state.waits)
+        now = state.now + self._empty[state.robot][option.origin]
+        ready = 0
+        slot = self.slots.get(place)
+        if slot is not None:
+            ready, *others = waits[slot]
+            waits[slot] = tuple(others)
+        elif self._intervals and place in self._starts:
+            ready = waits[self._picked][0] if self._picked is not None else self._came[self._fetched(state)]
+        now = (max(now, ready) if option.waits else now) + work
+        slot = self.slots.get(option.to)
+        if slot is not None:
+            process = self._process[option.to]
+            waits[slot] = (*waits[slot], ready if process is None else now + process)
+        if self._picked is not None and place in self._starts:
+            pick, coming = now - self._loaded[option.origin][option.target], self._fetched(state) + 1
+            waits[self._picked] = (pick + self._intervals[coming],) if coming < self.cell.parts else ()
+        # A part that finished earlier is ready now: forgetting since when lets more states be equal.
+        ready_at = tuple([tuple([max(tick, now) for tick in ticks]) if ticks else () for ticks in waits])
+        counts = state.counts + (1 << _BITS * option.to) - (1 << _BITS * place)
+        return State(now, counts, option.target, ready_at, way, state)
+
+    def _fetched(self, state: State) -> int:
+        """How many parts have left their first station."""
+        return self.cell.parts - sum(state.counts >> _BITS * place & _LOW for place in self._starts)
+
+
+class _Search:
+    """The states that are queued and those that were reached; `expanded`: how many were opened."""
+
+    def __init__(self, cell: Cell) -> None:
+        self.cell, self.moves = cell, Moves(cell)
+        self.expanded = self.bound = self._serial = 0
+        self._fronts: dict[tuple[int, int], list[tuple[int, ...]]] = {}
+        self._heap: list[tuple[int, int, State]] = []
+        self.dead: State | None = None  # one from which nothing can move
+        self._reach(self.moves.start(), greedy=False)
+
+    def run(self, most: int, greedy: bool = False) -> State | None:
+        """The first complete state; None: after opening `most` states there was none, or nothing is left to open."""
+        while self._heap:
+            bound, _, state = heapq.heappop(self._heap)
+            if _times(state) not in self._fronts[state.counts, state.robot]:
+                continue  # overtaken since it was queued
+            if not greedy:
+                self.bound = max(self.bound, bound)
+            if self.moves.done(state):
+                return state
+            if self.expanded >= most:
+                heapq.heappush(self._heap, (bound, _, state))
+                return None
+            self.expanded += 1
+            found = list(self.moves.successors(state))
+            self.dead = state if not found else self.dead
+            for successor in found:
+                self._reach(successor, greedy)
+        return None
+
+    @property
+    def open(self) -> bool:
+        """Whether there are states left to open."""
+        return bool(self._heap)
+
+    def hasten(self) -> None:
+        """From now on open what has the least left to do first: any end will do."""
+        self._heap = [(self.moves.left(state), serial, state) for _, serial, state in self._heap]
+        heapq.heapify(self._heap)
+
+    def _reach(self, state: State, greedy: bool) -> None:
+        """Queue a state unless one that is alike otherwise is no later anywhere; those that it beats are forgotten."""
+        times = _times(state)
+        front = self._fronts.setdefault((state.counts, state.robot), [])
+        if any(all(map(le, other, times)) for other in front):
+            return
+        front[:] = [other for other in front if not all(map(le, times, other))]
+        front.append(times)
+        # Of equally promising states the newest comes first, hence the falling serial number.
+        self._serial -= 1
+        left = self.moves.left(state)
+        heapq.heappush(self._heap, (left if greedy else state.now + left, self._serial, state))
 
 
 def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
-    """The shortest makespan of the cell and a sequence that reaches it, toasts numbered first in, first out.
+    """The shortest makespan of the cell and a sequence that reaches it, alike parts numbered first in, first out.
 
-    States are opened in the order of time so far + a bound on what the robot still has to do, so the first complete one
-    is optimal. After `max_expanded` states it gives up: the FIFO sequence, `proven` False and the bound reached so far.
+    States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
+    optimal. After `max_expanded` states it gives up and opens as many again, nearest to the end first: `proven` False, and
+    the bound reached so far. Raises BadInput when every sequence ends in a deadlock, WorkFailed when it found no end.
     Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
     states that are otherwise alike is the thesis's branch and bound, App. IV.
     """
     search = _Search(cell)
-    # Of equally promising states the newest comes first, hence the falling serial number.
-    heap = [(search.bound(search.start), 0, search.start)]
-    fronts: dict[tuple[tuple[int, ...], int], list[tuple[int, ...]]] = {}
-    expanded = serial = bound = 0
-    while heap:
-        bound, _, state = heapq.heappop(heap)
-        if state.parent is not None and _times(state) not in fronts[state.counts, state.robot]:
-            continue  # overtaken since it was queued
-        if state.counts[cell.last] == cell.toasts:
-            sequence = _sequence(cell, state)
-            makespan_s = simulate(cell, sequence).makespan_s
-            return Optimum(makespan_s, sequence, True, makespan_s, expanded)
-        if expanded >= max_expanded:
-            break
-        expanded += 1
-        for successor in search.successors(state):
-            if _enters(fronts.setdefault((successor.counts, successor.robot), []), _times(successor)):
-                serial -= 1
-                heapq.heappush(heap, (successor.now + search.bound(successor), serial, successor))
-    fallback = fifo(cell)
-    return Optimum(fallback.makespan_s, fallback.sequence, False, bound / TICKS_PER_S, expanded)
+    state = search.run(max_expanded)
+    if state is not None:
+        sequence = _sequence(cell, state)
+        cost = simulate(cell, sequence).makespan_s
+        return Optimum(cost, sequence, True, cost, search.expanded)
+    expanded = search.expanded
+    search.hasten()
+    state = search.run(2 * max_expanded, greedy=True)
+    if state is None:
+        raise _no_end(cell, search)
+    sequence = _sequence(cell, state)
+    cost = simulate(cell, sequence).makespan_s
+    return Optimum(cost, sequence, False, search.bound / TICKS_PER_S, expanded)
 
 
-class _Search:
-    """The cell in whole ticks, the moves from a state, and the bound."""
-
-    def __init__(self, cell: Cell) -> None:
-        self.cell = cell
-        self.empty = [ticks(row) for row in cell.empty_s.tolist()]
-        self.loaded = [ticks(row) for row in cell.loaded_s.tolist()]
-        self.processing = [round(station.processing_s * TICKS_PER_S) for station in cell.stations]
-        self.is_machine = [station.kind == "machine" for station in cell.stations]
-        self.origins = [place for place, ahead in enumerate(cell.ahead) if ahead is not None]
-        self.work = RobotWork(cell)
-        for place in range(len(cell.stations)):
-            self.empty[place][place] = 0
-        counts = tuple(cell.counts(cell.start_locations()))
-        self.start = _State(0, counts, cell.index(cell.robot_start), ((),) * len(counts))
-
-    def bound(self, state: _State) -> int:
-        """Ticks that the robot still needs at least."""
-        return self.work.left(state.counts, state.robot)
-
-    def successors(self, state: _State) -> Iterator[_State]:
-        """The states after each possible move: one a station, since its toasts are alike."""
-        for origin in self.origins:
-            target = self.cell.target(state.counts, origin) if state.counts[origin] else None
-            if target is None:
-                continue
-            finish = list(state.finish)
-            now = state.now + self.empty[state.robot][origin]
-            if self.is_machine[origin]:
-                now = max(now, finish[origin][0])
-                finish[origin] = finish[origin][1:]
-            now += self.loaded[origin][target]
-            if self.is_machine[target]:
-                finish[target] = (*finish[target], now + self.processing[target])
-            counts = list(state.counts)
-            counts[origin] -= 1
-            counts[target] += 1
-            # A toast that finished earlier is ready now: forgetting since when lets more states be equal.
-            ready = tuple(tuple(max(tick, now) for tick in ticks) if ticks else () for ticks in finish)
-            yield _State(now, tuple(counts), target, ready, origin, state)
-
-
-def _times(state: _State) -> tuple[int, ...]:
-    """Now and all finishing times: of two states with equal counts and robot, one that is nowhere later is no worse."""
-    return state.now, *(tick for ticks in state.finish for tick in ticks)
-
-
-def _enters(front: list[tuple[int, ...]], times: tuple[int, ...]) -> bool:
-    """Put `times` into the front unless one there is no later anywhere; those that it beats leave."""
-    if any(all(map(le, other, times)) for other in front):
-        return False
-    front[:] = [other for other in front if not all(map(le, times, other))]
-    front.append(times)
-    return True
-
-
-def _sequence(cell: Cell, state: _State) -> tuple[int, ...]:
-    """The toasts moved on the way to `state`, each station first in, first out."""
-    moves: list[tuple[int, int]] = []
-    while state.parent is not None:
-        moves.append((state.left, state.robot))
-        state = state.parent
-    queues: list[deque[int]] = [deque() for _ in cell.stations]
-    queues[cell.first].extend(range(1, cell.toasts + 1))
+def first_come(cell: Cell) -> tuple[int, ...]:
+    """A sequence that always comes to its end: what is ready first goes first; in a deadlock, one part after another."""
+    run, sequence = Run(cell), list[int]()
+    while allowed := run.allowed():
+        sequence.append(min(allowed, key=lambda decision: run.ready_s[(decision - 1) % cell.parts]))
+        run.move(sequence[-1])
+    if run.done:
+        return tuple(sequence)
+    run = Run(cell)
     sequence = []
-    for origin, target in reversed(moves):
-        toast = queues[origin].popleft()
-        queues[target].append(toast)
-        sequence.append(toast)
+    for part in range(1, cell.parts + 1):
+        while run.finished_s[part - 1] is None:
+            sequence.append(next(d for d in run.allowed() if (d - 1) % cell.parts == part - 1))
+            run.move(sequence[-1])
+    return tuple(sequence)
+
+
+def _times(state: State) -> tuple[int, ...]:
+    """Now and all that is waited for: of two states with equal counts and robot, one that is nowhere later is no worse."""
+    return (state.now, *chain.from_iterable(state.waits))
+
+
+def _sequence(cell: Cell, state: State) -> tuple[int, ...]:
+    """The decisions on the way to `state`, each position first in, first out."""
+    taken: list[Way] = []
+    while state.way is not None and state.parent is not None:
+        taken.append(state.way)
+        state = state.parent
+    queues: list[deque[int]] = [deque() for _ in cell.positions]
+    for part, start in enumerate(cell.starts, 1):
+        queues[start].append(part)
+    sequence = []
+    for place, option, _ in reversed(taken):
+        part = queues[place].popleft()
+        queues[option.to].append(part)
+        sequence.append(entry(part, option.choice, cell.parts))
     return tuple(sequence)

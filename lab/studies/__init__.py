@@ -39,6 +39,40 @@ def _table(name: str) -> Run:
     return run
 
 
+def _chapter7(name: str) -> Run:
+    def run(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+        from lab.studies import chapter7_parts
+
+        findings: Findings = getattr(chapter7_parts, name)(job, reading)
+        return findings
+
+    return run
+
+
+def _appendix_iii(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.appendix3 import appendix_iii
+
+    return appendix_iii(job, reading)
+
+
+def _srl_time(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.comparison import srl_time_study
+
+    return srl_time_study(job, reading)
+
+
+def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.comparison import sequencing_speed
+
+    return sequencing_speed(job, reading)
+
+
+def _flat(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.flat import flat
+
+    return flat(job, reading)
+
+
 def _speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.speed import speed
 
@@ -57,6 +91,21 @@ STUDIES: dict[str, Study] = {
     "chapter-9": Study("Chapter 9: its tables, Appendix V and figures", _chapter9("whole")),
     "readings": Study(
         "Readings of chapter 9: what the thesis leaves open, and what comes nearest", _chapter9("readings")
+    ),
+    "table-7.4": Study("Table 7.4: sequencing case I by session length", _chapter7("table_7_4")),
+    "table-7.5": Study("Table 7.5: sequencing case II by session length", _chapter7("table_7_5")),
+    "table-7.6": Study("Table 7.6: sequencing case III by session length", _chapter7("table_7_6")),
+    "table-iv.1": Study("Table IV.1: SRL with several decay factors", _chapter7("table_iv_1")),
+    "table-iv.2": Study("Table IV.2: SRL with reward factors of types A and B", _chapter7("table_iv_2")),
+    "chapter-7": Study("Chapter 7 and Appendix IV: tables and figures", _chapter7("whole")),
+    "readings-7": Study(
+        "Readings of chapter 7: what the thesis leaves open, and what comes nearest", _chapter7("readings")
+    ),
+    "appendix-iii": Study("Appendix III: a flexible manufacturing system", _appendix_iii),
+    "srl-time": Study("SRL improved, beside every rival", _srl_time),
+    "flat": Study("One flat problem, or two levels: the toast task on a small grid", _flat),
+    "sequencing-speed": Study(
+        "Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed
     ),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,8 @@ FORMAT = 1  # of what is stored; another one is computed anew
 STORE = "sessions.jsonl"
 Progress = Callable[[int, int], None]  # settings done, of how many
 Count = NDArray[np.int64]
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -112,23 +114,32 @@ class Job:
         }
         left = [setting for setting in wanted if setting not in done]
         self.progress(len(done), len(wanted))
-        for setting, outcome in self._computed(left):
+        for setting, outcome in self._computed(partial(sessions_of, sessions=self.sessions, seed=self.seed), left):
             done[setting] = outcome
             self._keep(setting, outcome)
             self.progress(len(done), len(wanted))
         return {setting: done[setting] for setting in wanted}
 
-    def _computed(self, settings: list[Setting]) -> Iterator[tuple[Setting, Outcome]]:
-        work = partial(sessions_of, sessions=self.sessions, seed=self.seed)
+    def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> dict[Item, Result]:
+        """What `work`, a function of a module, makes of each item, done where the job says; nothing is kept in the folder."""
+        wanted = list(dict.fromkeys(items))
+        done: dict[Item, Result] = {}
+        self.progress(0, len(wanted))
+        for item, result in self._computed(work, wanted):
+            done[item] = result
+            self.progress(len(done), len(wanted))
+        return {item: done[item] for item in wanted}
+
+    def _computed(self, work: Callable[[Item], Result], items: list[Item]) -> Iterator[tuple[Item, Result]]:
         if self.dask is not None:
-            yield from _on_cluster(work, settings, self.dask)
-        elif self.workers == 1 or len(settings) <= 1:
-            yield from ((setting, work(setting)) for setting in settings)
+            yield from _on_cluster(work, items, self.dask)
+        elif self.workers == 1 or len(items) <= 1:
+            yield from ((item, work(item)) for item in items)
         else:
             from joblib import Parallel, delayed
 
-            results = Parallel(self.workers, return_as="generator", batch_size=4)(delayed(work)(s) for s in settings)
-            yield from zip(settings, results, strict=True)
+            results = Parallel(self.workers, return_as="generator", batch_size=4)(delayed(work)(item) for item in items)
+            yield from zip(items, results, strict=True)
 
     def _stored(self) -> Iterator[tuple[str, Outcome]]:
         path = None if self.folder is None else self.folder / STORE
@@ -156,9 +167,7 @@ class Job:
             raise WorkFailed(f"output folder '{self.folder}' (--out) cannot be written: {error.strerror}") from error
 
 
-def _on_cluster(
-    work: Callable[[Setting], Outcome], settings: list[Setting], address: str
-) -> Iterator[tuple[Setting, Outcome]]:
+def _on_cluster(work: Callable[[Item], Result], items: list[Item], address: str) -> Iterator[tuple[Item, Result]]:
     try:
         from distributed import Client, as_completed
     except ImportError:
@@ -170,7 +179,7 @@ def _on_cluster(
     with client:
         if not client.scheduler_info()["workers"]:
             raise WorkFailed(f"--dask {address}: the cluster has no workers")
-        tasks = {client.submit(work, setting, pure=False): setting for setting in settings}
+        tasks = {client.submit(work, item, pure=False): item for item in items}
         for task in as_completed(tasks):  # type: ignore[no-untyped-call]
             try:
                 found = task.result()
@@ -228,8 +237,8 @@ def _exact_values(name: str) -> FloatArray:
     return optimal_values(_problem(name), world(name).learner.discount)
 
 
-def seeds_of(setting: Setting, sessions: int, seed: int) -> NDArray[np.uint64]:
-    """The seeds (N,) of a setting's sessions: its own, whoever runs it."""
+def seeds_of(setting: Any, sessions: int, seed: int) -> NDArray[np.uint64]:
+    """The seeds (N,) of a setting's sessions, whichever dataclass it is: its own, whoever runs it."""
     digest = sha256(json.dumps(asdict(setting)).encode()).digest()
     rng = np.random.default_rng([seed, int.from_bytes(digest[:8], "big")])
     return rng.integers(2**64, size=sessions, dtype=np.uint64)

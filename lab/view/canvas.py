@@ -1,9 +1,10 @@
-"""What all plots share: a palette, a style, and a figure that becomes a PNG file.
+"""What all plots share: a palette, a style, and a figure that becomes a PNG or SVG file.
 
 matplotlib is imported where it is used: it takes half a second. The same data gives the same bytes.
 """
 
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -12,10 +13,13 @@ from typing import TYPE_CHECKING, Any
 from lab.errors import BadInput
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
+FORMS = ("png", "svg")
 # Okabe and Ito's palette, which colour-blind people can tell apart, and tints of it.
 BLUE, SKY, ORANGE, RED, YELLOW = "#0072B2", "#8FCBEF", "#E69F00", "#D55E00", "#F0E442"
+GREEN, PURPLE = "#009E73", "#CC79A7"
 INK, GREY, PALE_GREY, PALE_GREEN = "#222222", "#8C8C8C", "#EDEDED", "#CDE9DF"
 
 STYLE: dict[str, Any] = {
@@ -34,41 +38,84 @@ STYLE: dict[str, Any] = {
     "savefig.dpi": 130,
     "figure.dpi": 130,
 }
+SVG_STYLE: dict[str, Any] = {"svg.hashsalt": "lab", "svg.fonttype": "none"}  # text stays text: it can be searched
+_TIP = "tip: "  # how the id of a group begins whose rest is what a tooltip says
 
 
 def check_png(path: Path) -> None:
     """Raise BadInput unless `path` ends in .png, its folder is there, and it is no folder itself."""
-    if path.suffix.lower() != ".png":
-        raise BadInput(f"picture '{path}': plots are written as .png")
-    if not path.parent.is_dir():
-        raise BadInput(f"picture '{path}': there is no folder '{path.parent}'")
-    if path.is_dir():
-        raise BadInput(f"picture '{path}': it is a folder, a file is wanted")
+    _check_file(path, ("png",))
+
+
+def check_picture(path: Path) -> None:
+    """Raise BadInput unless `path` ends in .png or .svg, its folder is there, and it is no folder itself."""
+    _check_file(path, FORMS)
 
 
 @contextmanager
 def picture_file(path: Path, width_inch: float, height_inch: float) -> Iterator["Figure"]:
-    """A figure in the lab's style, written to `path` when the block ends well.
+    """A figure in the lab's style, written to `path` (PNG or SVG by its suffix) when the block ends well.
 
-    Raises BadInput as `check_png` does, and when the path cannot be written.
+    Raises BadInput as `check_picture` does, and when the path cannot be written.
     """
-    import matplotlib.style
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    check_png(path)
-    with matplotlib.style.context(STYLE, after_reset=True):
-        figure = Figure(figsize=(width_inch, height_inch), layout="constrained")
-        FigureCanvasAgg(figure)
+    check_picture(path)
+    drawn = BytesIO()
+    with _figure(drawn, path.suffix[1:].lower(), width_inch, height_inch) as figure:
         yield figure
-        drawn = BytesIO()
-        figure.savefig(drawn, format="png", metadata={"Software": None})
     try:
         path.write_bytes(drawn.getvalue())
     except OSError as error:
         raise BadInput(f"picture '{path}' cannot be written: {error.strerror}") from error
 
 
+def picture_bytes(draw: Callable[["Figure"], None], width_inch: float, height_inch: float, form: str) -> bytes:
+    """What `draw` puts on a figure in the lab's style, as PNG or SVG bytes; BadInput for another form."""
+    if form not in FORMS:
+        raise BadInput(f"picture as '{form}': known: {', '.join(FORMS)}")
+    drawn = BytesIO()
+    with _figure(drawn, form, width_inch, height_inch) as figure:
+        draw(figure)
+    return drawn.getvalue()
+
+
+def tip(artist: "Artist", text: str) -> None:
+    """What a browser says when the pointer rests on this in an SVG picture; a PNG picture has no such thing."""
+    artist.set_gid(_TIP + text.replace('"', "'"))
+
+
 def seconds(value: float) -> str:
     """Seconds for reading: "12.3 s", "12 s"."""
     return f"{value:.1f} s".replace(".0 s", " s")
+
+
+@contextmanager
+def _figure(out: BytesIO, form: str, width_inch: float, height_inch: float) -> Iterator["Figure"]:
+    """A figure whose bytes are in `out` when the block ends well: no date, no random names."""
+    import matplotlib.style
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with matplotlib.style.context(STYLE | SVG_STYLE, after_reset=True):
+        figure = Figure(figsize=(width_inch, height_inch), layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
+        if form == "png":
+            figure.savefig(out, format="png", metadata={"Software": None})
+            return
+        plain = BytesIO()
+        figure.savefig(plain, format="svg", metadata={"Date": None, "Creator": None})
+    out.write(_with_tips(plain.getvalue().decode()).encode())
+
+
+def _with_tips(svg: str) -> str:
+    """Each group whose id is a tip gets it as its title, which is what browsers show."""
+    return re.sub(f'<g id="{_TIP}([^"]*)">', r"<g><title>\1</title>", svg)
+
+
+def _check_file(path: Path, forms: tuple[str, ...]) -> None:
+    if path.suffix[1:].lower() not in forms:
+        raise BadInput(f"picture '{path}': plots are written as {' or '.join(f'.{form}' for form in forms)}")
+    if not path.parent.is_dir():
+        raise BadInput(f"picture '{path}': there is no folder '{path.parent}'")
+    if path.is_dir():
+        raise BadInput(f"picture '{path}': it is a folder, a file is wanted")

@@ -1,130 +1,161 @@
-"""The Gantt chart of a schedule: robot, machines and toasts over time (thesis fig. IV.1)."""
+"""The Gantt chart of a schedule: parts, machines and the robot over time (thesis fig. IV.1)."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
+from functools import cache
+from itertools import product
+from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from lab.errors import BadInput
-from lab.sequencing.events import Activity, Schedule
-from lab.view.canvas import BLUE, GREY, INK, ORANGE, PALE_GREEN, PALE_GREY, RED, SKY, YELLOW, picture_file, seconds
+from lab.sequencing.events import Schedule
+from lab.view.canvas import GREY, INK, RED, picture_file, seconds, tip
+from lab.view.gantt_bars import LOOKS, Bar, Chart, mixed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.patches import Patch
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
-TOUCHING_S = 1e-3  # measured activities that overlap by less follow one another
-
-# kind of activity -> (what the legend says, colour, hatch), in the legend's order
-ACTIVITIES: dict[str, tuple[str, str, str | None]] = {
-    "carry": ("robot carries a toast", BLUE, None),
-    "empty": ("robot moves empty", SKY, None),
-    "wait": ("robot idle", PALE_GREY, "////"),
-    "process": ("machine processes", ORANGE, None),
-    "blocked": ("finished, not fetched yet", YELLOW, "...."),
-    "store": ("toast in storage or buffer", PALE_GREEN, None),
-}
-LABELS: dict[str, Callable[[Activity], tuple[str, ...]]] = {  # what to write on a bar: the first that fits
-    "carry": lambda a: (f"{a.toast}: {a.origin} \N{RIGHTWARDS ARROW} {a.target}", f"{a.toast}"),
-    "empty": lambda a: (f"to {a.target}",),
-    "wait": lambda a: ("idle",),
-    "process": lambda a: (f"toast {a.toast}", f"{a.toast}"),
-    "blocked": lambda a: (f"{a.toast}",),
-}
-TOAST_LABELS: dict[str, Callable[[Activity], tuple[str, ...]]] = {
-    "carry": lambda a: (f"to {a.target}",),
-    "process": lambda a: (a.target,),
-    "blocked": lambda a: (a.target,),
-    "store": lambda a: (a.target,),
-}
+MANY_ROWS = 12  # from here on, the times and names stand on both sides of the chart
+FAR_PIXELS = 100  # as close to the row's name, the name of a part is not repeated
+BAND = "#F5F5F5"  # every other row's background
+FONT_SIZES = 7.5, 6.0  # of what stands on bars, in points: the larger where it fits
 
 
 def gantt(schedule: Schedule, path: Path, predicted: Schedule | None = None) -> None:
-    """Robot, machines and toasts over time [s], the makespan marked; `predicted` as a thin strip under each row.
+    """Parts, machines and robot over time [s], the makespan marked; `predicted` as a thin strip under each row.
 
-    Raises BadInput for a schedule without activities and as all plots here do: for a path that is not a PNG file or
-    cannot be written. Source: thesis fig. IV.1.
+    PNG or SVG by the path's suffix; in an SVG each bar says what it is when pointed at. The page grows with the number
+    of moves and rows; the colour tells products apart. Raises BadInput for a schedule without activities and as all
+    plots here do: for a path that is no picture or cannot be written. Source: thesis fig. IV.1.
     """
     if not schedule.robot:
         raise BadInput("Gantt chart: the schedule has no activities")
-    rows = _rows(schedule)
-    toasts = len(set(schedule.sequence))
-    middle = 0.29 if predicted is None else 0.38
-    with picture_file(path, 12, 1.5 + (0.42 if predicted is None else 0.5) * len(rows)) as figure:
+    chart = Chart(schedule)
+    width_inch, height_inch = chart.page_inch(predicted is not None)
+    with picture_file(path, width_inch, height_inch) as figure:
         axes = figure.add_subplot()
-        bars = [bar for y, row in enumerate(rows.values()) for bar in _draw_row(axes, row, y - middle, 0.58)]
+        bars = chart.bars(schedule, -0.31 if predicted is None else -0.38, 0.62)
         ends = [(schedule.makespan_s, "-", "makespan" if predicted is None else "makespan, measured")]
+        strips: list[Bar] = []
         if predicted is not None:
-            for y, row in enumerate(_rows(predicted).get(name, []) for name in rows):
-                _draw_row(axes, row, y + 0.24, 0.13)
+            strips = [bar for bar in chart.bars(predicted, 0.28, 0.13) if bar.look != "outside"]
             ends.append((predicted.makespan_s, "--", "makespan, predicted (thin strips)"))
-        for end_s, dashes, name in ends:  # behind the bars
-            line = axes.axvline(end_s, color=RED, linestyle=dashes, linewidth=1.4, zorder=0.9)
-            line.set_label(f"{name}: {seconds(end_s)}")
-        axes.set_yticks(range(len(rows)), list(rows))
-        axes.tick_params(axis="y", length=0)
-        last_s = max(*(activity.end_s for activity, _, _ in bars), *(end_s for end_s, _, _ in ends))
-        axes.set(ylim=(len(rows) - 0.5, -0.55), xlim=(0, 1.01 * last_s), xlabel="time [s]")
-        axes.grid(axis="x")
-        axes.set_title(f"{toasts} toast{'s' * (toasts > 1)}: {seconds(schedule.makespan_s)}")
-        keys = [*_activity_keys(rows), *axes.get_lines()]
-        figure.legend(handles=keys, loc="outside lower center", ncols=4)
+        for bar in (*bars, *strips):
+            _draw_bar(axes, bar, chart)
+        lines = [_draw_end(axes, *end) for end in ends]
+        last_s = max(*(bar.activity.end_s for bar in (*bars, *strips)), *(end_s for end_s, _, _ in ends))
+        _dress(axes, chart, 1.01 * last_s, width_inch)
+        _legend(figure, chart, [*lines, *_draw_arrivals(axes, chart)], {bar.look for bar in bars}, width_inch)
         figure.draw_without_rendering()  # settles the layout, so that widths in pixels are known
-        for activity, low, height in bars:
-            choices = (TOAST_LABELS if activity.resource.startswith("toast ") else LABELS)[activity.kind](activity)
-            _write_on_bar(axes, activity, low, height, choices)
+        _write(axes, bars, chart)
 
 
-def _rows(schedule: Schedule) -> dict[str, list[Activity]]:
-    """Activities by row, top to bottom: the robot, machines in order of first use, toasts by number."""
-    rows: dict[str, list[Activity]] = {}
-    for activity in (*schedule.robot, *schedule.machines, *schedule.toasts):
-        rows.setdefault(activity.resource, []).append(activity)
-    return rows
+def _draw_bar(axes: "Axes", bar: Bar, chart: Chart) -> None:
+    from matplotlib.patches import Rectangle
+
+    start_s, end_s, outside = bar.activity.start_s, bar.activity.end_s, bar.look == "outside"
+    look: dict[str, Any] = {"facecolor": chart.colour(bar), "hatch": LOOKS[bar.look].hatch, "edgecolor": GREY}
+    patch = Rectangle((start_s, bar.top), end_s - start_s, bar.height, linewidth=0 if outside else 0.4, **look)
+    patch.set_in_layout(False)
+    tip(patch, chart.tip(bar.activity))
+    axes.add_patch(patch)
 
 
-def _draw_row(axes: "Axes", row: Sequence[Activity], top: float, height: float) -> list[tuple[Activity, float, float]]:
-    """Bars of one row and where each is (activity, top, height); side by side where a machine holds several toasts."""
-    lanes: list[float] = []
-    placed: list[tuple[Activity, int]] = []
-    holds: dict[int | None, int] = {}
-    for activity in row:
-        follows = activity.kind == "blocked" and activity.toast in holds
-        free = [lane for lane, end_s in enumerate(lanes) if end_s <= activity.start_s + TOUCHING_S]
-        lane = holds[activity.toast] if follows else free[0] if free else len(lanes)
-        lanes[lane : lane + 1] = [activity.end_s]
-        holds[activity.toast] = lane
-        placed.append((activity, lane))
-    lane_height = height / max(1, len(lanes))
-    bars = [(activity, top + lane * lane_height, lane_height) for activity, lane in placed]
-    for activity, low, tall in bars:
-        _, colour, hatch = ACTIVITIES[activity.kind]
-        span = [(activity.start_s, activity.end_s - activity.start_s)]
-        axes.broken_barh(span, (low, tall), facecolor=colour, hatch=hatch, edgecolor=GREY, linewidth=0.4)
-    return bars
+def _dress(axes: "Axes", chart: Chart, last_s: float, width_inch: float) -> None:
+    """Names of the rows, bands to follow them by, and the axis of time."""
+    from matplotlib.ticker import MaxNLocator
+
+    rows, parts = chart.rows, len(chart.names)
+    for row in range(1, len(rows), 2):
+        axes.axhspan(row - 0.5, row + 0.5, color=BAND, linewidth=0, zorder=0.5)
+    for edge in (parts, len(rows) - 1):
+        axes.axhline(edge - 0.5, color=GREY, linewidth=0.8, zorder=0.8)
+    axes.set_yticks(range(len(rows)), rows, parse_math=False)
+    axes.set(ylim=(len(rows) - 0.5, -0.5), xlim=(0, last_s), xlabel="time [s]")
+    axes.tick_params(axis="y", length=0, labelright=len(rows) > MANY_ROWS)
+    axes.tick_params(axis="x", top=len(rows) > MANY_ROWS, labeltop=len(rows) > MANY_ROWS)
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=int(1.5 * width_inch), steps=[1, 2, 5, 10]))
+    axes.grid(axis="x")
+    axes.set_title(chart.title())
 
 
-def _write_on_bar(axes: "Axes", activity: Activity, top: float, height: float, choices: Sequence[str]) -> None:
-    """The first of the texts that fits into the bar; nothing when none does."""
-    ends = axes.transData.transform([(activity.start_s, top), (activity.end_s, top + height)])
-    room_across, room_down = abs(ends[1] - ends[0])
-    _, background, hatch = ACTIVITIES[activity.kind]
-    for choice in choices:
-        text = axes.text((activity.start_s + activity.end_s) / 2, top + height / 2, choice, ha="center", fontsize=7.5)
-        text.set(va="center_baseline", in_layout=False, color="white" if activity.kind == "carry" else INK)
-        if hatch:
-            text.set_bbox({"facecolor": background, "linewidth": 0, "pad": 1})
-        extent = text.get_window_extent()
-        if extent.width + 4 <= room_across and extent.height <= room_down:
-            return
-        text.remove()
+def _draw_end(axes: "Axes", end_s: float, dashes: str, name: str) -> "Line2D":
+    """The makespan's line, behind the bars."""
+    look: dict[str, Any] = {"color": RED, "linestyle": dashes, "linewidth": 1.4, "zorder": 0.9}
+    return axes.axvline(end_s, label=f"{name}: {seconds(end_s)}", **look)
 
 
-def _activity_keys(rows: Mapping[str, Sequence[Activity]]) -> list["Patch"]:
+def _draw_arrivals(axes: "Axes", chart: Chart) -> list["Line2D"]:
+    """A mark where a part arrives; nothing for those that are there from the start."""
+    came_s = {activity.resource: activity.start_s for activity in reversed(chart.schedule.parts)}
+    late = [(at_s, chart.rows.index(row)) for row, at_s in came_s.items() if at_s > 0]
+    look: dict[str, Any] = {"marker": 5, "color": INK, "linestyle": "none", "markersize": 6}  # 5: the tip is the place
+    return axes.plot(*zip(*late, strict=True), label="arrives", **look) if late else []
+
+
+def _write(axes: "Axes", bars: Sequence[Bar], chart: Chart) -> None:
+    """On each bar the first of its texts that fits; nothing when none does."""
+    from matplotlib.font_manager import FontProperties
+
+    renderer = axes.figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    fonts = {size: FontProperties(size=size) for size in FONT_SIZES}
+
+    @cache
+    def extent(text: str, size: float) -> tuple[float, float]:
+        wide, high, _ = renderer.get_text_width_height_descent(text, fonts[size], ismath=False)
+        return wide, high
+
+    corners = axes.transData.transform([(0, 0), (1, 1)])
+    second, row = np.abs(corners[1] - corners[0])
+    for bar in bars:
+        across, tall = second * (bar.activity.end_s - bar.activity.start_s), row * bar.height
+        if bar.look == "outside":  # the line goes on beside the text; the row's own name must not be close
+            across, tall = min(across - 12, second * bar.activity.end_s - FAR_PIXELS), inf
+        for text, size in product(chart.texts(bar), FONT_SIZES):
+            wide, high = extent(text, size)
+            if wide + 4 <= across and high <= tall:
+                _write_text(axes, bar, text, size, chart.colour(bar))
+                break
+
+
+def _write_text(axes: "Axes", bar: Bar, text: str, size: float, colour: str) -> None:
+    """A text in the middle of its bar; beside the part's own bars when it has not begun or is finished."""
+    start_s, end_s = bar.activity.start_s, bar.activity.end_s
+    at_s, align, points = (start_s + end_s) / 2, "center", 0
+    if bar.look == "outside":
+        at_s, align, points = (start_s, "left", 4) if text.startswith("finished") else (end_s, "right", -4)
+    look: dict[str, Any] = {"ha": align, "va": "center_baseline", "fontsize": size, "color": LOOKS[bar.look].ink}
+    where: dict[str, Any] = {"xytext": (points, 0), "textcoords": "offset points"}
+    written = axes.annotate(text, (at_s, bar.middle), parse_math=False, **where, **look)
+    written.set_in_layout(False)
+    if bar.look == "outside":
+        written.set_bbox({"facecolor": BAND if bar.row % 2 else "white", "linewidth": 0, "pad": 1})
+    elif LOOKS[bar.look].hatch:
+        written.set_bbox({"facecolor": colour, "linewidth": 0, "pad": 1})
+
+
+def _legend(figure: "Figure", chart: Chart, lines: Sequence[Any], kinds: set[str], width_inch: float) -> None:
+    from matplotlib.legend_handler import HandlerTuple
     from matplotlib.patches import Patch
 
-    kinds = {activity.kind for row in rows.values() for activity in row}
-    return [
-        Patch(facecolor=colour, hatch=hatch, edgecolor=GREY, linewidth=0.4, label=says)
-        for kind, (says, colour, hatch) in ACTIVITIES.items()
-        if kind in kinds
-    ]
+    handles: list[Any] = []
+    labels: list[str] = []
+    for kind, look in LOOKS.items():
+        if kind not in kinds:
+            continue
+        colours = [look.colour] if look.colour else [mixed(own, look.strength) for own in chart.products.values()]
+        handles.append(tuple(Patch(facecolor=own, hatch=look.hatch, edgecolor=GREY, linewidth=0.4) for own in colours))
+        several = f" ({', '.join(chart.products)})" if kind == "process" and len(chart.products) > 1 else ""
+        labels.append(look.says + several)
+    columns = max(1, int(width_inch / 2.7))
+    figure.legend(
+        [*handles, *lines],
+        [*labels, *(str(line.get_label()) for line in lines)],
+        loc="outside lower left",
+        ncols=columns,
+        handler_map={tuple: HandlerTuple(ndivide=None, pad=0)},
+    )

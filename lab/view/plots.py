@@ -1,4 +1,4 @@
-"""Pictures of what happened, as PNG files: Gantt chart, learning curves, value map, sequencing episodes."""
+"""Pictures of what happened: Gantt chart, sequencing episodes, learning curves (PNG or SVG), value map (PNG)."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,15 +8,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput
-from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, SKY, picture_file, seconds
+from lab.view.canvas import BLUE, INK, ORANGE, RED, SKY, check_png, picture_file
 from lab.view.gantt import gantt
+from lab.view.sequencing_plots import sequence_plot, success_picture, success_plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from lab.overhead import View
 
-__all__ = ["Curve", "cell_corners", "gantt", "learning_curves", "sequence_plot", "value_map"]
+__all__ = [
+    "Curve",
+    "cell_corners",
+    "gantt",
+    "learning_curves",
+    "sequence_plot",
+    "success_picture",
+    "success_plot",
+    "value_map",
+]
 
 
 class Curve(Protocol):
@@ -68,8 +78,9 @@ def value_map(
 
     `corners` (rows + 1, columns + 1, 2): pixel (x, y) of the grid lines' crossings, see `cell_corners`; without: row
     down, column right. `route`: cells of the greedy path; `blocked` (rows, columns) bool. The goal has no
-    value, an episode ends there. Raises BadInput when the shapes do not fit.
+    value, an episode ends there. Raises BadInput when the shapes do not fit, and for a path that is no PNG file.
     """
+    check_png(path)
     table = np.array(values, dtype=np.float64)
     if table.ndim != 2:
         raise BadInput(f"value map: values have shape {table.shape}; a grid of cells is needed")
@@ -113,32 +124,6 @@ def cell_corners(view: "View", height_m: float = 0.0) -> NDArray[np.float64]:
     )
     x, y = np.meshgrid(along_x, along_y, indexing="ij")
     return view.pixel(np.stack([x, y, np.full_like(x, height_m)], axis=-1))
-
-
-def sequence_plot(episode_makespans_s: Sequence[float], optimal_s: float | None, path: Path) -> None:
-    """Makespan [s] of each sequencing episode, the best so far, and the proven optimum; BadInput without episodes.
-
-    Source: thesis fig. 7.3.
-    """
-    if not len(episode_makespans_s):
-        raise BadInput("sequencing plot: there are no episodes")
-    from matplotlib.ticker import MaxNLocator
-
-    episodes = np.arange(1, len(episode_makespans_s) + 1)
-    best_s = np.minimum.accumulate(np.asarray(episode_makespans_s, dtype=np.float64))
-    with picture_file(path, 7, 3.8) as figure:
-        axes = figure.add_subplot()
-        axes.plot(episodes, episode_makespans_s, ".", color=GREY, markersize=4, label="each episode")
-        label = f"best so far: {seconds(best_s[-1])}"
-        axes.step(episodes, best_s, where="post", color=BLUE, linewidth=1.8, marker="o", markevery=[-1], label=label)
-        if optimal_s is not None:
-            label = f"optimum: {seconds(optimal_s)}"
-            axes.axhline(optimal_s, color=RED, linestyle="--", linewidth=1.4, label=label)
-        axes.set(xlabel="episode", ylabel="makespan [s]", title="Sequences tried")
-        axes.set_xlim(0, 1.02 * max(2, len(episodes)))
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        axes.grid()
-        figure.legend(loc="outside lower center", ncols=3)
 
 
 def _draw_curve(axes: "Axes", policy: Curve) -> None:

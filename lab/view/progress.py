@@ -13,7 +13,7 @@ from rich.text import Text
 from lab.learning.session import AdviceRejected, AdviceRequested, Event
 from lab.listener import Listener
 from lab.sequencing.events import Move, SequenceResult
-from lab.sequencing.exact import Optimum
+from lab.sequencing.search import Reference
 from lab.teaching import Lesson
 
 BARS = "▁▂▃▄▅▆▇█"
@@ -142,20 +142,21 @@ class RunProgress(Listener):
         self._say(f"  {name:{_NAME}} {seconds:6.2f} s")
         self._advance()
 
-    def sequenced(self, best: SequenceResult, proven: Optimum) -> None:
-        gap = proven.gap(best.makespan_s)
-        what = "proven optimum" if proven.proven else "proven bound"
+    def sequenced(self, best: SequenceResult, known: Reference) -> None:
+        gap = known.gap(best.cost)
+        what = "proven optimum" if known.proven else "proven bound"
         order = " ".join(map(str, best.sequence[:_SHOWN_MOVES]))
         more = f" and {len(best.sequence) - _SHOWN_MOVES} more" if len(best.sequence) > _SHOWN_MOVES else ""
-        found = f"{best.makespan_s:.1f} s after {len(best.episode_makespans_s)} episodes"
-        parts = [f"  toasts {order}{more}:", f"{found}, {what} {proven.bound_s:.1f} s, gap {gap:.1%}"]
+        found = f"{best.cost:.1f} s after {len(best.episode_costs)} episodes"
+        more_than = "" if gap is None else f", gap {gap:.1%}"
+        parts = [f"  parts {order}{more}:", f"{found}, {what} {known.bound:.1f} s{more_than}"]
         self._pack(list(map(Text, parts)), gap=" ")
         self._advance()
 
     def moved(self, move: Move) -> None:
         waited = move.pick_s - move.reach_s
         wait = f", waited {waited:.1f} s" if waited > 0.05 else ""
-        self._say(f"  {move.drop_s:7.1f} s  toast {move.toast}: {move.origin} to {move.target}{wait}")
+        self._say(f"  {move.drop_s:7.1f} s  toast {move.part}: {move.origin} to {move.target}{wait}")
         self._advance()
 
     def retried(self, text: str) -> None:

@@ -1,5 +1,6 @@
 """What commands show when they are done: short rich tables and lines from plain data."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -85,16 +86,51 @@ def _advice(lesson: Mapping[str, Any]) -> str:
 
 def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     """The end of `lab sequence`, from its JSON document."""
+    what, unit = _measured(found["objective"])
     proven = "proven optimum" if found["optimum_proven"] else "proven bound"
+    gap = "" if found["gap"] is None else f", gap {found['gap']:.2%}"
     lines = [
-        f"{found['method']}: {found['makespan_s']:.2f} s for {found['toasts']} toasts (seed {found['seed']})",
+        f"{found['method']}: {what}{found['cost']:.2f}{unit} for {_ordered(found['order'])} (seed {found['seed']})",
         f"order of the transfers: {' '.join(map(str, found['sequence']))}",
-        f"{proven} {found['bound_s']:.2f} s, gap {found['gap']:.2%}",
+        f"{proven} {found['bound_cost']:.2f}{unit}{gap} ({found['bound_by']})",
     ]
     if found["sessions"] > 1:
-        hits = f"optimum found in {found['success_percent']:.0f} %"
-        lines.append(f"{found['sessions']} sessions: {hits}, mean best {found['mean_best_s']:.2f} s")
+        hits = "" if found["success_percent"] is None else f"optimum found in {found['success_percent']:.0f} %, "
+        lines.append(f"{found['sessions']} sessions: {hits}mean best {found['mean_best_cost']:.2f}{unit}")
+    for number, advice in enumerate(found["advice"] or [], 1):
+        text = f"session {number}: asked in {advice['requests']} episodes, {advice['helped_steps']} moves advised"
+        episode = advice["rejected_at_episode"]
+        lines.append(text if episode is None else f"{text}; rejected its advisor in episode {episode}")
+    if found["stochastic"] is not None:
+        lines += _drawn(found["stochastic"], unit)
     return Group(*map(Text, [*lines, *found["files"].values()]))
+
+
+def _measured(objective: str) -> tuple[str, str]:
+    """What stands before and after a cost."""
+    if objective == "makespan":
+        return "", " s"
+    return f"{objective.replace('-', ' ')} ", "" if objective == "tardy-parts" else " s"
+
+
+def _ordered(order: Sequence[str]) -> str:
+    """An order in words: how many of each product."""
+    counts = Counter(order)
+    return ", ".join(f"{count} {name}{'s' * (count > 1)}" for name, count in counts.items())
+
+
+def _drawn(stochastic: Mapping[str, Any], unit: str) -> list[str]:
+    """What a list and a policy come to where times are drawn."""
+
+    def mean(name: str) -> str:
+        low, high = stochastic[name]["ci95"]
+        return f"{stochastic[name]['mean']:.2f}{unit} ({low:.2f} to {high:.2f})"
+
+    return [
+        f"{stochastic['replications']} drawn episodes: the list as it is {mean('fixed')}",
+        f"reacting {mean('reacting')}: {stochastic['reacting']['policy']}",
+        f"saved by reacting {mean('saved_by_reacting')}",
+    ]
 
 
 def table_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> Table:

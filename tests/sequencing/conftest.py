@@ -8,7 +8,7 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from lab.sequencing.cell import Cell, Stage, Station, needed_moves
+from lab.sequencing.cell import Arrivals, Cell, Product, Route, Stage, Station, needed_moves
 
 X = math.nan
 # Thesis table 7.2, robot times [s], row from, column to, stations 1 to 6.
@@ -39,56 +39,97 @@ ROBOT_S = {
         [60, 55, 50, 45, X, X],
     ],
 }
+# Thesis App. VIII, robot times [s], stations numbered as in the listing: two lathes, the mill, incoming, outgoing.
+FMS_S = [
+    [X, 65, 15, 45, 45, 45, 25, 25, 25, 40, X],
+    [25, X, 20, 45, 45, 45, 25, 25, 25, 40, X],
+    [25, 45, X, 45, 45, 45, 25, 25, 25, 40, 40],
+    [45, 45, 45, X, 65, 15, 50, 50, 50, 60, X],
+    [45, 45, 45, 25, X, 20, 50, 50, 50, 60, X],
+    [45, 45, 45, 25, 45, X, 50, 50, 50, 60, 60],
+    [25, 25, 25, 50, 50, 50, X, 50, 15, 30, X],
+    [25, 25, 25, 50, 50, 50, 25, X, 25, 30, X],
+    [25, 25, 25, 50, 50, 50, 25, 25, X, 30, 30],
+    [40, X, X, 60, X, X, 30, X, X, X, X],
+    [40, 40, 40, 60, 60, 60, 30, 30, 30, 20, X],
+]
 MACHINE_S = {"I": 60, "II": 90, "III": 120}  # thesis table 7.1
 TOAST_ROUTE = (Stage("plate"), Stage("toaster", "toaster buffer"), Stage("butter", "butter buffer"), Stage("done"))
 
 
-def build_toast_cell(case: str, toasts: int, buffer_room: int = 50) -> Cell:
+
+
+def build_toast_cell(case: str, parts: int, buffer_room: int = 50, room: int = 200) -> Cell:
     stations = (
-        Station("plate", "storage", 50),
+        Station("plate", "storage", room),
         Station("toaster buffer", "buffer", buffer_room),
         Station("toaster", "machine", 1, MACHINE_S[case]),
         Station("butter buffer", "buffer", buffer_room),
         Station("butter", "machine", 1, MACHINE_S[case]),
-        Station("done", "storage", 50),
+        Station("done", "storage", room),
     )
     table = np.array(ROBOT_S[case])
-    return Cell(stations, TOAST_ROUTE, table, table, "toaster buffer", toasts)
+    return Cell.alike(stations, TOAST_ROUTE, table, table, "toaster buffer", parts)
 
 
-def build_oven_cell(toasts: int = 2, **change: object) -> Cell:
+def build_oven_cell(parts: int = 2, **change: object) -> Cell:
     """in (0) -> oven (1), 10 s, one toast -> out (2), no buffer; empty moves 1 s, loaded moves 2 s."""
-    parts: dict[str, object] = {
+    described: dict[str, object] = {
         "stations": (Station("in", "storage", 9), Station("oven", "machine", 1, 10.0), Station("out", "storage", 9)),
-        "route": (Stage("in"), Stage("oven"), Stage("out")),
+        "products": (Product("toast", ((Stage("in"), Stage("oven"), Stage("out")),)),),
+        "order": ("toast",) * parts,
         "empty_s": np.ones((3, 3)) - np.eye(3),
         "loaded_s": 2 * (np.ones((3, 3)) - np.eye(3)),
         "robot_start": "in",
-        "toasts": toasts,
     }
-    return Cell(**(parts | change))  # type: ignore[arg-type]
+    return Cell(**(described | change))  # type: ignore[arg-type]
+
+
+def build_fms_cell(order: str, interval_s: float = 200.0) -> Cell:
+    """The flexible manufacturing system of thesis App. III: "R" a rook, "S" a sign; arrivals after each pick."""
+    machines = ("lathe 1", "lathe 2", "mill")
+    stations = [
+        station
+        for machine in machines
+        for station in (
+            Station(f"{machine} in", "buffer", 1),
+            Station(machine, "machine", 1, 600.0 if machine == "mill" else 185.0),
+            Station(f"{machine} out", "buffer", 1),
+        )
+    ]
+    stations += [Station("incoming", "storage", 1), Station("outgoing", "storage", 1)]
+    lathes = tuple(_fms_route(machine, 0.0) for machine in machines[:2])
+    products = (Product("rook", lathes), Product("sign", (_fms_route("mill", 240.0),)))
+    names = tuple({"R": "rook", "S": "sign"}[letter] for letter in order)
+    table = np.array(FMS_S)
+    arrivals = Arrivals((interval_s,) * len(names), "pick")
+    return Cell(tuple(stations), products, names, table, table, "incoming", arrivals)
+
+
+def _fms_route(machine: str, service_s: float) -> Route:
+    stages = (Stage(f"{machine} in"), Stage(machine, service_s=service_s, pallet=True), Stage(f"{machine} out"))
+    return (Stage("incoming"), *stages, Stage("outgoing"))
 
 
 @st.composite
-def random_cells(draw: st.DrawFn, max_machines: int = 2, max_toasts: int = 3) -> Cell:
-    """A small cell whose tables hold the needed moves and nothing else."""
-    toasts = draw(st.integers(1, max_toasts))
+def random_cells(draw: st.DrawFn, max_machines: int = 2, max_parts: int = 3, many: bool = False) -> Cell:
+    """A small cell whose tables hold the needed moves and nothing else; `many`: products, routes, pallets, arrivals."""
+    parts = draw(st.integers(1, max_parts))
     seconds = st.one_of(st.integers(0, 20).map(float), st.floats(0, 20, allow_subnormal=False))
-    stations, route = [Station("in", "storage", toasts)], [Stage("in")]
-    for number in range(draw(st.integers(1, max_machines))):
-        buffer = f"buffer {number}" if draw(st.booleans()) else None
-        if buffer:
-            stations.append(Station(buffer, "buffer", draw(st.integers(1, 2))))
-        kind = draw(st.sampled_from(["machine", "machine", "storage"]))
-        time_s = draw(seconds) if kind == "machine" else 0.0
-        stations.append(Station(f"stage {number}", kind, draw(st.integers(1, 2)), time_s))  # type: ignore[arg-type]
-        route.append(Stage(f"stage {number}", buffer))
-    stations.append(Station("out", "storage", toasts))
-    route.append(Stage("out"))
+    stations = [Station("in", "storage", parts), Station("out", "storage", parts)]
+    products = []
+    for product in range(draw(st.integers(1, 2 if many else 1))):
+        routes = []
+        for number in range(draw(st.integers(1, 2 if many else 1))):
+            name = f"{product}.{number}" if many else ""
+            routes.append(_random_route(draw, stations, name, max_machines, seconds, many))
+        products.append(Product(f"type {product}" if product else "toast", tuple(routes)))
     stations = draw(st.permutations(stations))
+    buffers = draw(st.sampled_from(["busy", "free"])) if many else "busy"
     start = draw(st.sampled_from(stations)).name
+    order = tuple(draw(st.sampled_from(products)).name for _ in range(parts))
+    moves = needed_moves(stations, products, start, parts, buffers)  # type: ignore[arg-type]
     names = [station.name for station in stations]
-    moves = needed_moves(stations, route, start, toasts)
     tables = []
     for pairs in (moves.empty, moves.loaded):
         table = np.full((len(names), len(names)), np.nan)
@@ -96,7 +137,43 @@ def random_cells(draw: st.DrawFn, max_machines: int = 2, max_toasts: int = 3) ->
             # Above 0, so that 1 / T exists.
             table[names.index(origin), names.index(target)] = 0.5 + draw(seconds)
         tables.append(table)
-    return Cell(tuple(stations), tuple(route), tables[0], tables[1], start, toasts)
+    arrivals = None
+    if many and draw(st.booleans()):
+        arrivals = Arrivals(tuple(draw(seconds) for _ in order), draw(st.sampled_from(["clock", "pick"])))
+    due_s = tuple(1000.0 * draw(seconds) + 4000.0 for _ in order) if many else None
+    return Cell(
+        tuple(stations), tuple(products), order, tables[0], tables[1], start, arrivals, buffers, due_s  # type: ignore[arg-type]
+    )
+
+
+def _random_route(
+    draw: st.DrawFn,
+    stations: list[Station],
+    name: str,
+    max_machines: int,
+    seconds: SearchStrategy[float],
+    many: bool,
+) -> Route:
+    """A route from "in" to "out" through stations of its own, which are added; with `many` also with pallets."""
+    route = [Stage("in")]
+    for number in range(draw(st.integers(1, max_machines))):
+        label = f"{name}{number}"
+        time_s = draw(seconds)
+        if many and draw(st.booleans()):
+            stations += [Station(f"pallet {label}", "buffer", draw(st.integers(1, 2)))]
+            stations += [Station(f"machine {label}", "machine", draw(st.integers(1, 2)), time_s)]
+            stations += [Station(f"after {label}", "buffer", draw(st.integers(1, 2)))]
+            machine = Stage(f"machine {label}", None, None, draw(seconds), True)
+            route += [Stage(f"pallet {label}"), machine, Stage(f"after {label}")]
+            continue
+        buffer = f"buffer {label}" if draw(st.booleans()) else None
+        if buffer:
+            stations.append(Station(buffer, "buffer", draw(st.integers(1, 2))))
+        kind = draw(st.sampled_from(["machine", "machine", "storage"]))
+        room = draw(st.integers(1, 2))
+        stations.append(Station(f"stage {label}", kind, room, time_s if kind == "machine" else 0.0))  # type: ignore[arg-type]
+        route.append(Stage(f"stage {label}", buffer))
+    return (*route, Stage("out"))
 
 
 @pytest.fixture(scope="session")
@@ -107,6 +184,11 @@ def toast_cell() -> Callable[..., Cell]:
 @pytest.fixture(scope="session")
 def oven_cell() -> Callable[..., Cell]:
     return build_oven_cell
+
+
+@pytest.fixture(scope="session")
+def fms_cell() -> Callable[..., Cell]:
+    return build_fms_cell
 
 
 @pytest.fixture(scope="session")

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.sequencing.cell import Cell
-from lab.sequencing.events import Activity, Move, Run, Schedule, simulate
-from lab.sequencing.rivals import random_search
+from lab.sequencing.events import Activity, Move, Schedule
+from lab.sequencing.run import Run, simulate
 
 CellMaker = Callable[..., Cell]
 
@@ -26,7 +26,7 @@ def test_one_toast_by_hand(oven_cell: CellMaker) -> None:
         Activity("robot", "carry", 1, "oven", "out", 12, 14),
     )
     assert schedule.machines == (Activity("oven", "process", 1, "oven", "oven", 2, 12),)
-    assert [(a.kind, a.start_s, a.end_s) for a in schedule.toasts] == [
+    assert [(a.kind, a.start_s, a.end_s) for a in schedule.parts] == [
         ("carry", 0, 2),
         ("process", 2, 12),
         ("carry", 12, 14),
@@ -55,7 +55,7 @@ def test_a_toast_that_is_not_fetched_blocks_its_machine(toast_cell: CellMaker) -
     schedule = simulate(cell, [1, 2, 3, 4, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4])
     toaster = [a for a in schedule.machines if a.resource == "toaster"][:2]
     # 60 + (30 + 20) + (30 + 20) + (30 + 20) + 30 to the toaster = 240
-    assert [(a.kind, a.toast, a.start_s, a.end_s) for a in toaster] == [
+    assert [(a.kind, a.part, a.start_s, a.end_s) for a in toaster] == [
         ("process", 1, 60, 150),
         ("blocked", 1, 150, 240),
     ]
@@ -79,7 +79,7 @@ def test_the_printed_solution_of_case_ii(toast_cell: CellMaker) -> None:
 @pytest.mark.parametrize(
     ("sequence", "says"),
     [
-        ([1, 3, 1, 2], "position 2 of the sequence: there is no toast 3, only 1 to 2; allowed here: 1"),
+        ([1, 3, 1, 2], "position 2 of the sequence: there is no part 3, only 1 to 2; allowed here: 1"),
         ([1, 2], "position 2 of the sequence: toast 2 at 'in' cannot move on: 'oven' full; allowed here: 1"),
         ([1, 1, 1], "position 3 of the sequence: toast 1 is already at 'out'; allowed here: 2"),
         ([1, 1, 2], "the sequence ends after 3 moves, but toast 2 is still at 'oven'"),
@@ -103,11 +103,14 @@ def test_a_run_refuses_too(oven_cell: CellMaker) -> None:
 def test_rows_have_neither_gaps_nor_overlaps(
     cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject
 ) -> None:
-    cell = data.draw(cells(max_machines=3, max_toasts=4))
-    sequence = random_search(cell, 1, np.random.default_rng(data.draw(st.integers(0, 99)))).sequence
+    cell = data.draw(cells(max_machines=3, max_parts=4))
+    run, sequence = Run(cell), []
+    while allowed := run.allowed():
+        sequence.append(data.draw(st.sampled_from(allowed)))
+        run.move(sequence[-1])
     schedule = simulate(cell, sequence)
     rows = [list(schedule.robot)]
-    rows += [[a for a in schedule.toasts if a.toast == toast] for toast in range(1, cell.toasts + 1)]
+    rows += [[a for a in schedule.parts if a.part == toast] for toast in range(1, cell.parts + 1)]
     for row in rows:
         assert row[0].start_s == 0
         assert row[-1].end_s == schedule.makespan_s
@@ -125,16 +128,9 @@ def test_json_keeps_everything(toast_cell: CellMaker) -> None:
     assert Schedule.from_json(json.loads(json.dumps(schedule.to_json()))) == schedule
 
 
-def test_a_measured_schedule_from_logged_activities(oven_cell: CellMaker) -> None:
-    """The log may come in any order; it gives the same rows as the simulation it was taken from."""
-    schedule = simulate(oven_cell(2), [1, 1, 2, 2])
-    log = [*schedule.toasts, *schedule.machines, *schedule.robot][::-1]
-    assert Schedule.from_activities(log, schedule.sequence) == schedule
-
-
 def test_a_measured_schedule_from_timed_moves(oven_cell: CellMaker) -> None:
     """A run that was slower, and fetched the toast 0.5 s before its nominal end: processing ends with the pick."""
-    moves = [Move(1, "in", "in", "oven", 0, 0.5, 0.5, 3), Move(1, "oven", "oven", "out", 3, 3, 12.5, 15)]
+    moves = [Move(1, "in", "in", "oven", 0, 0.5, 0.5, 3, 10.0), Move(1, "oven", "oven", "out", 3, 3, 12.5, 15)]
     schedule = Schedule.from_moves(oven_cell(1), moves)
     assert schedule.makespan_s == 15
     assert schedule.sequence == (1, 1)
@@ -145,8 +141,9 @@ def test_a_measured_schedule_from_timed_moves(oven_cell: CellMaker) -> None:
     ("document", "says"),
     [
         ({}, "not a schedule: KeyError"),
-        ({"robot": [{}], "machines": [], "toasts": [], "sequence": []}, "not a schedule: TypeError"),
-        ({"robot": [], "machines": [], "toasts": [], "sequence": ["x"]}, "not a schedule: ValueError"),
+        ({"robot": [{}], "machines": [], "parts": [], "sequence": []}, "not a schedule: TypeError"),
+        ({"robot": [], "machines": [], "parts": [], "sequence": []}, "not a schedule: KeyError 'makespan_s'"),
+        ({"robot": [], "machines": [], "parts": [], "sequence": ["x"]}, "not a schedule: ValueError"),
     ],
 )
 def test_not_a_schedule(document: dict[str, object], says: str) -> None:
@@ -165,4 +162,24 @@ def test_not_a_schedule(document: dict[str, object], says: str) -> None:
 def test_bad_activities(kind: str, start_s: float, end_s: float, says: str) -> None:
     activity = Activity("robot", kind, 1, "in", "oven", start_s, end_s)  # type: ignore[arg-type]
     with pytest.raises(BadInput, match=says):
-        Schedule.from_activities([activity], [1])
+        Schedule((activity,), (), (), 2.0, (1,))
+
+
+def test_pallets_and_vacuuming_are_rows_of_their_own(fms_cell: CellMaker) -> None:
+    """One sign: see `test_a_sign_takes_five_moves_and_its_pallet_follows` for the times."""
+    schedule = simulate(fms_cell("S"), [1] * 5)
+    assert [(a.kind, a.start_s, a.end_s) for a in schedule.robot] == [
+        ("wait", 0, 200),
+        ("carry", 200, 230),
+        ("carry", 230, 280),
+        ("empty", 280, 305),
+        ("pallet", 305, 320),
+        ("empty", 320, 345),
+        ("wait", 345, 880),
+        ("service", 880, 1120),
+        ("carry", 1120, 1145),
+        ("carry", 1145, 1175),
+    ]
+    assert [(a.kind, a.start_s, a.end_s) for a in schedule.machines] == [("process", 280, 880), ("blocked", 880, 1120)]
+    assert schedule.parts[0] == Activity("sign 1", "carry", 1, "incoming", "mill in", 200, 230)
+    assert schedule.makespan_s == 1175

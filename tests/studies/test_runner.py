@@ -310,6 +310,17 @@ def test_the_same_from_one_process_from_two_and_from_a_cluster(few: list[Setting
     assert plain(Job(sessions=5, seed=3, dask=cluster).run(few)) == plain(one)
 
 
+def test_other_work_is_shared_out_alike(folder: Path, cluster: str) -> None:
+    """`abs` of numbers, one of them twice: in the order asked for, told one by one, and nothing is written."""
+    told: list[tuple[int, int]] = []
+    job = Job(folder=folder, progress=partial(_tell, told))
+    for where in ({}, {"workers": 2}, {"dask": cluster}):
+        told.clear()
+        assert [*replace(job, **where).each(abs, [-3, 5, -3, -1]).items()] == [(-3, 3), (5, 5), (-1, 1)]
+        assert told == [(0, 3), (1, 3), (2, 3), (3, 3)]
+    assert not folder.exists()
+
+
 def test_a_cluster_that_is_not_there(few: list[Setting], monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
     """Nothing listens on port 9; the lab's ten seconds of patience are cut short here."""
     distributed = pytest.importorskip("distributed", reason="no Dask: install the extra 'dask'")

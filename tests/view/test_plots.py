@@ -1,4 +1,4 @@
-"""The pictures: they are written, alike for like data, and show what they should."""
+"""Learning curves and value maps: they are written, alike for like data, and show what they should."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,25 +9,8 @@ import pytest
 
 from lab.errors import BadInput
 from lab.overhead import plain_view
-from lab.sequencing.cell import Cell, Stage, Station
-from lab.sequencing.events import Activity, Schedule, simulate
-from lab.view import gantt as gantt_chart
-from lab.view.canvas import BLUE, ORANGE, RED, SKY, YELLOW, seconds
-from lab.view.plots import cell_corners, gantt, learning_curves, sequence_plot, value_map
-
-
-def schedule(loaded_s: float = 2.0, room: int = 1) -> Schedule:
-    """Two toasts, in -> buffer or oven -> out; the second waits in the buffer while the first bakes."""
-    stations = (
-        Station("in", "storage", 2),
-        Station("buffer", "buffer", 2),
-        Station("oven", "machine", room, 5.0),
-        Station("out", "storage", 2),
-    )
-    off_diagonal = np.ones((4, 4)) - np.eye(4)
-    route = (Stage("in"), Stage("oven", "buffer"), Stage("out"))
-    cell = Cell(stations, route, off_diagonal, loaded_s * off_diagonal, "in", 2)
-    return simulate(cell, [1, 2, 1, 2, 2] if room == 1 else [1, 2, 1, 2])
+from lab.view.canvas import ORANGE, RED
+from lab.view.plots import cell_corners, learning_curves, value_map
 
 
 @dataclass(frozen=True)
@@ -38,10 +21,6 @@ class Learned:
     guided: list[bool]
     subtask: str = "insert"
     optimal_steps: int = 8
-
-
-def draw_gantt(path: Path) -> None:
-    gantt(schedule(2.1), path, predicted=schedule())
 
 
 def draw_curves(path: Path) -> None:
@@ -58,15 +37,9 @@ def draw_values(path: Path) -> None:
     value_map(np.arange(12.0).reshape(3, 4), picture, path, corners=corners, route=route, blocked=blocked, goal=(1, 2))
 
 
-def draw_episodes(path: Path) -> None:
-    sequence_plot([30.0, 28.5, 29.0, 25.0], 25.0, path)
-
-
 PLOTS: dict[str, Callable[[Path], None]] = {
-    "gantt": draw_gantt,
     "curves": draw_curves,
     "values": draw_values,
-    "episodes": draw_episodes,
 }
 
 
@@ -76,6 +49,13 @@ def colours(path: Path) -> set[str]:
 
     pixels = np.unique((imread(path)[..., :3] * 255).round().astype(int).reshape(-1, 3), axis=0)
     return {"#{:02X}{:02X}{:02X}".format(*pixel) for pixel in pixels}
+
+
+def test_curves_can_be_scaled_but_a_map_over_a_photo_cannot(tmp_path: Path) -> None:
+    draw_curves(tmp_path / "plot.svg")
+    assert (tmp_path / "plot.svg").read_bytes().startswith(b"<?xml")
+    with pytest.raises(BadInput, match=r"plots are written as \.png$"):
+        draw_values(tmp_path / "map.svg")
 
 
 @pytest.mark.parametrize("name", PLOTS)
@@ -88,7 +68,7 @@ def test_same_data_same_bytes(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", PLOTS)
-def test_only_png_and_only_where_files_can_be(tmp_path: Path, name: str) -> None:
+def test_only_pictures_and_only_where_files_can_be(tmp_path: Path, name: str) -> None:
     with pytest.raises(BadInput, match=r"plots are written as \.png"):
         PLOTS[name](tmp_path / "plot.jpeg")
     with pytest.raises(BadInput, match="there is no folder"):
@@ -100,41 +80,8 @@ def test_the_global_style_is_left_alone(tmp_path: Path) -> None:
     import matplotlib
 
     before = dict(matplotlib.rcParams)
-    draw_episodes(tmp_path / "plot.png")
+    draw_curves(tmp_path / "plot.png")
     assert dict(matplotlib.rcParams) == before
-
-
-def test_gantt_shows_each_kind_of_activity(tmp_path: Path) -> None:
-    draw_gantt(tmp_path / "plot.png")
-    assert {BLUE, SKY, ORANGE, RED} <= colours(tmp_path / "plot.png")
-
-
-def test_a_machine_with_two_toasts_gets_two_lanes() -> None:
-    from matplotlib.figure import Figure
-
-    row = [activity for activity in schedule(room=2).machines if activity.resource == "oven"]
-    bars = gantt_chart._draw_row(Figure().add_subplot(), row, 0.0, 1.0)
-    lanes = {(activity.toast, top, height) for activity, top, height in bars}
-    assert lanes == {(1, 0.0, 0.5), (2, 0.5, 0.5)}
-
-
-@pytest.mark.parametrize("overlap_s", [0.0, 1e-4])
-def test_one_after_the_other_stays_in_one_lane(overlap_s: float) -> None:
-    from matplotlib.figure import Figure
-
-    row = [
-        Activity("robot", "empty", None, "in", "oven", 0.0, 1.0 + overlap_s),
-        Activity("robot", "carry", 1, "oven", "out", 1.0, 2.0),
-    ]
-    bars = gantt_chart._draw_row(Figure().add_subplot(), row, 0.0, 1.0)
-    assert {(top, height) for _, top, height in bars} == {(0.0, 1.0)}
-
-
-def test_a_run_that_failed_before_its_first_carry(tmp_path: Path) -> None:
-    stopped = Schedule.from_activities([Activity("robot", "empty", None, "in", "oven", 0.0, 3.0)], [])
-    gantt(stopped, tmp_path / "plot.png")
-    assert SKY in colours(tmp_path / "plot.png")
-    assert YELLOW not in colours(tmp_path / "plot.png")
 
 
 @pytest.mark.parametrize("curve", [[], [8], [8, 9, 8], [201] * 3])
@@ -186,11 +133,3 @@ def test_corners_of_a_plain_view() -> None:
 def test_nothing_to_show(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no policy"):
         learning_curves({}, tmp_path / "plot.png")
-    with pytest.raises(BadInput, match="no episodes"):
-        sequence_plot([], None, tmp_path / "plot.png")
-    with pytest.raises(BadInput, match="no activities"):
-        gantt(Schedule((), (), (), 0.0, ()), tmp_path / "plot.png")
-
-
-def test_seconds() -> None:
-    assert [seconds(513), seconds(12.34), seconds(10.04)] == ["513 s", "12.3 s", "10 s"]

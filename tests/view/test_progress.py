@@ -15,7 +15,7 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.policy import Policy
 from lab.sequencing.events import Move, SequenceResult
-from lab.sequencing.exact import Optimum
+from lab.sequencing.search import Reference
 from lab.teaching import Lesson
 from lab.view.progress import BARS, PLAIN_BARS, RunProgress, sparkline
 
@@ -131,7 +131,7 @@ def test_the_rest_of_a_run() -> None:
         progress.phase("measure", 1)
         progress.measured("plate > toaster, loaded", 15.131)
         progress.phase("sequence", 1)
-        progress.sequenced(SequenceResult((1, 2, 1), 110.0, (120.0, 110.0)), Optimum(100.0, (1, 1, 2), True, 100.0, 9))
+        progress.sequenced(SequenceResult((1, 2, 1), 110.0, (120.0, 110.0)), Reference(100.0, True, "A*"))
         progress.phase("carry out", 2)
         progress.moved(Move(1, "plate", "plate", "toaster", 0.0, 0.0, 0.0, 17.14))
         progress.moved(Move(2, "toaster", "toaster", "oven [hot]", 20.0, 21.0, 81.0, 84.4))
@@ -142,7 +142,7 @@ def test_the_rest_of_a_run() -> None:
         "Time every move in simulation",
         "  plate > toaster, loaded                               15.13 s",
         "Find the order of the transfers",
-        "  toasts 1 2 1: 110.0 s after 2 episodes, proven optimum 100.0 s, gap 10.0%",
+        "  parts 1 2 1: 110.0 s after 2 episodes, proven optimum 100.0 s, gap 10.0%",
         "Make toast in physics",
         "     17.1 s  toast 1: plate to toaster",
         "     84.4 s  toast 2: toaster to oven [hot], waited 60.0 s",
@@ -155,10 +155,19 @@ def test_the_rest_of_a_run() -> None:
 def test_a_long_order_is_cut_and_what_is_not_proven_is_not_called_so() -> None:
     shown = console(80)
     order = tuple(range(1, 51)) * 4
-    RunProgress(shown).sequenced(SequenceResult(order, 300.0, (300.0,)), Optimum(200.0, order, False, 150.0, 9))
+    RunProgress(shown).sequenced(SequenceResult(order, 300.0, (300.0,)), Reference(150.0, False, "A*"))
     first, second = lines(shown)
     assert first.endswith(" 23 24 and 176 more:")
     assert second == "            300.0 s after 1 episodes, proven bound 150.0 s, gap 100.0%"
+
+
+def test_a_bound_of_nothing_has_no_gap() -> None:
+    shown = console(120)
+    for cost in (0.0, 5.0):
+        RunProgress(shown).sequenced(SequenceResult((1,), cost, (cost,)), Reference(0.0, True, "CP-SAT"))
+    first, second = lines(shown)
+    assert first == "  parts 1: 0.0 s after 1 episodes, proven optimum 0.0 s, gap 0.0%"
+    assert second == "  parts 1: 5.0 s after 1 episodes, proven optimum 0.0 s"
 
 
 def test_a_prompt_gets_the_terminal_for_itself() -> None:

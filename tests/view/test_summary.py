@@ -141,36 +141,82 @@ def test_lessons_that_went_otherwise(change: dict[str, Any], line: str) -> None:
     assert line in shown(lesson_summary(LESSON | change), 200)
 
 
+FOUND: dict[str, Any] = {
+    "method": "srl",
+    "objective": "makespan",
+    "cost": 110.0,
+    "order": ["toast", "toast"],
+    "seed": 3,
+    "sequence": [2, 1, 2, 1],
+    "optimum_proven": True,
+    "bound_cost": 100.0,
+    "bound_by": "A*",
+    "gap": 0.1,
+    "sessions": 1,
+    "success_percent": 0.0,
+    "mean_best_cost": 110.0,
+    "advice": None,
+    "stochastic": None,
+    "files": {},
+}
+
+
 def test_a_sequence() -> None:
-    found = {
-        "method": "srl",
-        "makespan_s": 110.0,
-        "toasts": 2,
-        "seed": 3,
-        "sequence": [2, 1, 2, 1],
-        "optimal_s": 100.0,
-        "optimum_proven": True,
-        "bound_s": 100.0,
-        "gap": 0.1,
-        "sessions": 1,
-        "success_percent": 0.0,
-        "mean_best_s": 110.0,
-        "files": {},
-    }
     first = [
         "srl: 110.00 s for 2 toasts (seed 3)",
         "order of the transfers: 2 1 2 1",
-        "proven optimum 100.00 s, gap 10.00%",
+        "proven optimum 100.00 s, gap 10.00% (A*)",
     ]
-    assert shown(sequence_summary(found)) == first
-    several = {"sessions": 4, "success_percent": 75.0, "mean_best_s": 102.5, "files": {"plot": "e.png"}}
-    assert shown(sequence_summary(found | several)) == [
+    assert shown(sequence_summary(FOUND)) == first
+    several = {"sessions": 4, "success_percent": 75.0, "mean_best_cost": 102.5, "files": {"plot": "[e].png"}}
+    assert shown(sequence_summary(FOUND | several)) == [
         *first,
         "4 sessions: optimum found in 75 %, mean best 102.50 s",
-        "e.png",
+        "[e].png",
     ]
-    unproven = found | {"optimum_proven": False, "bound_s": 90.0}
-    assert shown(sequence_summary(unproven))[2] == "proven bound 90.00 s, gap 10.00%"
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ({"optimum_proven": False, "bound_cost": 90.0}, "proven bound 90.00 s, gap 10.00% (A*)"),
+        ({"gap": None}, "proven optimum 100.00 s (A*)"),
+        ({"order": ["rook", "sign", "rook"]}, "srl: 110.00 s for 2 rooks, 1 sign (seed 3)"),
+        ({"objective": "mean-tardiness"}, "srl: mean tardiness 110.00 s for 2 toasts (seed 3)"),
+        ({"objective": "tardy-parts", "cost": 2.0}, "srl: tardy parts 2.00 for 2 toasts (seed 3)"),
+        (
+            {"objective": "tardy-parts", "bound_cost": 1.0, "gap": 1.0, "bound_by": "CP-SAT"},
+            "proven optimum 1.00, gap 100.00% (CP-SAT)",
+        ),
+        ({"sessions": 2, "success_percent": None}, "2 sessions: mean best 110.00 s"),
+    ],
+)
+def test_sequences_that_went_otherwise(change: dict[str, Any], line: str) -> None:
+    assert line in shown(sequence_summary(FOUND | change))
+
+
+def test_a_sequence_with_advice() -> None:
+    advice = {"requests": 12, "helped_steps": 40, "misleads": 1, "rejected_at_episode": None}
+    lines = shown(sequence_summary(FOUND | {"advice": [advice, advice | {"rejected_at_episode": 95}]}))
+    assert lines[3:] == [
+        "session 1: asked in 12 episodes, 40 moves advised",
+        "session 2: asked in 12 episodes, 40 moves advised; rejected its advisor in episode 95",
+    ]
+
+
+def test_a_sequence_in_drawn_times() -> None:
+    drawn = {
+        "replications": 200,
+        "fixed": {"mean": 112.0, "ci95": [110.5, 113.5]},
+        "reacting": {"mean": 109.0, "ci95": [108.0, 110.0], "policy": "planned anew at every decision"},
+        "saved_by_reacting": {"mean": 3.0, "ci95": [2.25, 3.75]},
+    }
+    lines = shown(sequence_summary(FOUND | {"stochastic": drawn}))
+    assert lines[3:] == [
+        "200 drawn episodes: the list as it is 112.00 s (110.50 to 113.50)",
+        "reacting 109.00 s (108.00 to 110.00): planned anew at every decision",
+        "saved by reacting 3.00 s (2.25 to 3.75)",
+    ]
 
 
 def test_a_table_takes_what_looks_like_markup_as_it_is() -> None:

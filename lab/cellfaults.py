@@ -1,0 +1,131 @@
+"""What is wrong with a cell file, and where in it."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+from lab.cellparts import CellFields
+from lab.errors import BadInput, unknown
+from lab.sequencing.cell import MAX_PARTS, check_layout, needed_moves
+from lab.tomltext import Loc
+
+MAX_STAGES = 400  # of all routes together: the time to find the moves they need grows with the square
+SHOWN = 3  # missing moves in one message
+
+
+class Fault(NamedTuple):
+    """The way to what is wrong in the file, and what is wrong."""
+
+    loc: Loc
+    message: str
+
+
+def file_faults(cell: CellFields) -> Iterator[Fault]:
+    """Faults of all but stations, routes and times: the order, the robot's start, due times, names of methods."""
+    yield from _order_faults(cell)
+    if cell.robot.start not in cell.station_names:
+        yield Fault(("robot", "start"), str(unknown("station", cell.robot.start, cell.station_names, "robot.start")))
+    if cell.due_s is not None and cell.due_factor is not None:
+        yield Fault(("due_factor",), "due_s and due_factor: wanted is one of them, a time for each part or a rule")
+    for field, error in cell.sequencing.faults(due=cell.due_s is not None or cell.due_factor is not None):
+        yield Fault(("sequencing", field), str(error))
+
+
+def _order_faults(cell: CellFields) -> Iterator[Fault]:
+    if (cell.order is None) == (cell.parts is None):
+        yield Fault(("parts",), "order and parts: wanted is one of them, a product for each part or a number")
+    if cell.parts is not None and len(cell.products) > 1:
+        yield Fault(("parts",), f"parts = {cell.parts}: with several products an order is wanted, one for each part")
+    count, field = (len(cell.order), "order") if cell.order is not None else (cell.parts or 0, "parts")
+    if not 1 <= count <= MAX_PARTS:
+        yield Fault((field,), f"an order of {count} parts: allowed are 1 to {MAX_PARTS}")
+    for number, name in enumerate(cell.order or ()):
+        if name not in cell.names:
+            where = f"part {number + 1} of the order"
+            yield Fault(("order", number), str(unknown("product", name, cell.names, where)))
+
+
+def layout_faults(cell: CellFields) -> Iterator[Fault]:
+    """Stations and routes that cannot be, machines without a time, stations that no route leads to."""
+    stages = list(cell.stages())
+    if len(stages) > MAX_STAGES:
+        yield Fault(("products",), f"{len(stages)} stages on all routes together: allowed are up to {MAX_STAGES}")
+    try:
+        check_layout(cell.built_stations, cell.built_products)
+    except BadInput as error:
+        yield Fault(loc_of(cell, str(error)) or _bad_stage(cell), str(error))
+    reached = {cell.robot.start} | {name for _, stage in stages for name in (stage.station, stage.buffer)}
+    timeless = {one.name for one in cell.stations if one.kind == "machine" and one.processing_s is None}
+    for loc, stage in stages:
+        if stage.station in timeless and stage.processing_s is None:
+            yield Fault(loc, f"machine '{stage.station}' has no processing_s, and neither has this stage of a route")
+    for number, station in enumerate(cell.stations):
+        if station.name not in reached:
+            yield Fault(("stations", number, "name"), f"station '{station.name}' cannot be reached: it is on no route")
+
+
+def travel_faults(cell: CellFields) -> Iterator[Fault]:
+    """Names in the tables of times that no station has, and times for staying."""
+    names = cell.station_names
+    for field, table in (("travel", cell.travel), ("loaded", cell.loaded)):
+        for origin, row in table.items():
+            if origin not in names:
+                yield Fault((field, origin), str(unknown("station", origin, names, field)))
+            for target, time_s in row.items():
+                loc = (field, origin, target)
+                if target not in names:
+                    yield Fault(loc, str(unknown("station", target, names, f"{field} from '{origin}'")))
+                if target == origin and time_s > 0:
+                    yield Fault(loc, f"{field} '{origin}' -> '{target}' = {time_s:g}: staying takes 0 s")
+
+
+def missing_times(cell: CellFields, parts: int) -> Iterator[Fault]:
+    """Moves that a sequence for so many parts may need and that have no time; when none leads to a station, that.
+
+    For a cell without the faults above.
+    """
+    needed = needed_moves(cell.built_stations, cell.built_products, cell.robot.start, parts, cell.buffers)
+    given = {(origin, target) for origin, row in cell.travel.items() for target in row}
+    carried = given | {(origin, target) for origin, row in cell.loaded.items() for target in row}
+    lacking = {pair: "go there empty" for pair in needed.empty if pair not in given}
+    lacking |= {pair: "carry a part there" for pair in needed.loaded if pair not in carried}
+    if not lacking:
+        return
+    ways = list(dict.fromkeys((*needed.empty, *needed.loaded)))
+    for number, name in enumerate(cell.station_names):
+        into = [pair for pair in ways if pair[1] == name]
+        if len(into) > 1 and all(pair in lacking for pair in into):
+            some = ", ".join(f"'{origin}' -> '{target}'" for origin, target in into[:SHOWN])
+            more = f" and {len(into) - SHOWN} more" if len(into) > SHOWN else ""
+            unreached = f"station '{name}' cannot be reached: there is no travel time {some}{more}"
+            yield Fault(("stations", number, "name"), unreached)
+    (origin, target), why = next(iter(lacking.items()))
+    only = f"; no other time leads to '{target}'" if sum(pair[1] == target for pair in ways) == 1 else ""
+    more = f" (and {len(lacking) - 1} more are missing)" if len(lacking) > 1 else ""
+    missing = f"travel time '{origin}' -> '{target}' is missing: the robot may have to {why}{only}{more}"
+    yield Fault(("travel", origin), missing)
+
+
+def loc_of(cell: CellFields, message: str) -> Loc:
+    """Where the sequencer's complaint about a station, a product or due times belongs in the file; () when nowhere."""
+    for field, members in (("stations", cell.stations), ("products", cell.products)):
+        for number in reversed(range(len(members))):  # of two of one name the second is one too many
+            if message.startswith(f"{field[:-1]} '{members[number].name}'"):
+                return (field, number, "name")
+    if found := re.match(r"due_s of part (\d+) ", message):
+        return ("due_s", int(found[1]) - 1)
+    return ("due_s",) if message.startswith("due_s") else ()
+
+
+def _bad_stage(cell: CellFields) -> Loc:
+    """The first route that cannot be even alone, and its stage that the complaint is about."""
+    for i, product in enumerate(cell.built_products):
+        for j, route in enumerate(product.routes):
+            try:
+                check_layout(cell.built_stations, (replace(product, routes=(route,)),))
+            except BadInput as error:
+                found = re.match(r".*stage (\d+) of ", str(error))
+                stage = () if found is None else (int(found[1]) - 1,)
+                return ("products", i, "routes", j, *stage)
+    return ()

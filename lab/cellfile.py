@@ -1,0 +1,163 @@
+"""Cell files: a cell for the sequencer alone, without physics, and the words that ask for an order of its parts."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PrivateAttr, ValidationError
+
+from lab.cellfaults import Fault, file_faults, layout_faults, loc_of, missing_times, travel_faults
+from lab.cellparts import CellFields, CellStage, Times
+from lab.errors import BadInput, unknown
+from lab.sequencing.cell import MAX_PARTS, Arrivals, Cell
+from lab.sequencing.chance import Chance
+from lab.sequencing.deadlock import forced
+from lab.tomltext import TomlText, explain
+
+TOAST_CASES = {"I": "toast-case-1", "II": "toast-case-2", "III": "toast-case-3"}
+
+
+class CellFile(CellFields):
+    """A whole cell file: the cell, the order it is to make, and how a sequence for it is looked for; read by `checked`."""
+
+    _toml: TomlText | None = PrivateAttr(default=None)
+
+    @classmethod
+    def checked(cls, toml: TomlText) -> Self:
+        """The cell that a file's text describes; BadInput, with file and line, when its own order cannot be made."""
+        try:
+            found = cls.model_validate(toml.raw)
+        except ValidationError as error:
+            raise toml.refusal(error.errors()[0]["loc"], explain(error)) from None
+        found._toml = toml
+        found.cell()
+        return found
+
+    def cell(self, order: Sequence[str] | int | None = None) -> Cell:
+        """The cell for an order: a product for each part, or a number of parts of the only one; None: the file's own.
+
+        Raises BadInput, with file and line when it was read from a file, for what cannot be a cell, and for a cell in
+        which every sequence ends in a deadlock.
+        """
+        built = self._cell_or_fault(order)
+        if isinstance(built, Cell):
+            return built
+        raise BadInput(built.message) if self._toml is None else self._toml.refusal(built.loc, built.message)
+
+    def chance(self) -> Chance:
+        """What --stochastic draws from."""
+        return self.stochastic.built()
+
+    def work_s(self, product: str) -> float:
+        """The least that a part of a product takes alone: moves, processing and service on its quickest route [s].
+
+        BadInput for an unknown product. For a file without faults.
+        """
+        if product not in self.names:
+            raise unknown("product", product, self.names, f"cell '{self.name}'")
+        return min(self._route_s(route) for route in self.products[self.names.index(product)].routes)
+
+    def ordered(self, order: Sequence[str] | int | None = None) -> tuple[str, ...]:
+        """A product for each part of an order as `cell` takes it; BadInput for one that this cell cannot be given."""
+        if order is None:
+            return self.order if self.order is not None else (self.names[0],) * (self.parts or 0)
+        count = order if isinstance(order, int) else len(order)
+        if isinstance(order, int) and len(self.products) > 1:
+            wanted = f"give their order with --case, such as {_example(self.names)}"
+            raise BadInput(f"{order} parts (--toasts): cell '{self.name}' makes several products: {wanted}")
+        if not 1 <= count <= MAX_PARTS:
+            raise BadInput(f"an order of {count} parts: allowed are 1 to {MAX_PARTS}")
+        parts = (self.names[0],) * count if isinstance(order, int) else tuple(order)
+        for name in parts:
+            if name not in self.names:
+                raise unknown("product", name, self.names, f"order for cell '{self.name}'")
+        return parts
+
+    def _cell_or_fault(self, order: Sequence[str] | int | None) -> Cell | Fault:
+        """The cell, or the first fault; each kind of fault is looked for once there are none of those before it."""
+        for faults in (file_faults, layout_faults, travel_faults):
+            if (fault := next(faults(self), None)) is not None:
+                return fault
+        parts = self.ordered(order)
+        if (fault := next(missing_times(self, len(parts)), None)) is not None:
+            return fault
+        try:
+            cell = self._built(parts)
+        except BadInput as error:
+            return Fault(loc_of(self, str(error)), str(error))
+        deadlock = forced(cell)
+        return cell if deadlock is None else Fault(("products",), f"no sequence can finish the order: {deadlock}")
+
+    def _built(self, parts: tuple[str, ...]) -> Cell:
+        arrivals, due_s = self.arrivals, self.due_s
+        came_s = [0.0 if arrivals is None else number * arrivals.interval_s for number in range(1, len(parts) + 1)]
+        if self.due_factor is not None:
+            due_s = tuple(came + self.due_factor * self.work_s(name) for came, name in zip(came_s, parts, strict=True))
+        return Cell(
+            self.built_stations,
+            self.built_products,
+            parts,
+            self._table(self.travel),
+            self._table(self.travel, self.loaded),
+            self.robot.start,
+            None if arrivals is None else Arrivals((arrivals.interval_s,) * len(parts), arrivals.after),
+            self.buffers,
+            due_s,
+        )
+
+    def _table(self, *tables: Times) -> NDArray[np.float64]:
+        """Seconds (n, n) from station row to station column, NaN where there is no time; what a later table says counts."""
+        names = self.station_names
+        seconds = np.full((len(names), len(names)), np.nan)
+        for table in tables:
+            for origin, row in table.items():
+                for target, time_s in row.items():
+                    seconds[names.index(origin), names.index(target)] = time_s
+        return seconds
+
+    def _route_s(self, route: tuple[CellStage, ...]) -> float:
+        """What one part takes along a route when it never waits, its pallets' moves included [s]."""
+        own_s = {station.name: station.processing_s or 0.0 for station in self.stations}
+        legs = [*pairwise(stage.station for stage in route)]
+        work_s = 0.0
+        for number, stage in enumerate(route):
+            work_s += stage.service_s + (own_s[stage.station] if stage.processing_s is None else stage.processing_s)
+            if stage.pallet:
+                legs.append((route[number - 1].station, route[number + 1].station))
+        carried_s = [self.loaded.get(a, {}).get(b, self.travel.get(a, {}).get(b, 0.0)) for a, b in legs]
+        return work_s + sum(carried_s)
+
+
+def toast_case(word: str) -> str:
+    """The name of the cell file of a case of the thesis's toast cell: I, II or III, or 1, 2 or 3. BadInput for others."""
+    for number, (case, name) in enumerate(TOAST_CASES.items(), 1):
+        if word.strip().upper() in (case, str(number)):
+            return name
+    raise unknown("case", word, TOAST_CASES, "--case")
+
+
+def order_from_word(cellfile: CellFile, word: str) -> tuple[str, ...]:
+    """The order that a word means: products by their initials, "RSR", or in full, "rook,sign,rook". BadInput for others."""
+    if "," in word or word in cellfile.names:
+        return cellfile.ordered([name.strip() for name in word.split(",")])
+    meant: dict[str, list[str]] = {}
+    for name in cellfile.names:
+        meant.setdefault(name[0].upper(), []).append(name)
+    known = ", ".join(f"{letter} ({' or '.join(names)})" for letter, names in meant.items())
+    order: list[str] = []
+    for number, letter in enumerate(word.strip(), 1):
+        found = meant.get(letter.upper(), [])
+        if len(found) != 1:
+            wrong = f"letter {number}, '{letter}', means {'no' if not found else 'more than one'} product"
+            wanted = f"known: {known}; or names with commas between them"
+            raise BadInput(f"order '{word[:80]}' (--case) for cell '{cellfile.name}': {wrong}: {wanted}")
+        order += found
+    return cellfile.ordered(order)
+
+
+def _example(names: Sequence[str]) -> str:
+    """An order to show, in the shortest words that `order_from_word` takes."""
+    letters = [name[0].upper() for name in names]
+    return "".join([*letters, letters[0]]) if len(set(letters)) == len(letters) else ",".join([*names, names[0]])

@@ -1,0 +1,317 @@
+"""The order of the robot's transfers: of a task, over measured durations, or of a cell file."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lab.cellfile import CellFile, order_from_word, toast_case
+from lab.cellparts import Sequencing
+from lab.errors import BadInput, unknown
+from lab.gridworld import GridWorld
+from lab.listener import Listener
+from lab.sequencing import DRAWN, SEQUENCERS
+from lab.sequencing.cell import Cell
+from lab.sequencing.chance import NO_CHANCE, Chance
+from lab.sequencing.events import EpisodeSequenced, LearnedSequence, SequenceResult
+from lab.sequencing.objectives import MAKESPAN, check_objective
+from lab.sequencing.search import SAME, Reference, Search
+from lab.taskfile import Task, load_any
+from lab.teaching import Teacher
+
+if TYPE_CHECKING:
+    from lab.sequencing.advised import AdvisedResult, SequenceRequest
+    from lab.sequencing.execute import Policy
+
+    Ask = Callable[[SequenceRequest], int | None]
+
+REPLICATIONS = 200  # drawn episodes in which a list and a policy are compared
+DEFAULT_TOASTS = 3
+SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What `lab sequence` is asked for; None: as the file says. advisor: who may be asked which part to move next."""
+
+    method: str | None = None
+    episodes: int | None = None
+    objective: str | None = None
+    sessions: int = 1
+    seed: int = 0
+    stochastic: bool = False
+    advisor: str = "none"
+    gate: str = "ccrl"
+    ask: "Ask | None" = None
+
+
+def search_for(
+    settings: Sequencing,
+    *,
+    episodes: int | None = None,
+    objective: str | None = None,
+    chance: Chance = NO_CHANCE,
+    on_episode: Callable[[EpisodeSequenced], None] | None = None,
+) -> Search:
+    """What a file's settings ask of a sequencer, changed where something else is given."""
+    return Search(
+        episodes or settings.episodes, objective or settings.objective, chance, settings.settings(), on_episode
+    )
+
+
+def find_sequence(
+    cell: Cell, method: str, search: Search, seed: int, session: int = 0
+) -> SequenceResult:
+    """The best sequence that a method finds; BadInput for an unknown method."""
+    _check_method(method)
+    return SEQUENCERS[method](cell, search, np.random.default_rng([seed, 2, session]))
+
+
+def sequence_named(
+    name: str,
+    case: str | None,
+    toasts: int | None,
+    wanted: Wanted,
+    *,
+    teacher: Teacher,
+    listener: Listener,
+    files: dict[str, Path],
+) -> dict[str, Any]:
+    """What `lab sequence` does: a cell file's cell, or a task's over durations measured in simulation, and its pictures.
+
+    files: pictures to draw, by name (see `draw`). Raises BadInput for a world and for what does not fit the file.
+    """
+    from lab.view.canvas import check_picture
+
+    for path in files.values():
+        check_picture(path)
+    if case is not None and name == "toast":
+        name, case = toast_case(case), None
+    loaded = load_any(name)
+    if isinstance(loaded, GridWorld):
+        raise BadInput(f"{name}: it is a world, there is nothing to sequence: learn it with lab teach {name}")
+    if isinstance(loaded, CellFile):
+        cell, chance = ordered_cell(loaded, case, toasts), loaded.chance()
+    else:
+        if case is not None:
+            raise BadInput(f"case '{case}' (--case): task '{name}' has none; toast has I, II and III, a cell its orders")
+        cell, chance = measured_cell(loaded, DEFAULT_TOASTS if toasts is None else toasts, wanted, teacher, listener), Chance()
+    listener.phase("sequence", wanted.sessions)
+    document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, on_session=listener.sequenced)
+    document = {"task": loaded.name} | document
+    draw(cell, document, found, files)
+    return document
+
+
+def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
+    """The cell of a file, for its own order, or the one that --case or --toasts asks for."""
+    if case is not None and toasts is not None:
+        raise BadInput(f"--case {case} and --toasts {toasts}: an order is one or the other")
+    return file.cell(order_from_word(file, case) if case is not None else toasts)
+
+
+def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher, listener: Listener) -> Cell:
+    """The cell of a task, once its skills are learned and their durations measured."""
+    from lab.run import prepare, teach_all
+
+    _check_method(wanted.method or task.sequencing.method)
+    return teach_all(prepare(task, toasts, teacher.seed), teacher, listener).cell
+
+
+def sequence_cell(
+    cell: Cell,
+    settings: Sequencing,
+    wanted: Wanted,
+    chance: Chance,
+    *,
+    on_session: Callable[[SequenceResult, Reference], None] | None = None,
+) -> tuple[dict[str, Any], list[SequenceResult]]:
+    """Sessions of one method on a cell, beside what cannot be beaten; the document of `lab sequence`, and the sessions.
+
+    BadInput for an unknown method or objective, and for an objective that the cell has no times for.
+    """
+    method = wanted.method or settings.method
+    search = search_for(
+        settings,
+        episodes=wanted.episodes,
+        objective=wanted.objective,
+        chance=chance if wanted.stochastic and method in DRAWN else NO_CHANCE,
+    )
+    _check_method(method)
+    check_objective(search.objective, cell)
+    known = reference(cell, search.objective)
+    found = []
+    for session in range(wanted.sessions):
+        if wanted.advisor == "none":
+            found.append(find_sequence(cell, method, search, wanted.seed, session))
+        else:
+            found.append(_advised(cell, method, search, wanted, session))
+        if on_session is not None:
+            on_session(found[-1], known)
+    document = _document(cell, method, search, found, known, wanted)
+    if wanted.stochastic:
+        document["stochastic"] = stochastic(cell, method, search, min(found, key=_cost), chance, wanted.seed)
+    return document, found
+
+
+def _advised(cell: Cell, method: str, search: Search, wanted: Wanted, session: int) -> "AdvisedResult":
+    """A session of SRL with advice."""
+    from lab.learning.settings import GateSettings
+    from lab.sequencing.advised import advised_srl, sequence_advisor
+
+    if method != "srl":
+        raise BadInput(f"--advisor {wanted.advisor} with --method {method}: only srl asks for advice")
+    rng = np.random.default_rng([wanted.seed, 2, session])
+    advisor = sequence_advisor(wanted.advisor, cell, np.random.default_rng([wanted.seed, 3, session]), wanted.ask)
+    return advised_srl(cell, search, rng, GateSettings(wanted.gate), advisor)
+
+
+def reference(cell: Cell, objective: str) -> Reference:
+    """The proven optimum, or the best bound: by A* for the makespan, by CP-SAT for the other objectives."""
+    if objective == MAKESPAN:
+        from lab.sequencing.exact import optimum
+
+        best = optimum(cell)
+        return Reference(best.bound_s, best.proven, "A*")
+    from lab.sequencing.cpsat import cp_sat
+
+    opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)
+    return Reference(opinion.bound, opinion.proven, "CP-SAT")
+
+
+def stochastic(
+    cell: Cell, method: str, search: Search, found: SequenceResult, chance: Chance, seed: int
+) -> dict[str, Any]:
+    """The list as it is and a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
+    from lab.sequencing.execute import replicate
+
+    policy, says = _policy(cell, method, search, seed)
+    fixed = _planned(cell, method, search, found, seed)
+    costs = [replicate(cell, how, chance, REPLICATIONS, seed, search.objective) for how in (fixed, policy)]
+    difference = costs[0] - costs[1]
+    return {
+        "processing": chance.processing,
+        "arrivals": chance.arrivals if cell.arrivals else None,
+        "spread": chance.spread,
+        "replications": REPLICATIONS,
+        "fixed": _mean(costs[0]) | {"sequence": list(fixed)},
+        "reacting": _mean(costs[1]) | {"policy": says},
+        "saved_by_reacting": _mean(difference),
+    }
+
+
+def _policy(cell: Cell, method: str, search: Search, seed: int) -> "tuple[Policy, str]":
+    """What reacts in the manner of the method, and what that is."""
+    from lab.sequencing.execute import by_rule, replan
+    from lab.sequencing.reactive import reacting
+    from lab.sequencing.rivals import first_in_first_out
+    from lab.sequencing.rules import RULES
+
+    if method == "srl-time":
+        return reacting(cell, search.objective, seed), "it goes on learning before every decision"
+    if method in RULES:
+        return by_rule(RULES[method]), f"the rule {method}, asked at every decision"
+    if method == "fifo":
+        return first_in_first_out, "a queue of tasks as they become possible"
+    return replan(objective=search.objective), "planned anew at every decision"
+
+
+def _planned(cell: Cell, method: str, search: Search, found: SequenceResult, seed: int) -> Sequence[int]:
+    """The list to carry out as it is: what the method finds with the mean times."""
+    if search.chance == NO_CHANCE:
+        return found.sequence
+    return find_sequence(cell, method, replace(search, chance=NO_CHANCE, on_episode=None), seed).sequence
+
+
+def _document(
+    cell: Cell, method: str, search: Search, found: Sequence[SequenceResult], known: Reference, wanted: Wanted
+) -> dict[str, Any]:
+    from lab.sequencing.run import simulate
+
+    best = min(found, key=_cost)
+    hits = [result.cost <= known.bound + SAME for result in found]
+    finals = [result.final_cost <= known.bound + SAME for result in found if isinstance(result, LearnedSequence)]
+    schedule = simulate(cell, best.sequence)
+    timed, same_times = search.objective == MAKESPAN, search.chance == NO_CHANCE  # a lucky draw is no success
+    optimal = known.bound if known.proven else None
+    return {
+        "toasts": cell.parts,
+        "order": list(cell.order),
+        "seed": wanted.seed,
+        "method": method,
+        "objective": search.objective,
+        "episodes": len(best.episode_costs),
+        "sessions": wanted.sessions,
+        "makespan_s": best.cost if timed else schedule.makespan_s,
+        "cost": best.cost,
+        "sequence": list(best.sequence),
+        "moves": _in_words(cell, best.sequence),
+        "episode_costs": list(found[0].episode_costs),
+        "episode_makespans_s": list(found[0].episode_costs) if timed else None,
+        "optimal_s": optimal if timed else None,
+        "optimal_cost": optimal,
+        "optimum_proven": known.proven,
+        "bound_s": known.bound if timed else None,
+        "bound_cost": known.bound,
+        "bound_by": known.method,
+        "gap": known.gap(best.cost) if same_times else None,
+        "success_percent": 100.0 * sum(hits) / len(found) if known.proven and same_times else None,
+        "final_success_percent": 100.0 * sum(finals) / len(finals) if finals and known.proven and same_times else None,
+        "mean_best_s": float(np.mean([result.cost for result in found])) if timed else None,
+        "mean_best_cost": float(np.mean([result.cost for result in found])),
+        "advisor": wanted.advisor,
+        "advice": _advice(found) if wanted.advisor != "none" else None,
+        "stochastic": None,
+        "files": {},
+    }
+
+
+def _advice(found: "Sequence[Any]") -> list[dict[str, Any]]:
+    """What became of the advice, session by session."""
+    names = ("requests", "helped_steps", "misleads", "rejected_at_episode")
+    return [{name: getattr(result, name) for name in names} for result in found]
+
+
+def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
+    """What each decision of a sequence does."""
+    from lab.sequencing.run import Run
+
+    run, words = Run(cell), []
+    for decision in sequence:
+        move = run.move(decision)
+        what = cell.part_name(move.part) + ("'s pallet" if move.carries == "pallet" else "")
+        words.append(f"{what}: {move.origin} > {move.target}")
+    return words
+
+
+def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], files: dict[str, Path]) -> None:
+    """The pictures that are asked for by name: "plot", the costs of the episodes, "gantt", the best sequence."""
+    from lab.sequencing.run import simulate
+    from lab.view.gantt import gantt
+    from lab.view.plots import sequence_plot
+
+    if "plot" in files:
+        label = "makespan [s]" if document["objective"] == MAKESPAN else document["objective"]
+        costs = [result.episode_costs for result in found]
+        sequence_plot(costs, document["optimal_cost"], files["plot"], ylabel=label)
+    if "gantt" in files:
+        gantt(simulate(cell, document["sequence"]), files["gantt"])
+    document["files"] = {name: str(path) for name, path in files.items()}
+
+
+def _check_method(name: str) -> None:
+    if name not in SEQUENCERS:
+        raise unknown("method", name, SEQUENCERS, "--method")
+
+
+def _mean(values: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, Any]:
+    from lab.studies.statistics import interval
+
+    mean, low, high = interval(values)
+    return {"mean": mean, "ci95": [low, high]}
+
+
+def _cost(result: SequenceResult) -> float:
+    return result.cost

@@ -1,0 +1,194 @@
+"""SRL with advice: when the makespan stops improving, it asks which part to move next, and rejects who misleads."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from lab.advice.advisors import SKILLS, AdvisorLeft
+from lab.advice.gates import GATES, Gate, improvement
+from lab.errors import BadInput, unknown
+from lab.learning.selection import softmax
+from lab.learning.settings import GateSettings
+from lab.sequencing.cell import Cell
+from lab.sequencing.events import LearnedSequence
+from lab.sequencing.exact import optimum
+from lab.sequencing.run import Run
+from lab.sequencing.search import Search, kernel_seed
+from lab.sequencing.sessions import Guide, learn_readably
+from lab.sequencing.srl import Srl
+from lab.sequencing.values import ExactValues
+
+NEVER_REACHED = 10**12  # a cost that no episode has, so that a gate takes every episode for a finished one
+FITTING = ("ccrl", "always", "never")  # gates that judge by episodes alone; those that compare values know steps only
+
+
+@dataclass(frozen=True)
+class SequenceRequest:
+    """What the learner shows when it asks: where the work stands, what may be done, what it would do itself, and why.
+
+    The means are costs over the last K episodes and the K before, None before there are 2K.
+    """
+
+    run: Run
+    allowed: tuple[int, ...]
+    own: int
+    episode: int
+    improvement_rate: float | None
+    current_mean: float | None
+    previous_mean: float | None
+    why: str
+
+
+class SequenceAdvisor(Protocol):
+    """Whoever can be asked which part to move next."""
+
+    def advise(self, request: SequenceRequest) -> int | None:
+        """A decision among the allowed ones; None leaves it to the learner. Raises AdvisorLeft to end advice for good."""
+
+
+@dataclass(frozen=True)
+class AdvisedResult(LearnedSequence):
+    """A sequencer's result, and the advice in it: episodes that asked, decisions taken from the advisor, misleads."""
+
+    requests: int
+    helped_steps: int
+    misleads: int
+    rejected_at_episode: int | None
+
+
+class KnowingAdvisor:
+    """A simulated advisor: draws from a softmax over the exact values; tau in units of the optimum's mean step.
+
+    sign -1: it takes the worst for the best. Source: thesis eq. 9.1, taken to the high level (10.2.1 iii).
+    """
+
+    def __init__(self, cell: Cell, tau: float, rng: np.random.Generator, sign: float = 1.0) -> None:
+        self._values, self._rng, self._tau, self._sign = ExactValues(cell), rng, tau, sign
+        best = optimum(cell)
+        self._unit_s = best.cost / len(best.sequence) or 1.0
+
+    def advise(self, request: SequenceRequest) -> int | None:
+        """One draw among the allowed decisions."""
+        left_s = self._values.of(request.run, request.allowed)
+        worst_s = max((value for value in left_s if value < np.inf), default=0.0) + 10 * self._unit_s
+        worth = [-self._sign * min(value, worst_s) / self._unit_s for value in left_s]
+        return request.allowed[int(self._rng.choice(len(worth), p=softmax(worth, self._tau)))]
+
+
+class AskedAdvisor:
+    """A person, asked through a prompt that a view brings."""
+
+    def __init__(self, ask: Callable[[SequenceRequest], int | None]) -> None:
+        self._ask = ask
+
+    def advise(self, request: SequenceRequest) -> int | None:
+        """What the person says."""
+        return self._ask(request)
+
+
+def sequence_advisor(
+    name: str,
+    cell: Cell,
+    rng: np.random.Generator,
+    ask: Callable[[SequenceRequest], int | None] | None = None,
+) -> SequenceAdvisor | None:
+    """The advisor of that name: one of the four skills, "tau=X", "wrong", "terminal" (needs `ask`), "none".
+
+    Raises BadInput for other names, for "terminal" without a prompt, and for a cell with too many states to know.
+    """
+    if name == "none":
+        return None
+    if name == "terminal":
+        if ask is None:
+            raise BadInput("advisor 'terminal': there is no prompt to ask a person through")
+        return AskedAdvisor(ask)
+    if name == "wrong":
+        return KnowingAdvisor(cell, SKILLS["expert"], rng, sign=-1.0)
+    if name in SKILLS:
+        return KnowingAdvisor(cell, SKILLS[name], rng)
+    try:
+        tau = float(name.removeprefix("tau=")) if name.startswith("tau=") else 0.0
+    except ValueError:
+        tau = 0.0
+    if not 0.0 < tau < np.inf:
+        raise unknown("advisor", name, [*SKILLS, "wrong", "terminal", "none", "tau=X"], "--advisor")
+    return KnowingAdvisor(cell, tau, rng)
+
+
+def advised_srl(
+    cell: Cell, search: Search, rng: np.random.Generator, gate: GateSettings, advisor: SequenceAdvisor | None
+) -> AdvisedResult:
+    """SRL as printed that asks for advice when the gate says so; an advised decision is learned from as its own.
+
+    The gates are those of the low level: the step counts that they compare are costs here (makespans [s]). Raises
+    BadInput for a gate that does not judge by episodes, and as `srl` does. Source: thesis 10.2.1 iii with fig. 6.2.
+    """
+    if gate.gate not in FITTING:
+        raise unknown("gate", gate.gate, FITTING, "--gate, for sequencing") if gate.gate not in GATES else BadInput(
+            f"gate '{gate.gate}' (--gate): it looks at a table of states, which sequencing has not; "
+            f"allowed here: {', '.join(FITTING)}"
+        )
+    session = _Advised(GATES[gate.gate](gate, search.episodes, NEVER_REACHED, None), gate, advisor)
+    learned = learn_readably(cell, search, kernel_seed(rng), Srl, session)
+    log = learned.log
+    log.check(cell)
+    return AdvisedResult(
+        log.best,
+        log.best_cost,
+        tuple(log.costs),
+        learned.final_cost,
+        session.requests,
+        session.helped_steps,
+        session.gate.misleads,
+        session.rejected_at,
+    )
+
+
+class _Advised(Guide):
+    """What a session asks before it takes its own decision, and tells when an episode has ended."""
+
+    def __init__(self, gate: Gate, settings: GateSettings, advisor: SequenceAdvisor | None) -> None:
+        self.gate, self._settings, self._advisor = gate, settings, advisor
+        self.requests = self.helped_steps = 0
+        self.rejected_at: int | None = None
+        self._costs: list[float] = []
+        self._open = self._asked = False
+        self._helped = 0
+
+    def begins(self, episode: int) -> None:
+        """An episode begins: may it ask?"""
+        self._open = self._advisor is not None and self.gate.opens(episode, self._costs)
+        self._asked, self._helped = False, 0
+
+    def decide(self, run: Run, allowed: tuple[int, ...], own: int) -> int:
+        """The advisor's decision where the episode is open and there is a choice, else the learner's own."""
+        if not self._open or self._advisor is None or len(allowed) == 1:
+            return own
+        self.requests += not self._asked
+        self._asked = True
+        means = improvement(self._costs, self._settings.window)
+        rate, current, previous = (means.rate, means.current_mean, means.previous_mean) if means else (None, None, None)
+        number = len(self._costs) + 1
+        try:
+            said = self._advisor.advise(
+                SequenceRequest(run, allowed, own, number, rate, current, previous, self.gate.why)
+            )
+        except AdvisorLeft:
+            self._advisor = None
+            return own
+        if said is None:
+            return own
+        if said not in allowed:
+            raise BadInput(f"the advisor named {said}: allowed {', '.join(map(str, allowed))}")
+        self._helped += 1
+        return said
+
+    def ends(self, cost: float) -> None:
+        """An episode has ended: was it better than those before?"""
+        self._costs.append(cost)
+        self.helped_steps += self._helped
+        self.gate.judges(self._costs, self._open and self._helped > 0)
+        if self.gate.rejected and self.rejected_at is None:
+            self.rejected_at = len(self._costs)

@@ -1,0 +1,166 @@
+"""What a cell is laid out of: stations, stages, routes and products, when parts arrive; and what cannot be."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Literal
+
+import numpy as np
+
+from lab.errors import BadInput, unknown
+
+MAX_S = 1e9  # one time; far above any cell, far below where sums lose their nanoseconds
+ROBOT = "robot"
+STATION_KINDS = ("storage", "buffer", "machine")
+
+
+@dataclass(frozen=True)
+class Station:
+    """A place for parts. `capacity` in parts; `processing_s` in seconds, above 0 only for machines."""
+
+    name: str
+    kind: Literal["storage", "buffer", "machine"]
+    capacity: int
+    processing_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A step of a route: the station to reach, and the buffer before it for when it is full (None: no buffer).
+
+    processing_s: this product's time there (None: the station's). service_s: what the robot has to do there before it
+    can take the part out, such as vacuuming a mill [s]. pallet: the part is lifted off its pallet for this machine; the
+    pallet stays at the station before, and has to be brought to the station after before the part can leave.
+    """
+
+    station: str
+    buffer: str | None = None
+    processing_s: float | None = None
+    service_s: float = 0.0
+    pallet: bool = False
+
+
+Route = tuple[Stage, ...]
+
+
+@dataclass(frozen=True)
+class Product:
+    """A type of part: its name and the routes that a part of it may take; all begin at the same station."""
+
+    name: str
+    routes: tuple[Route, ...]
+
+
+@dataclass(frozen=True)
+class Arrivals:
+    """When parts come to the first station, in the order of the order: `interval_s` before each [s], mean or constant.
+
+    after: "clock", from the arrival before; "pick", from when the part before was taken away, as when a vehicle brings
+    one at a time (thesis App. III's listing).
+    """
+
+    interval_s: tuple[float, ...]
+    after: Literal["clock", "pick"] = "clock"
+
+
+def check_layout(stations: Sequence[Station], products: Sequence[Product]) -> None:
+    """BadInput for stations and routes that cannot be."""
+    _check_stations(stations)
+    names: set[str] = set()
+    for product in products:
+        if product.name in names:
+            raise BadInput(f"product '{product.name}': the name is used twice; every product needs its own")
+        names.add(product.name)
+        if not product.routes:
+            raise BadInput(f"product '{product.name}': it has no route; it needs at least one")
+        for number, route in enumerate(product.routes, 1):
+            one_of = f"route {number}" if len(product.routes) > 1 else "the route"
+            _check_route(stations, route, one_of if len(products) == 1 else f"{one_of} of '{product.name}'")
+            if route[0].station != product.routes[0][0].station:
+                starts = f"'{product.routes[0][0].station}' and '{route[0].station}'"
+                raise BadInput(f"product '{product.name}': its routes begin at {starts}; they must begin alike")
+    if not products:
+        raise BadInput("a cell needs at least one product")
+    ends = {stage.station for p in products for route in p.routes for stage in (route[0], route[-1])}
+    inner = {stage.station for p in products for route in p.routes for stage in route[1:-1]}
+    inner |= {stage.buffer for p in products for route in p.routes for stage in route if stage.buffer}
+    if ends & inner:
+        raise BadInput(f"station '{min(ends & inner)}' is an end of one route and inside another; it can only be one")
+
+
+def _check_stations(stations: Sequence[Station]) -> None:
+    seen: set[str] = set()
+    for station in stations:
+        where = f"station '{station.name}'"
+        if station.name in seen:
+            raise BadInput(f"{where}: the name is used twice; every station needs its own")
+        seen.add(station.name)
+        if station.name == ROBOT:
+            raise BadInput(f"{where}: 'robot' names another row of a schedule; call it something else")
+        if station.kind not in STATION_KINDS:
+            raise unknown("kind", station.kind, STATION_KINDS, where)
+        if not is_count(station.capacity):
+            raise BadInput(f"{where}: capacity = {station.capacity!r}; allowed are whole numbers from 1")
+        check_seconds(f"{where}: processing_s", station.processing_s)
+        if station.kind != "machine" and station.processing_s > 0:
+            raise BadInput(f"{where}: processing_s = {station.processing_s}, but only a machine processes")
+
+
+def _check_route(stations: Sequence[Station], route: Route, one_of: str) -> None:
+    kinds = {station.name: station.kind for station in stations}
+    if len(route) < 2:
+        raise BadInput(f"{one_of} has {len(route)} stages; it needs at least 2, a start and an end")
+    if route[0].buffer is not None:
+        raise BadInput(f"stage 1 of {one_of} ('{route[0].station}'): buffer '{route[0].buffer}' before the start")
+    visited: set[str] = set()
+    for number, stage in enumerate(route, 1):
+        where = f"stage {number} of {one_of}"
+        for name, is_buffer in ((stage.station, False), (stage.buffer, True)):
+            if name is None:
+                continue
+            if name not in kinds:
+                raise unknown("station", name, kinds, where)
+            if name in visited:
+                raise BadInput(f"{where}: station '{name}' is on the route twice, a cycle; once is allowed")
+            visited.add(name)
+            if is_buffer and kinds[name] != "buffer":
+                raise BadInput(f"{where}: '{name}' is a {kinds[name]}; a buffer fits")
+        if number in (1, len(route)) and kinds[stage.station] != "storage":
+            raise BadInput(
+                f"{where}: '{stage.station}' is a {kinds[stage.station]}; a route starts and ends in storage"
+            )
+        _check_stage(stage, kinds[stage.station], where)
+    for number, stage in enumerate(route, 1):
+        if stage.pallet and not _takes_pallet(route, number - 1, kinds):
+            raise BadInput(
+                f"stage {number} of {one_of}: pallet = true needs a buffer or storage before and after it, which are no "
+                "ends of the route, and no 'buffer' of its own or of the stage after"
+            )
+
+
+def _takes_pallet(route: Route, number: int, kinds: Mapping[str, str]) -> bool:
+    before, stage, after = route[number - 1], route[number], route[number + 1]
+    inside = 2 <= number <= len(route) - 3
+    return (
+        inside and not (stage.buffer or after.buffer) and "machine" not in (kinds[before.station], kinds[after.station])
+    )
+
+
+def _check_stage(stage: Stage, kind: str, where: str) -> None:
+    if stage.processing_s is not None:
+        check_seconds(f"{where}: processing_s", stage.processing_s)
+    check_seconds(f"{where}: service_s", stage.service_s)
+    for name, given in (("processing_s", stage.processing_s), ("pallet", stage.pallet), ("service_s", stage.service_s)):
+        if given and kind != "machine":
+            raise BadInput(f"{where}: {name} = {given}, but '{stage.station}' is a {kind}; only a machine has it")
+
+
+def check_seconds(what: str, seconds: float) -> None:
+    """BadInput unless it is a time from 0 to MAX_S."""
+    if not (isfinite(seconds) and 0 <= seconds <= MAX_S):
+        raise BadInput(f"{what} = {seconds}; allowed are 0 to {MAX_S:g} s")
+
+
+def is_count(value: object) -> bool:
+    """Whether it is a whole number from 1."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and int(value) >= 1

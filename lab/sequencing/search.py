@@ -1,0 +1,112 @@
+"""What a sequencer is asked for, and what it returns: the same for all of them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import inf
+from typing import Literal
+
+import numpy as np
+
+from lab.errors import BadInput, WorkFailed, unknown
+from lab.sequencing.cell import Cell
+from lab.sequencing.chance import NO_CHANCE, Chance
+from lab.sequencing.events import EpisodeSequenced
+from lab.sequencing.objectives import MAKESPAN, check_objective
+
+FACTORS = ("A", "B")
+VALUES = ("pairs", "states")
+STATES = ("parts", "stations")
+SAME = 1e-6  # costs nearer than this are equal
+OnEpisode = Callable[[EpisodeSequenced], None]
+
+
+@dataclass(frozen=True)
+class SrlSettings:
+    """The parameters of SRL and of Monte Carlo: alpha, discount, beta (epsilon = n ** -beta), the reward factor's type.
+
+    values: "pairs", Q(s,a) as fig. 5.1; "states", a value per next state, as the listings have it. state: "parts", where
+    each part is, or "stations", what stands at each station (thesis App. III). Raises BadInput for what is out of range.
+    """
+
+    alpha: float = 0.05
+    discount: float = 0.9
+    beta: float = 1.0
+    factor: Literal["A", "B"] = "B"
+    values: Literal["pairs", "states"] = "pairs"
+    state: Literal["parts", "stations"] = "parts"
+
+    def __post_init__(self) -> None:
+        for name, known in (("factor", FACTORS), ("values", VALUES), ("state", STATES)):
+            if getattr(self, name) not in known:
+                raise unknown("reward factor" if name == "factor" else name, getattr(self, name), known, "SRL")
+        for name in ("alpha", "discount"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise BadInput(f"{name} = {getattr(self, name)}: allowed are 0 to 1")
+        if not 0 <= self.beta < inf:
+            raise BadInput(f"beta = {self.beta}: allowed are finite numbers from 0")
+
+
+@dataclass(frozen=True)
+class Search:
+    """How long to look, for what, in which environment, and whom to tell. BadInput for fewer than 1 episode.
+
+    chance: what the processing times and arrivals are drawn from while it learns. settings: those of SRL and Monte
+    Carlo; the others have none.
+    """
+
+    episodes: int = 400
+    objective: str = MAKESPAN
+    chance: Chance = NO_CHANCE
+    settings: SrlSettings = field(default_factory=SrlSettings)
+    on_episode: OnEpisode | None = None
+
+    def __post_init__(self) -> None:
+        if self.episodes < 1:
+            raise BadInput(f"episodes = {self.episodes}: allowed are whole numbers from 1")
+
+    def check(self, cell: Cell) -> None:
+        """BadInput when the cell does not have what the objective needs."""
+        check_objective(self.objective, cell)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What no sequence can beat: `bound`, in the objective's unit; `proven`: some sequence reaches it."""
+
+    bound: float
+    proven: bool
+    method: str
+
+    def gap(self, cost: float) -> float | None:
+        """How much more a cost is than the bound, as a fraction; None where the bound is 0 and the cost is not."""
+        if self.bound > SAME:
+            return cost / self.bound - 1.0
+        return 0.0 if cost <= self.bound + SAME else None
+
+
+@dataclass
+class Log:
+    """The sequences tried so far: the cost of each, and the best one. `note` keeps them and tells the search's listener."""
+
+    search: Search
+    costs: list[float] = field(default_factory=list)
+    best: tuple[int, ...] = ()
+    best_cost: float = inf
+
+    def note(self, sequence: tuple[int, ...], cost: float, complete: bool = True) -> None:
+        """One episode; what ended in a deadlock is not complete, and never the best."""
+        self.costs.append(cost)
+        if complete and cost < self.best_cost:
+            self.best, self.best_cost = sequence, cost
+        if self.search.on_episode is not None:
+            self.search.on_episode(EpisodeSequenced(len(self.costs), cost, self.best_cost))
+
+    def check(self, cell: Cell) -> None:
+        """WorkFailed when no sequence came to its end."""
+        if not self.best:
+            raise WorkFailed(f"no sequence for {cell.parts} parts came to its end in {len(self.costs)} episodes: deadlocks")
+
+
+def kernel_seed(rng: np.random.Generator) -> int:
+    """A seed for the compiled streams, drawn from a generator."""
+    return int(rng.integers(2**63))

@@ -1,0 +1,177 @@
+"""TOML text: its values, the line of the file that each of them stands on, and how a fault in one is said."""
+
+import re
+import tomllib
+from bisect import bisect_right
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from lab.errors import BadInput
+
+Loc = tuple[str | int, ...]  # the way to a value: keys of tables, and numbers in arrays from 0
+
+_BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_PLAIN = re.compile(r"[^,\]}#\n]+")  # a number, a date, true or false
+_STRING = re.compile(
+    r'"""(?:\\.|[^\\])*?""""{0,2}'
+    r"|'''.*?''''{0,2}"
+    r'|"(?:\\.|[^"\\\n])*"'
+    r"|'[^'\n]*'",
+    re.DOTALL,
+)
+
+
+@dataclass(frozen=True)
+class TomlText:
+    """A file's text and its values; all are equal, so that records which remember where they are from compare by content."""
+
+    path: Path = field(compare=False)
+    text: str = field(compare=False, repr=False)
+    raw: dict[str, Any] = field(compare=False, repr=False)
+
+    @classmethod
+    def parsed(cls, path: Path, text: str) -> "TomlText":
+        """The values of a text; BadInput, with file and line, when it is no TOML."""
+        try:
+            return cls(path, text, tomllib.loads(text))
+        except (ValueError, RecursionError) as error:  # beside TOMLDecodeError: numbers or nests beyond Python's limits
+            raise BadInput(f"{path}: not valid TOML: {error}") from None
+
+    @cached_property
+    def _lines(self) -> dict[Loc, int]:
+        return lines_of(self.text)
+
+    def line(self, loc: Sequence[str | int]) -> int | None:
+        """The line, from 1, of a value, or of the nearest thing around it that the file has; None: only the file itself."""
+        for end in range(len(loc), 0, -1):
+            if (line := self._lines.get(tuple(loc[:end]))) is not None:
+                return line
+        return None
+
+    def refusal(self, loc: Sequence[str | int], message: str) -> BadInput:
+        """The error that names the file, the line of what is wrong, and what it is."""
+        line = self.line(loc)
+        return BadInput(f"{self.path}: {'' if line is None else f'line {line}: '}{message}")
+
+
+def lines_of(text: str) -> dict[Loc, int]:
+    """The line, from 1, on which each table, key and element of an array begins, in a text that is valid TOML.
+
+    Of a text that is not, those before its fault.
+    """
+    scan = _Scan(text)
+    with suppress(ValueError, IndexError, RecursionError):  # a line that is not found is only not said
+        scan.document()
+    return scan.lines
+
+
+class _Scan:
+    """One pass over a text; `at` is where it is."""
+
+    def __init__(self, text: str) -> None:
+        self.text, self.at = text, 0
+        self.lines: dict[Loc, int] = {}
+        self._ends = [place for place, character in enumerate(text) if character == "\n"]
+        self._counts: dict[Loc, int] = {}  # tables in each array of tables so far
+
+    def document(self) -> None:
+        """All of it: headers of tables, and pairs in the table that the last header opened."""
+        table: Loc = ()
+        self._blank()
+        while self.at < len(self.text):
+            if self.text[self.at] == "[":
+                table = self._header()
+            else:
+                self._pair(table)
+            self._blank()
+
+    def _header(self) -> Loc:
+        line, many = self._line(), self.text.startswith("[[", self.at)
+        self.at += 2 if many else 1
+        keys = self._keys()
+        self.at += 2 if many else 1
+        loc: Loc = ()
+        for number, key in enumerate(keys, 1):
+            loc = (*loc, key)
+            self.lines.setdefault(loc, line)
+            if many and number == len(keys):
+                self._counts[loc] = self._counts.get(loc, 0) + 1
+            if loc in self._counts:
+                loc = (*loc, self._counts[loc] - 1)
+                self.lines.setdefault(loc, line)
+        return loc
+
+    def _pair(self, table: Loc) -> None:
+        line, loc = self._line(), table
+        for key in self._keys():
+            loc = (*loc, key)
+            self.lines.setdefault(loc, line)
+        self.at += 1  # =
+        self._value(loc)
+
+    def _keys(self) -> list[str]:
+        """The parts of a dotted key; a quoted one is read by the TOML reader, for its escapes."""
+        keys = []
+        while True:
+            self._blank()
+            quoted = self.text[self.at] in "\"'"
+            key = self._take(_STRING if quoted else _BARE)
+            keys.append(str(tomllib.loads(f"key = {key}")["key"]) if quoted else key)
+            self._blank()
+            if self.text[self.at] != ".":
+                return keys
+            self.at += 1
+
+    def _value(self, loc: Loc) -> None:
+        self._blank()
+        opened = self.text[self.at]
+        if opened not in "[{":
+            self._take(_STRING if opened in "\"'" else _PLAIN)
+            return
+        self.at += 1
+        number = 0
+        self._blank()
+        while self.text[self.at] not in "]}":
+            if opened == "{":
+                self._pair(loc)
+            else:
+                self.lines[*loc, number] = self._line()
+                self._value((*loc, number))
+            number += 1
+            self._blank()
+            if self.text[self.at] == ",":
+                self.at += 1
+            self._blank()
+        self.at += 1
+
+    def _blank(self) -> None:
+        """Past spaces, line breaks and comments."""
+        self._take(_BLANK)
+
+    def _take(self, pattern: re.Pattern[str]) -> str:
+        match = pattern.match(self.text, self.at)
+        if match is None:
+            raise ValueError(f"at {self.at}")
+        self.at = match.end()
+        return match[0]
+
+    def _line(self) -> int:
+        return bisect_right(self._ends, self.at) + 1
+
+
+def explain(error: ValidationError) -> str:
+    """The first finding of a validation as one line: the field, the bad value, what is allowed; and how many more there are."""
+    findings = error.errors()
+    first = findings[0]
+    where = ".".join(str(part) for part in first["loc"])
+    message = first["msg"].removeprefix("Value error, ")
+    shown = "" if isinstance(first["input"], dict) or not where else f" (got {first['input']!r})"
+    more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
+    return f"{where + ': ' if where else ''}{message}{shown}{more}"

@@ -1,0 +1,199 @@
+"""What a Gantt chart consists of: rows, bars and their words and colours. `lab/view/gantt.py` draws it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from lab.sequencing.cell import ROBOT
+from lab.sequencing.events import Activity, Schedule
+from lab.view.canvas import BLUE, GREEN, INK, ORANGE, PALE_GREY, PURPLE, RED, SKY, YELLOW, seconds
+
+TOUCHING_S = 1e-3  # measured activities that overlap by less follow one another
+PRODUCTS = (ORANGE, GREEN, PURPLE, YELLOW, RED)  # one colour a product; a sixth begins again
+DARK_GREY = "#5F5F5F"
+NARROWEST_INCH, WIDEST_INCH, MOVE_INCH = 12.0, 60.0, 0.36
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a kind of activity is drawn: the legend's words, colour (None: the product's, mixed with white), hatch, ink."""
+
+    says: str
+    colour: str | None
+    hatch: str | None = None
+    strength: float = 1.0
+    ink: str = INK
+
+
+# in the legend's order
+LOOKS: dict[str, Look] = {
+    "carry": Look("carried by the robot", BLUE, ink="white"),
+    "process": Look("in process", None),
+    "blocked": Look("processed, not fetched yet", None, "...", 0.45),
+    "store": Look("in a buffer", None, None, 0.22),
+    "outside": Look("not begun, or finished", "#C9C9C9"),
+    "pallet": Look("robot carries an empty pallet", "#A68CC9", "////"),
+    "empty": Look("robot moves empty", SKY),
+    "service": Look("robot serves a machine", DARK_GREY, ink="white"),
+    "wait": Look("robot idle", PALE_GREY, "////"),
+}
+
+
+@dataclass(frozen=True)
+class Bar:
+    """An activity and where it is drawn: the row's number from the top, and the part of the row's height."""
+
+    activity: Activity
+    look: str
+    row: int
+    top: float
+    height: float
+
+    @property
+    def middle(self) -> float:
+        """Height of its middle, in rows from the top."""
+        return self.top + self.height / 2
+
+
+@dataclass(frozen=True)
+class Chart:
+    """What a schedule's chart needs to know of it: its rows, what its parts are called, and their colours."""
+
+    schedule: Schedule
+
+    @cached_property
+    def rows(self) -> tuple[str, ...]:
+        """Names of the rows from the top: parts by number, machines by first use, the robot."""
+        parts = sorted((activity.part or 0, activity.resource) for activity in self.schedule.parts)
+        names = [name for _, name in parts] + [activity.resource for activity in self.schedule.machines]
+        return tuple(dict.fromkeys([*names, *(activity.resource for activity in self.schedule.robot)]))
+
+    @cached_property
+    def names(self) -> dict[int, str]:
+        """What each part is called, by its number."""
+        return {activity.part: activity.resource for activity in self.schedule.parts if activity.part is not None}
+
+    @cached_property
+    def begins_s(self) -> dict[str, float]:
+        """When the robot first takes each part [s], by the row's name."""
+        return {a.resource: a.start_s for a in reversed(self.schedule.parts) if a.kind == "carry"}
+
+    @cached_property
+    def products(self) -> dict[str, str]:
+        """The colour of each product, by its name."""
+        products = dict.fromkeys(self.product(part) for part in sorted(self.names)) or {"": None}
+        return {name: PRODUCTS[number % len(PRODUCTS)] for number, name in enumerate(products)}
+
+    @property
+    def moves(self) -> int:
+        """How often the robot carries something."""
+        return sum(activity.kind in ("carry", "pallet") for activity in self.schedule.robot)
+
+    def product(self, part: int | None) -> str:
+        """The name of a part's product: what it is called, without its number."""
+        return self.name(part).rpartition(" ")[0]
+
+    def name(self, part: int | None) -> str:
+        """What a part is called."""
+        return self.names.get(part or 0, f"part {part}")
+
+    def title(self) -> str:
+        """How many of what, and how long it takes."""
+        products = [self.product(part) for part in self.names]
+        counts = [f"{products.count(name)} × {name}" for name in self.products if name]
+        return f"{', '.join([*counts, f'{self.moves} moves'])}: {seconds(self.schedule.makespan_s)}"
+
+    def page_inch(self, strips: bool) -> tuple[float, float]:
+        """Width and height of the page [inch]: rows become lower when there are many."""
+        row_inch = max(0.25, 0.42 - 0.17 * max(0, len(self.rows) - 8) / 16) * (1.2 if strips else 1.0)
+        return min(max(NARROWEST_INCH, MOVE_INCH * self.moves), WIDEST_INCH), 1.5 + row_inch * len(self.rows)
+
+    def bars(self, schedule: Schedule, top: float, height: float) -> list[Bar]:
+        """The bars of a schedule in this one's rows, from `top` of each row's middle on, `height` in rows."""
+        ends = _ends(schedule.parts)
+        rows: dict[str, list[Activity]] = {}
+        for activity in (*schedule.parts, *schedule.machines, *schedule.robot):
+            rows.setdefault(activity.resource, []).append(activity)
+        bars = []
+        for number, name in enumerate(self.rows):
+            lanes = _lanes(rows.get(name, ()))
+            lane_height = height / (1 + max((lane for _, lane in lanes), default=0))
+            for activity, lane in lanes:
+                low, tall = number + top + lane * lane_height, lane_height
+                look = "outside" if activity in ends else activity.kind
+                if look == "outside":
+                    low, tall = low + 0.44 * tall, 0.12 * tall
+                bars.append(Bar(activity, look, number, low, tall))
+        return bars
+
+    def colour(self, bar: Bar) -> str:
+        """The colour of a bar."""
+        look = LOOKS[bar.look]
+        return look.colour or mixed(self.products.get(self.product(bar.activity.part), ORANGE), look.strength)
+
+    def texts(self, bar: Bar) -> tuple[str, ...]:
+        """What may be written on a bar, the longest first."""
+        activity, name = bar.activity, self.name(bar.activity.part)
+        number, to = f"{activity.part}", f"\N{RIGHTWARDS ARROW} {activity.target}"
+        if bar.look == "outside":
+            begins = activity.end_s <= self.begins_s.get(activity.resource, activity.end_s)
+            return (name,) if begins else (f"finished at {seconds(activity.start_s)}", "finished")
+        if activity.resource == ROBOT:
+            return {
+                "carry": (f"{name} {to}", f"{number} {to}", number),
+                "pallet": (f"pallet {to}", "pallet"),
+                "empty": (f"to {activity.target}",),
+                "service": (f"service at {activity.target}", "service"),
+                "wait": (f"waits for {name}", "idle"),
+            }.get(activity.kind, ())
+        if activity.resource in self.names.values():
+            return (to,) if activity.kind == "carry" else (activity.target,)
+        return (name, number)
+
+    def tip(self, activity: Activity) -> str:
+        """A bar in words."""
+        span = f"{activity.start_s:g} to {activity.end_s:g} s ({activity.end_s - activity.start_s:g} s)"
+        name, moves = self.name(activity.part), f"from {activity.origin} to {activity.target}"
+        own = "" if activity.resource in (name, ROBOT) else f" {name}"
+        does = {
+            "carry": f"carries {name} {moves}" if activity.resource == ROBOT else f"carried {moves}",
+            "pallet": f"carries the pallet of {name} {moves}",
+            "empty": f"moves empty {moves}",
+            "wait": f"waits at {activity.target} for {name}",
+            "service": f"serves {activity.target} for {name}",
+            "process": f"{own} in process at {activity.target}",
+            "blocked": f"{own} processed, waits in {activity.target}",
+            "store": f"at {activity.target}",
+        }[activity.kind]
+        return f"{activity.resource}: {does.strip()}, {span}"
+
+
+def _ends(parts: Sequence[Activity]) -> set[Activity]:
+    """The stays of parts before their first move and after their last, where no part stays in between."""
+    rows: dict[str, list[Activity]] = {}
+    for activity in parts:
+        rows.setdefault(activity.resource, []).append(activity)
+    inside = {activity.target for row in rows.values() for activity in row[1:-1] if activity.kind != "carry"}
+    ends = {end for row in rows.values() for end in (row[0], row[-1])}
+    return {end for end in ends if end.kind == "store" and end.target not in inside}
+
+
+def _lanes(row: Sequence[Activity]) -> list[tuple[Activity, int]]:
+    """The activities of a row and the lane of each: side by side where a machine holds several parts."""
+    lanes: list[float] = []
+    placed: list[tuple[Activity, int]] = []
+    holds: dict[int | None, int] = {}
+    for activity in row:
+        follows = activity.kind == "blocked" and activity.part in holds
+        free = [lane for lane, end_s in enumerate(lanes) if end_s <= activity.start_s + TOUCHING_S]
+        lane = holds[activity.part] if follows else free[0] if free else len(lanes)
+        lanes[lane : lane + 1] = [activity.end_s]
+        holds[activity.part] = lane
+        placed.append((activity, lane))
+    return placed
+
+
+def mixed(colour: str, strength: float) -> str:
+    """The colour mixed with white."""
+    parts = [int(colour[start : start + 2], 16) for start in (1, 3, 5)]
+    return "#" + "".join(f"{round(255 + strength * (part - 255)):02X}" for part in parts)
