@@ -178,7 +178,7 @@ def reference(cell: Cell, objective: str) -> Reference:
     from lab.sequencing.cpsat import cp_sat
 
     opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)
-    return Reference(opinion.bound, opinion.proven, "CP-SAT")
+    return Reference(opinion.bound, opinion.status == "optimal", "CP-SAT")
 
 
 def stochastic(

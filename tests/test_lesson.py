@@ -1,7 +1,6 @@
-"""Single commands: a teaching session in a sub-task or a world, the order alone."""
+"""Single commands: a teaching session in a sub-task or a world."""
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,11 +10,7 @@ from lab.advice.advisors import AdviceRequest
 from lab.errors import BadInput
 from lab.gridworld import GridWorld, View
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.lesson import find_skill, fitting, sequence_task, teach_one, teach_world
-from lab.listener import Listener
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import SequenceResult
-from lab.sequencing.exact import Optimum
+from lab.lesson import find_skill, fitting, teach_one, teach_world
 from lab.skills import Butter, Grasp, Skill
 from lab.taskfile import Task, load
 from lab.teaching import Interrupted, Teacher
@@ -243,65 +238,3 @@ def test_as_many_toasts_as_both_ends_hold(task: Task) -> None:
         }
     )
     assert [fitting(task, 3), fitting(small, 3), fitting(small, 1)] == [3, 2, 1]
-
-
-# ---- sequence -----------------------------------------------------------------------------------------------------
-
-
-class Heard(Listener):
-    """Notes what it hears."""
-
-    def __init__(self) -> None:
-        self.notes: list[object] = []
-
-    def phase(self, name: str, parts: int) -> None:
-        self.notes.append((name, parts))
-
-    def sequenced(self, best: SequenceResult, proven: Optimum) -> None:
-        self.notes.append(best.makespan_s / proven.makespan_s >= 1)
-
-
-@pytest.fixture
-def measured(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A cell as if it had been measured: 1 s to go, 2 s to carry, 10 s in the oven."""
-    from lab.sequencing.cell import Stage, Station
-
-    def cell(prepared: int, *_: object) -> SimpleNamespace:
-        stations = (Station("in", "storage", 9), Station("oven", "machine", 1, 10.0), Station("out", "storage", 9))
-        step = np.ones((3, 3)) - np.eye(3)
-        return SimpleNamespace(
-            cell=Cell(stations, (Stage("in"), Stage("oven"), Stage("out")), step, 2 * step, "in", prepared)
-        )
-
-    monkeypatch.setattr("lab.run.prepare", lambda task, toasts, seed: toasts)
-    monkeypatch.setattr("lab.run.teach_all", cell)
-
-
-SEQUENCE_FIELDS = (
-    *("task", "toasts", "seed", "method", "sessions", "makespan_s", "sequence", "episode_makespans_s", "optimal_s"),
-    *("optimum_proven", "bound_s", "gap", "success_percent", "final_success_percent", "mean_best_s", "files"),
-)
-
-
-@pytest.mark.usefixtures("measured")
-@pytest.mark.parametrize("method", [None, "srl", "exact", "fifo", "random"])
-def test_the_order_alone(task: Task, teacher: Teacher, tmp_path: Path, method: str | None) -> None:
-    """A toast takes 2 s into the oven, 10 s in it and 2 s out; the robot comes back in 1 s for the other: 29 s."""
-    heard, plot = Heard(), tmp_path / "episodes.png"
-    document = sequence_task(task, 2, teacher, method=method, episodes=20, sessions=3, plot=plot, listener=heard)
-    assert tuple(document) == SEQUENCE_FIELDS
-    assert document["method"] == method or document["method"] == "srl"
-    assert (document["optimal_s"], document["optimum_proven"], document["bound_s"]) == (29.0, True, 29.0)
-    assert (document["makespan_s"], document["gap"], document["success_percent"]) == (29.0, 0.0, 100.0)
-    assert sorted(document["sequence"]) == [1, 1, 2, 2]
-    assert document["files"] == {"plot": str(plot)}
-    assert read_picture(plot).shape[2] == 3
-    assert heard.notes == [("sequence", 3), True, True, True]
-
-
-@pytest.mark.usefixtures("measured")
-def test_the_same_seed_gives_the_same_order(task: Task, teacher: Teacher) -> None:
-    def found() -> dict[str, Any]:
-        return sequence_task(task, 4, teacher, method="srl", episodes=5, sessions=1, plot=None, listener=Listener())
-
-    assert found() == found()

@@ -53,17 +53,9 @@ def _genetic(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "Seq
 
 
 def _exact(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    """A*, which knows makespans only; CP-SAT for the other objectives. One sequence, by the mean times."""
-    from lab.sequencing.events import SequenceResult
-    from lab.sequencing.exact import optimum
-    from lab.sequencing.objectives import MAKESPAN
-    from lab.sequencing.search import Log
+    from lab.sequencing.exact import exact
 
-    if search.objective != MAKESPAN:
-        return _cp_sat(cell, search, rng)
-    best, log = optimum(cell), Log(search)
-    log.note(best.sequence, best.cost)
-    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+    return exact(cell, search, rng)
 
 
 def _cp_sat(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":

@@ -60,8 +60,7 @@ def cp_sat(
     check_objective(objective, cell)
     if not (isfinite(time_limit_s) and time_limit_s > 0):
         raise BadInput(f"time limit = {time_limit_s} s: allowed are finite times above 0")
-    model = Model(cell, objective)
-    model.suggest(first_come(cell) if hint is None else hint)
+    model = Model(cell, objective, first_come(cell) if hint is None else hint)
     solver = cp_model.CpSolver()
     solver.parameters.max_time_in_seconds = time_limit_s
     solver.parameters.num_workers = 1
@@ -69,6 +68,7 @@ def cp_sat(
     # Measured: without these, ten toasts are not proven within a minute.
     solver.parameters.use_strong_propagation_in_disjunctive = True
     solver.parameters.use_dynamic_precedence_in_disjunctive = True
+    solver.parameters.absolute_gap_limit = model.blur
     status = _STATUS[solver.solve(model.model)]
     sequence = () if status == "unknown" else model.sequence(solver)
     value = inf if status == "unknown" else cost_of(cell, sequence, objective)

@@ -6,78 +6,27 @@ It shares the cell's positions with the simulation, and nothing else: no states,
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
 from ortools.sat.python import cp_model
 
-from lab.errors import BadInput
 from lab.sequencing.bound import Way, distances, follows, ways_of
 from lab.sequencing.cell import Cell
+from lab.sequencing.cpsat_times import Timed, Times, longest, timed
 from lab.sequencing.objectives import MAKESPAN, WITH_DUE_TIMES, machine_places
-from lab.sequencing.positions import entry, part_of
-from lab.sequencing.run import Run
-
-UNITS_S = (1.0, 0.1, 0.01, 1e-3, 1e-4, 1e-5, 1e-6)
-MOST_UNITS = 1e12  # no time above it, in units: sums of many then stay exact
-_SAME = 1e-12  # of the longest time: what two floats that are equal may differ by
-
-
-class Times:
-    """The cell's times in whole units: the largest unit in which they all are whole, else the smallest.
-
-    rounded_s: by how much a time is changed at the most [s]; 0 when all are whole.
-    """
-
-    def __init__(self, cell: Cell, ways: Sequence[Way]) -> None:
-        carries = [float(cell.loaded_s[way.option.origin, way.option.target]) for way in ways]
-        tables = np.concatenate([cell.empty_s.ravel(), cell.loaded_s.ravel()])
-        given = np.array(
-            [
-                *tables[~np.isnan(tables)],
-                *(place.processing_s or 0.0 for place in cell.positions),
-                *(way.option.service_s for way in ways),
-                *(cell.arrivals.interval_s if cell.arrivals else ()),
-                *(cell.due_s or ()),
-            ]
-        )
-        longest_s = cell.longest_s + max(cell.due_s or (0.0,))
-        units = [unit for unit in UNITS_S if longest_s / unit <= MOST_UNITS] or [longest_s / MOST_UNITS]
-        fit = [unit for unit in units if _off_s(given, unit) <= _SAME * longest_s and min(carries) >= unit / 2]
-        self.unit_s = fit[0] if fit else units[-1]
-        # Moves that take no time are given a unit, see `carry`.
-        self.rounded_s = 0.0 if fit else max(_off_s(given, self.unit_s), self.unit_s if min(carries) == 0 else 0.0)
-        self._cell = cell
-
-    def whole(self, seconds: float) -> int:
-        """A time in units."""
-        return round(seconds / self.unit_s)
-
-    def travel(self, origin: int, target: int) -> int:
-        """The robot's empty way between two stations."""
-        return 0 if origin == target else self.whole(float(self._cell.empty_s[origin, target]))
-
-    def work(self, way: Way) -> int:
-        """Service and carrying; at least a unit, so that the order of moves is the order of their times."""
-        carry_s = float(self._cell.loaded_s[way.option.origin, way.option.target])
-        return self.whole(way.option.service_s) + max(1, self.whole(carry_s))
-
-    def processing(self, place: int) -> int:
-        """What begins in a position."""
-        return self.whole(self._cell.positions[place].processing_s or 0.0)
-
-
-def _off_s(given: NDArray[np.float64], unit_s: float) -> float:
-    return float(np.abs(given - np.round(given / unit_s) * unit_s).max(initial=0.0))
+from lab.sequencing.positions import entry
 
 
 class Task(NamedTuple):
-    """A move that one part may make: whether it does, and when the robot begins it, its waiting over, and drops."""
+    """A move that one part may make: whether it does, and when the robot begins it, its waiting over, and drops.
+
+    waits: whether the robot has to wait before; None: it never does.
+    """
 
     part: int
     way: Way
     done: cp_model.IntVar
     begin: cp_model.IntVar
     drop: cp_model.LinearExpr
+    waits: cp_model.IntVar | None
 
 
 class Visit(NamedTuple):
@@ -91,22 +40,26 @@ class Visit(NamedTuple):
 
 
 class Model:
-    """The variables and constraints; `worth`: what a unit of the model's objective is in the cell's.
+    """The variables and constraints. worth: what a unit of the model's objective is in the cell's.
 
-    Parts are numbered from 0 here. `come`: by part and position, when it is dropped there.
+    blur: by how many units rounding may change a sequence's cost; 0 when no time is rounded. Parts are numbered from 0
+    here.
     """
 
-    def __init__(self, cell: Cell, objective: str) -> None:
+    def __init__(self, cell: Cell, objective: str, hint: Sequence[int]) -> None:
         self.cell, self.model, self._ways = cell, cp_model.CpModel(), ways_of(cell)
         self.times = Times(cell, self._ways)
-        self._longest = self.times.whole(cell.longest_s) + len(self._ways) * cell.parts + 1
+        known = timed(cell, self.times, self._ways, hint)
+        self._longest = known[-1].drop if objective == MAKESPAN else longest(cell, self.times, self._ways)
         self._holds = [[s in place.holds for place in cell.positions] for s in range(len(cell.stations))]
-        self._distances = distances(cell, self.times.unit_s)
+        self._distances = distances(cell, self.times.per_s)
         self._tasks: list[Task] = []
         self._arcs: dict[tuple[int, int], cp_model.IntVar] = {}
         self._come: dict[tuple[int, int], cp_model.IntVar] = {}
         self._travels: list[cp_model.LinearExpr] = []
         self._waits: list[cp_model.LinearExpr] = []
+        self._first = [self._moment(f"first {part}") for part in range(cell.parts)]
+        self._taken = [self._moment(f"taken {part}") for part in range(cell.parts)]
         self._end = self._moment("makespan")
         for part in range(cell.parts):
             self._add_part(part)
@@ -114,24 +67,9 @@ class Model:
         self._add_full([visit for station in range(len(cell.stations)) for visit in self._add_room(station)])
         self._add_order(objective)
         self.worth = self._add_objective(objective)
-
-    def suggest(self, sequence: Sequence[int]) -> None:
-        """Give the solver a sequence to begin with; BadInput when a decision of it may not be taken."""
-        run, before = Run(self.cell), 0
-        tasks = {(task.part, task.way.place, task.way.option): n for n, task in enumerate(self._tasks, 1)}
-        hinted = dict.fromkeys([task.done for task in self._tasks] + [*self._arcs.values()], 0)
-        for decision in sequence:
-            part = part_of(decision, self.cell.parts) - 1
-            place, option = run.locations[part], run.option(decision)
-            if option is None:
-                raise BadInput(f"hint: {run.refusal(decision)}")
-            move, number = run.move(decision), tasks[part, place, option]
-            task = self._tasks[number - 1]
-            self.model.add_hint(task.begin, self.times.whole(move.pick_s - move.service_s))
-            hinted[task.done] = hinted[self._arcs[before, number]] = 1
-            before = number
-        for variable, value in hinted.items():
-            self.model.add_hint(variable, value)
+        each = {"machine-idle": machine_places(cell), "mean-tardiness": cell.parts, "tardy-parts": 0}.get(objective, 1)
+        self.blur = 2 * each * len(self._tasks) if self.times.rounded_s else 0
+        self._suggest(known)
 
     def sequence(self, solver: cp_model.CpSolver) -> tuple[int, ...]:
         """The decisions of the solution, in the order of the robot's tour."""
@@ -143,6 +81,23 @@ class Model:
             decisions.append(entry(task.part + 1, task.way.option.choice, self.cell.parts))
         return tuple(decisions)
 
+    def _suggest(self, known: Sequence[Timed]) -> None:
+        """Give the solver a sequence to begin with."""
+        tasks = {(task.part, task.way): number for number, task in enumerate(self._tasks, 1)}
+        hints = dict.fromkeys([*self._arcs.values(), *self._come.values()], 0)
+        for task in self._tasks:
+            hints |= {task.done: 0, task.begin: 0}
+        before = 0
+        for move in known:
+            number = tasks[move.part, move.way]
+            task = self._tasks[number - 1]
+            hints |= {task.done: 1, task.begin: move.begin, self._arcs[before, number]: 1}
+            hints[self._come[move.part, move.way.option.to]] = move.drop
+            before = number
+        hints[self._end] = known[-1].drop
+        for variable, value in hints.items():
+            self.model.add_hint(variable, value)
+
     def _moment(self, name: str) -> cp_model.IntVar:
         return self.model.new_int_var(0, self._longest, name)
 
@@ -153,9 +108,7 @@ class Model:
             self._come[part, place] = self._moment(f"come {part} {place}")
             for way in self._ways:
                 if way.place == place:
-                    begin = self._moment(f"begin {part}")
-                    done = self.model.new_bool_var(f"do {part}")
-                    own.append(Task(part, way, done, begin, begin + self.times.work(way)))
+                    own.append(self._task(part, way))
                     reached += [way.option.to] if way.option.to not in reached else []
         self._tasks += own
         self.model.add(self._come[part, reached[0]] == 0)
@@ -166,17 +119,33 @@ class Model:
                 self.model.add(sum(out) == (sum(into) if into else 1))
         for task in own:
             self.model.add(self._come[part, task.way.option.to] == task.drop).only_enforce_if(task.done)
-            self._add_wait(task)
+            if task.way.place == reached[0]:
+                self.model.add(self._first[part] == task.begin).only_enforce_if(task.done)
+                self.model.add(self._taken[part] == task.drop).only_enforce_if(task.done)
 
-    def _add_wait(self, task: Task) -> None:
-        """The pick comes after the processing that was begun last."""
-        place = task.way.place
-        if not task.way.option.waits:
-            return
+    def _task(self, part: int, way: Way) -> Task:
+        """A move that begins when what was begun before is finished; if the robot is there earlier, just then."""
+        done, begin, waits = self.model.new_bool_var("does"), self._moment("begin"), None
+        ready = self._ready(part, way) if way.option.waits else None
+        if ready is not None:
+            waits = self.model.new_bool_var("waits")
+            self.model.add(begin >= ready).only_enforce_if(done)
+            self.model.add(begin <= ready).only_enforce_if(done, waits)
+        return Task(part, way, done, begin, begin + self.times.work(way), waits)
+
+    def _ready(self, part: int, way: Way) -> cp_model.LinearExprT | None:
+        """When the part is finished, or has come; None: it always is, when the robot is there."""
+        place, arrivals = way.place, self.cell.arrivals
+        if place == self.cell.starts[part]:
+            if arrivals is None:
+                return None
+            intervals = [self.times.whole(seconds) for seconds in arrivals.interval_s[: part + 1]]
+            after_pick = part > 0 and arrivals.after == "pick"
+            return self._first[part - 1] + intervals[-1] if after_pick else sum(intervals)
         while self.cell.positions[place].processing_s is None:
-            place = next(way.place for way in self._ways if way.option.to == place)
-        ready = self._come[task.part, place] + self.times.processing(place)
-        self.model.add(task.begin >= ready).only_enforce_if(task.done)
+            place = next(before.place for before in self._ways if before.option.to == place)
+        process = self.times.processing(place)
+        return self._come[part, place] + process if process else None
 
     def _add_tour(self) -> None:
         """The robot goes from move to move, in one tour from its start to the last end; time follows."""
@@ -197,8 +166,11 @@ class Model:
 
     def _arc(self, left: int, then: int, travel: int, wait: int) -> cp_model.IntVar:
         done = self._arcs[left, then] = self.model.new_bool_var("follows")
-        before = self._tasks[left - 1].drop if left else 0
-        self.model.add(self._tasks[then - 1].begin >= before + travel).only_enforce_if(done)
+        before, task = self._tasks[left - 1].drop if left else 0, self._tasks[then - 1]
+        self.model.add(task.begin >= before + travel).only_enforce_if(done)
+        # No later either, unless it waits: else the solver would find the same tour again and again, a little later.
+        at_once = [done] if task.waits is None else [done, ~task.waits]
+        self.model.add(task.begin <= before + travel).only_enforce_if(*at_once)
         self._travels.append(travel * done)
         self._waits.append(wait * done)
         return done
@@ -213,7 +185,7 @@ class Model:
         out = [way for way in self._ways if holds[way.place] and not holds[way.option.to]]
         ways = [self._distances[left.option.target][way.option.origin] for left in out for way in into]
         change = min([*ways, self._longest]) if room == 1 and self.cell.parts > 1 else 0
-        visits, intervals, least = list[Visit](), list[cp_model.IntervalVar](), list[cp_model.LinearExprT]()
+        visits, intervals, least = list[Visit](), list[cp_model.IntervalVar](), list[cp_model.LinearExpr]()
         for part in range(self.cell.parts):
             own = [task for task in self._tasks if task.part == part]
             brings, takes = [t for t in own if t.way in into], [t for t in own if t.way in out]
@@ -241,12 +213,13 @@ class Model:
             self.model.add(leave == task.drop).only_enforce_if(task.done)
         return here, begin, leave
 
-    def _least(self, brings: list[Task], takes: list[Task]) -> cp_model.LinearExprT:
+    def _least(self, brings: list[Task], takes: list[Task]) -> cp_model.LinearExpr:
         """How long a visit lasts at least: the moves that begin and end it, and the processing."""
         waits = all(task.way.option.waits for task in takes)
         process = [self.times.processing(task.way.option.to) if waits else 0 for task in brings]
         begins = [(self.times.work(t.way) + more) * t.done for t, more in zip(brings, process, strict=True)]
-        return sum([*begins, *(self.times.work(task.way) * task.done for task in takes)])
+        ends = [self.times.work(task.way) * task.done for task in takes]
+        return cp_model.LinearExpr.sum([*begins, *ends])
 
     def _add_full(self, visits: Sequence[Visit]) -> None:
         """A buffer is used only when the station ahead is full at that moment, where the cell says so."""
@@ -266,25 +239,13 @@ class Model:
 
     def _add_order(self, objective: str) -> None:
         """Parts that arrive are taken in their order; of parts that are alike in all, the first in number goes first."""
-        cell, arrivals, came_s = self.cell, self.cell.arrivals, 0.0
-        first = [self._moment(f"first {part}") for part in range(cell.parts)]
-        taken = [self._moment(f"taken {part}") for part in range(cell.parts)]
-        for task in self._tasks:
-            if task.way.place == cell.starts[task.part]:
-                self.model.add(first[task.part] == task.begin).only_enforce_if(task.done)
-                self.model.add(taken[task.part] == task.drop).only_enforce_if(task.done)
-        for part in range(cell.parts) if arrivals is not None else ():
-            came_s += arrivals.interval_s[part]
-            if part == 0 or arrivals.after == "clock":
-                self.model.add(first[part] >= self.times.whole(came_s))
-            else:
-                self.model.add(first[part] >= first[part - 1] + self.times.whole(arrivals.interval_s[part]))
+        cell = self.cell
         due_s = cell.due_s if cell.due_s and objective in WITH_DUE_TIMES else (0.0,) * cell.parts
         latest: dict[object, int] = {}
         for part, product in enumerate(cell.order):
-            kind = None if arrivals is not None else (product, due_s[part])
+            kind = None if cell.arrivals is not None else (product, due_s[part])
             if kind in latest:
-                self.model.add(first[part] >= taken[latest[kind]])
+                self.model.add(self._first[part] >= self._taken[latest[kind]])
             latest[kind] = part
 
     def _add_objective(self, objective: str) -> float:
@@ -304,7 +265,7 @@ class Model:
             model.minimize(machine_places(self.cell) * self._end - processed)
         else:
             return self._add_late(ends, objective)
-        return self.times.unit_s
+        return 1.0 / self.times.per_s
 
     def _add_late(self, ends: Sequence[Task], objective: str) -> float:
         due = [self.times.whole(due_s) for due_s in self.cell.due_s or ()]
@@ -318,4 +279,4 @@ class Model:
         for task in ends:
             self.model.add(lateness[task.part] >= task.drop - due[task.part]).only_enforce_if(task.done)
         self.model.minimize(sum(lateness))
-        return self.times.unit_s / self.cell.parts
+        return 1.0 / self.times.per_s / self.cell.parts

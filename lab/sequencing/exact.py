@@ -1,24 +1,22 @@
 """The proven optimum of a cell: best-first search over its decision states, with alike parts merged."""
 
 import heapq
-from collections import deque
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import accumulate, chain
+from math import inf
 from operator import le
-from typing import NamedTuple
 
 import numpy as np
 
-from lab.errors import BadInput
-from lab.sequencing.bound import TICKS_PER_S, Least, LeastLeft, Way, ticks, ways_of
+from lab.sequencing.bound import TICKS_PER_S
 from lab.sequencing.cell import Cell
-from lab.sequencing.positions import entry
+from lab.sequencing.events import SequenceResult
+from lab.sequencing.objectives import MAKESPAN
+from lab.sequencing.positions import part_of
 from lab.sequencing.run import Run, simulate
+from lab.sequencing.search import Log, Search
+from lab.sequencing.states import Moves, State, sequence_of, times_of
 
 MAX_EXPANDED = 1_000_000
-_BITS = 8  # a count in the code of all counts; MAX_PARTS fits
-_LOW = (1 << _BITS) - 1
 
 
 @dataclass(frozen=True)
@@ -42,129 +40,9 @@ class Optimum:
 
     def gap(self, cost: float) -> float:
         """How much longer a makespan is than the proven optimum, or than the bound when there is none; a fraction."""
+        if self.bound_s == 0:
+            return inf if cost > 0 else 0.0
         return cost / self.bound_s - 1.0
-
-
-class State(NamedTuple):
-    """Between two moves, in ticks: how many parts stand in each position, the robot's station, what is waited for.
-
-    Which part stands where is left out: those of one product in one position are alike, and the first that came goes
-    first. waits: by slot (see `Moves`), when each part there is finished, ascending, never before `now`.
-    """
-
-    now: int
-    counts: int
-    robot: int
-    waits: tuple[tuple[int, ...], ...]
-    way: Way | None = None
-    parent: "State | None" = None
-
-
-class Moves:
-    """The cell in ticks, and the states that follow one another.
-
-    slots: by position where something is waited for, where the state has it in `waits`; after these, where parts arrive
-    one after the pick of the other, the slot of the next one.
-    """
-
-    def __init__(self, cell: Cell) -> None:
-        self.cell = cell
-        self._empty = [ticks(row) for row in cell.empty_s.tolist()]
-        for place in range(len(self._empty)):
-            self._empty[place][place] = 0
-        process = [place.processing_s for place in cell.positions]
-        self._loaded = [ticks(row) for row in cell.loaded_s.tolist()]
-        self._process = [None if seconds is None else round(seconds * TICKS_PER_S) for seconds in process]
-        timed = [place for place, seconds in enumerate(process) if seconds is None or seconds > 0]
-        self.slots = {place: slot for slot, place in enumerate(timed)}
-        self._picked = len(timed) if cell.arrivals is not None and cell.arrivals.after == "pick" else None
-        self._intervals = ticks(cell.arrivals.interval_s) if cell.arrivals is not None else []
-        self._came = list(accumulate(self._intervals))
-        self._starts = sorted(set(cell.starts))
-        self._ways: list[list[Way]] = [[] for _ in cell.positions]
-        for way in ways_of(cell):
-            self._ways[way.place].append(way)
-        self._least = LeastLeft(cell, self.slots, self._picked)
-        self._known: dict[int, tuple[tuple[Way, ...], Least]] = {}
-
-    def start(self) -> State:
-        """Where all begins."""
-        counts = sum(1 << _BITS * place for place in self.cell.starts)
-        waits: tuple[tuple[int, ...], ...] = ((),) * len(self.slots)
-        if self._picked is not None:
-            waits = (*waits, (self._intervals[0],))
-        return State(0, counts, self.cell.index(self.cell.robot_start), waits)
-
-    def done(self, state: State) -> bool:
-        """Whether all parts are finished."""
-        return all(not self._ways[place] for place, count in enumerate(self.counted(state.counts)) if count)
-
-    def left(self, state: State) -> int:
-        """Ticks still needed at least."""
-        return self._here(state.counts)[1].left(state.now, state.robot, state.waits)
-
-    def successors(self, state: State) -> Iterator[State]:
-        """The states after each possible move: one an option of a position, since its parts are alike."""
-        for way in self._here(state.counts)[0]:
-            yield self._after(state, way)
-
-    def counted(self, counts: int) -> list[int]:
-        """The parts in each position."""
-        return [counts >> _BITS * place & _LOW for place in range(len(self._ways))]
-
-    def _here(self, counts: int) -> tuple[tuple[Way, ...], Least]:
-        """What depends on the counts only: the ways that may be taken, and the bounds."""
-        known = self._known.get(counts)
-        if known is None:
-            counted = self.counted(counts)
-            known = self._known[counts] = self._allowed(counted), self._least.of(counted)
-        return known
-
-    def _allowed(self, counted: list[int]) -> tuple[Way, ...]:
-        cell = self.cell
-        occupied = [0] * len(cell.stations)
-        for count, place in zip(counted, cell.positions, strict=True):
-            for station in place.holds:
-                occupied[station] += count
-        room = [occupied[station] < most for station, most in enumerate(cell.capacities)]
-        waiting = sum(counted[place] for place in self._starts)
-        in_turn = cell.starts[cell.parts - waiting] if waiting and cell.arrivals is not None else None
-        return tuple(
-            way
-            for place, count in enumerate(counted)
-            if count and (in_turn in (None, place) or place not in self._starts)
-            for way in self._ways[place]
-            if all(room[station] for station in way.option.needs)
-            and (way.option.if_full is None or not room[way.option.if_full])
-        )
-
-    def _after(self, state: State, way: Way) -> State:
-        place, option, work = way
-        waits = list(state.waits)
-        now = state.now + self._empty[state.robot][option.origin]
-        ready = 0
-        slot = self.slots.get(place)
-        if slot is not None:
-            ready, *others = waits[slot]
-            waits[slot] = tuple(others)
-        elif self._intervals and place in self._starts:
-            ready = waits[self._picked][0] if self._picked is not None else self._came[self._fetched(state)]
-        now = (max(now, ready) if option.waits else now) + work
-        slot = self.slots.get(option.to)
-        if slot is not None:
-            process = self._process[option.to]
-            waits[slot] = (*waits[slot], ready if process is None else now + process)
-        if self._picked is not None and place in self._starts:
-            pick, coming = now - self._loaded[option.origin][option.target], self._fetched(state) + 1
-            waits[self._picked] = (pick + self._intervals[coming],) if coming < self.cell.parts else ()
-        # A part that finished earlier is ready now: forgetting since when lets more states be equal.
-        ready_at = tuple([tuple([max(tick, now) for tick in ticks]) if ticks else () for ticks in waits])
-        counts = state.counts + (1 << _BITS * option.to) - (1 << _BITS * place)
-        return State(now, counts, option.target, ready_at, way, state)
-
-    def _fetched(self, state: State) -> int:
-        """How many parts have left their first station."""
-        return self.cell.parts - sum(state.counts >> _BITS * place & _LOW for place in self._starts)
 
 
 class _Search:
@@ -175,42 +53,35 @@ class _Search:
         self.expanded = self.bound = self._serial = 0
         self._fronts: dict[tuple[int, int], list[tuple[int, ...]]] = {}
         self._heap: list[tuple[int, int, State]] = []
-        self.dead: State | None = None  # one from which nothing can move
-        self._reach(self.moves.start(), greedy=False)
+        self._greedy = False
+        self._reach(self.moves.start())
 
-    def run(self, most: int, greedy: bool = False) -> State | None:
-        """The first complete state; None: after opening `most` states there was none, or nothing is left to open."""
+    def run(self, most: int) -> State | None:
+        """The first complete state; None: when `most` states were opened in all there was none."""
         while self._heap:
-            bound, _, state = heapq.heappop(self._heap)
-            if _times(state) not in self._fronts[state.counts, state.robot]:
+            bound, serial, state = heapq.heappop(self._heap)
+            if times_of(state) not in self._fronts[state.counts, state.robot]:
                 continue  # overtaken since it was queued
-            if not greedy:
-                self.bound = max(self.bound, bound)
+            self.bound = max(self.bound, bound)
             if self.moves.done(state):
                 return state
             if self.expanded >= most:
-                heapq.heappush(self._heap, (bound, _, state))
+                heapq.heappush(self._heap, (bound, serial, state))
                 return None
             self.expanded += 1
-            found = list(self.moves.successors(state))
-            self.dead = state if not found else self.dead
-            for successor in found:
-                self._reach(successor, greedy)
+            for successor in self.moves.successors(state):
+                self._reach(successor)
         return None
-
-    @property
-    def open(self) -> bool:
-        """Whether there are states left to open."""
-        return bool(self._heap)
 
     def hasten(self) -> None:
         """From now on open what has the least left to do first: any end will do."""
+        self._greedy = True
         self._heap = [(self.moves.left(state), serial, state) for _, serial, state in self._heap]
         heapq.heapify(self._heap)
 
-    def _reach(self, state: State, greedy: bool) -> None:
+    def _reach(self, state: State) -> None:
         """Queue a state unless one that is alike otherwise is no later anywhere; those that it beats are forgotten."""
-        times = _times(state)
+        times = times_of(state)
         front = self._fronts.setdefault((state.counts, state.robot), [])
         if any(all(map(le, other, times)) for other in front):
             return
@@ -219,68 +90,68 @@ class _Search:
         # Of equally promising states the newest comes first, hence the falling serial number.
         self._serial -= 1
         left = self.moves.left(state)
-        heapq.heappush(self._heap, (left if greedy else state.now + left, self._serial, state))
+        heapq.heappush(self._heap, (left if self._greedy else state.now + left, self._serial, state))
 
 
 def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     """The shortest makespan of the cell and a sequence that reaches it, alike parts numbered first in, first out.
 
     States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
-    optimal. After `max_expanded` states it gives up and opens as many again, nearest to the end first: `proven` False, and
-    the bound reached so far. Raises BadInput when every sequence ends in a deadlock, WorkFailed when it found no end.
+    optimal; a deadlock leads nowhere. After `max_expanded` states it gives up and opens as many again, nearest to the end
+    first, for the sequence it returns: `proven` False, and the bound reached so far.
     Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
     states that are otherwise alike is the thesis's branch and bound, App. IV.
     """
     search = _Search(cell)
     state = search.run(max_expanded)
     if state is not None:
-        sequence = _sequence(cell, state)
+        sequence = sequence_of(cell, state)
         cost = simulate(cell, sequence).makespan_s
         return Optimum(cost, sequence, True, cost, search.expanded)
-    expanded = search.expanded
+    bound_s, expanded = search.bound / TICKS_PER_S, search.expanded
     search.hasten()
-    state = search.run(2 * max_expanded, greedy=True)
-    if state is None:
-        raise _no_end(cell, search)
-    sequence = _sequence(cell, state)
-    cost = simulate(cell, sequence).makespan_s
-    return Optimum(cost, sequence, False, search.bound / TICKS_PER_S, expanded)
+    state = search.run(2 * max_expanded)
+    sequence = first_come(cell) if state is None else sequence_of(cell, state)
+    return Optimum(simulate(cell, sequence).makespan_s, sequence, False, bound_s, expanded)
+
+
+def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
+    """The proven best sequence by the mean times, as a sequencer; it draws nothing from `rng`.
+
+    The makespan is minimised by `optimum`; when that gives up, and for other objectives, by CP-SAT within its time limit,
+    which may not prove its sequence.
+    """
+    from lab.sequencing.cpsat import cp_sat  # takes its time to import
+
+    search.check(cell)
+    log = Log(search)
+    found = optimum(cell) if search.objective == MAKESPAN else None
+    if found is not None and found.proven:
+        log.note(found.sequence, found.cost)
+    else:
+        other = cp_sat(cell, search.objective, hint=found.sequence if found else None)
+        nearest = found is not None and found.cost <= other.cost
+        sequence, cost = (found.sequence, found.cost) if found and nearest else (other.sequence, other.cost)
+        log.note(sequence, cost, complete=bool(sequence))
+    log.check(cell)
+    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
 
 
 def first_come(cell: Cell) -> tuple[int, ...]:
-    """A sequence that always comes to its end: what is ready first goes first; in a deadlock, one part after another."""
+    """A sequence that comes to its end in every cell: what is ready first goes first, or part after part.
+
+    One part alone never meets a full station, so the second way always works; it is taken when the first one ends in a
+    deadlock.
+    """
     run, sequence = Run(cell), list[int]()
     while allowed := run.allowed():
-        sequence.append(min(allowed, key=lambda decision: run.ready_s[(decision - 1) % cell.parts]))
+        sequence.append(min(allowed, key=lambda decision: run.ready_s[part_of(decision, cell.parts) - 1]))
         run.move(sequence[-1])
     if run.done:
         return tuple(sequence)
-    run = Run(cell)
-    sequence = []
+    run, sequence = Run(cell), []
     for part in range(1, cell.parts + 1):
         while run.finished_s[part - 1] is None:
-            sequence.append(next(d for d in run.allowed() if (d - 1) % cell.parts == part - 1))
+            sequence.append(next(one for one in run.allowed() if part_of(one, cell.parts) == part))
             run.move(sequence[-1])
-    return tuple(sequence)
-
-
-def _times(state: State) -> tuple[int, ...]:
-    """Now and all that is waited for: of two states with equal counts and robot, one that is nowhere later is no worse."""
-    return (state.now, *chain.from_iterable(state.waits))
-
-
-def _sequence(cell: Cell, state: State) -> tuple[int, ...]:
-    """The decisions on the way to `state`, each position first in, first out."""
-    taken: list[Way] = []
-    while state.way is not None and state.parent is not None:
-        taken.append(state.way)
-        state = state.parent
-    queues: list[deque[int]] = [deque() for _ in cell.positions]
-    for part, start in enumerate(cell.starts, 1):
-        queues[start].append(part)
-    sequence = []
-    for place, option, _ in reversed(taken):
-        part = queues[place].popleft()
-        queues[option.to].append(part)
-        sequence.append(entry(part, option.choice, cell.parts))
     return tuple(sequence)

@@ -5,9 +5,10 @@ from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, field
 
-from lab.sequencing.bound import TICKS_PER_S, Least, LeastLeft, ticks
+from lab.sequencing.bound import TICKS_PER_S, ticks
 from lab.sequencing.cell import Cell
 from lab.sequencing.chance import Episode
+from lab.sequencing.least import Least, LeastLeft
 from lab.sequencing.objectives import machine_places
 from lab.sequencing.positions import Option, entry
 from lab.sequencing.run import Run

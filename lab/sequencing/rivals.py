@@ -8,8 +8,8 @@ from lab.sequencing.events import SequenceResult
 from lab.sequencing.execute import WAIT, Choose, Observed, carry_out
 from lab.sequencing.objectives import cost
 from lab.sequencing.positions import choice_of, part_of
-from lab.sequencing.run import Run
 from lab.sequencing.search import Log, Search, kernel_seed
+from lab.sequencing.sessions import Learner, learn
 
 
 def random_search(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
@@ -18,14 +18,7 @@ def random_search(cell: Cell, search: Search, rng: np.random.Generator) -> Seque
     By chance, each sequence is judged by the times of its own episode. Raises BadInput for an objective that the cell
     does not allow, WorkFailed when every sequence ends in a deadlock. Source: thesis 7.6, random search.
     """
-    search.check(cell)
-    log = Log(search)
-    for _ in range(search.episodes):
-        run, sequence = Run(cell, drawn_times(cell, search, rng)), []
-        while allowed := run.allowed():
-            sequence.append(allowed[int(rng.integers(len(allowed)))])
-            run.move(sequence[-1])
-        log.note(tuple(sequence), cost(run, search.objective), run.done)
+    log = learn(cell, search, kernel_seed(rng), Learner).log
     log.check(cell)
     return SequenceResult(log.best, log.best_cost, tuple(log.costs))
 

@@ -62,7 +62,7 @@ def _srl_time(job: "Job", reading: Mapping[str, Any]) -> "Findings":
 
 
 def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.comparison import sequencing_speed
+    from lab.studies.comparison_speed import sequencing_speed
 
     return sequencing_speed(job, reading)
 

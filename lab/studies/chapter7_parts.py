@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from lab.studies import appendix4
 from lab.studies import chapter7_figures as figures
 from lab.studies.chapter7 import (
     DECAY_FACTORS,
@@ -97,7 +98,7 @@ def table_iv_2(job: Job, changes: Changes) -> Findings:
 
 
 def whole(job: Job, changes: Changes) -> Findings:
-    """All tables and figures 7.3 to 7.12; each cell is measured once."""
+    """All tables and figures 7.3 to 7.12 and IV.1 to IV.3; each cell is measured once."""
     cells = _changed(printed(SESSION_LENGTHS), changes)
     measured = Measured(job, [*(cell.setting for cell in cells), *_decay_settings(changes)])
     rows = _decay_rows(measured, changes)
@@ -105,7 +106,7 @@ def whole(job: Job, changes: Changes) -> Findings:
     for case, table in TABLES.items():
         rows += _compared(measured, _of_table(cells, case), table)[0]
     factors = _compared(measured, [cell for cell in cells if cell.setting.method == "srl"], FACTOR_TABLE)[0]
-    pictures |= figures.lengths([*rows, *factors], figures.COMPARED)
+    pictures |= figures.lengths([*rows, *factors], figures.COMPARED) | appendix4.pictures()
     rows += [one for one in factors if one.get("reward_factor") != "B"]  # type B stands in the other tables
     notes = (SYMBOLS, READ_AS, FACTORS, DECAY, SHADED, HOW_MANY)
     return Findings(rows, summary(rows, job.sessions), pictures, notes)

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,6 @@ CAPS = {  # sessions at the most, by size of the job and method: the others woul
     "order": {"srl-time": 10, "ga": 5, COMPILED: 200},
 }
 LEARNING = ("srl", "mc", "random", "srl-time", "ga")
-CP_SAT = "cp-sat"
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,9 @@ class Tried:
 
 
 def single(work: Work) -> tuple[str, ...]:
-    """The methods that have one sequence for this work: constructive ones, and those that prove the optimum."""
-    return ("fifo", *usable(work.cell), "exact")
+    """The methods that have one sequence for this work: constructive ones, and those that prove the optimum (in seconds)."""
+    proving = ("exact", "cp-sat") if work.size == "few" else ("exact",)
+    return ("fifo", *usable(work.cell), *proving)
 
 
 def tried(setting: Setting, *, sessions: int, seed: int) -> Tried:
@@ -136,7 +137,8 @@ def _search(setting: Setting) -> Search:
 
 def _settings(setting: Setting) -> SrlSettings:
     """Fig. 5.1 with the parameters of section 7.6 for toasts; for the FMS those of App. III."""
-    work, factor = setting.work, "A" if setting.reward_factor == "A" else "B"
+    work = setting.work
+    factor: Literal["A", "B"] = "A" if setting.reward_factor == "A" else "B"
     if work.order is not None:
         given = settings(len(work.order))
         return SrlSettings(beta=given.beta, factor=factor, values=given.values, state=given.state)

@@ -1,6 +1,6 @@
 """The Gantt chart of a schedule: parts, machines and the robot over time (thesis fig. IV.1)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import product
 from math import inf
@@ -11,7 +11,7 @@ import numpy as np
 
 from lab.errors import BadInput
 from lab.sequencing.events import Schedule
-from lab.view.canvas import GREY, INK, RED, picture_file, seconds, tip
+from lab.view.canvas import GREY, INK, RED, picture_bytes, picture_file, seconds, tip
 from lab.view.gantt_bars import LOOKS, Bar, Chart, mixed
 
 if TYPE_CHECKING:
@@ -32,18 +32,32 @@ def gantt(schedule: Schedule, path: Path, predicted: Schedule | None = None) -> 
     of moves and rows; the colour tells products apart. Raises BadInput for a schedule without activities and as all
     plots here do: for a path that is no picture or cannot be written. Source: thesis fig. IV.1.
     """
+    draw, size_inch = _drawing(schedule, predicted)
+    with picture_file(path, *size_inch) as figure:
+        draw(figure)
+
+
+def gantt_picture(schedule: Schedule, form: str = "svg", predicted: Schedule | None = None) -> bytes:
+    """The same as PNG or SVG bytes; BadInput for a schedule without activities, and for another form."""
+    draw, size_inch = _drawing(schedule, predicted)
+    return picture_bytes(draw, *size_inch, form)
+
+
+def _drawing(schedule: Schedule, predicted: Schedule | None) -> tuple[Callable[["Figure"], None], tuple[float, float]]:
+    """What draws the chart on a figure, and the figure's width and height [inch]."""
     if not schedule.robot:
         raise BadInput("Gantt chart: the schedule has no activities")
     chart = Chart(schedule)
     width_inch, height_inch = chart.page_inch(predicted is not None)
-    with picture_file(path, width_inch, height_inch) as figure:
+    bars = chart.bars(schedule, -0.31 if predicted is None else -0.38, 0.62)
+    ends = [(schedule.makespan_s, "-", "makespan" if predicted is None else "makespan, measured")]
+    strips: list[Bar] = []
+    if predicted is not None:
+        strips = [bar for bar in chart.bars(predicted, 0.28, 0.13) if bar.look != "outside"]
+        ends.append((predicted.makespan_s, "--", "makespan, predicted (thin strips)"))
+
+    def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
-        bars = chart.bars(schedule, -0.31 if predicted is None else -0.38, 0.62)
-        ends = [(schedule.makespan_s, "-", "makespan" if predicted is None else "makespan, measured")]
-        strips: list[Bar] = []
-        if predicted is not None:
-            strips = [bar for bar in chart.bars(predicted, 0.28, 0.13) if bar.look != "outside"]
-            ends.append((predicted.makespan_s, "--", "makespan, predicted (thin strips)"))
         for bar in (*bars, *strips):
             _draw_bar(axes, bar, chart)
         lines = [_draw_end(axes, *end) for end in ends]
@@ -52,6 +66,8 @@ def gantt(schedule: Schedule, path: Path, predicted: Schedule | None = None) -> 
         _legend(figure, chart, [*lines, *_draw_arrivals(axes, chart)], {bar.look for bar in bars}, width_inch)
         figure.draw_without_rendering()  # settles the layout, so that widths in pixels are known
         _write(axes, bars, chart)
+
+    return draw, (width_inch, height_inch)
 
 
 def _draw_bar(axes: "Axes", bar: Bar, chart: Chart) -> None:

@@ -179,7 +179,11 @@ def _ends(parts: Sequence[Activity]) -> set[Activity]:
 
 
 def _lanes(row: Sequence[Activity]) -> list[tuple[Activity, int]]:
-    """The activities of a row and the lane of each: side by side where a machine holds several parts."""
+    """The activities of a row and the lane of each: side by side where a machine holds several parts.
+
+    A part keeps its lane of a machine until it is fetched.
+    """
+    fetched_s = {activity.part: activity.end_s for activity in row if activity.kind == "blocked"}
     lanes: list[float] = []
     placed: list[tuple[Activity, int]] = []
     holds: dict[int | None, int] = {}
@@ -187,7 +191,8 @@ def _lanes(row: Sequence[Activity]) -> list[tuple[Activity, int]]:
         follows = activity.kind == "blocked" and activity.part in holds
         free = [lane for lane, end_s in enumerate(lanes) if end_s <= activity.start_s + TOUCHING_S]
         lane = holds[activity.part] if follows else free[0] if free else len(lanes)
-        lanes[lane : lane + 1] = [activity.end_s]
+        stays = activity.kind == "process" and activity.resource == activity.origin
+        lanes[lane : lane + 1] = [fetched_s.get(activity.part, activity.end_s) if stays else activity.end_s]
         holds[activity.part] = lane
         placed.append((activity, lane))
     return placed

@@ -1,6 +1,6 @@
 """The tree of a branch-and-bound search: which sequences were tried, and why most were not (thesis figs. IV.2, IV.3)."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,10 +9,24 @@ from lab.errors import BadInput
 from lab.sequencing.cell import Cell
 from lab.sequencing.chance import Episode
 from lab.sequencing.run import Run
-from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PALE_GREEN, PALE_GREY, RED, picture_file, seconds, tip
+from lab.view.canvas import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PALE_GREEN,
+    PALE_GREY,
+    RED,
+    picture_bytes,
+    picture_file,
+    seconds,
+    tip,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MAX_NODES = 3000
 EDGE_INCH, HEAD_INCH, FOOT_INCH, NARROWEST_INCH = 0.15, 0.95, 0.4, 7.0
@@ -87,6 +101,21 @@ def branch_plot(branches: Sequence[Branch], path: Path, *, title: str = "", near
     BadInput for no nodes, more than MAX_NODES of them, a parent that does not come before its child, and as all plots
     here do. Source: thesis figs. IV.2, IV.3.
     """
+    draw, size_inch = _drawing(branches, title, near)
+    with picture_file(path, *size_inch) as figure:
+        draw(figure)
+
+
+def branch_picture(branches: Sequence[Branch], form: str = "svg", *, title: str = "", near: bool = False) -> bytes:
+    """The same as PNG or SVG bytes; BadInput as `branch_plot`, and for another form."""
+    draw, size_inch = _drawing(branches, title, near)
+    return picture_bytes(draw, *size_inch, form)
+
+
+def _drawing(
+    branches: Sequence[Branch], title: str, near: bool
+) -> tuple[Callable[["Figure"], None], tuple[float, float]]:
+    """What draws the tree on a figure, and the figure's width and height [inch]."""
     columns, rows = _layout(branches)
     if near:
         branches = _near(branches)
@@ -101,7 +130,8 @@ def branch_plot(branches: Sequence[Branch], path: Path, *, title: str = "", near
     height_inch = HEAD_INCH + leaves * scale.row + FOOT_INCH
     middles = [HEAD_INCH + (row + 0.5) * scale.row for row in rows]
     places = [(EDGE_INCH + column * step, middle) for column, middle in zip(columns, middles, strict=True)]
-    with picture_file(path, width_inch, height_inch) as figure:
+
+    def draw(figure: "Figure") -> None:
         figure.set_layout_engine("none")  # one unit is one inch
         axes = figure.add_axes((0, 0, 1, 1), xlim=(0, width_inch), ylim=(height_inch, 0))
         axes.set_axis_off()
@@ -113,6 +143,8 @@ def branch_plot(branches: Sequence[Branch], path: Path, *, title: str = "", near
             for y in (HEAD_INCH - 0.12, height_inch - 0.15):
                 axes.text(EDGE_INCH + column * step, y, words, fontsize=7.5, color=GREY)
         _draw_head(axes, branches, title, width_inch)
+
+    return draw, (width_inch, height_inch)
 
 
 def branches_of(

@@ -101,13 +101,19 @@ def test_deadlocks_are_learned_from_and_never_the_best(method: str) -> None:
             assert (log.best, log.best_cost) == ((), math.inf)
             with pytest.raises(WorkFailed, match="deadlocks"):
                 log.check(cell)
+    batch = run_sessions(cell, method, Search(1), 12, 0, keep_costs=True)
+    ended = batch.costs[:, 0] < stuck
+    assert set(ended.tolist()) == {True, False}
+    assert np.array_equal(batch.best_cost, np.where(ended, batch.costs[:, 0], math.inf))
+    assert np.array_equal(batch.sequences.any(axis=1), ended)
 
 
-def test_a_table_grows(toast_cell: CellMaker) -> None:
+@pytest.mark.parametrize("method", ["srl", "mc"])
+def test_a_table_grows(toast_cell: CellMaker, method: str) -> None:
     """Learning on with what was copied is as learning with a table that was large enough from the start."""
     cell, search = toast_cell("I", 12), Search(2000, settings=SrlSettings(beta=0.2))
-    batch = run_sessions(cell, "srl", search, 1, 5, keep_costs=True)
-    grown = learn(cell, search, int(session_seeds(5, 1)[0]), Srl)
+    batch = run_sessions(cell, method, search, 1, 5, keep_costs=True)
+    grown = learn(cell, search, int(session_seeds(5, 1)[0]), METHODS[method])
     assert sum(map(len, grown.table.values())) > ROWS
     assert grown.log.costs == batch.costs[0].tolist()
     assert grown.final_cost == batch.final_cost[0]

@@ -1,0 +1,697 @@
+"""The order of the transfers: what `lab sequence` answers for a cell and for a task, and what it refuses."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from math import nan
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from lab.errors import BadInput
+from lab.listener import Listener
+from lab.sequence import (
+    Wanted,
+    find_sequence,
+    measured_cell,
+    reference,
+    search_for,
+    sequence_cell,
+    sequence_named,
+)
+from lab.sequencing import DRAWN, SEQUENCERS
+from lab.sequencing.cell import Cell, Stage, Station
+from lab.sequencing.chance import NO_CHANCE, Chance
+from lab.sequencing.events import SequenceResult
+from lab.sequencing.execute import replicate
+from lab.sequencing.objectives import OBJECTIVES
+from lab.sequencing.run import simulate
+from lab.sequencing.search import Reference, Search, SrlSettings
+from lab.taskfile import load, load_cell
+from lab.teaching import Teacher
+from lab.toolbox import Toolbox
+from lab.vision import read_picture
+
+Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
+CONTRACT = {  # what CLI.md promises
+    *("method", "makespan_s", "sequence", "episode_makespans_s", "optimal_s", "bound_s", "gap"),
+    *("success_percent", "final_success_percent", "mean_best_s"),
+}
+FIELDS = (
+    *("task", "toasts", "order", "seed", "method", "objective", "episodes", "sessions", "makespan_s", "cost"),
+    *("sequence", "moves", "episode_costs", "episode_makespans_s", "optimal_s", "optimal_cost", "optimum_proven"),
+    *("bound_s", "bound_cost", "bound_by", "gap", "success_percent", "final_success_percent", "mean_best_s"),
+    *("mean_best_cost", "advisor", "advice", "stochastic", "files"),
+)
+LEARNERS = ("srl", "srl-time", "mc")
+AT_ONCE = ("fifo", "exact", "cp-sat", "shortest-move", "longest-remaining-work", "most-urgent-machine", "nearest-ready")
+UNDUE = sorted(set(SEQUENCERS) - {"earliest-due"})  # those that need no due times
+
+# A toast takes 2 s into the oven, 10 s in it and 2 s out; the robot comes back in 1 s for the next one: 14 s, 29 s.
+OVEN = """
+name = "oven"
+kind = "cell"
+parts = 2
+stations = [
+  { name = "in", kind = "storage", capacity = 9 },
+  { name = "hot", kind = "machine", capacity = 1, processing_s = 10 },
+  { name = "out", kind = "storage", capacity = 9 },
+]
+robot = { start = "in" }
+products = [{ name = "toast", routes = [["in", "hot", "out"]] }]
+travel = { in = { hot = 1, out = 1 }, hot = { in = 1, out = 1 }, out = { in = 1, hot = 1 } }
+loaded = { in = { hot = 2 }, hot = { out = 2 } }
+"""
+LATE = "due_s = [14, 20]\n" + OVEN  # the second toast is out after 29 s, 9 s late
+
+# Two products that meet head-on: once each is in the machine that the other wants, nothing moves any more.
+CROSSING = """
+name = "crossing"
+kind = "cell"
+order = ["east", "west"]
+stations = [
+  { name = "in", kind = "storage", capacity = 2 },
+  { name = "left", kind = "machine", capacity = 1, processing_s = 5 },
+  { name = "right", kind = "machine", capacity = 1, processing_s = 5 },
+  { name = "out", kind = "storage", capacity = 2 },
+]
+robot = { start = "in" }
+products = [
+  { name = "east", routes = [["in", "left", "right", "out"]] },
+  { name = "west", routes = [["in", "right", "left", "out"]] },
+]
+[travel]
+in = { left = 1, right = 1, out = 1 }
+left = { in = 1, right = 1, out = 1 }
+right = { in = 1, left = 1, out = 1 }
+out = { in = 1, left = 1, right = 1 }
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder to run in that holds the cells of this file, with a toolbox that is not there yet."""
+    for name, text in (("oven", OVEN), ("late", LATE), ("crossing", CROSSING)):
+        (tmp_path / f"{name}.toml").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("LAB_TOOLBOX", str(tmp_path / "toolbox"))
+    return tmp_path
+
+
+@pytest.fixture
+def teacher(folder: Path) -> Teacher:
+    return Teacher(Toolbox(folder / "toolbox"))
+
+
+def asked(lab: Lab, words: str, **more: Any) -> dict[str, Any]:
+    """The document of a command that went well."""
+    ran = lab("sequence", *words.split(), "--json", **more)
+    assert ran.code == 0, ran.err
+    document: dict[str, Any] = ran.json
+    return document
+
+
+def listed(folder: Path) -> list[str]:
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+# ---- the document -------------------------------------------------------------------------------------------------
+
+
+def test_one_document_and_nothing_else_on_stdout(lab: Lab, folder: Path) -> None:
+    before = listed(folder)
+    ran = lab("sequence", "oven.toml", "--method", "fifo", "--json")
+    assert (ran.code, ran.out.count("\n")) == (0, 1)
+    assert tuple(ran.json) == FIELDS
+    assert set(FIELDS) >= CONTRACT
+    assert ran.err.splitlines() == [
+        "Find the order of the transfers",
+        "  parts 1 1 2 2: 29.0 s after 1 episodes, proven optimum 29.0 s, gap 0.0%",
+    ]
+    assert listed(folder) == before
+
+
+def test_a_cell_by_hand(lab: Lab) -> None:
+    assert asked(lab, "oven.toml --method fifo --seed 5") == {
+        "task": "oven",
+        "toasts": 2,
+        "order": ["toast", "toast"],
+        "seed": 5,
+        "method": "fifo",
+        "objective": "makespan",
+        "episodes": 1,
+        "sessions": 1,
+        "makespan_s": 29.0,
+        "cost": 29.0,
+        "sequence": [1, 1, 2, 2],
+        "moves": ["toast 1: in > hot", "toast 1: hot > out", "toast 2: in > hot", "toast 2: hot > out"],
+        "episode_costs": [29.0],
+        "episode_makespans_s": [29.0],
+        "optimal_s": 29.0,
+        "optimal_cost": 29.0,
+        "optimum_proven": True,
+        "bound_s": 29.0,
+        "bound_cost": 29.0,
+        "bound_by": "A*",
+        "gap": 0.0,
+        "success_percent": 100.0,
+        "final_success_percent": None,
+        "mean_best_s": 29.0,
+        "mean_best_cost": 29.0,
+        "advisor": "none",
+        "advice": None,
+        "stochastic": None,
+        "files": {},
+    }
+
+
+@pytest.mark.parametrize("method", UNDUE)
+def test_every_method_has_the_same_document(lab: Lab, method: str) -> None:
+    document = asked(lab, f"oven.toml --method {method} --episodes 12 --sessions 2")
+    assert tuple(document) == FIELDS
+    assert (document["method"], document["sessions"]) == (method, 2)
+    assert (document["makespan_s"], document["gap"], document["success_percent"]) == (29.0, 0.0, 100.0)
+    assert sorted(document["sequence"]) == [1, 1, 2, 2]
+    assert document["episode_makespans_s"] == [29.0] * (1 if method in AT_ONCE else 12)
+    assert document["final_success_percent"] == (100.0 if method in LEARNERS else None)
+
+
+@pytest.mark.parametrize(
+    ("words", "makespan_s"),
+    [
+        ("--case I --toasts 3", 513),
+        ("--case I --toasts 4", 663),
+        ("--case II --toasts 3", 700),
+        ("--case II --toasts 4", 900),
+        ("--case III --toasts 3", 995),
+        ("--case III --toasts 4", 1290),
+    ],
+)
+def test_the_optima_that_the_thesis_prints(lab: Lab, words: str, makespan_s: int) -> None:
+    document = asked(lab, f"toast {words} --method exact")
+    assert (document["makespan_s"], document["optimal_s"], document["bound_s"]) == (makespan_s,) * 3
+    assert (document["gap"], document["success_percent"], document["optimum_proven"]) == (0.0, 100.0, True)
+    assert simulate(load_cell(document["task"]).cell(document["toasts"]), document["sequence"]).makespan_s == makespan_s
+
+
+@pytest.mark.parametrize("method", ["random", "srl"])
+def test_several_sessions_are_summed_up(method: str) -> None:
+    """Each session has chance of its own; the document is of the best one, and counts how many got there."""
+    file = load_cell("toast-case-1")
+    cell = file.cell(3)
+    document, found = sequence_cell(cell, file.sequencing, Wanted(method, 40, sessions=8, seed=3), NO_CHANCE)
+    search = search_for(file.sequencing, episodes=40)
+    alone = [find_sequence(cell, method, search, 3, session) for session in range(8)]
+    assert [result.episode_costs for result in found] == [result.episode_costs for result in alone]
+    costs = [result.cost for result in alone]
+    best = costs.index(min(costs))
+    assert document["cost"] == document["makespan_s"] == costs[best]
+    assert document["sequence"] == list(alone[best].sequence)
+    assert document["mean_best_s"] == document["mean_best_cost"] == pytest.approx(sum(costs) / 8)
+    assert document["episode_makespans_s"] == document["episode_costs"] == list(alone[0].episode_costs)
+    assert best != 0  # so that the first session is not the best one
+    assert document["gap"] == pytest.approx(costs[best] / 513 - 1)
+    assert document["success_percent"] == 12.5 * costs.count(513.0)
+    finals = [getattr(result, "final_cost", nan) for result in alone]
+    assert document["final_success_percent"] == (12.5 * finals.count(513.0) if method == "srl" else None)
+    assert len(set(costs)) > 1
+
+
+def test_a_gap_is_told(lab: Lab) -> None:
+    document = asked(lab, "toast-case-1 --method fifo --sessions 3")
+    assert (document["makespan_s"], document["optimal_s"]) == (544.0, 513.0)
+    assert (document["gap"], document["success_percent"]) == (pytest.approx(31 / 513), 0.0)
+    assert document["mean_best_s"] == 544.0
+
+
+def test_the_same_seed_gives_the_same_document(lab: Lab) -> None:
+    words = "fms --method random --episodes 6 --sessions 2"
+    assert asked(lab, f"{words} --seed 3") == asked(lab, f"{words} --seed 3")
+    assert asked(lab, f"{words} --seed 3")["episode_costs"] != asked(lab, f"{words} --seed 4")["episode_costs"]
+
+
+def test_what_a_person_is_shown(lab: Lab) -> None:
+    ran = lab("sequence", "toast", "--case", "I", "--method", "fifo", "--sessions", "2")
+    assert ran.code == 0
+    assert ran.out.splitlines() == [
+        "fifo: 544.00 s for 3 toasts (seed 0)",
+        "order of the transfers: 1 2 3 1 2 1 2 3 2 3 3",
+        "proven optimum 513.00 s, gap 6.04% (A*)",
+        "2 sessions: optimum found in 0 %, mean best 544.00 s",
+    ]
+
+
+# ---- which order of parts -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "task", "order"),
+    [
+        ("oven.toml", "oven", ["toast"] * 2),
+        ("oven.toml --toasts 3", "oven", ["toast"] * 3),
+        ("oven.toml --case TTT", "oven", ["toast"] * 3),
+        ("toast --case 2", "toast-case-2", ["toast"] * 3),
+        ("toast --case iii --toasts 1", "toast-case-3", ["toast"]),
+        ("toast-case-3 --toasts 2", "toast-case-3", ["toast"] * 2),
+        ("fms", "fms", ["rook", "sign", "rook"]),
+        ("fms --case sR", "fms", ["sign", "rook"]),
+        ("fms --case sign,rook", "fms", ["sign", "rook"]),
+        ("fms --case rook", "fms", ["rook"]),
+    ],
+)
+def test_cases(lab: Lab, words: str, task: str, order: list[str]) -> None:
+    document = asked(lab, f"{words} --method fifo")
+    assert (document["task"], document["order"], document["toasts"]) == (task, order, len(order))
+
+
+def test_moves_in_words(lab: Lab) -> None:
+    """One rook: to the lathe's table, lifted off its pallet, which follows around the lathe, and out."""
+    assert asked(lab, "fms --case R --method exact")["moves"] == [
+        "rook 1: incoming > lathe-1-in",
+        "rook 1: lathe-1-in > lathe-1",
+        "rook 1's pallet: lathe-1-in > lathe-1-out",
+        "rook 1: lathe-1 > lathe-1-out",
+        "rook 1: lathe-1-out > outgoing",
+    ]
+
+
+# ---- other objectives ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("objective", "cost"),
+    [
+        ("robot-idle", 20.0),  # it waits 10 s at the oven, twice
+        ("machine-idle", 9.0),  # 29 s, of which it works 20 s
+        ("mean-tardiness", 4.5),  # 0 s and 9 s
+        ("tardy-parts", 1.0),
+    ],
+)
+@pytest.mark.parametrize("method", ["srl-time", "exact", "fifo"])
+def test_objectives_by_hand(lab: Lab, objective: str, cost: float, method: str) -> None:
+    document = asked(lab, f"late.toml --objective {objective} --method {method} --episodes 30")
+    assert (document["objective"], document["cost"], document["optimal_cost"]) == (objective, cost, cost)
+    assert (document["bound_cost"], document["bound_by"], document["optimum_proven"]) == (cost, "CP-SAT", True)
+    assert (document["gap"], document["success_percent"], document["mean_best_cost"]) == (0.0, 100.0, cost)
+    assert document["makespan_s"] == 29.0  # of that sequence
+    assert min(document["episode_costs"]) == cost
+    names = ("episode_makespans_s", "optimal_s", "bound_s", "mean_best_s")
+    assert [document[name] for name in names] == [None] * 4  # these are about makespans
+
+
+def test_the_objective_is_told_in_words(lab: Lab) -> None:
+    ran = lab("sequence", "late.toml", "--objective", "mean-tardiness", "--method", "earliest-due")
+    assert ran.out.splitlines()[0] == "earliest-due: mean tardiness 4.50 s for 2 toasts (seed 0)"
+    ran = lab("sequence", "late.toml", "--objective", "tardy-parts", "--method", "earliest-due")
+    assert ran.out.splitlines()[0] == "earliest-due: tardy parts 1.00 for 2 toasts (seed 0)"
+
+
+def test_what_cannot_be_beaten_comes_from_whom_it_can() -> None:
+    cell = load_cell("late.toml").cell()
+    assert reference(cell, "makespan") == Reference(29.0, True, "A*")
+    for objective in set(OBJECTIVES) - {"makespan"}:
+        assert reference(cell, objective).method == "CP-SAT"
+
+
+def test_an_optimum_that_is_not_proven_is_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = load_cell("oven.toml").cell()
+    monkeypatch.setattr("lab.sequence.reference", lambda *_: Reference(20.0, False, "A*"))
+    document, _ = sequence_cell(cell, load_cell("oven.toml").sequencing, Wanted("fifo"), NO_CHANCE)
+    assert (document["optimal_s"], document["optimal_cost"], document["optimum_proven"]) == (None, None, False)
+    assert (document["bound_s"], document["gap"]) == (20.0, pytest.approx(0.45))
+    assert (document["success_percent"], document["final_success_percent"]) == (None, None)
+
+
+# ---- drawn times --------------------------------------------------------------------------------------------------
+
+REACTING = {
+    "srl": "planned anew at every decision",
+    "srl-time": "it goes on learning before every decision",
+    "fifo": "a queue of tasks as they become possible",
+    "shortest-move": "the rule shortest-move, asked at every decision",
+    "exact": "planned anew at every decision",
+}
+
+
+@pytest.mark.parametrize("method", REACTING)
+def test_drawn_times(lab: Lab, monkeypatch: pytest.MonkeyPatch, method: str) -> None:
+    """The list as it is, and what reacts, in the same episodes: the document has the means of both, and of the difference."""
+    monkeypatch.setattr("lab.sequence.REPLICATIONS", 5)
+    words = f"toast-case-1 --toasts 3 --method {method} --episodes 40"
+    plain, document = asked(lab, words), asked(lab, f"{words} --stochastic")
+    assert tuple(document) == FIELDS
+    drawn = document["stochastic"]
+    assert list(drawn) == [
+        *("processing", "arrivals", "spread", "replications", "fixed", "reacting", "saved_by_reacting")
+    ]
+    assert (drawn["processing"], drawn["arrivals"], drawn["spread"]) == ("normal", None, 0.1)
+    assert (drawn["replications"], drawn["reacting"]["policy"]) == (5, REACTING[method])
+    for name in ("fixed", "reacting", "saved_by_reacting"):
+        low, high = drawn[name]["ci95"]
+        assert low <= drawn[name]["mean"] <= high
+    saved = drawn["fixed"]["mean"] - drawn["reacting"]["mean"]
+    assert drawn["saved_by_reacting"]["mean"] == pytest.approx(saved)
+    assert drawn["fixed"]["sequence"] == plain["sequence"]  # planned with the mean times, whatever was learned in
+    cell = load_cell("toast-case-1").cell(3)
+    costs = replicate(cell, plain["sequence"], Chance(), 5, 0)
+    assert drawn["fixed"]["mean"] == pytest.approx(costs.mean())
+    assert len(set(costs)) == 5
+    assert plain["stochastic"] is None
+    judged = {name: document[name] for name in ("gap", "success_percent")}
+    if method in DRAWN:  # it looked in drawn times, where the shortest is luck
+        assert judged == {"gap": None, "success_percent": None}
+        assert document["episode_costs"] != plain["episode_costs"]
+    else:
+        assert judged == {name: plain[name] for name in judged}
+        assert document["episode_costs"] == plain["episode_costs"]
+
+
+def test_the_best_list_is_the_one_that_is_carried_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lab.sequence.REPLICATIONS", 2)
+    file = load_cell("toast-case-1")
+    wanted = Wanted("ga", 8, sessions=4, stochastic=True)
+    document, found = sequence_cell(file.cell(3), file.sequencing, wanted, file.chance())
+    best = min(found, key=lambda result: result.cost)
+    assert best.cost < found[-1].cost
+    assert document["stochastic"]["fixed"]["sequence"] == list(best.sequence)
+
+
+def test_without_spread_chance_changes_nothing(lab: Lab, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    monkeypatch.setattr("lab.sequence.REPLICATIONS", 3)
+    (folder / "sure.toml").write_text(OVEN + '[stochastic]\nprocessing = "normal"\nspread = 0\n')
+    drawn = asked(lab, "sure.toml --method srl --episodes 5 --stochastic")["stochastic"]
+    assert drawn["fixed"] == {"mean": 29.0, "ci95": [29.0, 29.0], "sequence": drawn["fixed"]["sequence"]}
+    assert drawn["saved_by_reacting"] == {"mean": 0.0, "ci95": [0.0, 0.0]}
+
+
+def test_the_file_says_what_is_drawn(lab: Lab, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    monkeypatch.setattr("lab.sequence.REPLICATIONS", 3)
+    come = (
+        '[arrivals]\ninterval_s = 30\n[stochastic]\nprocessing = "constant"\narrivals = "exponential"\nspread = 0.2\n'
+    )
+    (folder / "come.toml").write_text(OVEN + come)
+    drawn = asked(lab, "come.toml --method fifo --stochastic")["stochastic"]
+    assert (drawn["processing"], drawn["arrivals"], drawn["spread"]) == ("constant", "exponential", 0.2)
+    ran = lab("sequence", "come.toml", "--method", "fifo", "--stochastic")
+    assert ran.out.splitlines()[3].startswith("3 drawn episodes: the list as it is ")
+
+
+# ---- advice -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gate", ["always", "never", "ccrl"])
+def test_advice(lab: Lab, gate: str) -> None:
+    """An expert who is always asked leads along the optimum from the first episode; ccrl asks from episode 30 on."""
+    words = f"toast --case I --toasts 3 --method srl --advisor expert --gate {gate} --episodes 40 --sessions 2"
+    document = asked(lab, words)
+    assert tuple(document) == FIELDS
+    assert (document["advisor"], len(document["advice"])) == ("expert", 2)
+    names = {"requests", "helped_steps", "misleads", "rejected_at_episode"}
+    assert all(session.keys() == names for session in document["advice"])
+    requests = [session["requests"] for session in document["advice"]]
+    assert all(bool(session["helped_steps"]) == (gate != "never") for session in document["advice"])
+    if gate == "always":
+        assert requests == [40, 40]
+        assert document["episode_makespans_s"] == [513.0] * 40
+    else:
+        assert all(0 < number <= 11 for number in requests) if gate == "ccrl" else requests == [0, 0]
+
+
+def test_nobody_is_asked_unless_it_is_wanted(lab: Lab) -> None:
+    words = "toast-case-1 --method srl --episodes 40"
+    alone, never = asked(lab, words), asked(lab, f"{words} --advisor wrong --gate never")
+    assert alone.pop("advice") is None
+    assert never.pop("advice") == [{"requests": 0, "helped_steps": 0, "misleads": 0, "rejected_at_episode": None}]
+    assert (alone.pop("advisor"), never.pop("advisor")) == ("none", "wrong")
+    assert alone == never
+
+
+def test_an_advisor_has_chance_of_its_own_in_every_session() -> None:
+    """Every decision is a novice's, so what differs between the sessions is what the novice says."""
+    file = load_cell("toast-case-1")
+    wanted = Wanted("srl", 5, sessions=2, advisor="novice", gate="always")
+    _, (one, other) = sequence_cell(file.cell(3), file.sequencing, wanted, NO_CHANCE)
+    assert one.episode_costs != other.episode_costs
+
+
+def test_a_person_is_asked_on_the_terminal(lab: Lab) -> None:
+    """Toast 2 first, then the learner goes on alone: it asked in one episode, and one move was advised."""
+    words = "oven.toml --method srl --advisor terminal --gate always --episodes 2"
+    ran = lab("sequence", *words.split(), "--json", stdin="2\nauto\n")
+    assert ran.code == 0, ran.err
+    assert ran.json["advice"] == [{"requests": 2, "helped_steps": 1, "misleads": 0, "rejected_at_episode": None}]
+    assert "Episode 1: the learner asks which part to move next." in ran.err
+
+
+# ---- pictures -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", ["png", "svg"])
+def test_pictures(lab: Lab, folder: Path, form: str) -> None:
+    before = listed(folder)
+    words = f"oven.toml --method random --episodes 8 --sessions 2 --plot p.{form} --gantt g.{form}"
+    ran = lab("sequence", *words.split())
+    assert ran.code == 0, ran.err
+    assert ran.out.splitlines()[-2:] == [f"p.{form}", f"g.{form}"]
+    assert sorted(set(listed(folder)) - set(before)) == [f"g.{form}", f"p.{form}"]
+    if form == "png":
+        assert all(min(read_picture(folder / name).shape[:2]) > 150 for name in ("p.png", "g.png"))
+        return
+    plot, chart = (" ".join(ElementTree.parse(folder / name).getroot().itertext()) for name in ("p.svg", "g.svg"))
+    assert "makespan [s]" in plot
+    assert all(word in chart for word in ("toast 1", "toast 2", "hot", "robot"))
+
+
+def test_pictures_are_in_the_document(lab: Lab) -> None:
+    assert asked(lab, "oven.toml --method fifo --gantt g.svg")["files"] == {"gantt": "g.svg"}
+    words = "late.toml --method fifo --objective tardy-parts --plot p.svg --gantt g.svg"
+    assert asked(lab, words)["files"] == {"plot": "p.svg", "gantt": "g.svg"}
+    assert "tardy-parts" in Path("p.svg").read_text(encoding="utf-8")
+
+
+# ---- what is refused: exit 2 before anything is done; what fails: exit 1 ----------------------------------------------
+
+KNOWN = ", ".join(sorted(SEQUENCERS))
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ("world-1", "world-1: it is a world, there is nothing to sequence: learn it with lab teach world-1"),
+        ("ovn.toml", "no task file 'ovn.toml': give a file that exists, .toml or a .txt grid, or what ships: fms, "),
+        ("fsm", "unknown task 'fsm' (TASK): did you mean 'fms'? known: fms, toast, "),
+        ("fms --case RSR --toasts 3", "--case RSR and --toasts 3: an order is one or the other"),
+        ("oven.toml --case T --toasts 1", "--case T and --toasts 1: an order is one or the other"),
+        (
+            "fms --toasts 3",
+            "3 parts (--toasts): cell 'fms' makes several products: give their order with --case, such as RSR",
+        ),
+        (
+            "fms --case RXR",
+            "order 'RXR' (--case) for cell 'fms': letter 2, 'X', means no product: known: R (rook), S (sign)",
+        ),
+        ("fms --case rook,sgn", "unknown product 'sgn' (order for cell 'fms'): did you mean 'sign'? known: rook, sign"),
+        ("toast --case IV", "unknown case 'IV' (--case): did you mean 'I'? known: I, II, III"),
+        ("oven.toml --toasts 0", "an order of 0 parts: allowed are 1 to 200"),
+        ("toast --case I --toasts 201", "an order of 201 parts: allowed are 1 to 200"),
+        ("oven.toml --toasts 10", "station 'in': capacity 9 cannot hold all 10 parts"),
+        ("oven.toml --episodes 0", "invalid value for '--episodes'"),
+        ("oven.toml --sessions 0", "invalid value for '--sessions'"),
+        ("oven.toml --plot p.pdf", "picture 'p.pdf': plots are written as .png or .svg"),
+        ("oven.toml --gantt g", "picture 'g': plots are written as .png or .svg"),
+        ("oven.toml --gantt no/g.svg", "picture 'no/g.svg': there is no folder 'no'"),
+        ("toast --method srrl", f"unknown method 'srrl' (--method): did you mean 'srl'? known: {KNOWN}"),
+    ],
+)
+@pytest.mark.parametrize("json_too", [False, True], ids=["", "json"])
+def test_what_is_refused_at_once(lab: Lab, folder: Path, words: str, line: str, json_too: bool) -> None:
+    before = listed(folder)
+    ran = lab("sequence", *words.split(), *(["--json"] if json_too else []))
+    assert (ran.code, ran.out) == (2, "")
+    assert line in ran.err
+    assert re.fullmatch(r"lab: .*\n", ran.err), "one line"
+    assert listed(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ("--method srrl", f"unknown method 'srrl' (--method): did you mean 'srl'? known: {KNOWN}"),
+        (
+            "--objective makespn",
+            "unknown objective 'makespn' (--objective): did you mean 'makespan'? known: machine-idle, makespan, ",
+        ),
+        (
+            "--objective tardy-parts",
+            "objective 'tardy-parts': the cell has no due times (due_s); without them: makespan, robot-idle, machine-idle",
+        ),
+        ("--method earliest-due", "rule 'earliest-due': the cell has no due times (due_s)"),
+        ("--advisor exprt --method srl", "unknown advisor 'exprt' (--advisor): did you mean 'expert'? known: expert, "),
+        ("--advisor tau=0 --method srl", "unknown advisor 'tau=0' (--advisor): "),
+        (
+            "--advisor expert --gate cclr --method srl",
+            "unknown gate 'cclr' (--gate, for sequencing): did you mean 'ccrl'? known: always, ccrl, never",
+        ),
+        (
+            "--advisor expert --gate ia --method srl",
+            "gate 'ia' (--gate): it looks at a table of states, which sequencing has not; allowed here: ccrl, ",
+        ),
+        ("--advisor expert", "--advisor expert with --method srl-time: only srl asks for advice"),
+        ("--advisor expert --method exact", "--advisor expert with --method exact: only srl asks for advice"),
+        ("--advisor terminal --method mc", "--advisor terminal with --method mc: only srl asks for advice"),
+    ],
+)
+def test_what_does_not_fit_is_refused(lab: Lab, folder: Path, words: str, line: str) -> None:
+    before = listed(folder)
+    for more in ([], ["--json"]):
+        ran = lab("sequence", "oven.toml", *words.split(), *more)
+        assert (ran.code, ran.out) == (2, "")
+        assert ran.err.splitlines()[-1].startswith(f"lab: {line}")
+    assert listed(folder) == before
+
+
+def test_a_folder_for_a_picture(lab: Lab, folder: Path) -> None:
+    (folder / "p.png").mkdir()
+    ran = lab("sequence", "oven.toml", "--plot", "p.png")
+    assert (ran.code, ran.out, ran.err) == (2, "", "lab: picture 'p.png': it is a folder, a file is wanted\n")
+
+
+def test_a_deadlock_is_work_that_failed(lab: Lab) -> None:
+    """The queue puts both products into the machines at once; a search that looks further gets around it."""
+    ran = lab("sequence", "crossing.toml", "--method", "fifo", "--json")
+    assert (ran.code, ran.out) == (1, "")
+    assert ran.err.splitlines()[-1] == "lab: no sequence for 2 parts came to its end in 1 episodes: deadlocks"
+    document = asked(lab, "crossing.toml --method random --episodes 50")
+    assert document["makespan_s"] < max(document["episode_costs"])
+
+
+# ---- a task: measured in simulation, then sequenced -----------------------------------------------------------------
+
+
+class Heard(Listener):
+    """Notes what it hears."""
+
+    def __init__(self) -> None:
+        self.notes: list[object] = []
+
+    def phase(self, name: str, parts: int) -> None:
+        self.notes.append((name, parts))
+
+    def sequenced(self, best: SequenceResult, known: Reference) -> None:
+        self.notes.append((best.cost, known))
+
+
+@pytest.fixture
+def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int, int]]:
+    """The oven of the file above as if it had been measured; what was prepared: task, toasts, seed."""
+    prepared: list[tuple[str, int, int]] = []
+
+    def prepare(task: Any, toasts: int, seed: int) -> int:
+        prepared.append((task.name, toasts, seed))
+        return toasts
+
+    def cell(toasts: int, *_: object) -> SimpleNamespace:
+        stations = (Station("in", "storage", 9), Station("hot", "machine", 1, 10.0), Station("out", "storage", 9))
+        step = np.ones((3, 3)) - np.eye(3)
+        route = (Stage("in"), Stage("hot"), Stage("out"))
+        return SimpleNamespace(cell=Cell.alike(stations, route, step, 2 * step, "in", toasts))
+
+    monkeypatch.setattr("lab.run.prepare", prepare)
+    monkeypatch.setattr("lab.run.teach_all", cell)
+    return prepared
+
+
+@pytest.mark.parametrize("method", [None, "srl", "srl-time", "exact", "fifo", "random"])
+def test_a_task(lab: Lab, measured: list[tuple[str, int, int]], method: str | None) -> None:
+    words = "toast --toasts 2 --episodes 20 --sessions 3 --seed 9 --plot p.png --gantt g.svg"
+    document = asked(lab, words + (f" --method {method}" if method else ""))
+    assert measured == [("toast", 2, 9)]
+    assert tuple(document) == FIELDS
+    assert document["method"] == (method or load("toast").sequencing.method)
+    assert (document["task"], document["order"], document["seed"]) == ("toast", ["toast", "toast"], 9)
+    assert (document["makespan_s"], document["optimal_s"], document["mean_best_s"]) == (29.0, 29.0, 29.0)
+    assert (document["gap"], document["success_percent"]) == (0.0, 100.0)
+    assert document["final_success_percent"] == (100.0 if document["method"] in LEARNERS else None)
+    assert sorted(document["sequence"]) == [1, 1, 2, 2]
+    assert document["files"] == {"plot": "p.png", "gantt": "g.svg"}
+    assert all(Path(path).is_file() for path in document["files"].values())
+
+
+@pytest.mark.usefixtures("measured")
+def test_who_listens_hears_every_session(teacher: Teacher) -> None:
+    heard = Heard()
+    wanted = Wanted("random", 4, sessions=3)
+    document = sequence_named("toast", None, 2, wanted, teacher=teacher, listener=heard, files={})
+    assert document["sessions"] == 3
+    assert heard.notes == [("sequence", 3), *[(29.0, Reference(29.0, True, "A*"))] * 3]
+
+
+def test_a_task_is_for_three_toasts_unless_told(lab: Lab, measured: list[tuple[str, int, int]]) -> None:
+    assert asked(lab, "toast --method fifo")["toasts"] == 3
+    assert measured == [("toast", 3, 0)]
+
+
+@pytest.mark.usefixtures("measured")
+def test_the_times_of_a_task_are_drawn_as_the_thesis_has_it(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Normal, 10 % of the mean (section 7.6): with one machine and no buffer nothing can be saved by reacting."""
+    monkeypatch.setattr("lab.sequence.REPLICATIONS", 6)
+    drawn = asked(lab, "toast --toasts 2 --method exact --stochastic")["stochastic"]
+    assert (drawn["processing"], drawn["arrivals"], drawn["spread"]) == ("normal", None, 0.1)
+    assert drawn["saved_by_reacting"] == {"mean": 0.0, "ci95": [0.0, 0.0]}
+    costs = replicate(load_cell("oven.toml").cell(2), drawn["fixed"]["sequence"], Chance(), 6, 0)  # of the same times
+    assert drawn["fixed"]["mean"] == pytest.approx(costs.mean())
+
+
+def test_a_case_that_a_task_has_not(lab: Lab, folder: Path, root: Path, measured: list[tuple[str, int, int]]) -> None:
+    (folder / "mine.toml").write_text((root / "tasks" / "toast.toml").read_text(encoding="utf-8"))
+    ran = lab("sequence", "mine.toml", "--case", "I")
+    line = "lab: case 'I' (--case): task 'mine.toml' has none; toast has I, II and III, a cell its orders\n"
+    assert (ran.code, ran.out, ran.err, measured) == (2, "", line, [])
+
+
+@pytest.mark.usefixtures("measured")
+def test_a_task_with_advice(lab: Lab) -> None:
+    document = asked(lab, "toast --toasts 2 --method srl --advisor novice --gate always --episodes 3")
+    assert (document["advisor"], document["advice"][0]["requests"]) == ("novice", 3)
+
+
+def test_an_unknown_method_is_known_before_anything_is_measured(
+    teacher: Teacher, measured: list[tuple[str, int, int]]
+) -> None:
+    with pytest.raises(BadInput, match=r"^unknown method 'x' .--method.: known: cp-sat, "):
+        measured_cell(load("toast"), 2, Wanted("x"), teacher, Listener())
+    assert measured == []
+
+
+# ---- the parts ----------------------------------------------------------------------------------------------------
+
+
+def test_a_search_as_the_file_says_or_changed() -> None:
+    settings = load_cell("toast-case-2").sequencing.model_copy(
+        update={"episodes": 7, "alpha": 0.2, "discount": 0.8, "beta": 2.0, "reward_factor": "A", "state": "stations"}
+    )
+    srl = SrlSettings(0.2, 0.8, 2.0, "A", "pairs", "stations")
+    assert search_for(settings) == Search(7, "makespan", NO_CHANCE, srl)
+    told: list[object] = []
+    changed = search_for(settings, episodes=3, objective="robot-idle", chance=Chance(), on_episode=told.append)
+    assert changed == Search(3, "robot-idle", Chance(), srl, told.append)
+
+
+def test_what_is_found_is_told_and_depends_on_seed_and_session() -> None:
+    cell, told = load_cell("fms").cell(), list[object]()
+    search = Search(5, on_episode=told.append)
+    one, again = (find_sequence(cell, "random", search, 1) for _ in range(2))
+    assert one == again
+    assert len(told) == 10
+    quiet = replace(search, on_episode=None)
+    assert one != find_sequence(cell, "random", quiet, 2)
+    assert one != find_sequence(cell, "random", quiet, 1, session=1)
+
+
+def test_an_unknown_method_lists_the_known_ones() -> None:
+    with pytest.raises(BadInput, match=rf"^unknown method 'srrl' .--method.: did you mean 'srl'. known: {KNOWN}$"):
+        find_sequence(load_cell("oven.toml").cell(), "srrl", Search(5), 0)
