@@ -258,7 +258,9 @@ def sequence(
     toasts: Annotated[int | None, typer.Option("--toasts", help="How many parts of the only product.")] = None,
     method: Annotated[
         str | None,
-        typer.Option("--method", help="srl (as printed), srl-time, mc, random, fifo, ga, exact, ...; default: the file's."),
+        typer.Option(
+            "--method", help="srl (as printed), srl-time, mc, random, fifo, ga, exact, ...; default: the file's."
+        ),
     ] = None,
     objective: Annotated[
         str | None,
@@ -280,7 +282,8 @@ def sequence(
     advisor: Annotated[
         str,
         typer.Option(
-            "--advisor", help="Who srl may ask which part to move: expert, moderate, limited, novice, tau=X, wrong, terminal."
+            "--advisor",
+            help="Who srl may ask which part to move: expert, moderate, limited, novice, tau=X, wrong, terminal.",
         ),
     ] = "none",
     gate: Annotated[str, typer.Option("--gate", help="When srl asks: ccrl, always, never.")] = "ccrl",
@@ -305,9 +308,7 @@ def sequence(
     wanted = Wanted(method, episodes, objective, sessions, seed, stochastic, advisor, gate, ask)
     files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
     with progress:
-        document = sequence_named(
-            task, case, toasts, wanted, teacher=teacher, listener=progress, files=files
-        )
+        document = sequence_named(task, case, toasts, wanted, teacher=teacher, listener=progress, files=files)
     _show(document, as_json, sequence_summary)
 
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput, unknown
 from lab.gridworld import GridWorld
-from lab.listener import Listener
 from lab.mdp import greedy_path
 from lab.taskfile import Task, load, load_world, names_file, world_names
 from lab.teaching import Lesson, Teacher, check_name, plain_name, world_problem

@@ -11,10 +11,10 @@ from lab.composer import carry_out
 from lab.crew import Crew, Durations, cell_of
 from lab.line import measure
 from lab.listener import Listener
+from lab.planner import find_sequence, search_for
 from lab.policy import Policy
 from lab.recorder import Viewer, show_scene
 from lab.report import Prepared, Report, Taught, write_files
-from lab.sequence import find_sequence, search_for
 from lab.sequencing.exact import optimum
 from lab.sequencing.search import Reference
 from lab.sim.scene import Layout, check_apart, draw_layout

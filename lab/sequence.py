@@ -9,13 +9,14 @@ import numpy as np
 
 from lab.cellfile import CellFile, order_from_word, toast_case
 from lab.cellparts import Sequencing
-from lab.errors import BadInput, unknown
+from lab.errors import BadInput
 from lab.gridworld import GridWorld
 from lab.listener import Listener
-from lab.sequencing import DRAWN, SEQUENCERS
+from lab.planner import check_method, find_sequence, search_for
+from lab.sequencing import DRAWN
 from lab.sequencing.cell import Cell
 from lab.sequencing.chance import NO_CHANCE, Chance
-from lab.sequencing.events import EpisodeSequenced, LearnedSequence, SequenceResult
+from lab.sequencing.events import LearnedSequence, SequenceResult
 from lab.sequencing.objectives import MAKESPAN, check_objective
 from lab.sequencing.search import SAME, Reference, Search
 from lab.taskfile import Task, load_any
@@ -47,28 +48,6 @@ class Wanted:
     ask: "Ask | None" = None
 
 
-def search_for(
-    settings: Sequencing,
-    *,
-    episodes: int | None = None,
-    objective: str | None = None,
-    chance: Chance = NO_CHANCE,
-    on_episode: Callable[[EpisodeSequenced], None] | None = None,
-) -> Search:
-    """What a file's settings ask of a sequencer, changed where something else is given."""
-    return Search(
-        episodes or settings.episodes, objective or settings.objective, chance, settings.settings(), on_episode
-    )
-
-
-def find_sequence(
-    cell: Cell, method: str, search: Search, seed: int, session: int = 0
-) -> SequenceResult:
-    """The best sequence that a method finds; BadInput for an unknown method."""
-    _check_method(method)
-    return SEQUENCERS[method](cell, search, np.random.default_rng([seed, 2, session]))
-
-
 def sequence_named(
     name: str,
     case: str | None,
@@ -96,8 +75,13 @@ def sequence_named(
         cell, chance = ordered_cell(loaded, case, toasts), loaded.chance()
     else:
         if case is not None:
-            raise BadInput(f"case '{case}' (--case): task '{name}' has none; toast has I, II and III, a cell its orders")
-        cell, chance = measured_cell(loaded, DEFAULT_TOASTS if toasts is None else toasts, wanted, teacher, listener), Chance()
+            raise BadInput(
+                f"case '{case}' (--case): task '{name}' has none; toast has I, II and III, a cell its orders"
+            )
+        cell, chance = (
+            measured_cell(loaded, DEFAULT_TOASTS if toasts is None else toasts, wanted, teacher, listener),
+            Chance(),
+        )
     listener.phase("sequence", wanted.sessions)
     document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, on_session=listener.sequenced)
     document = {"task": loaded.name} | document
@@ -116,7 +100,7 @@ def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher, lis
     """The cell of a task, once its skills are learned and their durations measured."""
     from lab.run import prepare, teach_all
 
-    _check_method(wanted.method or task.sequencing.method)
+    check_method(wanted.method or task.sequencing.method)
     return teach_all(prepare(task, toasts, teacher.seed), teacher, listener).cell
 
 
@@ -139,7 +123,7 @@ def sequence_cell(
         objective=wanted.objective,
         chance=chance if wanted.stochastic and method in DRAWN else NO_CHANCE,
     )
-    _check_method(method)
+    check_method(method)
     check_objective(search.objective, cell)
     known = reference(cell, search.objective)
     found = []
@@ -299,11 +283,6 @@ def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], 
     if "gantt" in files:
         gantt(simulate(cell, document["sequence"]), files["gantt"])
     document["files"] = {name: str(path) for name, path in files.items()}
-
-
-def _check_method(name: str) -> None:
-    if name not in SEQUENCERS:
-        raise unknown("method", name, SEQUENCERS, "--method")
 
 
 def _mean(values: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, Any]:

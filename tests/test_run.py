@@ -18,9 +18,9 @@ from lab.composer import Outcome
 from lab.crew import Crew, Durations
 from lab.errors import BadInput, WorkFailed
 from lab.listener import Listener
+from lab.planner import find_sequence, search_for
 from lab.report import FILES, Prepared, Report, Taught, check_out, write_files
 from lab.run import prepare, teach_all
-from lab.sequence import find_sequence, search_for
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.events import Schedule
 from lab.sequencing.exact import optimum

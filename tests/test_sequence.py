@@ -14,12 +14,11 @@ import pytest
 
 from lab.errors import BadInput
 from lab.listener import Listener
+from lab.planner import find_sequence, search_for
 from lab.sequence import (
     Wanted,
-    find_sequence,
     measured_cell,
     reference,
-    search_for,
     sequence_cell,
     sequence_named,
 )

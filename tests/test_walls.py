@@ -32,7 +32,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.sim",),
     ("lab.skills", "lab.recorder"),
     ("lab.teaching", "lab.crew"),
-    ("lab.line", "lab.listener"),
+    ("lab.line", "lab.listener", "lab.planner"),
     ("lab.composer",),
     ("lab.view",),
     ("lab.report",),

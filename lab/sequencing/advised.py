@@ -126,9 +126,13 @@ def advised_srl(
     BadInput for a gate that does not judge by episodes, and as `srl` does. Source: thesis 10.2.1 iii with fig. 6.2.
     """
     if gate.gate not in FITTING:
-        raise unknown("gate", gate.gate, FITTING, "--gate, for sequencing") if gate.gate not in GATES else BadInput(
-            f"gate '{gate.gate}' (--gate): it looks at a table of states, which sequencing has not; "
-            f"allowed here: {', '.join(FITTING)}"
+        raise (
+            unknown("gate", gate.gate, FITTING, "--gate, for sequencing")
+            if gate.gate not in GATES
+            else BadInput(
+                f"gate '{gate.gate}' (--gate): it looks at a table of states, which sequencing has not; "
+                f"allowed here: {', '.join(FITTING)}"
+            )
         )
     session = _Advised(GATES[gate.gate](gate, search.episodes, NEVER_REACHED, None), gate, advisor)
     learned = learn_readably(cell, search, kernel_seed(rng), Srl, session)

@@ -126,6 +126,7 @@ class Model:
     def _task(self, part: int, way: Way) -> Task:
         """A move that begins when what was begun before is finished; if the robot is there earlier, just then."""
         done, begin, waits = self.model.new_bool_var("does"), self._moment("begin"), None
+        self.model.add(begin >= self._come[part, way.place]).only_enforce_if(done)
         ready = self._ready(part, way) if way.option.waits else None
         if ready is not None:
             waits = self.model.new_bool_var("waits")

@@ -5,15 +5,11 @@ from dataclasses import dataclass
 from math import inf
 from operator import le
 
-import numpy as np
-
+from lab.errors import BadInput
 from lab.sequencing.bound import TICKS_PER_S
 from lab.sequencing.cell import Cell
-from lab.sequencing.events import SequenceResult
-from lab.sequencing.objectives import MAKESPAN
 from lab.sequencing.positions import part_of
 from lab.sequencing.run import Run, simulate
-from lab.sequencing.search import Log, Search
 from lab.sequencing.states import Moves, State, sequence_of, times_of
 
 MAX_EXPANDED = 1_000_000
@@ -98,7 +94,8 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
 
     States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
     optimal; a deadlock leads nowhere. After `max_expanded` states it gives up and opens as many again, nearest to the end
-    first, for the sequence it returns: `proven` False, and the bound reached so far.
+    first, for the sequence it returns: `proven` False, and the bound reached so far. Raises BadInput when nothing brings
+    all parts to their ends.
     Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
     states that are otherwise alike is the thesis's branch and bound, App. IV.
     """
@@ -115,33 +112,10 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     return Optimum(simulate(cell, sequence).makespan_s, sequence, False, bound_s, expanded)
 
 
-def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
-    """The proven best sequence by the mean times, as a sequencer; it draws nothing from `rng`.
-
-    The makespan is minimised by `optimum`; when that gives up, and for other objectives, by CP-SAT within its time limit,
-    which may not prove its sequence.
-    """
-    from lab.sequencing.cpsat import cp_sat  # takes its time to import
-
-    search.check(cell)
-    log = Log(search)
-    found = optimum(cell) if search.objective == MAKESPAN else None
-    if found is not None and found.proven:
-        log.note(found.sequence, found.cost)
-    else:
-        other = cp_sat(cell, search.objective, hint=found.sequence if found else None)
-        nearest = found is not None and found.cost <= other.cost
-        sequence, cost = (found.sequence, found.cost) if found and nearest else (other.sequence, other.cost)
-        log.note(sequence, cost, complete=bool(sequence))
-    log.check(cell)
-    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
-
-
 def first_come(cell: Cell) -> tuple[int, ...]:
-    """A sequence that comes to its end in every cell: what is ready first goes first, or part after part.
+    """A sequence that comes to its end: what is ready first goes first; when that ends in a deadlock, part after part.
 
-    One part alone never meets a full station, so the second way always works; it is taken when the first one ends in a
-    deadlock.
+    One part alone never meets a full station where routes are sound. Raises BadInput, naming the deadlock, where it does.
     """
     run, sequence = Run(cell), list[int]()
     while allowed := run.allowed():
@@ -149,9 +123,12 @@ def first_come(cell: Cell) -> tuple[int, ...]:
         run.move(sequence[-1])
     if run.done:
         return tuple(sequence)
-    run, sequence = Run(cell), []
+    stuck, run, sequence = run, Run(cell), []
     for part in range(1, cell.parts + 1):
         while run.finished_s[part - 1] is None:
-            sequence.append(next(one for one in run.allowed() if part_of(one, cell.parts) == part))
-            run.move(sequence[-1])
+            decision = next((one for one in run.allowed() if part_of(one, cell.parts) == part), None)
+            if decision is None:
+                raise BadInput(f"no sequence found that finishes all {cell.parts} parts: {stuck.deadlock()}")
+            sequence.append(decision)
+            run.move(decision)
     return tuple(sequence)

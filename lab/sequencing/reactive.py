@@ -30,7 +30,9 @@ def reacting(cell: Cell, objective: str = MAKESPAN, seed: int = 0, practice: int
             learner.episode(here)
         place, choice, wanted = learner.greedy(here)
         parts = cell.parts
-        fitting = [d for d in allowed if choice_of(d, parts) == choice and seen.locations[part_of(d, parts) - 1] == place]
+        fitting = [
+            d for d in allowed if choice_of(d, parts) == choice and seen.locations[part_of(d, parts) - 1] == place
+        ]
         named = [d for d in fitting if part_of(d, parts) == wanted]
         return min(named or fitting, key=lambda d: (seen.ready_s[part_of(d, parts) - 1], d))
 

@@ -104,7 +104,9 @@ class Log:
     def check(self, cell: Cell) -> None:
         """WorkFailed when no sequence came to its end."""
         if not self.best:
-            raise WorkFailed(f"no sequence for {cell.parts} parts came to its end in {len(self.costs)} episodes: deadlocks")
+            raise WorkFailed(
+                f"no sequence for {cell.parts} parts came to its end in {len(self.costs)} episodes: deadlocks"
+            )
 
 
 def kernel_seed(rng: np.random.Generator) -> int:

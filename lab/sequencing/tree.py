@@ -42,7 +42,9 @@ def branch_and_bound(cell: Cell, most: int = MAX_NODES) -> SearchTree:
     while tree.heap:
         now, number = heapq.heappop(tree.heap)
         tree.open(number, now)
-    return SearchTree(tuple(Node(*node) for node in zip(tree.decisions, tree.times_s, tree.ends, strict=True)), tree.best)
+    return SearchTree(
+        tuple(Node(*node) for node in zip(tree.decisions, tree.times_s, tree.ends, strict=True)), tree.best
+    )
 
 
 class _Tree:

@@ -104,8 +104,6 @@ STUDIES: dict[str, Study] = {
     "appendix-iii": Study("Appendix III: a flexible manufacturing system", _appendix_iii),
     "srl-time": Study("SRL improved, beside every rival", _srl_time),
     "flat": Study("One flat problem, or two levels: the toast task on a small grid", _flat),
-    "sequencing-speed": Study(
-        "Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed
-    ),
+    "sequencing-speed": Study("Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }

@@ -42,6 +42,7 @@ METHODS = {  # as rows and as pictures name them
     "reacting": "reacting",
     "rollout": "rollout",
 }
+BESIDE = ("random", "srl-time", "exact")
 FIFO_NAMES = {"listing": "FIFO as listed", "idle-start": "FIFO, idle start"}
 PRINTED_IP = {(8, "normal", 100.0): 11.0, (8, "normal", 200.0): 11.0}  # percent
 PRINTED_DIFFERENCE = {(3, "normal", 100.0): 211.0, (8, "normal", 200.0): 576.0}  # seconds
@@ -65,8 +66,8 @@ PRINTED = (
 METHODS_NOTE = (
     f"SRL: type B, {EPISODES} episodes, values per next state of the stations as listed; it learns with constant arrivals, and "
     "its best sequence is carried out as a fixed list. So are those of random search, srl-time and the proven optimum. "
-    "'reacting' (SRL over time) and 'rollout' decide as times become known. 'srl greedy' is SRL's own policy after the last "
-    "episode, which the thesis does not use; 'srl pairs' keeps values per state and decision, as fig. 5.1 has it."
+    "'reacting' (SRL over time) and 'rollout' decide as exponential arrivals become known. 'srl greedy' is SRL's own policy "
+    "after the last episode, which the thesis does not use; 'srl pairs' keeps values per state and decision, as in fig. 5.1."
 )
 HOW_MANY = (
     "The thesis learns one session for each order. Here, of the sessions asked for, one in "
@@ -172,9 +173,9 @@ def _example_rows(orders: Mapping[int, Sequence[str]], found: Mapping[Mix, Made]
 
 
 def _in_short(rows: Sequence[Row]) -> Row:
-    """The range of IP over the cells, for SRL with both FIFO, and for what improves on it with the FIFO as listed."""
+    """The range of IP over the cells, for SRL with both FIFO, and for other methods with the FIFO as listed."""
     says: Row = {}
-    for method, start in (("srl", "listing"), ("srl", "idle-start"), ("srl-time", "listing"), ("exact", "listing")):
+    for method, start in (("srl", "listing"), ("srl", "idle-start"), *((m, "listing") for m in BESIDE)):
         of = [one["value"] for one in rows if _is(one, method=method, fifo=start, measure="IP_percent")]
         says[f"IP of {method} over {FIFO_NAMES[start]} [%]"] = f"{min(of):.1f} to {max(of):.1f}"
     return says

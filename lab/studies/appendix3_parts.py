@@ -24,6 +24,7 @@ LEARNED_BY = 10  # of the sessions asked for, one in so many is learned for each
 SLOW_BY = 250  # and one in so many by what is not compiled
 REACTIONS = {3: 6, 5: 2, 8: 1}  # replications of a policy that reacts, for 500 sessions: it takes its time
 ASKED = 500
+UNKNOWN = "exponential"  # the law of arrivals by which there is something to react to
 REACTING: dict[str, Policy | None] = {"reacting": None, "rollout": replan()}  # None: made for each cell
 FIFO = {start: f"fifo {start}" for start in STARTS}
 
@@ -40,9 +41,9 @@ class Mix:
 class Made:
     """What the methods make of an order. makespans_s: by method and law of arrivals, of each replication (n,) [s].
 
-    Replications are the same ones for all methods, of which some have fewer. By constant arrivals there is one, and none of
-    policies that react. Methods that learn: the mean over their sessions. gaps: by method, constant arrivals, how much
-    longer than the proven optimum (where not `proven`, than the bound), as a fraction.
+    Replications are the same ones for all methods; of policies that react there are fewer, and by exponential arrivals only.
+    By constant arrivals there is one. Methods that learn: the mean over their sessions. gaps: by method, constant arrivals,
+    how much longer than the proven optimum (where not `proven`, than the bound), as a fraction.
     """
 
     makespans_s: dict[tuple[str, str], Floats]
@@ -77,7 +78,7 @@ def made(mix: Mix, *, sessions: int, seed: int) -> Made:
         for start, method in FIFO.items():
             found[method, law] = replicate(cell, queued_fifo(start), chance, count, times_seed)
         few = min(count, max(1, REACTIONS.get(cell.parts, 1) * sessions // ASKED))
-        for method, policy in REACTING.items() if law != "constant" else ():
+        for method, policy in REACTING.items() if law == UNKNOWN else ():
             found[method, law] = replicate(cell, policy or reacting(cell), chance, few, times_seed)
     gaps = {method: best.gap(float(costs.mean())) for (method, law), costs in found.items() if law == "constant"}
     return Made(found, gaps, best.proven)

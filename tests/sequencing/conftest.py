@@ -57,8 +57,6 @@ MACHINE_S = {"I": 60, "II": 90, "III": 120}  # thesis table 7.1
 TOAST_ROUTE = (Stage("plate"), Stage("toaster", "toaster buffer"), Stage("butter", "butter buffer"), Stage("done"))
 
 
-
-
 def build_toast_cell(case: str, parts: int, buffer_room: int = 50, room: int = 200) -> Cell:
     stations = (
         Station("plate", "storage", room),
@@ -141,9 +139,8 @@ def random_cells(draw: st.DrawFn, max_machines: int = 2, max_parts: int = 3, man
     if many and draw(st.booleans()):
         arrivals = Arrivals(tuple(draw(seconds) for _ in order), draw(st.sampled_from(["clock", "pick"])))
     due_s = tuple(1000.0 * draw(seconds) + 4000.0 for _ in order) if many else None
-    return Cell(
-        tuple(stations), tuple(products), order, tables[0], tables[1], start, arrivals, buffers, due_s  # type: ignore[arg-type]
-    )
+    tables_s = tables[0], tables[1]
+    return Cell(tuple(stations), tuple(products), order, *tables_s, start, arrivals, buffers, due_s)  # type: ignore[arg-type]
 
 
 def _random_route(

@@ -170,7 +170,9 @@ def test_a_station_that_nothing_leads_to_is_said_to_be_out_of_reach(toast_cell: 
     cell = toast_cell("I", 2)
     times = np.array(cell.empty_s)
     times[:, 0] = np.nan
-    with pytest.raises(BadInput, match="'toaster buffer' -> 'plate' is missing.*no time leads there: it cannot be reached"):
+    with pytest.raises(
+        BadInput, match=r"'toaster buffer' -> 'plate' is missing.*no time leads there: it cannot be reached"
+    ):
         Cell(cell.stations, cell.products, cell.order, times, cell.loaded_s, cell.robot_start)
 
 

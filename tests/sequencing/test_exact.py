@@ -1,16 +1,53 @@
-"""The optimum: the printed ones, and brute force on random small cells."""
+"""The optimum: the printed ones, and brute force on small cells of every sort."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from copy import copy
+from dataclasses import replace
+from itertools import pairwise
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import simulate
-from lab.sequencing.exact import optimum
+from lab.errors import BadInput
+from lab.sequencing.cell import Arrivals, Cell, Product, Stage, Station
+from lab.sequencing.cpsat import exact
+from lab.sequencing.exact import Optimum, first_come, optimum
+from lab.sequencing.objectives import cost
+from lab.sequencing.positions import part_of
+from lab.sequencing.run import Run, simulate
+from lab.sequencing.search import Search
 
 CellMaker = Callable[..., Cell]
+
+
+def ends(run: Run) -> Iterator[Run]:
+    """Every run that a run can become, to the end; without those that end in a deadlock."""
+    allowed = run.allowed()
+    if run.done:
+        yield run
+    for decision in allowed:
+        branch = copy(run)
+        for field in ("locations", "occupied", "finished_s", "ready_s"):
+            setattr(branch, field, list(getattr(run, field)))
+        branch.move(decision)
+        yield from ends(branch)
+
+
+def crossing_cell(order: str, buffers: str = "busy") -> Cell:
+    """Pins (P) go from the lathe to the mill, nuts (N) from the mill to the lathe; room for one each: deadlocks."""
+    stations = (
+        Station("in", "storage", 9),
+        Station("lathe", "machine", 1, 7.0),
+        Station("mill", "machine", 1, 3.0),
+        Station("out", "storage", 9),
+    )
+    ways = {"pin": ("in", "lathe", "mill", "out"), "nut": ("in", "mill", "lathe", "out")}
+    products = tuple(Product(name, (tuple(Stage(place) for place in way),)) for name, way in ways.items())
+    table = 1.0 + np.arange(16.0).reshape(4, 4) % 3 - np.eye(4) * (1.0 + np.arange(16.0).reshape(4, 4) % 3)
+    names = tuple({"P": "pin", "N": "nut"}[letter] for letter in order)
+    return Cell(stations, products, names, table, table, "in")
 
 
 @pytest.mark.parametrize(
@@ -20,60 +57,143 @@ CellMaker = Callable[..., Cell]
 def test_the_six_printed_optima(toast_cell: CellMaker, case: str, toasts: int, makespan_s: float) -> None:
     best = optimum(toast_cell(case, toasts))
     assert best.proven
-    assert best.makespan_s == best.bound_s == makespan_s
+    assert best.cost == best.bound_s == best.optimal_s == makespan_s
 
 
+@pytest.mark.parametrize("toasts", [12, 30, 100])
 @pytest.mark.parametrize(("case", "fixed_s", "each_s"), [("I", 63, 150), ("II", 100, 200), ("III", 110, 295)])
-def test_more_toasts_cost_the_same_each(toast_cell: CellMaker, case: str, fixed_s: float, each_s: float) -> None:
-    assert optimum(toast_cell(case, 12)).makespan_s == fixed_s + 12 * each_s
-
-
-def brute_force_s(
-    cell: Cell, locations: tuple[int, ...], ready_s: tuple[float, ...], robot: int, now_s: float
-) -> float:
-    """Every sequence of numbered toasts, timed here anew."""
-    ends = []
-    for toast in cell.allowed(locations):
-        origin, target = locations[toast - 1], cell.destination(locations, toast)
-        assert target is not None
-        at_s = now_s if robot == origin else now_s + cell.empty_s[robot, origin]
-        drop_s = max(at_s, ready_s[toast - 1]) + cell.loaded_s[origin, target]
-        moved = (*locations[: toast - 1], target, *locations[toast:])
-        done_s = drop_s + cell.stations[target].processing_s
-        ends.append(brute_force_s(cell, moved, (*ready_s[: toast - 1], done_s, *ready_s[toast:]), target, drop_s))
-    return min(ends) if ends else now_s
-
-
-@settings(max_examples=60, deadline=None)
-@given(data=st.data(), size=st.sampled_from([(1, 3), (2, 2), (3, 2)]))
-def test_never_worse_or_better_than_brute_force(
-    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject, size: tuple[int, int]
+def test_more_toasts_cost_the_same_each(
+    toast_cell: CellMaker, toasts: int, case: str, fixed_s: float, each_s: float
 ) -> None:
-    """Random tables, capacities, station orders and robot starts; machines x toasts up to `size`."""
-    cell = data.draw(cells(*size))
+    best = optimum(toast_cell(case, toasts, buffer_room=200))
+    assert best.proven
+    assert best.cost == fixed_s + toasts * each_s
+
+
+@settings(max_examples=20)
+@given(data=st.data(), size=st.sampled_from([(1, 3), (2, 2), (3, 2)]), many=st.booleans())
+def test_never_worse_or_better_than_brute_force(
+    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject, size: tuple[int, int], many: bool
+) -> None:
+    """Random tables, capacities, starts; with `many` also products, routes, pallets, services, arrivals, free buffers."""
+    cell = data.draw(cells(*size, many=many))
     best = optimum(cell)
-    start = cell.start_locations()
-    expected_s = brute_force_s(cell, start, (0.0,) * cell.toasts, cell.index(cell.robot_start), 0.0)
-    assert best.makespan_s == pytest.approx(expected_s, abs=1e-6)
-    assert simulate(cell, best.sequence).makespan_s == best.makespan_s
+    assert best.proven
+    assert best.cost == pytest.approx(min(run.now_s for run in ends(Run(cell))), abs=1e-6)
+    assert simulate(cell, best.sequence).makespan_s == best.cost
 
 
-def test_toasts_leave_each_station_first_in_first_out(toast_cell: CellMaker) -> None:
-    schedule = simulate(toast_cell("III", 5), optimum(toast_cell("III", 5)).sequence)
-    first_moves = list(dict.fromkeys(schedule.sequence))
-    assert first_moves == [1, 2, 3, 4, 5]
+@pytest.mark.parametrize("order", ["PN", "PNP", "PNN", "NNPP"])
+def test_deadlocks_lead_nowhere(order: str) -> None:
+    cell = crossing_cell(order)
+    stuck = Run(cell)
+    for decision in (order.index("P") + 1, order.index("N") + 1):
+        stuck.move(decision)
+    assert list(ends(stuck)) == []
+    best = optimum(cell)
+    assert best.proven
+    assert best.cost == min(run.now_s for run in ends(Run(cell)))
+
+
+def test_the_fms_in_the_order_of_arrival(fms_cell: CellMaker) -> None:
+    """Thesis App. III: all sequences of a rook and a sign."""
+    cell = fms_cell("RS")
+    assert optimum(cell).cost == min(run.now_s for run in ends(Run(cell))) == 1375.0
+
+
+def test_alike_parts_leave_each_station_first_in_first_out(toast_cell: CellMaker) -> None:
+    cell = toast_cell("III", 5)
+    run, waiting = Run(cell), dict[int, list[int]]()
+    for decision in optimum(cell).sequence:
+        part = part_of(decision, cell.parts)
+        place = run.locations[part - 1]
+        assert waiting.get(place, [part])[0] == part
+        waiting[place] = waiting.get(place, [part])[1:]
+        run.move(decision)
+        waiting.setdefault(run.locations[part - 1], []).append(part)
+        waiting = {place: queue for place, queue in waiting.items() if queue}
+    first = list(dict.fromkeys(optimum(cell).sequence))
+    assert first == [1, 2, 3, 4, 5]
 
 
 def test_giving_up_says_what_is_proven(toast_cell: CellMaker) -> None:
     """After 10 states: a sequence that works, not proven, with a bound below the true 663 s."""
-    best = optimum(toast_cell("I", 4), max_expanded=10)
+    cell = toast_cell("I", 4)
+    best = optimum(cell, max_expanded=10)
     assert not best.proven
+    assert best.optimal_s is None
     assert best.expanded == 10
-    assert 0 < best.bound_s <= 663 <= best.makespan_s
-    assert simulate(toast_cell("I", 4), best.sequence).makespan_s == best.makespan_s
+    assert 0 < best.bound_s <= 663 <= best.cost
+    assert simulate(cell, best.sequence).makespan_s == best.cost
+
+
+def test_giving_up_at_once_still_finds_a_way_out_of_deadlocks() -> None:
+    cell = crossing_cell("PNPN")
+    best = optimum(cell, max_expanded=1)
+    assert (best.proven, best.expanded) == (False, 1)
+    assert simulate(cell, best.sequence).makespan_s == best.cost
+
+
+def test_more_states_never_lower_the_bound(toast_cell: CellMaker) -> None:
+    bounds = [optimum(toast_cell("I", 6), most).bound_s for most in (0, 10, 20, 1000)]
+    assert all(one <= other for one, other in pairwise(bounds))
+    assert bounds[-1] == 963
 
 
 def test_a_full_buffer_costs_time(toast_cell: CellMaker) -> None:
     roomy, tight = optimum(toast_cell("I", 4)), optimum(toast_cell("I", 4, buffer_room=1))
     assert tight.proven
-    assert tight.makespan_s >= roomy.makespan_s
+    assert tight.cost >= roomy.cost
+
+
+@pytest.mark.parametrize(("after", "ends_s"), [("clock", 1014.0), ("pick", 1019.0)])
+def test_arrivals_by_hand(oven_cell: CellMaker, after: str, ends_s: float) -> None:
+    """Every empty way takes 5 s, so the first is picked at 5; 1000 s after it came, or after that pick, comes the other."""
+    cell = oven_cell(2, robot_start="out", arrivals=Arrivals((0.0, 1000.0), after))  # type: ignore[arg-type]
+    cell = replace(cell, empty_s=5.0 * np.ones((3, 3)) - 5.0 * np.eye(3))
+    assert optimum(cell).cost == ends_s
+
+
+def test_gap() -> None:
+    best = Optimum(110.0, (1,), False, 100.0, 1)
+    assert best.gap(120.0) == pytest.approx(0.2)
+    assert Optimum(0.0, (1,), True, 0.0, 1).gap(0.0) == 0.0
+    assert Optimum(0.0, (1,), True, 0.0, 1).gap(1.0) == np.inf
+
+
+@given(data=st.data())
+def test_first_come_always_comes_to_its_end(cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject) -> None:
+    cell = data.draw(cells(max_parts=4, many=True))
+    assert simulate(cell, first_come(cell)).makespan_s <= cell.longest_s
+
+
+def test_first_come_gets_around_deadlocks() -> None:
+    """Both are ready at once; the second would block the first."""
+    cell = crossing_cell("PN")
+    assert first_come(cell) == (1, 1, 1, 2, 2, 2)
+
+
+def test_rules_that_no_part_can_follow_are_refused() -> None:
+    """Positions laid by hand, so that a part in the lathe needs room in the lathe."""
+    cell = crossing_cell("PN")
+    places, lathe = list(cell.positions), cell.index("lathe")
+    stuck = next(n for n, place in enumerate(places) if (place.product, place.station) == (0, lathe))
+    (way,) = places[stuck].options
+    places[stuck] = replace(places[stuck], options=(replace(way, needs=(lathe,)),))
+    cell.__dict__["positions"] = tuple(places)
+    with pytest.raises(BadInput, match=r"no sequence found .* deadlock: pin 1 at 'lathe' cannot move on: 'lathe' full"):
+        optimum(cell)
+
+
+@pytest.mark.parametrize("objective", ["makespan", "mean-tardiness", "tardy-parts", "robot-idle", "machine-idle"])
+def test_the_sequencer_is_exact_for_every_objective(toast_cell: CellMaker, objective: str) -> None:
+    cell = replace(toast_cell("II", 2), due_s=(350.0, 450.0))
+    found = exact(cell, Search(objective=objective), np.random.default_rng(0))
+    assert found.cost == min(cost(run, objective) for run in ends(Run(cell)))
+    assert found.episode_costs == (found.cost,)
+    simulate(cell, found.sequence)
+
+
+def test_the_sequencer_checks_the_objective(toast_cell: CellMaker) -> None:
+    with pytest.raises(BadInput, match="no due times"):
+        exact(toast_cell("I", 2), Search(objective="tardy-parts"), np.random.default_rng(0))

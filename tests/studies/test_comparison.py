@@ -60,7 +60,9 @@ def test_what_takes_long_is_tried_less_often(setting: Setting, sessions: int) ->
     assert sessions_for(setting, 1) == 1
 
 
-@pytest.mark.parametrize("method", ["srl", "mc", "random", "srl-time", "ga", "fifo", "nearest-ready", "exact", "cp-sat"])
+@pytest.mark.parametrize(
+    "method", ["srl", "mc", "random", "srl-time", "ga", "fifo", "nearest-ready", "exact", "cp-sat"]
+)
 def test_what_sessions_come_to(method: str) -> None:
     learns = method in comparison_parts.LEARNING
     setting = Setting(THREE, method, 10 if learns else None, "A" if method == "srl" else None)
@@ -123,7 +125,9 @@ def found() -> Findings:
 
 def test_the_study_has_every_row(found: Findings) -> None:
     keys = [
-        tuple(one.get(name) for name in ("table", "case", "interval_s", "method", "reward_factor", "episodes", "measure"))
+        tuple(
+            one.get(name) for name in ("table", "case", "interval_s", "method", "reward_factor", "episodes", "measure")
+        )
         for one in found.rows
     ]
     assert len({*keys}) == len(keys)

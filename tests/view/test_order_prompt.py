@@ -61,5 +61,3 @@ def test_what_is_shown() -> None:
     assert "auto: it goes on alone from here" in shown
     ask(request())
     assert written.getvalue().count("Episode 30") == 1, "an episode is announced once"
-
-
