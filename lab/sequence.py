@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     Ask = Callable[[SequenceRequest], int | None]
 
 REPLICATIONS = 200  # drawn episodes in which a list and a policy are compared
+PLANNED = 2000  # of a policy that plans at every decision so many by parts squared, at least FEWEST: it takes its time
+FEWEST = 20
 DEFAULT_TOASTS = 3
 SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
 
@@ -159,8 +161,10 @@ def reference(cell: Cell, objective: str) -> Reference:
 
         best = optimum(cell)
         return Reference(best.bound_s, best.proven, "A*")
-    from lab.sequencing.cpsat import cp_sat
+    from lab.sequencing.cpsat import cp_sat, fits
 
+    if not fits(cell):
+        return Reference(0.0, False, "nothing: too many moves for CP-SAT")
     opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)
     return Reference(opinion.bound, opinion.status == "optimal", "CP-SAT")
 
@@ -170,16 +174,19 @@ def stochastic(
 ) -> dict[str, Any]:
     """The list as it is and a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
     from lab.sequencing.execute import replicate
+    from lab.sequencing.rules import RULES
 
     policy, says = _policy(cell, method, search, seed)
     fixed = _planned(cell, method, search, found, seed)
-    costs = [replicate(cell, how, chance, REPLICATIONS, seed, search.objective) for how in (fixed, policy)]
+    episodes = REPLICATIONS if method == "fifo" or method in RULES else min(REPLICATIONS, PLANNED // cell.parts**2)
+    episodes = max(FEWEST, episodes)
+    costs = [replicate(cell, how, chance, episodes, seed, search.objective) for how in (fixed, policy)]
     difference = costs[0] - costs[1]
     return {
         "processing": chance.processing,
         "arrivals": chance.arrivals if cell.arrivals else None,
         "spread": chance.spread,
-        "replications": REPLICATIONS,
+        "replications": episodes,
         "fixed": _mean(costs[0]) | {"sequence": list(fixed)},
         "reacting": _mean(costs[1]) | {"policy": says},
         "saved_by_reacting": _mean(difference),

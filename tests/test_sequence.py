@@ -336,10 +336,16 @@ REACTING = {
 }
 
 
+def few(monkeypatch: pytest.MonkeyPatch, episodes: int) -> None:
+    """Draw so many episodes, whatever the method and however many parts."""
+    for name in ("REPLICATIONS", "FEWEST"):
+        monkeypatch.setattr(f"lab.sequence.{name}", episodes)
+
+
 @pytest.mark.parametrize("method", REACTING)
 def test_drawn_times(lab: Lab, monkeypatch: pytest.MonkeyPatch, method: str) -> None:
     """The list as it is, and what reacts, in the same episodes: the document has the means of both, and of the difference."""
-    monkeypatch.setattr("lab.sequence.REPLICATIONS", 5)
+    few(monkeypatch, 5)
     words = f"toast-case-1 --toasts 3 --method {method} --episodes 40"
     plain, document = asked(lab, words), asked(lab, f"{words} --stochastic")
     assert tuple(document) == FIELDS
@@ -369,8 +375,22 @@ def test_drawn_times(lab: Lab, monkeypatch: pytest.MonkeyPatch, method: str) -> 
         assert document["episode_costs"] == plain["episode_costs"]
 
 
+@pytest.mark.parametrize(
+    ("method", "toasts", "episodes"),
+    [("fifo", 5, 30), ("nearest-ready", 1, 30), ("exact", 1, 24), ("exact", 2, 6), ("exact", 5, 2)],
+)
+def test_who_plans_at_every_decision_is_given_fewer_episodes(
+    lab: Lab, monkeypatch: pytest.MonkeyPatch, method: str, toasts: int, episodes: int
+) -> None:
+    """Here 24 by parts squared, from 2 to 30."""
+    for name, number in (("REPLICATIONS", 30), ("PLANNED", 24), ("FEWEST", 2)):
+        monkeypatch.setattr(f"lab.sequence.{name}", number)
+    drawn = asked(lab, f"oven.toml --toasts {toasts} --method {method} --stochastic")["stochastic"]
+    assert drawn["replications"] == episodes
+
+
 def test_the_best_list_is_the_one_that_is_carried_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lab.sequence.REPLICATIONS", 2)
+    few(monkeypatch, 2)
     file = load_cell("toast-case-1")
     wanted = Wanted("ga", 8, sessions=4, stochastic=True)
     document, found = sequence_cell(file.cell(3), file.sequencing, wanted, file.chance())
@@ -380,7 +400,7 @@ def test_the_best_list_is_the_one_that_is_carried_out(monkeypatch: pytest.Monkey
 
 
 def test_without_spread_chance_changes_nothing(lab: Lab, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
-    monkeypatch.setattr("lab.sequence.REPLICATIONS", 3)
+    few(monkeypatch, 3)
     (folder / "sure.toml").write_text(OVEN + '[stochastic]\nprocessing = "normal"\nspread = 0\n')
     drawn = asked(lab, "sure.toml --method srl --episodes 5 --stochastic")["stochastic"]
     assert drawn["fixed"] == {"mean": 29.0, "ci95": [29.0, 29.0], "sequence": drawn["fixed"]["sequence"]}
@@ -388,7 +408,7 @@ def test_without_spread_chance_changes_nothing(lab: Lab, monkeypatch: pytest.Mon
 
 
 def test_the_file_says_what_is_drawn(lab: Lab, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
-    monkeypatch.setattr("lab.sequence.REPLICATIONS", 3)
+    few(monkeypatch, 3)
     come = (
         '[arrivals]\ninterval_s = 30\n[stochastic]\nprocessing = "constant"\narrivals = "exponential"\nspread = 0.2\n'
     )
@@ -637,7 +657,7 @@ def test_a_task_is_for_three_toasts_unless_told(lab: Lab, measured: list[tuple[s
 @pytest.mark.usefixtures("measured")
 def test_the_times_of_a_task_are_drawn_as_the_thesis_has_it(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     """Normal, 10 % of the mean (section 7.6): with one machine and no buffer nothing can be saved by reacting."""
-    monkeypatch.setattr("lab.sequence.REPLICATIONS", 6)
+    few(monkeypatch, 6)
     drawn = asked(lab, "toast --toasts 2 --method exact --stochastic")["stochastic"]
     assert (drawn["processing"], drawn["arrivals"], drawn["spread"]) == ("normal", None, 0.1)
     assert drawn["saved_by_reacting"] == {"mean": 0.0, "ci95": [0.0, 0.0]}

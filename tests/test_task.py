@@ -50,7 +50,7 @@ def test_the_cells_that_ship_are_sound(name: str, root: Path) -> None:
 def test_check_finds_what_is_wrong_with_a_cell(tmp_path: Path, root: Path) -> None:
     text = (root / "tasks" / "toast-case-1.toml").read_text(encoding="utf-8")
     path = tmp_path / "c.toml"
-    path.write_text(text.replace("capacity = 50", "capacity = 3"))
+    path.write_text(text.replace("capacity = 200", "capacity = 3"))
     assert check_task(str(path), None, 0) == check_task(str(path), 3, 0) == []
     (error,) = check_task(str(path), 4, 0)
     assert error == f"{path}: line 17: station 'finished_plate': capacity 3 cannot hold all 4 parts"

@@ -18,6 +18,7 @@ from lab.sequencing.run import Run
 from lab.sequencing.search import Log, Search
 
 TIME_LIMIT_S = 60.0
+MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory grows with the square, to a gigabyte
 
 Status = Literal["optimal", "feasible", "unknown"]
 _STATUS: dict[object, Status] = {
@@ -54,10 +55,14 @@ def cp_sat(
     """The best sequence that CP-SAT finds within the time limit [s], by the cell's own times.
 
     hint: a complete sequence to begin with (None: `first_come`). One thread: the same seed gives the same result, unless
-    the time limit cuts it off. Raises BadInput for an objective that the cell has no times for, for a time limit that is
-    not above 0, and for a hint that cannot be. Source: circuit and interval constraints of OR-Tools CP-SAT.
+    the time limit cuts it off; before it begins, the model takes up to half a minute to build. Raises BadInput for an
+    objective that the cell has no times for, for a time limit that is not above 0, for a hint that cannot be, and for
+    more than MOST_MOVES moves. Source: circuit and interval constraints of OR-Tools CP-SAT.
     """
     check_objective(objective, cell)
+    if not fits(cell):
+        allowed = f"allowed are {MOST_MOVES}; order fewer parts"
+        raise BadInput(f"CP-SAT: the {cell.parts} parts have {possible_moves(cell)} moves to choose from; {allowed}")
     if not (isfinite(time_limit_s) and time_limit_s > 0):
         raise BadInput(f"time limit = {time_limit_s} s: allowed are finite times above 0")
     model = Model(cell, objective, first_come(cell) if hint is None else hint)
@@ -89,20 +94,32 @@ def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResul
     """The proven best sequence by the mean times, as a sequencer; it draws nothing from `rng`.
 
     The makespan is minimised by `optimum`; when that gives up, and for other objectives, by CP-SAT within its time limit,
-    which may not prove its sequence.
+    which may not prove its sequence. Raises BadInput as these do.
     """
     search.check(cell)
     log = Log(search)
     found = optimum(cell) if search.objective == MAKESPAN else None
-    if found is not None and found.proven:
-        log.note(found.sequence, found.cost)
-    else:
+    best = None if found is None else (found.cost, found.sequence)
+    if found is None or (not found.proven and fits(cell)):
         other = cp_sat(cell, search.objective, hint=found.sequence if found else None)
-        nearest = found is not None and found.cost <= other.cost
-        sequence, cost = (found.sequence, found.cost) if found and nearest else (other.sequence, other.cost)
-        log.note(sequence, cost, complete=bool(sequence))
+        best = min(best or (other.cost, other.sequence), (other.cost, other.sequence))
+    if best is not None:
+        log.note(best[1], best[0], complete=bool(best[1]))
     log.check(cell)
     return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+
+
+def fits(cell: Cell) -> bool:
+    """Whether the cell is not too large for a model."""
+    return possible_moves(cell) <= MOST_MOVES
+
+
+def possible_moves(cell: Cell) -> int:
+    """How many moves all parts may make, by all their routes."""
+    own = [0] * len(cell.products)
+    for place in cell.positions:
+        own[place.product] += len(place.options)
+    return sum(own[cell.positions[start].product] for start in cell.starts)
 
 
 def cost_of(cell: Cell, sequence: Sequence[int], objective: str) -> float:

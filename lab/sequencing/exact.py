@@ -12,7 +12,7 @@ from lab.sequencing.positions import part_of
 from lab.sequencing.run import Run, simulate
 from lab.sequencing.states import Moves, State, sequence_of, times_of
 
-MAX_EXPANDED = 1_000_000
+MAX_EXPANDED = 300_000
 
 
 @dataclass(frozen=True)

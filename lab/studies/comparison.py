@@ -38,8 +38,8 @@ METHODS = (
 WALLS = (
     "Seconds are those of one session on one core, other processes of the study beside it; compiling is not counted. srl, mc "
     "and random are compiled and run many sessions at once; srl-time, ga, the rules and exact are plain Python. srl-time "
-    "takes its lower bound's table into the count. On these jobs exact proves the optimum sooner than srl-time ends a session; "
-    "a learner is of use where a cell is only there to be tried, or too large for a proof."
+    "takes its lower bound's table into the count. exact proves the optimum of all these jobs in less "
+    "time than 200 episodes of srl-time take: a learner is of use where there is no such proof."
 )
 LIMITS = (
     f"Sessions at most: {CAPS['few']['srl-time']} of srl-time and {CAPS['few']['ga']} of ga with few toasts; with 10 and more "

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from math import inf, isfinite
 from statistics import median
@@ -12,7 +11,6 @@ import numpy as np
 
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.batch import run_sessions
-from lab.sequencing.cell import Cell
 from lab.sequencing.cpsat import cp_sat
 from lab.sequencing.events import EpisodeSequenced
 from lab.sequencing.exact import optimum
@@ -76,18 +74,8 @@ class _Count:
         self._job.progress(self._done, self._total)
 
 
-def toast_cell(case: str, toasts: int) -> Cell:
-    """A case of ch. 7 with room for all toasts wherever there is no machine."""
-    cell = robot_cell(case, 1)
-    stations = tuple(
-        station if station.kind == "machine" else replace(station, capacity=max(station.capacity, toasts))
-        for station in cell.stations
-    )
-    return replace(cell, stations=stations, order=cell.order * toasts)
-
-
 def _rates(job: Job, tell: Callable[[], None]) -> list[Row]:
-    cell = toast_cell("I", TOASTS)
+    cell = robot_cell("I", TOASTS)
     search = Search(EPISODES, settings=SrlSettings(beta=0.5, factor="B"))
 
     def compiled(method: str) -> Timed:
@@ -118,7 +106,7 @@ def _rates(job: Job, tell: Callable[[], None]) -> list[Row]:
 
 def _proof(case: str, toasts: int, tell: Callable[[], None]) -> Row:
     """Seconds to the proof; of a search that gives up, to that, under another name."""
-    cell, seconds, proven = toast_cell(case, toasts), list[float](), True
+    cell, seconds, proven = robot_cell(case, toasts), list[float](), True
     for _ in range(REPEATS):
         began = time.perf_counter()
         proven &= optimum(cell).proven
@@ -131,7 +119,7 @@ def _proof(case: str, toasts: int, tell: Callable[[], None]) -> Row:
 
 def _seconds_to_near(case: str, job: Job) -> list[float]:
     """Of each session of srl-time, the seconds until it was near enough; inf where it was not."""
-    cell = toast_cell(case, MANY)
+    cell = robot_cell(case, MANY)
     wanted, found = (1.0 + NEAR) * optimum(cell).bound_s, []
     for session in range(min(job.sessions, MANY_SESSIONS)):
         reached, began = [inf], time.perf_counter()
@@ -158,7 +146,7 @@ def _near_rows(case: str, seconds: list[float]) -> list[Row]:
 
 def _solved(case: str, missed: list[str], seed: int) -> list[Row]:
     """CP-SAT's gap after its limit; where it found nothing at all, a word of that is added to `missed`."""
-    cell = toast_cell(case, MANY)
+    cell = robot_cell(case, MANY)
     best, found = optimum(cell), cp_sat(cell, time_limit_s=CP_SAT_LIMIT_S, seed=seed)
     if not found.sequence:
         missed.append(f"CP-SAT found no sequence for {MANY} toasts in case {case} within {CP_SAT_LIMIT_S:g} s.")

@@ -10,6 +10,8 @@ from rich.text import Text
 
 _STUDY_ROWS = 30
 
+SHOWN_MOVES = 60
+
 
 def run_summary(report: Mapping[str, Any]) -> RenderableType:
     """The end of `lab run`, from its JSON document."""
@@ -91,7 +93,7 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     gap = "" if found["gap"] is None else f", gap {found['gap']:.2%}"
     lines = [
         f"{found['method']}: {what}{found['cost']:.2f}{unit} for {_ordered(found['order'])} (seed {found['seed']})",
-        f"order of the transfers: {' '.join(map(str, found['sequence']))}",
+        f"order of the transfers: {_begun(found['sequence'])}",
         f"{proven} {found['bound_cost']:.2f}{unit}{gap} ({found['bound_by']})",
     ]
     if found["sessions"] > 1:
@@ -104,6 +106,13 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     if found["stochastic"] is not None:
         lines += _drawn(found["stochastic"], unit)
     return Group(*map(Text, [*lines, *found["files"].values()]))
+
+
+def _begun(sequence: Sequence[int]) -> str:
+    """A sequence, or its beginning when it is long."""
+    more = len(sequence) - SHOWN_MOVES
+    begun = " ".join(map(str, sequence[:SHOWN_MOVES]))
+    return begun if more <= 0 else f"{begun} and {more} more (--json has all)"
 
 
 def _measured(objective: str) -> tuple[str, str]:

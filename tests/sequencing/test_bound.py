@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.sequencing.bound import FAR, TICKS_PER_S, RobotWork, distances, follows, ticks, ways_of
-from lab.sequencing.cell import Arrivals, Cell
+from lab.sequencing.cell import Arrivals, Cell, Product, Stage, Station
 from lab.sequencing.exact import optimum
 from lab.sequencing.run import Run
 from lab.sequencing.states import Moves, State
@@ -101,6 +101,34 @@ def test_no_state_is_bound_above_what_follows_it(
     assert all(before.now + left <= state.now + len(least) for before, left in least)
 
 
+@pytest.mark.parametrize("kind", ["I", "II", "III", "RSRS"])
+def test_no_walk_is_bound_above_its_end(toast_cell: CellMaker, fms_cell: CellMaker, kind: str) -> None:
+    """Buffers, pallets, vacuuming and arrivals; whatever is done next, at random."""
+    moves = Moves(fms_cell(kind) if kind == "RSRS" else toast_cell(kind, 3))
+    rng = np.random.default_rng(7)
+    for _ in range(40):
+        state, ends = moves.start(), list[int]()
+        while not moves.done(state):
+            ends.append(state.now + moves.left(state))
+            successors = list(moves.successors(state))
+            state = successors[int(rng.integers(len(successors)))]
+        assert max(ends) <= state.now
+
+
+def test_the_shorter_way_on_counts(oven_cell: CellMaker) -> None:
+    """From the oven to the end it takes 100 s directly, 2 s and 2 s by a rack: after 10 s in the oven that is 14 s."""
+    stations = (*oven_cell(1).stations, Station("rack", "buffer", 1))
+    route = (Stage("in"), Stage("oven"), Stage("out", "rack"))
+    loaded_s = np.full((4, 4), 2.0) - 2.0 * np.eye(4)
+    loaded_s[1, 2] = 100.0
+    change = {"stations": stations, "products": (Product("toast", (route,)),), "loaded_s": loaded_s}
+    cell = oven_cell(1, **change, empty_s=np.ones((4, 4)) - np.eye(4), buffers="free")
+    moves = Moves(cell)
+    (inside,) = moves.successors(moves.start())
+    assert moves.left(inside) / TICKS_PER_S == 14.0
+    assert optimum(cell).cost == 16.0
+
+
 def test_what_follows_what(oven_cell: CellMaker) -> None:
     """With room for one in the oven, a second part cannot be brought before the first is taken out."""
     cell = oven_cell(2)
@@ -110,6 +138,15 @@ def test_what_follows_what(oven_cell: CellMaker) -> None:
     assert not follows(cell, bring, take, same=False)
     assert follows(cell, take, bring, same=False)
     assert not follows(cell, take, take, same=False)
+
+
+def test_what_is_full_stays_full_when_a_buffer_was_used(toast_cell: CellMaker) -> None:
+    """A toast goes to the buffer because the toaster is full: none can be brought to the toaster next."""
+    cell = toast_cell("I", 2)
+    buffered = next(way for way in ways_of(cell) if way.option.if_full == cell.index("toaster"))
+    following = [way for way in ways_of(cell) if follows(cell, buffered, way, same=False)]
+    assert following
+    assert all(cell.names[way.option.target] != "toaster" for way in following)
 
 
 def test_distances_take_the_shortest_way(toast_cell: CellMaker) -> None:

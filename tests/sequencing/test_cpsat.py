@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.sequencing.bound import ways_of
 from lab.sequencing.cell import Arrivals, Cell, Product, Stage, Station
-from lab.sequencing.cpsat import cost_of, cp_sat, cp_sat_sequencer
+from lab.sequencing.cpsat import cost_of, cp_sat, cp_sat_sequencer, fits
 from lab.sequencing.cpsat_times import Times, longest, timed
 from lab.sequencing.exact import first_come, optimum
 from lab.sequencing.objectives import OBJECTIVES, WITH_DUE_TIMES, cost
@@ -128,6 +128,13 @@ def test_the_sequencer(toast_cell: CellMaker) -> None:
 def test_time_limits_that_are_none(oven_cell: CellMaker, limit_s: float) -> None:
     with pytest.raises(BadInput, match=r"time limit = .*: allowed are finite times above 0"):
         cp_sat(oven_cell(1), time_limit_s=limit_s)
+
+
+def test_cells_that_are_too_large(toast_cell: CellMaker) -> None:
+    """A toast has 7 moves to choose from: 3 stages, 2 buffers to go to and to leave."""
+    assert fits(toast_cell("I", 114))
+    with pytest.raises(BadInput, match="the 115 parts have 805 moves to choose from; allowed are 800"):
+        cp_sat(toast_cell("I", 115))
 
 
 def test_hints_that_cannot_be(oven_cell: CellMaker) -> None:

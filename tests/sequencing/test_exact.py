@@ -7,10 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
+from lab.sequencing.bound import TICKS_PER_S
 from lab.sequencing.cell import Arrivals, Cell, Product, Stage, Station
 from lab.sequencing.cpsat import exact
 from lab.sequencing.exact import Optimum, first_come, optimum
@@ -18,6 +19,8 @@ from lab.sequencing.objectives import cost
 from lab.sequencing.positions import part_of
 from lab.sequencing.run import Run, simulate
 from lab.sequencing.search import Search
+from lab.sequencing.states import Moves, sequence_of
+from lab.sequencing.tree import branch_and_bound
 
 CellMaker = Callable[..., Cell]
 
@@ -68,19 +71,46 @@ def test_more_toasts_cost_the_same_each(
     best = optimum(toast_cell(case, toasts, buffer_room=200))
     assert best.proven
     assert best.cost == fixed_s + toasts * each_s
+    assert best.expanded < 100 * toasts  # few more than moves are needed: what is alike is opened once
 
 
-@settings(max_examples=20)
-@given(data=st.data(), size=st.sampled_from([(1, 3), (2, 2), (3, 2)]), many=st.booleans())
+@settings(max_examples=30)
+@given(data=st.data(), size=st.sampled_from([(1, 3, False), (2, 2, False), (3, 2, False), (1, 2, True)]))
 def test_never_worse_or_better_than_brute_force(
-    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject, size: tuple[int, int], many: bool
+    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject, size: tuple[int, int, bool]
 ) -> None:
-    """Random tables, capacities, starts; with `many` also products, routes, pallets, services, arrivals, free buffers."""
-    cell = data.draw(cells(*size, many=many))
+    """Random tables, capacities, starts; some also with products, routes, pallets, services, arrivals, free buffers."""
+    cell = data.draw(cells(*size))
     best = optimum(cell)
     assert best.proven
     assert best.cost == pytest.approx(min(run.now_s for run in ends(Run(cell))), abs=1e-6)
     assert simulate(cell, best.sequence).makespan_s == best.cost
+
+
+@settings(max_examples=30)
+@given(data=st.data())
+def test_the_search_that_estimates_nothing_agrees(
+    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject
+) -> None:
+    cell = data.draw(cells(max_machines=2, max_parts=3, many=True))
+    try:
+        tree = branch_and_bound(cell, most=3000)
+    except BadInput:
+        assume(False)
+    assert optimum(cell).cost == pytest.approx(simulate(cell, tree.optimal).makespan_s, abs=1e-6)
+
+
+@given(data=st.data())
+def test_states_keep_the_time_of_the_simulation(
+    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject
+) -> None:
+    """A walk to the end by any moves, and its decisions simulated."""
+    cell = data.draw(cells(max_parts=4, many=True))
+    moves = Moves(cell)
+    state = moves.start()
+    while not moves.done(state):
+        state = data.draw(st.sampled_from(list(moves.successors(state))))
+    assert state.now / TICKS_PER_S == pytest.approx(simulate(cell, sequence_of(cell, state)).makespan_s, abs=1e-6)
 
 
 @pytest.mark.parametrize("order", ["PN", "PNP", "PNN", "NNPP"])
@@ -192,6 +222,15 @@ def test_the_sequencer_is_exact_for_every_objective(toast_cell: CellMaker, objec
     assert found.cost == min(cost(run, objective) for run in ends(Run(cell)))
     assert found.episode_costs == (found.cost,)
     simulate(cell, found.sequence)
+
+
+def test_what_is_not_proven_is_improved_by_cp_sat(toast_cell: CellMaker, monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = toast_cell("II", 3)
+    rough = optimum(cell, max_expanded=0)
+    monkeypatch.setattr("lab.sequencing.cpsat.optimum", lambda cell: rough)
+    assert rough.cost > exact(cell, Search(), np.random.default_rng(0)).cost == 700
+    monkeypatch.setattr("lab.sequencing.cpsat.MOST_MOVES", 20)
+    assert exact(cell, Search(), np.random.default_rng(0)).cost == rough.cost
 
 
 def test_the_sequencer_checks_the_objective(toast_cell: CellMaker) -> None:

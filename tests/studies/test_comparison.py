@@ -10,9 +10,10 @@ import pytest
 
 from lab.sequencing.exact import optimum
 from lab.studies import comparison, comparison_parts, comparison_speed
+from lab.studies.chapter7 import robot_cell
 from lab.studies.comparison import rows_of, settings_of, srl_time_study, works_of
 from lab.studies.comparison_parts import CAPS, Setting, Tried, Work, sessions_for, single, tried
-from lab.studies.comparison_speed import RATE, SECONDS, sequencing_speed, toast_cell
+from lab.studies.comparison_speed import RATE, SECONDS, sequencing_speed
 from lab.studies.findings import Findings
 from lab.studies.runner import Job
 
@@ -153,13 +154,10 @@ def test_pictures_of_the_comparison(found: Findings) -> None:
         assert ("FIFO" in text) == ("Sessions" not in caption)
 
 
-def test_a_cell_with_room_for_a_hundred() -> None:
+def test_the_cells_have_room_for_a_hundred() -> None:
     for case in comparison_speed.CASES:
-        cell = toast_cell(case, 100)
-        assert cell.parts == 100
-        assert min(station.capacity for station in cell.stations if station.kind != "machine") == 100
-        assert max(station.capacity for station in cell.stations if station.kind == "machine") == 1
-    assert optimum(toast_cell("III", 3)).cost == 995.0  # printed
+        assert robot_cell(case, 100).parts == 100
+    assert optimum(robot_cell("III", 3)).cost == 995.0  # printed
 
 
 @pytest.fixture
