@@ -7,8 +7,8 @@ from pydantic import BeforeValidator, Field
 
 from lab.errors import BadInput, unknown
 from lab.record import Name, Record, as_tuple
-from lab.sequencing.cell import STATION_KINDS, Product, Stage, Station
 from lab.sequencing.chance import LAWS, Chance
+from lab.sequencing.layout import STATION_KINDS, Product, Stage, Station
 from lab.sequencing.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES
 from lab.sequencing.search import SrlSettings
 from lab.tomltext import Loc

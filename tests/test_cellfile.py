@@ -11,9 +11,10 @@ import pytest
 from lab.cellfile import TOAST_CASES, CellFile, order_from_word, toast_case
 from lab.data import tasks_folder
 from lab.errors import BadInput
-from lab.sequencing.cell import MAX_PARTS, Arrivals
+from lab.sequencing.cell import MAX_PARTS
 from lab.sequencing.chance import Chance
 from lab.sequencing.exact import optimum
+from lab.sequencing.layout import Arrivals
 from lab.sequencing.run import simulate
 from lab.sequencing.search import SrlSettings
 from lab.taskfile import cell_names, load_cell

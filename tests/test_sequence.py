@@ -23,10 +23,11 @@ from lab.sequence import (
     sequence_named,
 )
 from lab.sequencing import DRAWN, SEQUENCERS
-from lab.sequencing.cell import Cell, Stage, Station
+from lab.sequencing.cell import Cell
 from lab.sequencing.chance import NO_CHANCE, Chance
 from lab.sequencing.events import SequenceResult
 from lab.sequencing.execute import replicate
+from lab.sequencing.layout import Stage, Station
 from lab.sequencing.objectives import OBJECTIVES
 from lab.sequencing.run import simulate
 from lab.sequencing.search import Reference, Search, SrlSettings

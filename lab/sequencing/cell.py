@@ -9,15 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput, unknown
-from lab.sequencing.layout import MAX_S, check_seconds, is_count
-from lab.sequencing.layout import ROBOT as ROBOT
-from lab.sequencing.layout import STATION_KINDS as STATION_KINDS
-from lab.sequencing.layout import Arrivals as Arrivals
-from lab.sequencing.layout import Product as Product
-from lab.sequencing.layout import Route as Route
-from lab.sequencing.layout import Stage as Stage
-from lab.sequencing.layout import Station as Station
-from lab.sequencing.layout import check_layout as check_layout
+from lab.sequencing.layout import MAX_S, Arrivals, Product, Route, Station, check_layout, check_seconds, is_count
 from lab.sequencing.positions import Moves, Position, moves_between, positions_of
 
 MAX_PARTS = 200

@@ -6,7 +6,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
 from lab.errors import BadInput
-from lab.sequencing.cell import ROBOT, Cell
+from lab.sequencing.cell import Cell
+from lab.sequencing.layout import ROBOT
 
 Kind = Literal["carry", "pallet", "empty", "wait", "service", "process", "blocked", "store"]
 KINDS: tuple[Kind, ...] = get_args(Kind)

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.batch import evaluate, run_sessions
-from lab.sequencing.cell import Arrivals, Cell
+from lab.sequencing.cell import Cell
 from lab.sequencing.chance import LAWS, Chance
 from lab.sequencing.exact import optimum
 from lab.sequencing.execute import Policy, replan, replicate
+from lab.sequencing.layout import Arrivals
 from lab.sequencing.reactive import reacting
 from lab.sequencing.search import Search, SrlSettings, kernel_seed
 from lab.studies.appendix3_fifo import STARTS, queued_fifo

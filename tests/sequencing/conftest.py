@@ -8,7 +8,8 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from lab.sequencing.cell import Arrivals, Cell, Product, Route, Stage, Station, needed_moves
+from lab.sequencing.cell import Cell, needed_moves
+from lab.sequencing.layout import Arrivals, Product, Route, Stage, Station
 
 X = math.nan
 # Thesis table 7.2, robot times [s], row from, column to, stations 1 to 6.

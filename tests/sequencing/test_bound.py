@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.sequencing.bound import FAR, TICKS_PER_S, RobotWork, distances, follows, ticks, ways_of
-from lab.sequencing.cell import Arrivals, Cell, Product, Stage, Station
+from lab.sequencing.cell import Cell
 from lab.sequencing.exact import optimum
+from lab.sequencing.layout import Arrivals, Product, Stage, Station
 from lab.sequencing.run import Run
 from lab.sequencing.states import Moves, State
 

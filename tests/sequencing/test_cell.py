@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.sequencing.cell import Arrivals, Cell, Product, Stage, Station, needed_moves
+from lab.sequencing.cell import Cell, needed_moves
+from lab.sequencing.layout import Arrivals, Product, Stage, Station
 from lab.sequencing.run import Run
 
 CellMaker = Callable[..., Cell]

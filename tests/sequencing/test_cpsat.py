@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.sequencing.bound import ways_of
-from lab.sequencing.cell import Arrivals, Cell, Product, Stage, Station
+from lab.sequencing.cell import Cell
 from lab.sequencing.cpsat import cost_of, cp_sat, cp_sat_sequencer, fits
 from lab.sequencing.cpsat_times import Times, longest, timed
 from lab.sequencing.exact import first_come, optimum
+from lab.sequencing.layout import Arrivals, Product, Stage, Station
 from lab.sequencing.objectives import OBJECTIVES, WITH_DUE_TIMES, cost
 from lab.sequencing.run import Run, simulate
 from lab.sequencing.search import Search

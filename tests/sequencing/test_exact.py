@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.sequencing.bound import TICKS_PER_S
-from lab.sequencing.cell import Arrivals, Cell, Product, Stage, Station
+from lab.sequencing.cell import Cell
 from lab.sequencing.cpsat import exact
 from lab.sequencing.exact import Optimum, first_come, optimum
+from lab.sequencing.layout import Arrivals, Product, Stage, Station
 from lab.sequencing.objectives import cost
 from lab.sequencing.positions import part_of
 from lab.sequencing.run import Run, simulate

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput, WorkFailed
-from lab.sequencing.cell import Arrivals, Cell, Product, Stage, Station
+from lab.sequencing.cell import Cell
 from lab.sequencing.chance import NO_CHANCE, Chance, Episode
 from lab.sequencing.execute import (
     WAIT,
@@ -23,6 +23,7 @@ from lab.sequencing.execute import (
     replicate,
     rollout,
 )
+from lab.sequencing.layout import Arrivals, Product, Stage, Station
 from lab.sequencing.objectives import cost
 from lab.sequencing.rules import RULES, dispatch, usable
 from lab.sequencing.run import Run, simulate

@@ -13,8 +13,9 @@ from hypothesis.strategies import DataObject, SearchStrategy
 
 from lab.sequencing import kernels, objectives
 from lab.sequencing.arrays import CellArrays, RunArrays, cell_arrays, most_moves, run_arrays
-from lab.sequencing.cell import Cell, Product, Stage, Station
+from lab.sequencing.cell import Cell
 from lab.sequencing.chance import LAWS, NO_CHANCE, Chance, Episode, uniform
+from lab.sequencing.layout import Product, Stage, Station
 from lab.sequencing.run import Run
 
 CellMaker = Callable[..., Cell]

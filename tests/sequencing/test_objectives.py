@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.sequencing.cell import Cell, Product, Stage, Station
+from lab.sequencing.cell import Cell
+from lab.sequencing.layout import Product, Stage, Station
 from lab.sequencing.objectives import OBJECTIVES, WITH_DUE_TIMES, check_objective, cost, machine_places, stuck_cost
 from lab.sequencing.run import Run
 

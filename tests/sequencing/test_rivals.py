@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput, WorkFailed
-from lab.sequencing.cell import Arrivals, Cell, Product, Stage, Station
+from lab.sequencing.cell import Cell
 from lab.sequencing.chance import Chance
 from lab.sequencing.events import EpisodeSequenced
 from lab.sequencing.execute import carry_out
+from lab.sequencing.layout import Arrivals, Product, Stage, Station
 from lab.sequencing.rivals import fifo, first_in_first_out, random_search
 from lab.sequencing.run import simulate
 from lab.sequencing.search import Search

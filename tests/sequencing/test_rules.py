@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput, WorkFailed
-from lab.sequencing.cell import Cell, Product, Route, Stage, Station
+from lab.sequencing.cell import Cell
+from lab.sequencing.layout import Product, Route, Stage, Station
 from lab.sequencing.rules import RULES, dispatch, dispatched, usable, work_left_s
 from lab.sequencing.run import Run, simulate
 from lab.sequencing.search import Search

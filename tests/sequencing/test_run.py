@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.sequencing.cell import Arrivals, Cell, Product, Route, Stage, Station
+from lab.sequencing.cell import Cell
 from lab.sequencing.chance import Chance, Episode
 from lab.sequencing.events import Move
+from lab.sequencing.layout import Arrivals, Product, Route, Stage, Station
 from lab.sequencing.run import Run, simulate
 
 CellMaker = Callable[..., Cell]

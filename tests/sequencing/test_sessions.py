@@ -11,10 +11,11 @@ from hypothesis.strategies import DataObject, SearchStrategy
 
 from lab.errors import WorkFailed
 from lab.sequencing.batch import METHODS, run_sessions, session_seeds
-from lab.sequencing.cell import Cell, Product, Stage, Station
+from lab.sequencing.cell import Cell
 from lab.sequencing.chance import LAWS, Chance
 from lab.sequencing.events import EpisodeSequenced
 from lab.sequencing.keys import keys_of
+from lab.sequencing.layout import Product, Stage, Station
 from lab.sequencing.objectives import OBJECTIVES, stuck_cost
 from lab.sequencing.search import FACTORS, STATES, VALUES, Search, SrlSettings
 from lab.sequencing.sessions import BLOCK, ROWS, Learned, Learner, learn, learn_compiled, learn_readably

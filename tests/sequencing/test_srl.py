@@ -8,7 +8,8 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sequencing.batch import run_sessions
-from lab.sequencing.cell import Cell, Station
+from lab.sequencing.cell import Cell
+from lab.sequencing.layout import Station
 from lab.sequencing.search import Search, SrlSettings
 from lab.sequencing.srl import srl
 
