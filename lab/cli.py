@@ -17,6 +17,7 @@ from lab.errors import BadInput, LabError
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
+    from lab.sequencing.advised import SequenceRequest
     from lab.teaching import Teacher
     from lab.view.progress import RunProgress
 
@@ -304,8 +305,14 @@ def sequence(
     progress = RunProgress(_console())
     teacher = _teacher(toolbox, "expert", seed, progress)
     teacher.toolbox.check()
-    ask = OrderPrompt(progress.console) if advisor == "terminal" else None
-    wanted = Wanted(method, episodes, objective, sessions, seed, stochastic, advisor, gate, ask)
+    prompt = OrderPrompt(progress.console) if advisor == "terminal" else None
+
+    def ask(request: "SequenceRequest") -> int | None:
+        assert prompt is not None
+        with progress.paused():
+            return prompt(request)
+
+    wanted = Wanted(method, episodes, objective, sessions, seed, stochastic, advisor, gate, ask if prompt else None)
     files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
     with progress:
         document = sequence_named(task, case, toasts, wanted, teacher=teacher, listener=progress, files=files)

@@ -1,7 +1,7 @@
 """The order of the robot's transfers: of a task, over measured durations, or of a cell file."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,28 +9,25 @@ import numpy as np
 
 from lab.cellfile import CellFile, order_from_word, toast_case
 from lab.cellparts import Sequencing
-from lab.errors import BadInput
+from lab.errors import BadInput, unknown
 from lab.gridworld import GridWorld
 from lab.listener import Listener
 from lab.planner import check_method, find_sequence, search_for
+from lab.sequence_drawn import stochastic
 from lab.sequencing import DRAWN
 from lab.sequencing.cell import Cell
 from lab.sequencing.chance import NO_CHANCE, Chance
 from lab.sequencing.events import LearnedSequence, SequenceResult
-from lab.sequencing.objectives import MAKESPAN, check_objective
+from lab.sequencing.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective
 from lab.sequencing.search import SAME, Reference, Search
 from lab.taskfile import Task, load_any
 from lab.teaching import Teacher
 
 if TYPE_CHECKING:
     from lab.sequencing.advised import AdvisedResult, SequenceRequest
-    from lab.sequencing.execute import Policy
 
     Ask = Callable[[SequenceRequest], int | None]
 
-REPLICATIONS = 200  # drawn episodes in which a list and a policy are compared
-PLANNED = 2000  # of a policy that plans at every decision so many by parts squared, at least FEWEST: it takes its time
-FEWEST = 20
 DEFAULT_TOASTS = 3
 SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
 
@@ -73,6 +70,7 @@ def sequence_named(
     loaded = load_any(name)
     if isinstance(loaded, GridWorld):
         raise BadInput(f"{name}: it is a world, there is nothing to sequence: learn it with lab teach {name}")
+    _check_names(wanted, loaded.sequencing)
     if isinstance(loaded, CellFile):
         cell, chance = ordered_cell(loaded, case, toasts), loaded.chance()
     else:
@@ -84,11 +82,25 @@ def sequence_named(
             measured_cell(loaded, DEFAULT_TOASTS if toasts is None else toasts, wanted, teacher, listener),
             Chance(),
         )
+    check_objective(wanted.objective or loaded.sequencing.objective, cell)
     listener.phase("sequence", wanted.sessions)
     document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, on_session=listener.sequenced)
     document = {"task": loaded.name} | document
     draw(cell, document, found, files)
     return document
+
+
+def _check_names(wanted: Wanted, settings: Sequencing) -> None:
+    """BadInput for a name that no table holds, and for advice to a method that asks for none; before any work."""
+    from lab.sequencing.advised import check_advice
+
+    method, objective = wanted.method or settings.method, wanted.objective or settings.objective
+    check_method(method)
+    if objective not in OBJECTIVES:
+        raise unknown("objective", objective, OBJECTIVES, "--objective")
+    check_advice(wanted.advisor, wanted.gate)
+    if wanted.advisor != "none" and method != "srl":
+        raise BadInput(f"--advisor {wanted.advisor} with --method {method}: only srl asks for advice")
 
 
 def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
@@ -102,7 +114,9 @@ def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher, lis
     """The cell of a task, once its skills are learned and their durations measured."""
     from lab.run import prepare, teach_all
 
-    check_method(wanted.method or task.sequencing.method)
+    objective = wanted.objective or task.sequencing.objective
+    if objective in WITH_DUE_TIMES:
+        raise BadInput(f"objective '{objective}' (--objective) needs due times, and a task has none: use a cell file")
     return teach_all(prepare(task, toasts, teacher.seed), teacher, listener).cell
 
 
@@ -147,8 +161,6 @@ def _advised(cell: Cell, method: str, search: Search, wanted: Wanted, session: i
     from lab.learning.settings import GateSettings
     from lab.sequencing.advised import advised_srl, sequence_advisor
 
-    if method != "srl":
-        raise BadInput(f"--advisor {wanted.advisor} with --method {method}: only srl asks for advice")
     rng = np.random.default_rng([wanted.seed, 2, session])
     advisor = sequence_advisor(wanted.advisor, cell, np.random.default_rng([wanted.seed, 3, session]), wanted.ask)
     return advised_srl(cell, search, rng, GateSettings(wanted.gate), advisor)
@@ -167,53 +179,6 @@ def reference(cell: Cell, objective: str) -> Reference:
         return Reference(0.0, False, "nothing: too many moves for CP-SAT")
     opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)
     return Reference(opinion.bound, opinion.status == "optimal", "CP-SAT")
-
-
-def stochastic(
-    cell: Cell, method: str, search: Search, found: SequenceResult, chance: Chance, seed: int
-) -> dict[str, Any]:
-    """The list as it is and a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
-    from lab.sequencing.execute import replicate
-    from lab.sequencing.rules import RULES
-
-    policy, says = _policy(cell, method, search, seed)
-    fixed = _planned(cell, method, search, found, seed)
-    episodes = REPLICATIONS if method == "fifo" or method in RULES else min(REPLICATIONS, PLANNED // cell.parts**2)
-    episodes = max(FEWEST, episodes)
-    costs = [replicate(cell, how, chance, episodes, seed, search.objective) for how in (fixed, policy)]
-    difference = costs[0] - costs[1]
-    return {
-        "processing": chance.processing,
-        "arrivals": chance.arrivals if cell.arrivals else None,
-        "spread": chance.spread,
-        "replications": episodes,
-        "fixed": _mean(costs[0]) | {"sequence": list(fixed)},
-        "reacting": _mean(costs[1]) | {"policy": says},
-        "saved_by_reacting": _mean(difference),
-    }
-
-
-def _policy(cell: Cell, method: str, search: Search, seed: int) -> "tuple[Policy, str]":
-    """What reacts in the manner of the method, and what that is."""
-    from lab.sequencing.execute import by_rule, replan
-    from lab.sequencing.reactive import reacting
-    from lab.sequencing.rivals import first_in_first_out
-    from lab.sequencing.rules import RULES
-
-    if method == "srl-time":
-        return reacting(cell, search.objective, seed), "it goes on learning before every decision"
-    if method in RULES:
-        return by_rule(RULES[method]), f"the rule {method}, asked at every decision"
-    if method == "fifo":
-        return first_in_first_out, "a queue of tasks as they become possible"
-    return replan(objective=search.objective), "planned anew at every decision"
-
-
-def _planned(cell: Cell, method: str, search: Search, found: SequenceResult, seed: int) -> Sequence[int]:
-    """The list to carry out as it is: what the method finds with the mean times."""
-    if search.chance == NO_CHANCE:
-        return found.sequence
-    return find_sequence(cell, method, replace(search, chance=NO_CHANCE, on_episode=None), seed).sequence
 
 
 def _document(
@@ -290,13 +255,6 @@ def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], 
     if "gantt" in files:
         gantt(simulate(cell, document["sequence"]), files["gantt"])
     document["files"] = {name: str(path) for name, path in files.items()}
-
-
-def _mean(values: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, Any]:
-    from lab.studies.statistics import interval
-
-    mean, low, high = interval(values)
-    return {"mean": mean, "ci95": [low, high]}
 
 
 def _cost(result: SequenceResult) -> float:

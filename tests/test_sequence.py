@@ -17,7 +17,6 @@ from lab.listener import Listener
 from lab.planner import find_sequence, search_for
 from lab.sequence import (
     Wanted,
-    measured_cell,
     reference,
     sequence_cell,
     sequence_named,
@@ -340,7 +339,7 @@ REACTING = {
 def few(monkeypatch: pytest.MonkeyPatch, episodes: int) -> None:
     """Draw so many episodes, whatever the method and however many parts."""
     for name in ("REPLICATIONS", "FEWEST"):
-        monkeypatch.setattr(f"lab.sequence.{name}", episodes)
+        monkeypatch.setattr(f"lab.sequence_drawn.{name}", episodes)
 
 
 @pytest.mark.parametrize("method", REACTING)
@@ -385,7 +384,7 @@ def test_who_plans_at_every_decision_is_given_fewer_episodes(
 ) -> None:
     """Here 24 by parts squared, from 2 to 30."""
     for name, number in (("REPLICATIONS", 30), ("PLANNED", 24), ("FEWEST", 2)):
-        monkeypatch.setattr(f"lab.sequence.{name}", number)
+        monkeypatch.setattr(f"lab.sequence_drawn.{name}", number)
     drawn = asked(lab, f"oven.toml --toasts {toasts} --method {method} --stochastic")["stochastic"]
     assert drawn["replications"] == episodes
 
@@ -549,7 +548,6 @@ def test_what_is_refused_at_once(lab: Lab, folder: Path, words: str, line: str, 
             "--objective tardy-parts",
             "objective 'tardy-parts': the cell has no due times (due_s); without them: makespan, robot-idle, machine-idle",
         ),
-        ("--method earliest-due", "rule 'earliest-due': the cell has no due times (due_s)"),
         ("--advisor exprt --method srl", "unknown advisor 'exprt' (--advisor): did you mean 'expert'? known: expert, "),
         ("--advisor tau=0 --method srl", "unknown advisor 'tau=0' (--advisor): "),
         (
@@ -560,6 +558,11 @@ def test_what_is_refused_at_once(lab: Lab, folder: Path, words: str, line: str, 
             "--advisor expert --gate ia --method srl",
             "gate 'ia' (--gate): it looks at a table of states, which sequencing has not; allowed here: ccrl, ",
         ),
+        (
+            "--gate cclr",
+            "unknown gate 'cclr' (--gate, for sequencing): did you mean 'ccrl'? known: always, ccrl, never",
+        ),
+        ("--advisor exprt", "unknown advisor 'exprt' (--advisor): did you mean 'expert'? known: expert, "),
         ("--advisor expert", "--advisor expert with --method srl-time: only srl asks for advice"),
         ("--advisor expert --method exact", "--advisor expert with --method exact: only srl asks for advice"),
         ("--advisor terminal --method mc", "--advisor terminal with --method mc: only srl asks for advice"),
@@ -570,8 +573,23 @@ def test_what_does_not_fit_is_refused(lab: Lab, folder: Path, words: str, line: 
     for more in ([], ["--json"]):
         ran = lab("sequence", "oven.toml", *words.split(), *more)
         assert (ran.code, ran.out) == (2, "")
-        assert ran.err.splitlines()[-1].startswith(f"lab: {line}")
+        assert ran.err.startswith(f"lab: {line}")
+        assert len(ran.err.splitlines()) == 1
     assert listed(folder) == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("--method x", "--objective x", "--objective mean-tardiness", "--gate x", "--method srl --advisor x"),
+        "--advisor expert --method fifo",
+    ],
+)
+def test_bad_names_are_known_before_a_task_is_measured(
+    lab: Lab, measured: list[tuple[str, int, int]], words: str
+) -> None:
+    ran = lab("sequence", "toast", *words.split())
+    assert (ran.code, ran.out, len(ran.err.splitlines()), measured) == (2, "", 1, [])
 
 
 def test_a_folder_for_a_picture(lab: Lab, folder: Path) -> None:
@@ -677,14 +695,6 @@ def test_a_case_that_a_task_has_not(lab: Lab, folder: Path, root: Path, measured
 def test_a_task_with_advice(lab: Lab) -> None:
     document = asked(lab, "toast --toasts 2 --method srl --advisor novice --gate always --episodes 3")
     assert (document["advisor"], document["advice"][0]["requests"]) == ("novice", 3)
-
-
-def test_an_unknown_method_is_known_before_anything_is_measured(
-    teacher: Teacher, measured: list[tuple[str, int, int]]
-) -> None:
-    with pytest.raises(BadInput, match=r"^unknown method 'x' .--method.: known: cp-sat, "):
-        measured_cell(load("toast"), 2, Wanted("x"), teacher, Listener())
-    assert measured == []
 
 
 # ---- the parts ----------------------------------------------------------------------------------------------------

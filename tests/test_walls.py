@@ -37,6 +37,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.view",),
     ("lab.report",),
     ("lab.run", "lab.studies", "lab.gym"),
+    ("lab.sequence_drawn",),
     ("lab.lesson", "lab.study", "lab.look", "lab.sequence"),
     ("lab.task",),
     ("lab.cli",),

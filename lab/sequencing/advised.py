@@ -88,6 +88,27 @@ class AskedAdvisor:
         return self._ask(request)
 
 
+def check_advice(name: str, gate: str) -> None:
+    """BadInput for an advisor that `sequence_advisor` does not know, and for a gate that does not judge by episodes."""
+    if name not in (*SKILLS, "wrong", "terminal", "none"):
+        _tau(name)
+    if gate not in FITTING and gate in GATES:
+        allowed = f"it looks at a table of states, which sequencing has not; allowed here: {', '.join(FITTING)}"
+        raise BadInput(f"gate '{gate}' (--gate): {allowed}")
+    if gate not in FITTING:
+        raise unknown("gate", gate, FITTING, "--gate, for sequencing")
+
+
+def _tau(name: str) -> float:
+    try:
+        tau = float(name.removeprefix("tau=")) if name.startswith("tau=") else 0.0
+    except ValueError:
+        tau = 0.0
+    if not 0.0 < tau < np.inf:
+        raise unknown("advisor", name, [*SKILLS, "wrong", "terminal", "none", "tau=X"], "--advisor")
+    return tau
+
+
 def sequence_advisor(
     name: str,
     cell: Cell,
@@ -106,15 +127,7 @@ def sequence_advisor(
         return AskedAdvisor(ask)
     if name == "wrong":
         return KnowingAdvisor(cell, SKILLS["expert"], rng, sign=-1.0)
-    if name in SKILLS:
-        return KnowingAdvisor(cell, SKILLS[name], rng)
-    try:
-        tau = float(name.removeprefix("tau=")) if name.startswith("tau=") else 0.0
-    except ValueError:
-        tau = 0.0
-    if not 0.0 < tau < np.inf:
-        raise unknown("advisor", name, [*SKILLS, "wrong", "terminal", "none", "tau=X"], "--advisor")
-    return KnowingAdvisor(cell, tau, rng)
+    return KnowingAdvisor(cell, SKILLS[name] if name in SKILLS else _tau(name), rng)
 
 
 def advised_srl(
@@ -125,15 +138,7 @@ def advised_srl(
     The gates are those of the low level: the step counts that they compare are costs here (makespans [s]). Raises
     BadInput for a gate that does not judge by episodes, and as `srl` does. Source: thesis 10.2.1 iii with fig. 6.2.
     """
-    if gate.gate not in FITTING:
-        raise (
-            unknown("gate", gate.gate, FITTING, "--gate, for sequencing")
-            if gate.gate not in GATES
-            else BadInput(
-                f"gate '{gate.gate}' (--gate): it looks at a table of states, which sequencing has not; "
-                f"allowed here: {', '.join(FITTING)}"
-            )
-        )
+    check_advice("none", gate.gate)
     session = _Advised(GATES[gate.gate](gate, search.episodes, NEVER_REACHED, None), gate, advisor)
     learned = learn_readably(cell, search, kernel_seed(rng), Srl, session)
     log = learned.log

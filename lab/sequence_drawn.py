@@ -1,0 +1,74 @@
+"""What a list of decisions, and a policy that reacts, come to where times are drawn."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lab.planner import find_sequence
+from lab.sequencing.cell import Cell
+from lab.sequencing.chance import NO_CHANCE, Chance
+from lab.sequencing.events import SequenceResult
+from lab.sequencing.search import Search
+
+if TYPE_CHECKING:
+    from lab.sequencing.execute import Policy
+
+REPLICATIONS = 200  # drawn episodes in which a list and a policy are compared
+PLANNED = 2000  # of a policy that plans at every decision so many by parts squared, at least FEWEST: it takes its time
+FEWEST = 20
+
+
+def stochastic(
+    cell: Cell, method: str, search: Search, found: SequenceResult, chance: Chance, seed: int
+) -> dict[str, Any]:
+    """The list as it is and a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
+    from lab.sequencing.execute import replicate
+    from lab.sequencing.rules import RULES
+
+    policy, says = _policy(cell, method, search, seed)
+    fixed = _planned(cell, method, search, found, seed)
+    episodes = REPLICATIONS if method == "fifo" or method in RULES else min(REPLICATIONS, PLANNED // cell.parts**2)
+    episodes = max(FEWEST, episodes)
+    costs = [replicate(cell, how, chance, episodes, seed, search.objective) for how in (fixed, policy)]
+    difference = costs[0] - costs[1]
+    return {
+        "processing": chance.processing,
+        "arrivals": chance.arrivals if cell.arrivals else None,
+        "spread": chance.spread,
+        "replications": episodes,
+        "fixed": _mean(costs[0]) | {"sequence": list(fixed)},
+        "reacting": _mean(costs[1]) | {"policy": says},
+        "saved_by_reacting": _mean(difference),
+    }
+
+
+def _policy(cell: Cell, method: str, search: Search, seed: int) -> "tuple[Policy, str]":
+    """What reacts in the manner of the method, and what that is."""
+    from lab.sequencing.execute import by_rule, replan
+    from lab.sequencing.reactive import reacting
+    from lab.sequencing.rivals import first_in_first_out
+    from lab.sequencing.rules import RULES
+
+    if method == "srl-time":
+        return reacting(cell, search.objective, seed), "it goes on learning before every decision"
+    if method in RULES:
+        return by_rule(RULES[method]), f"the rule {method}, asked at every decision"
+    if method == "fifo":
+        return first_in_first_out, "a queue of tasks as they become possible"
+    return replan(objective=search.objective), "planned anew at every decision"
+
+
+def _planned(cell: Cell, method: str, search: Search, found: SequenceResult, seed: int) -> Sequence[int]:
+    """The list to carry out as it is: what the method finds with the mean times."""
+    if search.chance == NO_CHANCE:
+        return found.sequence
+    return find_sequence(cell, method, replace(search, chance=NO_CHANCE, on_episode=None), seed).sequence
+
+
+def _mean(values: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, Any]:
+    from lab.studies.statistics import interval
+
+    mean, low, high = interval(values)
+    return {"mean": mean, "ci95": [low, high]}
