@@ -317,6 +317,8 @@ def sequence(
     with progress:
         document = sequence_named(task, case, toasts, wanted, teacher=teacher, listener=progress, files=files)
     _show(document, as_json, sequence_summary)
+    if document["interrupted"]:
+        _end("stopped by Ctrl-C; the best order until then is above", 130)
 
 
 @command(app, "see", "lab see overhead.png --task toast")

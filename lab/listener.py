@@ -24,7 +24,7 @@ class Listener:
     def measured(self, name: str, seconds: float) -> None:
         """A move was timed."""
 
-    def sequenced(self, best: SequenceResult, known: Reference) -> None:
+    def sequenced(self, best: SequenceResult, known: Reference | None) -> None:
         """An order was found."""
 
     def moved(self, move: Move) -> None:

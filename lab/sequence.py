@@ -1,7 +1,7 @@
 """The order of the robot's transfers: of a task, over measured durations, or of a cell file."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ from lab.sequence_drawn import stochastic
 from lab.sequencing import DRAWN
 from lab.sequencing.cell import Cell
 from lab.sequencing.chance import NO_CHANCE, Chance
-from lab.sequencing.events import LearnedSequence, SequenceResult
+from lab.sequencing.events import EpisodeSequenced, LearnedSequence, SequenceResult
 from lab.sequencing.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective
 from lab.sequencing.search import SAME, Reference, Search
 from lab.taskfile import Task, load_any
@@ -126,7 +126,7 @@ def sequence_cell(
     wanted: Wanted,
     chance: Chance,
     *,
-    on_session: Callable[[SequenceResult, Reference], None] | None = None,
+    on_session: Callable[[SequenceResult, Reference | None], None] | None = None,
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     """Sessions of one method on a cell, beside what cannot be beaten; the document of `lab sequence`, and the sessions.
 
@@ -143,17 +143,45 @@ def sequence_cell(
     check_objective(search.objective, cell)
     known = reference(cell, search.objective)
     found = []
+    interrupted = False
     for session in range(wanted.sessions):
-        if wanted.advisor == "none":
-            found.append(find_sequence(cell, method, search, wanted.seed, session))
-        else:
-            found.append(_advised(cell, method, search, wanted, session))
+        heard = _Heard()
+        try:
+            found.append(_session(cell, method, replace(search, on_episode=heard), wanted, session))
+        except KeyboardInterrupt:
+            interrupted = True
+            if heard.best is None and not found:
+                raise KeyboardInterrupt("stopped by Ctrl-C before an order was found") from None
+            found += [] if heard.best is None else [heard.result()]
+            break
         if on_session is not None:
-            on_session(found[-1], known)
-    document = _document(cell, method, search, found, known, wanted)
-    if wanted.stochastic:
+            on_session(found[-1], known if search.chance == NO_CHANCE else None)
+    document = _document(cell, method, search, found, known, wanted) | {"interrupted": interrupted}
+    if wanted.stochastic and not interrupted:
         document["stochastic"] = stochastic(cell, method, search, min(found, key=_cost), chance, wanted.seed)
     return document, found
+
+
+@dataclass
+class _Heard:
+    """Keeps what a session has found so far, for when it is stopped."""
+
+    best: EpisodeSequenced | None = None
+    costs: list[float] = field(default_factory=list)
+
+    def __call__(self, event: EpisodeSequenced) -> None:
+        self.costs.append(event.cost)
+        self.best = event if event.best else self.best
+
+    def result(self) -> SequenceResult:
+        assert self.best is not None
+        return SequenceResult(self.best.best, self.best.best_cost, tuple(self.costs))
+
+
+def _session(cell: Cell, method: str, search: Search, wanted: Wanted, session: int) -> SequenceResult:
+    if wanted.advisor == "none":
+        return find_sequence(cell, method, search, wanted.seed, session)
+    return _advised(cell, method, search, wanted, session)
 
 
 def _advised(cell: Cell, method: str, search: Search, wanted: Wanted, session: int) -> "AdvisedResult":
@@ -175,10 +203,11 @@ def reference(cell: Cell, objective: str) -> Reference:
         return Reference(best.bound_s, best.proven, "A*")
     from lab.sequencing.cpsat import cp_sat, fits
 
+    unit = "" if objective == "tardy-parts" else " s"
     if not fits(cell):
-        return Reference(0.0, False, "nothing: too many moves for CP-SAT")
+        return Reference(0.0, False, "nothing: too many moves for CP-SAT", unit)
     opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)
-    return Reference(opinion.bound, opinion.status == "optimal", "CP-SAT")
+    return Reference(opinion.bound, opinion.status == "optimal", "CP-SAT", unit)
 
 
 def _document(
@@ -186,11 +215,12 @@ def _document(
 ) -> dict[str, Any]:
     from lab.sequencing.run import simulate
 
-    best = min(found, key=_cost)
+    timed, same_times = search.objective == MAKESPAN, search.chance == NO_CHANCE  # a lucky draw is no success
+    # What was found in drawn times is judged by the means, too.
+    costs = [result.cost if same_times else _by_means(cell, result.sequence, search.objective) for result in found]
+    best, least = found[costs.index(min(costs))], min(costs)
     hits = [result.cost <= known.bound + SAME for result in found]
     finals = [result.final_cost <= known.bound + SAME for result in found if isinstance(result, LearnedSequence)]
-    schedule = simulate(cell, best.sequence)
-    timed, same_times = search.objective == MAKESPAN, search.chance == NO_CHANCE  # a lucky draw is no success
     optimal = known.bound if known.proven else None
     return {
         "toasts": cell.parts,
@@ -200,8 +230,10 @@ def _document(
         "objective": search.objective,
         "episodes": len(best.episode_costs),
         "sessions": wanted.sessions,
-        "makespan_s": best.cost if timed else schedule.makespan_s,
-        "cost": best.cost,
+        "makespan_s": least if timed else simulate(cell, best.sequence).makespan_s,
+        "cost": least,
+        "found_at_episode": best.episode_costs.index(best.cost) + 1,
+        "luckiest_cost": None if same_times else min(result.cost for result in found),
         "sequence": list(best.sequence),
         "moves": _in_words(cell, best.sequence),
         "episode_costs": list(found[0].episode_costs),
@@ -212,7 +244,7 @@ def _document(
         "bound_s": known.bound if timed else None,
         "bound_cost": known.bound,
         "bound_by": known.method,
-        "gap": known.gap(best.cost) if same_times else None,
+        "gap": known.gap(least),
         "success_percent": 100.0 * sum(hits) / len(found) if known.proven and same_times else None,
         "final_success_percent": 100.0 * sum(finals) / len(finals) if finals and known.proven and same_times else None,
         "mean_best_s": float(np.mean([result.cost for result in found])) if timed else None,
@@ -224,10 +256,17 @@ def _document(
     }
 
 
+def _by_means(cell: Cell, sequence: Sequence[int], objective: str) -> float:
+    """The cost of a sequence by the mean times."""
+    from lab.sequencing.cpsat import cost_of
+
+    return cost_of(cell, sequence, objective)
+
+
 def _advice(found: "Sequence[Any]") -> list[dict[str, Any]]:
     """What became of the advice, session by session."""
     names = ("requests", "helped_steps", "misleads", "rejected_at_episode")
-    return [{name: getattr(result, name) for name in names} for result in found]
+    return [{name: getattr(result, name, None) for name in names} for result in found]  # None: it was stopped
 
 
 def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:

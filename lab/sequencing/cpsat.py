@@ -77,7 +77,7 @@ def cp_sat(
     status = _STATUS[solver.solve(model.model)]
     sequence = () if status == "unknown" else model.sequence(solver)
     value = inf if status == "unknown" else cost_of(cell, sequence, objective)
-    bound = value if status == "optimal" else solver.best_objective_bound * model.worth
+    bound = min(value, solver.best_objective_bound * model.worth)
     return CpSatResult(status, value, bound, sequence, solver.wall_time, model.times.rounded_s)
 
 

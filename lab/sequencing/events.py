@@ -113,11 +113,12 @@ class Schedule:
 
 @dataclass(frozen=True)
 class EpisodeSequenced:
-    """One sequence tried: number from 1, its cost (see `SequenceResult`) and the best one so far."""
+    """One sequence tried: number from 1, its cost (see `SequenceResult`) and the best one so far, empty: there is none."""
 
     episode: int
     cost: float
     best_cost: float
+    best: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

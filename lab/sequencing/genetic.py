@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.errors import BadInput
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import SequenceResult
 from lab.sequencing.objectives import cost
@@ -24,7 +23,7 @@ def genetic(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceRes
     """The best sequence that a biased random-key genetic algorithm finds; every one that it tries is an episode.
 
     By chance, each sequence is judged by the times of its own episode. Raises BadInput for an objective that the cell
-    does not allow and when pymoo is missing, WorkFailed when every sequence ends in a deadlock.
+    does not allow, WorkFailed when every sequence ends in a deadlock.
     Source: Gonçalves and Resende 2011, as pymoo has it; random keys: Bean 1994.
     """
     search.check(cell)
@@ -81,14 +80,12 @@ def _longest_ways(cell: Cell) -> tuple[int, ...]:
 
 
 def _algorithm(genes: int, episodes: int, seed: int) -> Any:
-    """pymoo's algorithm, ready to be asked; BadInput when pymoo is not installed."""
-    try:
-        # Only here: nobody else needs pymoo, and it takes a while to import.
-        from pymoo.algorithms.soo.nonconvex.brkga import BRKGA  # type: ignore[import-untyped,unused-ignore]
-        from pymoo.core.problem import Problem  # type: ignore[import-untyped,unused-ignore]
-        from pymoo.core.termination import NoTermination  # type: ignore[import-untyped,unused-ignore]
-    except ImportError as error:
-        raise BadInput(f"method 'ga' needs the package pymoo: {error}; install the lab with its extra 'ga'") from error
+    """pymoo's algorithm, ready to be asked."""
+    # Only here: nobody else needs pymoo, and it takes a while to import.
+    from pymoo.algorithms.soo.nonconvex.brkga import BRKGA  # type: ignore[import-untyped,unused-ignore]
+    from pymoo.core.problem import Problem  # type: ignore[import-untyped,unused-ignore]
+    from pymoo.core.termination import NoTermination  # type: ignore[import-untyped,unused-ignore]
+
     size = min(max(math.ceil(episodes / GENERATIONS), SMALLEST), LARGEST)
     elites, mutants = max(1, round(ELITE * size)), max(1, round(MUTANTS * size))
     algorithm = BRKGA(n_elites=elites, n_offsprings=size - elites - mutants, n_mutants=mutants, bias=BIAS, seed=seed)

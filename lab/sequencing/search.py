@@ -76,11 +76,13 @@ class Reference:
     bound: float
     proven: bool
     method: str
+    unit: str = " s"
 
     def gap(self, cost: float) -> float | None:
         """How much more a cost is than the bound, as a fraction; None where the bound is 0 and the cost is not."""
         if self.bound > SAME:
-            return cost / self.bound - 1.0
+            gap = cost / self.bound - 1.0
+            return 0.0 if abs(gap) < SAME else gap
         return 0.0 if cost <= self.bound + SAME else None
 
 
@@ -99,7 +101,7 @@ class Log:
         if complete and cost < self.best_cost:
             self.best, self.best_cost = sequence, cost
         if self.search.on_episode is not None:
-            self.search.on_episode(EpisodeSequenced(len(self.costs), cost, self.best_cost))
+            self.search.on_episode(EpisodeSequenced(len(self.costs), cost, self.best_cost, self.best))
 
     def check(self, cell: Cell) -> None:
         """WorkFailed when no sequence came to its end."""

@@ -12,7 +12,7 @@ from lab.view.terminal import ReadLine, default_reader
 
 HELP = (
     "Type a number of the list: that move is made next. Enter: what the learner would do. skip: leave this step to the "
-    "learner. auto: it goes on alone from here. Ctrl-C ends the session; the best order so far is kept."
+    "learner. auto: it goes on alone from here. Ctrl-C ends the session and shows the best order so far."
 )
 
 

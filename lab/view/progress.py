@@ -142,14 +142,12 @@ class RunProgress(Listener):
         self._say(f"  {name:{_NAME}} {seconds:6.2f} s")
         self._advance()
 
-    def sequenced(self, best: SequenceResult, known: Reference) -> None:
-        gap = known.gap(best.cost)
-        what = "proven optimum" if known.proven else "proven bound"
+    def sequenced(self, best: SequenceResult, known: Reference | None) -> None:
+        unit = " s" if known is None else known.unit
         order = " ".join(map(str, best.sequence[:_SHOWN_MOVES]))
         more = f" and {len(best.sequence) - _SHOWN_MOVES} more" if len(best.sequence) > _SHOWN_MOVES else ""
-        found = f"{best.cost:.1f} s after {len(best.episode_costs)} episodes"
-        more_than = "" if gap is None else f", gap {gap:.1%}"
-        parts = [f"  parts {order}{more}:", f"{found}, {what} {known.bound:.1f} s{more_than}"]
+        found = f"{best.cost:.1f}{unit} found in episode {best.episode_costs.index(best.cost) + 1} of {len(best.episode_costs)}"
+        parts = [f"  parts {order}{more}:", f"{found}, {_beside(known, best.cost)}"]
         self._pack(list(map(Text, parts)), gap=" ")
         self._advance()
 
@@ -199,3 +197,12 @@ def sparkline(steps: Sequence[int], width: int = _CURVE, bars: str = BARS) -> st
     means = [mean(steps[a : max(b, a + 1)]) for a, b in pairwise(edges)]
     top = max(means) or 1
     return "".join(bars[min(len(bars) - 1, int(height / top * len(bars)))] for height in means)
+
+
+def _beside(known: Reference | None, cost: float) -> str:
+    """What a cost stands beside: None, it was drawn, and there is nothing to compare it with."""
+    if known is None:
+        return "its luckiest drawn episode"
+    gap = known.gap(cost)
+    what = "proven optimum" if known.proven else "proven bound"
+    return f"{what} {known.bound:.1f}{known.unit}" + ("" if gap is None else f", gap {gap:.1%}")

@@ -93,13 +93,17 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     gap = "" if found["gap"] is None else f", gap {found['gap']:.2%}"
     lines = [
         f"{found['method']}: {what}{found['cost']:.2f}{unit} for {_ordered(found['order'])} (seed {found['seed']})",
-        f"order of the transfers: {_begun(found['sequence'])}",
+        f"order of the transfers: {_begun(found['sequence'], len(found['order']))}",
         f"{proven} {found['bound_cost']:.2f}{unit}{gap} ({found['bound_by']})",
     ]
+    if found["luckiest_cost"] is not None:
+        lines.append(f"by the mean times; in its luckiest drawn episode {found['luckiest_cost']:.2f}{unit}")
     if found["sessions"] > 1:
         hits = "" if found["success_percent"] is None else f"optimum found in {found['success_percent']:.0f} %, "
         lines.append(f"{found['sessions']} sessions: {hits}mean best {found['mean_best_cost']:.2f}{unit}")
     for number, advice in enumerate(found["advice"] or [], 1):
+        if advice["requests"] is None:
+            continue
         text = f"session {number}: asked in {advice['requests']} episodes, {advice['helped_steps']} moves advised"
         episode = advice["rejected_at_episode"]
         lines.append(text if episode is None else f"{text}; rejected its advisor in episode {episode}")
@@ -108,10 +112,12 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     return Group(*map(Text, [*lines, *found["files"].values()]))
 
 
-def _begun(sequence: Sequence[int]) -> str:
-    """A sequence, or its beginning when it is long."""
+def _begun(sequence: Sequence[int], parts: int) -> str:
+    """A sequence, or its beginning when it is long; a second choice of a part is written as "3b"."""
     more = len(sequence) - SHOWN_MOVES
-    begun = " ".join(map(str, sequence[:SHOWN_MOVES]))
+    begun = " ".join(f"{(n - 1) % parts + 1}{' bcdefgh'[(n - 1) // parts].strip()}" for n in sequence[:SHOWN_MOVES])
+    if any(n > parts for n in sequence[:SHOWN_MOVES]):
+        begun += "  (b: by its second way)"
     return begun if more <= 0 else f"{begun} and {more} more (--json has all)"
 
 

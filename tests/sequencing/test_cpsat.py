@@ -62,6 +62,7 @@ def test_random_cells(
     found = cp_sat(cell)
     assert found.status == "optimal"
     assert found.cost == pytest.approx(optimum(cell).cost, abs=1e-3)
+    assert found.bound == pytest.approx(found.cost, abs=1e-3)
     assert simulate(cell, found.sequence).makespan_s == found.cost
 
 
@@ -75,6 +76,7 @@ def test_every_objective(cells: Callable[..., st.SearchStrategy[Cell]], data: st
     found = cp_sat(cell, objective)
     assert found.status == "optimal"
     assert found.cost == cost_of(cell, found.sequence, objective)
+    assert found.bound == pytest.approx(found.cost, abs=1e-3)
     assert found.cost == pytest.approx(min(cost(run, objective) for run in ends(Run(cell))), abs=1e-3)
 
 
@@ -97,6 +99,60 @@ def test_due_times_tell_alike_parts_apart(oven_cell: CellMaker) -> None:
     found = cp_sat(cell, "tardy-parts")
     assert (found.cost, found.sequence) == (0.0, (2, 2, 1, 1))
     assert cp_sat(replace(cell, due_s=(14.0, 14.0)), "mean-tardiness").cost == 7.5
+
+
+def test_one_machine_is_bound_by_itself(oven_cell: CellMaker) -> None:
+    assert cp_sat(oven_cell(3)).cost == 14.0 + 15.0 + 15.0
+
+
+def test_two_ovens_hold_no_third(oven_cell: CellMaker) -> None:
+    """100 s for two at a time: the third goes in when the first is out."""
+    room = Station("oven", "machine", 2, 100.0)
+    stations = oven_cell(3).stations
+    cell = oven_cell(3, stations=(stations[0], room, stations[2]))
+    found = cp_sat(cell)
+    assert found.cost == found.bound == min(run.now_s for run in ends(Run(cell))) > 200
+
+
+def rack_cell(oven_cell: CellMaker, order: tuple[str, ...], buffers: str) -> Cell:
+    """A rack before the oven: toast takes 2 s to it and 2 s on, 100 s directly; bread goes from the start to the end.
+
+    It is 1000 s from the oven back to the start, 1 s from elsewhere.
+    """
+    stations = (*oven_cell(1).stations, Station("rack", "buffer", 1))
+    toast = Product("toast", ((Stage("in"), Stage("oven", "rack"), Stage("out")),))
+    bread = Product("bread", ((Stage("in"), Stage("out")),))
+    empty_s, loaded_s = np.ones((4, 4)) - np.eye(4), 2.0 * (np.ones((4, 4)) - np.eye(4))
+    empty_s[1, 0], loaded_s[0, 1] = 1000.0, 100.0
+    change = {"stations": stations, "products": (toast, bread), "order": order, "buffers": buffers}
+    return oven_cell(1, **change, empty_s=empty_s, loaded_s=loaded_s)
+
+
+@pytest.mark.parametrize(
+    ("order", "buffers", "ends_s"),
+    [
+        (("toast", "bread"), "free", 2.0 + 2.0 + 10.0 + 2.0 + 1.0 + 2.0),
+        (("toast", "bread"), "busy", 112.0 + 1.0 + 2.0),
+        (("toast", "toast", "bread", "bread"), "busy", 112.0 + 1.0 + 112.0 + 1.0 + 2.0 + 1.0 + 2.0),
+    ],
+)
+def test_a_busy_buffer_is_for_when_the_oven_is_full(
+    oven_cell: CellMaker, order: tuple[str, ...], buffers: str, ends_s: float
+) -> None:
+    """The oven is empty at the start, and again when the robot has brought a toast to the end: toast goes directly."""
+    cell = rack_cell(oven_cell, order, buffers)
+    assert min(run.now_s for run in ends(Run(cell))) == ends_s
+    found = cp_sat(cell)
+    assert found.cost == found.bound == ends_s
+
+
+@pytest.mark.parametrize(("after", "ends_s"), [("clock", 1014.0), ("pick", 1019.0)])
+def test_arrivals_by_hand(oven_cell: CellMaker, after: str, ends_s: float) -> None:
+    """Every empty way takes 5 s, so the first is picked at 5; 1000 s after it came, or after that pick, comes the other."""
+    arrivals = Arrivals((0.0, 1000.0), after)  # type: ignore[arg-type]
+    cell = oven_cell(2, robot_start="out", arrivals=arrivals, empty_s=5.0 * np.ones((3, 3)) - 5.0 * np.eye(3))
+    found = cp_sat(cell)
+    assert found.cost == found.bound == ends_s
 
 
 def test_arrivals_by_the_clock(oven_cell: CellMaker) -> None:

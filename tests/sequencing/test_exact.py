@@ -114,6 +114,22 @@ def test_states_keep_the_time_of_the_simulation(
     assert state.now / TICKS_PER_S == pytest.approx(simulate(cell, sequence_of(cell, state)).makespan_s, abs=1e-6)
 
 
+def test_what_is_later_here_and_earlier_there_is_kept(toast_cell: CellMaker) -> None:
+    """Times with which two states that are alike otherwise are each the better one in something, and the best needs both."""
+    tens = [
+        [0, 5, 3, 5, 9, 9],
+        [3, 0, 2, 8, 4, 7],
+        [6, 8, 0, 9, 8, 1],
+        [1, 2, 6, 0, 2, 1],
+        [9, 6, 1, 3, 0, 3],
+        [7, 3, 6, 1, 8, 0],
+    ]
+    cell, slow = toast_cell("I", 2), {"toaster": 110.0, "butter": 130.0}
+    stations = tuple(replace(station, processing_s=slow.get(station.name, 0.0)) for station in cell.stations)
+    cell = replace(cell, stations=stations, empty_s=10.0 * np.array(tens), loaded_s=10.0 * np.array(tens))
+    assert optimum(cell).cost == min(run.now_s for run in ends(Run(cell))) == 760.0
+
+
 @pytest.mark.parametrize("order", ["PN", "PNP", "PNN", "NNPP"])
 def test_deadlocks_lead_nowhere(order: str) -> None:
     cell = crossing_cell(order)

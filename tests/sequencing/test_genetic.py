@@ -1,6 +1,5 @@
 """The genetic algorithm: what its keys mean, and that it keeps to the budget."""
 
-import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -102,9 +101,3 @@ def test_any_objective(cells: Callable[..., st.SearchStrategy[Cell]], data: st.D
 def test_due_times_are_needed_where_they_count(oven_cell: CellMaker) -> None:
     with pytest.raises(BadInput, match="due times"):
         genetic(oven_cell(), Search(objective="tardy-parts"), rng())
-
-
-def test_without_pymoo_it_says_so(oven_cell: CellMaker, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pymoo.algorithms.soo.nonconvex.brkga", None)
-    with pytest.raises(BadInput, match="'ga' needs the package pymoo"):
-        genetic(oven_cell(), Search(), rng())

@@ -142,7 +142,7 @@ def test_the_rest_of_a_run() -> None:
         "Time every move in simulation",
         "  plate > toaster, loaded                               15.13 s",
         "Find the order of the transfers",
-        "  parts 1 2 1: 110.0 s after 2 episodes, proven optimum 100.0 s, gap 10.0%",
+        "  parts 1 2 1: 110.0 s found in episode 2 of 2, proven optimum 100.0 s, gap 10.0%",
         "Make toast in physics",
         "     17.1 s  toast 1: plate to toaster",
         "     84.4 s  toast 2: toaster to oven [hot], waited 60.0 s",
@@ -158,7 +158,7 @@ def test_a_long_order_is_cut_and_what_is_not_proven_is_not_called_so() -> None:
     RunProgress(shown).sequenced(SequenceResult(order, 300.0, (300.0,)), Reference(150.0, False, "A*"))
     first, second = lines(shown)
     assert first.endswith(" 23 24 and 176 more:")
-    assert second == "            300.0 s after 1 episodes, proven bound 150.0 s, gap 100.0%"
+    assert second == "            300.0 s found in episode 1 of 1, proven bound 150.0 s, gap 100.0%"
 
 
 def test_a_bound_of_nothing_has_no_gap() -> None:
@@ -166,8 +166,8 @@ def test_a_bound_of_nothing_has_no_gap() -> None:
     for cost in (0.0, 5.0):
         RunProgress(shown).sequenced(SequenceResult((1,), cost, (cost,)), Reference(0.0, True, "CP-SAT"))
     first, second = lines(shown)
-    assert first == "  parts 1: 0.0 s after 1 episodes, proven optimum 0.0 s, gap 0.0%"
-    assert second == "  parts 1: 5.0 s after 1 episodes, proven optimum 0.0 s"
+    assert first == "  parts 1: 0.0 s found in episode 1 of 1, proven optimum 0.0 s, gap 0.0%"
+    assert second == "  parts 1: 5.0 s found in episode 1 of 1, proven optimum 0.0 s"
 
 
 def test_a_prompt_gets_the_terminal_for_itself() -> None:

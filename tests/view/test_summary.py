@@ -145,6 +145,7 @@ FOUND: dict[str, Any] = {
     "method": "srl",
     "objective": "makespan",
     "cost": 110.0,
+    "luckiest_cost": None,
     "order": ["toast", "toast"],
     "seed": 3,
     "sequence": [2, 1, 2, 1],
