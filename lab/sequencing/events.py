@@ -1,7 +1,7 @@
 """What a run of a cell comes to: timed moves, the Schedule of robot, machines and parts that they make, and results."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
@@ -99,16 +99,6 @@ class Schedule:
         """Plain dicts, lists, numbers and strings, for `json.dumps`."""
         rows = {name: [asdict(a) for a in getattr(self, name)] for name in _ROWS}
         return {"makespan_s": self.makespan_s, "sequence": list(self.sequence)} | rows
-
-    @classmethod
-    def from_json(cls, document: Mapping[str, Any]) -> "Schedule":
-        """The schedule that `to_json` wrote; BadInput when it is not one."""
-        try:
-            rows = [tuple(Activity(**entry) for entry in document[name]) for name in _ROWS]
-            sequence = tuple(int(decision) for decision in document["sequence"])
-            return cls(rows[0], rows[1], rows[2], float(document["makespan_s"]), sequence)
-        except (KeyError, TypeError, ValueError) as error:
-            raise BadInput(f"not a schedule: {type(error).__name__} {error}") from error
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,8 @@ class Optimum:
         """How much longer a makespan is than the proven optimum, or than the bound when there is none; a fraction."""
         if self.bound_s == 0:
             return inf if cost > 0 else 0.0
-        return cost / self.bound_s - 1.0
+        gap = cost / self.bound_s - 1.0
+        return 0.0 if abs(gap) < 1e-9 else gap
 
 
 class _Search:

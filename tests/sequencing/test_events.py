@@ -123,9 +123,12 @@ def test_rows_have_neither_gaps_nor_overlaps(
             assert len(busy) <= station.capacity
 
 
-def test_json_keeps_everything(toast_cell: CellMaker) -> None:
-    schedule = simulate(toast_cell("I", 3), [1, 2, 1, 2, 1, 2, 3, 2, 3, 3])
-    assert Schedule.from_json(json.loads(json.dumps(schedule.to_json()))) == schedule
+def test_json_says_everything(oven_cell: CellMaker) -> None:
+    schedule = simulate(oven_cell(1), [1, 1])
+    document = json.loads(json.dumps(schedule.to_json()))
+    assert (document["makespan_s"], document["sequence"]) == (14.0, [1, 1])
+    for name in ("robot", "machines", "parts"):
+        assert [Activity(**entry) for entry in document[name]] == list(getattr(schedule, name))
 
 
 def test_a_measured_schedule_from_timed_moves(oven_cell: CellMaker) -> None:
@@ -135,20 +138,6 @@ def test_a_measured_schedule_from_timed_moves(oven_cell: CellMaker) -> None:
     assert schedule.makespan_s == 15
     assert schedule.sequence == (1, 1)
     assert schedule.machines == (Activity("oven", "process", 1, "oven", "oven", 3, 12.5),)
-
-
-@pytest.mark.parametrize(
-    ("document", "says"),
-    [
-        ({}, "not a schedule: KeyError"),
-        ({"robot": [{}], "machines": [], "parts": [], "sequence": []}, "not a schedule: TypeError"),
-        ({"robot": [], "machines": [], "parts": [], "sequence": []}, "not a schedule: KeyError 'makespan_s'"),
-        ({"robot": [], "machines": [], "parts": [], "sequence": ["x"]}, "not a schedule: ValueError"),
-    ],
-)
-def test_not_a_schedule(document: dict[str, object], says: str) -> None:
-    with pytest.raises(BadInput, match=says):
-        Schedule.from_json(document)
 
 
 @pytest.mark.parametrize(
