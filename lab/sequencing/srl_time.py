@@ -10,9 +10,8 @@ from lab.sequencing.cell import Cell
 from lab.sequencing.events import LearnedSequence
 from lab.sequencing.flow import Action, Flow, Layout, State
 from lab.sequencing.objectives import MAKESPAN, WITH_DUE_TIMES, stuck_cost
-from lab.sequencing.search import Log, Search
+from lab.sequencing.search import SAME, Log, Search
 
-SAME = 1e-6  # two values nearer than this are equally good
 SMALL_JOBS = (5, 6, 7)  # parts; what is learned with so few is tried with more
 PRACTICE, TRIES = 5, 20  # each small job is practised in a fifth of the episodes, and tried in a twentieth
 
@@ -38,8 +37,8 @@ def srl_time(cell: Cell, search: Search, rng: np.random.Generator) -> SrlTimeRes
     Where alike parts are more than in SMALL_JOBS, these are learned first, each in a fifth of the episodes, and what was
     learned is tried on the job in a twentieth: with many parts waiting and many done, it does not matter how many. In
     what is left the job itself is learned. `episode_costs` are those of the job.
-    Q(s,a) begins at what has to come at least, never above the truth, so that greedy choices explore by themselves; ties
-    are drawn by `rng`. After an episode, from its last step to its first, Q(s,a) = cost of the step + min Q(s',.):
+    Q(s,a) begins at what the step costs and what has to come at least after it (`lab.sequencing.least`), never above the
+    truth, so that greedy choices explore by themselves; ties are drawn by `rng`. After an episode, from its last step to its first, Q(s,a) = cost of the step + min Q(s',.):
     Q-learning with alpha 1, exact where nothing is left to chance. It learns with the mean times; `lab.sequencing.reactive`
     carries out what was learned where times are drawn. Raises BadInput for an objective that the cell has no times for.
     Source: Q-learning (Watkins 1989) with admissible start values, as learning real-time A* (Korf 1990).
