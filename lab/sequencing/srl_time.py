@@ -40,7 +40,8 @@ def srl_time(cell: Cell, search: Search, rng: np.random.Generator) -> SrlTimeRes
     Q(s,a) begins at what the step costs and what has to come at least after it (`lab.sequencing.least`), never above the
     truth, so that greedy choices explore by themselves; ties are drawn by `rng`. After an episode, from its last step to
     its first, Q(s,a) = cost of the step + min Q(s',.): Q-learning with alpha 1, exact where nothing is left to chance. It
-    learns with the mean times; `lab.sequencing.reactive` goes on learning where times are drawn. Raises BadInput for an objective that the cell has no times for.
+    learns with the mean times; `lab.sequencing.reactive` goes on learning where times are drawn. Raises BadInput for an
+    objective that the cell has no times for.
     Source: Q-learning (Watkins 1989) with admissible start values, as learning real-time A* (Korf 1990).
     """
     search.check(cell)
