@@ -486,7 +486,7 @@ def study_run(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Run a study and write its report; what a folder already holds is not run again."""
+    """Run a study and write its report; sessions of chapter 9 that a folder already holds are not run again."""
     from lab.study import run_study
     from lab.view.progress import counting
     from lab.view.summary import study_summary

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from lab.errors import BadInput, unknown
 from lab.gridworld import GridWorld
 from lab.mdp import greedy_path
-from lab.taskfile import Task, load, load_world, names_file, world_names
+from lab.taskfile import Task, load, load_world, names_file, names_of
 from lab.teaching import Lesson, Teacher, check_name, plain_name, world_problem
 
 if TYPE_CHECKING:
@@ -168,7 +168,7 @@ def find_skill(skills: "dict[str, Skill]", name: str) -> "Skill":
         if skill.subtask == name:
             return skill
     subtasks = sorted({skill.subtask for skill in skills.values()})
-    worlds = world_names()
+    worlds = names_of("world")
     near = get_close_matches(name, [*subtasks, *worlds, *skills], n=1)
     hint = f" did you mean '{near[0]}'?" if near else ""
     allowed = f"{', '.join(subtasks)}, or one skill's full name, such as '{next(iter(skills))}'"

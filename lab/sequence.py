@@ -18,7 +18,8 @@ from lab.sequencing import DRAWN
 from lab.sequencing.cell import Cell
 from lab.sequencing.chance import NO_CHANCE, Chance
 from lab.sequencing.events import EpisodeSequenced, LearnedSequence, SequenceResult
-from lab.sequencing.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective
+from lab.sequencing.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective, cost
+from lab.sequencing.run import follow, simulate
 from lab.sequencing.search import SAME, Reference, Search
 from lab.taskfile import Task, load_any
 from lab.teaching import Teacher
@@ -213,11 +214,9 @@ def reference(cell: Cell, objective: str) -> Reference:
 def _document(
     cell: Cell, method: str, search: Search, found: Sequence[SequenceResult], known: Reference, wanted: Wanted
 ) -> dict[str, Any]:
-    from lab.sequencing.run import simulate
-
     timed, same_times = search.objective == MAKESPAN, search.chance == NO_CHANCE  # a lucky draw is no success
     # What was found in drawn times is judged by the means, too.
-    costs = [result.cost if same_times else _by_means(cell, result.sequence, search.objective) for result in found]
+    costs = [result.cost if same_times else cost(follow(cell, result.sequence), search.objective) for result in found]
     best, least = found[costs.index(min(costs))], min(costs)
     hits = [result.cost <= known.bound + SAME for result in found]
     finals = [result.final_cost <= known.bound + SAME for result in found if isinstance(result, LearnedSequence)]
@@ -256,13 +255,6 @@ def _document(
     }
 
 
-def _by_means(cell: Cell, sequence: Sequence[int], objective: str) -> float:
-    """The cost of a sequence by the mean times."""
-    from lab.sequencing.cpsat import cost_of
-
-    return cost_of(cell, sequence, objective)
-
-
 def _advice(found: "Sequence[Any]") -> list[dict[str, Any]]:
     """What became of the advice, session by session."""
     names = ("requests", "helped_steps", "misleads", "rejected_at_episode")
@@ -283,7 +275,6 @@ def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
 
 def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], files: dict[str, Path]) -> None:
     """The pictures that are asked for by name: "plot", the costs of the episodes, "gantt", the best sequence."""
-    from lab.sequencing.run import simulate
     from lab.view.gantt import gantt
     from lab.view.plots import sequence_plot
 

@@ -202,19 +202,9 @@ def _files() -> dict[str, Path]:
     return {path.stem: path for path in sorted(tasks_folder().glob("*.toml"))}
 
 
-def task_names() -> list[str]:
-    """The tasks that ship, by name."""
-    return [name for name, kind in shipped().items() if kind == "task"]
-
-
-def cell_names() -> list[str]:
-    """The cells for the sequencer that ship, by name."""
-    return [name for name, kind in shipped().items() if kind == "cell"]
-
-
-def world_names() -> list[str]:
-    """The grid worlds that ship, by name."""
-    return [name for name, kind in shipped().items() if kind == "world"]
+def names_of(wanted: Kind) -> list[str]:
+    """What ships of a kind, by name."""
+    return [name for name, kind in shipped().items() if kind == wanted]
 
 
 def names_file(word: str) -> bool:

@@ -172,6 +172,8 @@ def explain(error: ValidationError) -> str:
     first = findings[0]
     where = ".".join(str(part) for part in first["loc"])
     message = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "extra_forbidden":
+        message = "there is no such key"
     shown = "" if isinstance(first["input"], dict) or not where else f" (got {first['input']!r})"
     more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
     return f"{where + ': ' if where else ''}{message}{shown}{more}"

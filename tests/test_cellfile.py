@@ -17,29 +17,11 @@ from lab.sequencing.exact import optimum
 from lab.sequencing.layout import Arrivals
 from lab.sequencing.run import simulate
 from lab.sequencing.search import SrlSettings
-from lab.taskfile import cell_names, load_cell
+from lab.taskfile import load_cell, names_of
 from lab.tomltext import TomlText
 
 FMS = (tasks_folder() / "fms.toml").read_text(encoding="utf-8")
-OVEN = """\
-kind = "cell"
-name = "oven"
-parts = 2
-stations = [
-  { name = "in", kind = "storage", capacity = 9 },
-  { name = "oven", kind = "machine", capacity = 1, processing_s = 10 },
-  { name = "out", kind = "storage", capacity = 9 },
-]
-[robot]
-start = "in"
-[[products]]
-name = "bun"
-routes = [["in", "oven", "out"]]
-[travel]
-in = { oven = 2 }
-oven = { in = 1, out = 3 }
-out = { in = 1, oven = 1 }
-"""
+OVEN = (Path(__file__).parent / "cells" / "oven.toml").read_text(encoding="utf-8")
 # Thesis table III.2 with the stations numbered as in its listing: lathe 1, lathe 2, mill, incoming, outgoing.
 FMS_S = """
    X 65 15 45 45 45 25 25 25 40  X
@@ -79,7 +61,7 @@ def edited(text: str, *edits: str) -> str:
 # ---- what ships ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", cell_names())
+@pytest.mark.parametrize("name", names_of("cell"))
 def test_what_ships_loads_by_name_and_by_path(name: str) -> None:
     file = load_cell(name)
     assert file.name == name

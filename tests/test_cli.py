@@ -286,7 +286,7 @@ TOASTER = '[[route]]\nstation = "toaster"'
             "obstacle 'tower left' stands on station 'toaster_buffer'",
         ),
         ("height_m = 0.215", "height_m = 0.1", "insert.height_m 0.1: a carried slice would hit the toaster"),
-        ("mass_kg", "weight", "t.toml: slices.weight: Extra inputs are not permitted"),
+        ("mass_kg", "weight", "t.toml: slices.weight: there is no such key"),
     ],
 )
 def test_bad_task_files(lab: Lab, folder: Path, toml: str, old: str, new: str, line: str) -> None:

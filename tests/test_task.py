@@ -8,7 +8,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.task import check_task, describe
-from lab.taskfile import cell_names
+from lab.taskfile import names_of
 
 
 def test_check_finds_what_is_wrong(tmp_path: Path, root: Path) -> None:
@@ -35,7 +35,7 @@ def test_check_finds_what_is_wrong_with_a_world(tmp_path: Path, root: Path) -> N
     assert error == f"{path}: goal (8, 5, 30) is outside the world: allowed are 0..9 x 0..9 x 0..9"
 
 
-@pytest.mark.parametrize("name", cell_names())
+@pytest.mark.parametrize("name", names_of("cell"))
 def test_the_cells_that_ship_are_sound(name: str, root: Path) -> None:
     assert check_task(name, None, 0) == []
     text, document = describe(name)

@@ -53,7 +53,7 @@ def _genetic(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "Seq
 
 
 def _exact(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    from lab.sequencing.cpsat import exact
+    from lab.sequencing.proven import exact
 
     return exact(cell, search, rng)
 

@@ -12,9 +12,9 @@ from lab.errors import BadInput
 from lab.sequencing.cell import Cell
 from lab.sequencing.cpsat_model import Model
 from lab.sequencing.events import SequenceResult
-from lab.sequencing.exact import first_come, optimum
+from lab.sequencing.exact import first_come
 from lab.sequencing.objectives import MAKESPAN, check_objective, cost
-from lab.sequencing.run import Run
+from lab.sequencing.run import follow
 from lab.sequencing.search import Log, Search
 
 TIME_LIMIT_S = 60.0
@@ -76,7 +76,7 @@ def cp_sat(
     solver.parameters.absolute_gap_limit = model.blur
     status = _STATUS[solver.solve(model.model)]
     sequence = () if status == "unknown" else model.sequence(solver)
-    value = inf if status == "unknown" else cost_of(cell, sequence, objective)
+    value = inf if status == "unknown" else cost(follow(cell, sequence), objective)
     bound = min(value, solver.best_objective_bound * model.worth)
     return CpSatResult(status, value, bound, sequence, solver.wall_time, model.times.rounded_s)
 
@@ -86,25 +86,6 @@ def cp_sat_sequencer(cell: Cell, search: Search, rng: np.random.Generator) -> Se
     search.check(cell)
     found, log = cp_sat(cell, search.objective), Log(search)
     log.note(found.sequence, found.cost, complete=found.status != "unknown")
-    log.check(cell)
-    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
-
-
-def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
-    """The proven best sequence by the mean times, as a sequencer; it draws nothing from `rng`.
-
-    The makespan is minimised by `optimum`; when that gives up, and for other objectives, by CP-SAT within its time limit,
-    which may not prove its sequence. Raises BadInput as these do.
-    """
-    search.check(cell)
-    log = Log(search)
-    found = optimum(cell) if search.objective == MAKESPAN else None
-    best = None if found is None else (found.cost, found.sequence)
-    if found is None or (not found.proven and fits(cell)):
-        other = cp_sat(cell, search.objective, hint=found.sequence if found else None)
-        best = min(best or (other.cost, other.sequence), (other.cost, other.sequence))
-    if best is not None:
-        log.note(best[1], best[0], complete=bool(best[1]))
     log.check(cell)
     return SequenceResult(log.best, log.best_cost, tuple(log.costs))
 
@@ -120,11 +101,3 @@ def possible_moves(cell: Cell) -> int:
     for place in cell.positions:
         own[place.product] += len(place.options)
     return sum(own[cell.positions[start].product] for start in cell.starts)
-
-
-def cost_of(cell: Cell, sequence: Sequence[int], objective: str) -> float:
-    """The objective's value of a sequence, by the simulation."""
-    run = Run(cell)
-    for decision in sequence:
-        run.move(decision)
-    return cost(run, objective)

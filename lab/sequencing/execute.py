@@ -15,7 +15,7 @@ from lab.sequencing.events import Move, Schedule
 from lab.sequencing.objectives import MAKESPAN, check_objective, cost
 from lab.sequencing.positions import choice_of, part_of
 from lab.sequencing.rules import Rule, usable
-from lab.sequencing.run import Run
+from lab.sequencing.run import Run, branch, follow, take_over
 from lab.sequencing.search import kernel_seed
 
 WAIT = 0  # the decision to stay where the robot is until something happens: a machine finishes, a part arrives
@@ -31,7 +31,7 @@ class Observed(Run):
 
     def __init__(self, run: Run) -> None:
         super().__init__(run.cell)
-        _take_over(self, run)
+        take_over(self, run)
         self.ready: tuple[bool, ...] = ()
         self.busy_s: tuple[float, ...] = ()
 
@@ -119,21 +119,6 @@ class Execution:
                 came_s = seen.now_s if arrivals.after == "pick" else self.run.ready_s[index]
             else:
                 came_s = seen.ready_s[index] = max(seen.now_s, came_s + mean_s)
-
-
-def branch(run: Run) -> Run:
-    """Another run that goes on from where this one is, by the same times."""
-    other = Run(run.cell, run.times)
-    _take_over(other, run)
-    return other
-
-
-def follow(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Run:
-    """The run of a list of decisions, one after the other whatever the times; BadInput where one may not be taken."""
-    run = Run(cell, times)
-    for decision in sequence:
-        run.move(decision)
-    return run
 
 
 def carry_out(cell: Cell, policy: Policy, times: Episode | None = None) -> Execution:
@@ -240,10 +225,3 @@ def _finish(run: Run, rule: Rule, objective: str) -> tuple[float, tuple[int, ...
         tail.append(rule(ahead, allowed))
         ahead.move(tail[-1])
     return cost(ahead, objective), tuple(tail)
-
-
-def _take_over(run: Run, state: Run) -> None:
-    run.locations, run.occupied = state.locations.copy(), state.occupied.copy()
-    run.ready_s, run.finished_s = state.ready_s.copy(), state.finished_s.copy()
-    run.robot, run.fetched = state.robot, state.fetched
-    run.now_s, run.waited_s, run.processed_s = state.now_s, state.waited_s, state.processed_s

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 from lab.sequencing.bound import TICKS_PER_S, ticks
 from lab.sequencing.cell import Cell
-from lab.sequencing.chance import Episode
 from lab.sequencing.least import Least, LeastLeft
 from lab.sequencing.objectives import machine_places
 from lab.sequencing.positions import Option, entry
@@ -24,6 +23,8 @@ class Layout:
     cell: Cell
     empty: list[list[int]]
     loaded: list[list[int]]
+    process: list[int]  # by position
+    intervals: list[int]  # before each part, where parts arrive
     machines: int
     starts: frozenset[int]
     worked: tuple[int, ...]  # positions in which something is processed, or goes on being processed
@@ -44,7 +45,9 @@ class Layout:
         one_by_one = cell.arrivals is not None and cell.arrivals.after == "pick"
         slots = {place: slot for slot, place in enumerate(worked)}
         bounds = LeastLeft(cell, slots, len(worked) if one_by_one else None)
-        return cls(cell, empty, loaded, machine_places(cell), starts, worked, timed, bounds)
+        spans = [round((seconds or 0.0) * TICKS_PER_S) for seconds in process]
+        intervals = ticks(cell.arrivals.interval_s) if cell.arrivals else []
+        return cls(cell, empty, loaded, spans, intervals, machine_places(cell), starts, worked, timed, bounds)
 
     def least(self, counts: list[int]) -> Least:
         """The bounds for counts of parts by position, found once."""
@@ -61,9 +64,9 @@ class Flow:
     processed: ticks. last_finished: the part that the last move brought to its end, else 0.
     """
 
-    def __init__(self, layout: Layout, times: Episode | None = None, *, distinct: bool = False) -> None:
+    def __init__(self, layout: Layout, *, distinct: bool = False) -> None:
         cell = layout.cell
-        self.layout, self.times, self.distinct = layout, times or Episode(cell), distinct
+        self.layout, self.distinct = layout, distinct
         self.queues: list[list[tuple[int, int]]] = [[] for _ in cell.positions]
         self.counts = [0] * len(cell.positions)
         self.occupied = [0] * len(cell.stations)
@@ -129,7 +132,7 @@ class Flow:
         for station in there.holds:
             self.occupied[station] += 1
         if there.processing_s is not None:
-            process = round(self.times.processing_s(part, option.to) * TICKS_PER_S) if there.processing_s else 0
+            process = layout.process[option.to]
             ready = drop + process
             self.processed += process
         self.counts[place] -= 1
@@ -167,12 +170,12 @@ class Flow:
         return layout.least(self.counts).left(now, self.robot, waits)
 
     def _first_arrivals(self) -> list[int]:
-        cell, times = self.layout.cell, self.times
+        cell = self.layout.cell
         came = [0] * cell.parts
         if cell.arrivals is None:
             return came
         for part in range(1, cell.parts + 1) if cell.arrivals.after == "clock" else (1,):
-            came[part - 1] = (came[part - 2] if part > 1 else 0) + round(times.interval_s(part) * TICKS_PER_S)
+            came[part - 1] = (came[part - 2] if part > 1 else 0) + self.layout.intervals[part - 1]
         return came
 
     def _fetch(self, pick: int) -> None:
@@ -183,7 +186,7 @@ class Flow:
             return
         part = self.fetched + 1
         queue = self.queues[cell.starts[part - 1]]
-        queue[0] = (pick + round(self.times.interval_s(part) * TICKS_PER_S), part)
+        queue[0] = (pick + self.layout.intervals[part - 1], part)
 
     def _in_turn(self, queue: list[tuple[int, int]]) -> bool:
         return self.layout.cell.arrivals is None or queue[0][1] == self.fetched + 1

@@ -34,6 +34,7 @@ def inner(function: Function) -> Function:
 
 @inner
 def mixed(z: Any) -> Any:
+    """The last step of splitmix: 64 well mixed bits of a uint64 (Steele, Lea and Flood 2014)."""
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return z ^ (z >> np.uint64(31))

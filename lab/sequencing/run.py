@@ -186,3 +186,26 @@ def simulate(cell: Cell, sequence: Sequence[int], times: Episode | None = None) 
         where = cell.names[cell.positions[run.locations[left - 1]].station]
         raise BadInput(f"the sequence ends after {len(moves)} moves, but {cell.part_name(left)} is still at '{where}'")
     return Schedule.from_moves(cell, moves, sequence, came_s)
+
+
+def branch(run: Run) -> Run:
+    """Another run that goes on from where this one is, by the same times."""
+    other = Run(run.cell, run.times)
+    take_over(other, run)
+    return other
+
+
+def follow(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Run:
+    """The run of a list of decisions, one after the other whatever the times; BadInput where one may not be taken."""
+    run = Run(cell, times)
+    for decision in sequence:
+        run.move(decision)
+    return run
+
+
+def take_over(run: Run, state: Run) -> None:
+    """Put a run where another one is; both share the cell, not the times."""
+    run.locations, run.occupied = state.locations.copy(), state.occupied.copy()
+    run.ready_s, run.finished_s = state.ready_s.copy(), state.finished_s.copy()
+    run.robot, run.fetched = state.robot, state.fetched
+    run.now_s, run.waited_s, run.processed_s = state.now_s, state.waited_s, state.processed_s

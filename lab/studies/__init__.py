@@ -20,11 +20,13 @@ class Study:
     run: Run
 
 
-def _chapter9(name: str) -> Run:
-    def run(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-        from lab.studies import chapter9_parts
+def _chapter(number: int, name: str) -> Run:
+    """A study of chapter 7 or 9, by the name of its function."""
 
-        findings: Findings = getattr(chapter9_parts, name)(job, reading)
+    def run(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+        from lab.studies import chapter7_parts, chapter9_parts
+
+        findings: Findings = getattr({7: chapter7_parts, 9: chapter9_parts}[number], name)(job, reading)
         return findings
 
     return run
@@ -35,16 +37,6 @@ def _table(name: str) -> Run:
         from lab.studies.chapter9_parts import best_scores
 
         return best_scores(job, reading, name)
-
-    return run
-
-
-def _chapter7(name: str) -> Run:
-    def run(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-        from lab.studies import chapter7_parts
-
-        findings: Findings = getattr(chapter7_parts, name)(job, reading)
-        return findings
 
     return run
 
@@ -85,21 +77,21 @@ STUDIES: dict[str, Study] = {
     "table-9.4": Study("Table 9.4: best scores in world II with full view", _table("table-9.4")),
     "table-9.5": Study("Table 9.5: best scores in world II with limited view", _table("table-9.5")),
     "appendix-v": Study(
-        "Appendix V: all methods, parameters and advisors in both worlds and views", _chapter9("all_cells")
+        "Appendix V: all methods, parameters and advisors in both worlds and views", _chapter(9, "all_cells")
     ),
-    "figure-9.4": Study("Figure 9.4: learning alone with several decay factors", _chapter9("decay_factors")),
-    "chapter-9": Study("Chapter 9: its tables, Appendix V and figures", _chapter9("whole")),
+    "figure-9.4": Study("Figure 9.4: learning alone with several decay factors", _chapter(9, "decay_factors")),
+    "chapter-9": Study("Chapter 9: its tables, Appendix V and figures", _chapter(9, "whole")),
     "readings": Study(
-        "Readings of chapter 9: what the thesis leaves open, and what comes nearest", _chapter9("readings")
+        "Readings of chapter 9: what the thesis leaves open, and what comes nearest", _chapter(9, "readings")
     ),
-    "table-7.4": Study("Table 7.4: sequencing case I by session length", _chapter7("table_7_4")),
-    "table-7.5": Study("Table 7.5: sequencing case II by session length", _chapter7("table_7_5")),
-    "table-7.6": Study("Table 7.6: sequencing case III by session length", _chapter7("table_7_6")),
-    "table-iv.1": Study("Table IV.1: SRL with several decay factors", _chapter7("table_iv_1")),
-    "table-iv.2": Study("Table IV.2: SRL with reward factors of types A and B", _chapter7("table_iv_2")),
-    "chapter-7": Study("Chapter 7 and Appendix IV: tables and figures", _chapter7("whole")),
+    "table-7.4": Study("Table 7.4: sequencing case I by session length", _chapter(7, "table_7_4")),
+    "table-7.5": Study("Table 7.5: sequencing case II by session length", _chapter(7, "table_7_5")),
+    "table-7.6": Study("Table 7.6: sequencing case III by session length", _chapter(7, "table_7_6")),
+    "table-iv.1": Study("Table IV.1: SRL with several decay factors", _chapter(7, "table_iv_1")),
+    "table-iv.2": Study("Table IV.2: SRL with reward factors of types A and B", _chapter(7, "table_iv_2")),
+    "chapter-7": Study("Chapter 7 and Appendix IV: tables and figures", _chapter(7, "whole")),
     "readings-7": Study(
-        "Readings of chapter 7: what the thesis leaves open, and what comes nearest", _chapter7("readings")
+        "Readings of chapter 7: what the thesis leaves open, and what comes nearest", _chapter(7, "readings")
     ),
     "appendix-iii": Study("Appendix III: a flexible manufacturing system", _appendix_iii),
     "srl-time": Study("SRL improved, beside every rival", _srl_time),

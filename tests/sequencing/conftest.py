@@ -1,7 +1,7 @@
 """Cells to test with: the thesis's three cases, a one-machine cell to redo by hand, and random small ones."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from hypothesis.strategies import SearchStrategy
 
 from lab.sequencing.cell import Cell, needed_moves
 from lab.sequencing.layout import Arrivals, Product, Route, Stage, Station
+from lab.sequencing.run import Run, branch
 
 X = math.nan
 # Thesis table 7.2, robot times [s], row from, column to, stations 1 to 6.
@@ -110,6 +111,27 @@ def _fms_route(machine: str, service_s: float) -> Route:
     return (Stage("incoming"), *stages, Stage("outgoing"))
 
 
+def build_crossing_cell() -> Cell:
+    """Two machines, passed from left to right by one part, from right to left by the other: with one in each, nothing moves."""
+    stations = tuple(Station(name, "machine", 1, 5.0) for name in ("left", "right"))
+    stations += (Station("in", "storage", 2), Station("out", "storage", 2))
+    ways = (("left", "right"), ("right", "left"))
+    routes = [tuple(Stage(name) for name in ("in", *middle, "out")) for middle in ways]
+    products = (Product("there", (routes[0],)), Product("back", (routes[1],)))
+    table = 1.0 - np.eye(4)
+    return Cell(stations, products, ("there", "back"), table, table, "in")
+
+
+def all_ends(run: Run) -> Iterator[Run]:
+    """Every run that a run can become, to the end; without those that end in a deadlock."""
+    if run.done:
+        yield run
+    for decision in run.allowed():
+        ahead = branch(run)
+        ahead.move(decision)
+        yield from all_ends(ahead)
+
+
 @st.composite
 def random_cells(draw: st.DrawFn, max_machines: int = 2, max_parts: int = 3, many: bool = False) -> Cell:
     """A small cell whose tables hold the needed moves and nothing else; `many`: products, routes, pallets, arrivals."""
@@ -192,3 +214,13 @@ def fms_cell() -> Callable[..., Cell]:
 @pytest.fixture(scope="session")
 def cells() -> Callable[..., SearchStrategy[Cell]]:
     return random_cells
+
+
+@pytest.fixture(scope="session")
+def crossing_cell() -> Callable[[], Cell]:
+    return build_crossing_cell
+
+
+@pytest.fixture(scope="session")
+def ends() -> Callable[[Run], Iterator[Run]]:
+    return all_ends

@@ -1,7 +1,6 @@
 """The second opinion: CP-SAT agrees with the exact search and with brute force, and its sequences run."""
 
 from collections.abc import Callable, Iterator
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -12,27 +11,16 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.sequencing.bound import ways_of
 from lab.sequencing.cell import Cell
-from lab.sequencing.cpsat import cost_of, cp_sat, cp_sat_sequencer, fits
+from lab.sequencing.cpsat import cp_sat, cp_sat_sequencer, fits
 from lab.sequencing.cpsat_times import Times, longest, timed
 from lab.sequencing.exact import first_come, optimum
 from lab.sequencing.layout import Arrivals, Product, Stage, Station
 from lab.sequencing.objectives import OBJECTIVES, WITH_DUE_TIMES, cost
-from lab.sequencing.run import Run, simulate
+from lab.sequencing.run import Run, follow, simulate
 from lab.sequencing.search import Search
 
+Ends = Callable[[Run], Iterator[Run]]
 CellMaker = Callable[..., Cell]
-
-
-def ends(run: Run) -> Iterator[Run]:
-    """Every run that a run can become, to the end; without those that end in a deadlock."""
-    if run.done:
-        yield run
-    for decision in run.allowed():
-        branch = copy(run)
-        for field in ("locations", "occupied", "finished_s", "ready_s"):
-            setattr(branch, field, list(getattr(run, field)))
-        branch.move(decision)
-        yield from ends(branch)
 
 
 @pytest.mark.parametrize("case", ["I", "II", "III"])
@@ -68,20 +56,22 @@ def test_random_cells(
 
 @settings(max_examples=25)
 @given(data=st.data(), objective=st.sampled_from(sorted(OBJECTIVES)))
-def test_every_objective(cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject, objective: str) -> None:
+def test_every_objective(
+    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject, objective: str, ends: Ends
+) -> None:
     cell = data.draw(cells(max_machines=2, max_parts=2, many=True))
     came_s = sum(cell.arrivals.interval_s) if cell.arrivals else 0.0
     due_s = tuple(came_s + data.draw(st.integers(5, 80)) for _ in cell.order)
     cell = replace(cell, due_s=due_s)
     found = cp_sat(cell, objective)
     assert found.status == "optimal"
-    assert found.cost == cost_of(cell, found.sequence, objective)
+    assert found.cost == cost(follow(cell, found.sequence), objective)
     assert found.bound == pytest.approx(found.cost, abs=1e-3)
     assert found.cost == pytest.approx(min(cost(run, objective) for run in ends(Run(cell))), abs=1e-3)
 
 
 @pytest.mark.parametrize("order", ["PN", "PNP"])
-def test_no_room_for_deadlocks(order: str) -> None:
+def test_no_room_for_deadlocks(order: str, ends: Ends) -> None:
     """Pins go from the lathe to the mill, nuts from the mill to the lathe; room for one each."""
     ways = {"P": ("in", "lathe", "mill", "out"), "N": ("in", "mill", "lathe", "out")}
     stations = (Station("in", "storage", 9), Station("lathe", "machine", 1, 7.0), Station("mill", "machine", 1, 3.0))
@@ -105,7 +95,7 @@ def test_one_machine_is_bound_by_itself(oven_cell: CellMaker) -> None:
     assert cp_sat(oven_cell(3)).cost == 14.0 + 15.0 + 15.0
 
 
-def test_two_ovens_hold_no_third(oven_cell: CellMaker) -> None:
+def test_two_ovens_hold_no_third(oven_cell: CellMaker, ends: Ends) -> None:
     """100 s for two at a time: the third goes in when the first is out."""
     room = Station("oven", "machine", 2, 100.0)
     stations = oven_cell(3).stations
@@ -137,7 +127,7 @@ def rack_cell(oven_cell: CellMaker, order: tuple[str, ...], buffers: str) -> Cel
     ],
 )
 def test_a_busy_buffer_is_for_when_the_oven_is_full(
-    oven_cell: CellMaker, order: tuple[str, ...], buffers: str, ends_s: float
+    oven_cell: CellMaker, order: tuple[str, ...], buffers: str, ends_s: float, ends: Ends
 ) -> None:
     """The oven is empty at the start, and again when the robot has brought a toast to the end: toast goes directly."""
     cell = rack_cell(oven_cell, order, buffers)

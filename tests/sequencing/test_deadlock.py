@@ -16,7 +16,7 @@ from lab.errors import WorkFailed
 from lab.sequencing.cell import Cell
 from lab.sequencing.deadlock import completion, forced
 from lab.sequencing.run import Run, simulate
-from lab.taskfile import cell_names, load_cell
+from lab.taskfile import load_cell, names_of
 from lab.tomltext import TomlText
 
 # A lathe and a mill with room for one part each and no buffers: pins go through them one way, nuts the other; an oven
@@ -92,7 +92,7 @@ def test_from_the_start_one_part_after_the_other_gets_through() -> None:
     assert len(simulate(cell, way).sequence) == 9
 
 
-@pytest.mark.parametrize("name", cell_names())
+@pytest.mark.parametrize("name", names_of("cell"))
 def test_no_cell_that_ships_is_a_deadlock(name: str) -> None:
     cell = load_cell(name).cell()
     assert forced(cell) is None

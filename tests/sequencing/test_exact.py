@@ -1,7 +1,6 @@
 """The optimum: the printed ones, and brute force on small cells of every sort."""
 
 from collections.abc import Callable, Iterator
-from copy import copy
 from dataclasses import replace
 from itertools import pairwise
 
@@ -13,30 +12,18 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.sequencing.bound import TICKS_PER_S
 from lab.sequencing.cell import Cell
-from lab.sequencing.cpsat import exact
 from lab.sequencing.exact import Optimum, first_come, optimum
 from lab.sequencing.layout import Arrivals, Product, Stage, Station
 from lab.sequencing.objectives import cost
 from lab.sequencing.positions import part_of
+from lab.sequencing.proven import exact
 from lab.sequencing.run import Run, simulate
 from lab.sequencing.search import Search
 from lab.sequencing.states import Moves, sequence_of
 from lab.sequencing.tree import branch_and_bound
 
+Ends = Callable[[Run], Iterator[Run]]
 CellMaker = Callable[..., Cell]
-
-
-def ends(run: Run) -> Iterator[Run]:
-    """Every run that a run can become, to the end; without those that end in a deadlock."""
-    allowed = run.allowed()
-    if run.done:
-        yield run
-    for decision in allowed:
-        branch = copy(run)
-        for field in ("locations", "occupied", "finished_s", "ready_s"):
-            setattr(branch, field, list(getattr(run, field)))
-        branch.move(decision)
-        yield from ends(branch)
 
 
 def crossing_cell(order: str, buffers: str = "busy") -> Cell:
@@ -78,7 +65,7 @@ def test_more_toasts_cost_the_same_each(
 @settings(max_examples=30)
 @given(data=st.data(), size=st.sampled_from([(1, 3, False), (2, 2, False), (3, 2, False), (1, 2, True)]))
 def test_never_worse_or_better_than_brute_force(
-    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject, size: tuple[int, int, bool]
+    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject, size: tuple[int, int, bool], ends: Ends
 ) -> None:
     """Random tables, capacities, starts; some also with products, routes, pallets, services, arrivals, free buffers."""
     cell = data.draw(cells(*size))
@@ -114,7 +101,7 @@ def test_states_keep_the_time_of_the_simulation(
     assert state.now / TICKS_PER_S == pytest.approx(simulate(cell, sequence_of(cell, state)).makespan_s, abs=1e-6)
 
 
-def test_what_is_later_here_and_earlier_there_is_kept(toast_cell: CellMaker) -> None:
+def test_what_is_later_here_and_earlier_there_is_kept(toast_cell: CellMaker, ends: Ends) -> None:
     """Times with which two states that are alike otherwise are each the better one in something, and the best needs both."""
     tens = [
         [0, 5, 3, 5, 9, 9],
@@ -131,7 +118,7 @@ def test_what_is_later_here_and_earlier_there_is_kept(toast_cell: CellMaker) -> 
 
 
 @pytest.mark.parametrize("order", ["PN", "PNP", "PNN", "NNPP"])
-def test_deadlocks_lead_nowhere(order: str) -> None:
+def test_deadlocks_lead_nowhere(order: str, ends: Ends) -> None:
     cell = crossing_cell(order)
     stuck = Run(cell)
     for decision in (order.index("P") + 1, order.index("N") + 1):
@@ -142,7 +129,7 @@ def test_deadlocks_lead_nowhere(order: str) -> None:
     assert best.cost == min(run.now_s for run in ends(Run(cell)))
 
 
-def test_the_fms_in_the_order_of_arrival(fms_cell: CellMaker) -> None:
+def test_the_fms_in_the_order_of_arrival(fms_cell: CellMaker, ends: Ends) -> None:
     """Thesis App. III: all sequences of a rook and a sign."""
     cell = fms_cell("RS")
     assert optimum(cell).cost == min(run.now_s for run in ends(Run(cell))) == 1375.0
@@ -233,7 +220,7 @@ def test_rules_that_no_part_can_follow_are_refused() -> None:
 
 
 @pytest.mark.parametrize("objective", ["makespan", "mean-tardiness", "tardy-parts", "robot-idle", "machine-idle"])
-def test_the_sequencer_is_exact_for_every_objective(toast_cell: CellMaker, objective: str) -> None:
+def test_the_sequencer_is_exact_for_every_objective(toast_cell: CellMaker, objective: str, ends: Ends) -> None:
     cell = replace(toast_cell("II", 2), due_s=(350.0, 450.0))
     found = exact(cell, Search(objective=objective), np.random.default_rng(0))
     assert found.cost == min(cost(run, objective) for run in ends(Run(cell)))
@@ -244,7 +231,7 @@ def test_the_sequencer_is_exact_for_every_objective(toast_cell: CellMaker, objec
 def test_what_is_not_proven_is_improved_by_cp_sat(toast_cell: CellMaker, monkeypatch: pytest.MonkeyPatch) -> None:
     cell = toast_cell("II", 3)
     rough = optimum(cell, max_expanded=0)
-    monkeypatch.setattr("lab.sequencing.cpsat.optimum", lambda cell: rough)
+    monkeypatch.setattr("lab.sequencing.proven.optimum", lambda cell: rough)
     assert rough.cost > exact(cell, Search(), np.random.default_rng(0)).cost == 700
     monkeypatch.setattr("lab.sequencing.cpsat.MOST_MOVES", 20)
     assert exact(cell, Search(), np.random.default_rng(0)).cost == rough.cost

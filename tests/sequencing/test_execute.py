@@ -15,10 +15,8 @@ from lab.sequencing.execute import (
     WAIT,
     Execution,
     Observed,
-    branch,
     by_rule,
     carry_out,
-    follow,
     replan,
     replicate,
     rollout,
@@ -26,7 +24,7 @@ from lab.sequencing.execute import (
 from lab.sequencing.layout import Arrivals, Product, Stage, Station
 from lab.sequencing.objectives import cost
 from lab.sequencing.rules import RULES, dispatch, usable
-from lab.sequencing.run import Run, simulate
+from lab.sequencing.run import Run, branch, follow, simulate
 
 CellMaker = Callable[..., Cell]
 NORMAL, EXPONENTIAL = Chance("normal", "normal"), Chance("exponential", "exponential")

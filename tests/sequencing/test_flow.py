@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from lab.sequencing.bound import TICKS_PER_S
 from lab.sequencing.cell import Cell
-from lab.sequencing.chance import Chance, Episode
 from lab.sequencing.flow import Flow, Layout
 from lab.sequencing.positions import part_of
 from lab.sequencing.run import Run
@@ -16,12 +15,10 @@ from lab.sequencing.run import Run
 Cells = Callable[..., st.SearchStrategy[Cell]]
 
 
-@given(data=st.data(), distinct=st.booleans(), seed=st.none() | st.integers(0, 99))
-def test_a_flow_is_a_run(cells: Cells, data: st.DataObject, distinct: bool, seed: int | None) -> None:
+@given(data=st.data(), distinct=st.booleans())
+def test_a_flow_is_a_run(cells: Cells, data: st.DataObject, distinct: bool) -> None:
     cell = data.draw(cells(max_machines=2, max_parts=4, many=True))
-    chance = Chance("normal", "exponential", 0.3)
-    times = Episode(cell) if seed is None else Episode(cell, chance, seed)
-    flow, run = Flow(Layout.of(cell), times, distinct=distinct), Run(cell, times)
+    flow, run = Flow(Layout.of(cell), distinct=distinct), Run(cell)
     while actions := list(flow.actions()):
         # Alike parts are one, so that there may be fewer actions than decisions, but every position is among them.
         places = {(run.locations[part_of(d, cell.parts) - 1], (d - 1) // cell.parts) for d in run.allowed()}

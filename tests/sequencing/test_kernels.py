@@ -15,23 +15,10 @@ from lab.sequencing import kernels, objectives
 from lab.sequencing.arrays import CellArrays, RunArrays, cell_arrays, most_moves, run_arrays
 from lab.sequencing.cell import Cell
 from lab.sequencing.chance import LAWS, NO_CHANCE, Chance, Episode, uniform
-from lab.sequencing.layout import Product, Stage, Station
 from lab.sequencing.run import Run
 
 CellMaker = Callable[..., Cell]
 SEEDS = st.integers(0, 2**64 - 1)
-
-
-def crossing_cell() -> Cell:
-    """Two machines that one part passes from left to right, the other from right to left: with one in each, nothing moves."""
-    stations = tuple(Station(name, "machine", 1, 5.0) for name in ("left", "right"))
-    stations += (Station("in", "storage", 2), Station("out", "storage", 2))
-    routes = [
-        tuple(Stage(name) for name in ("in", *middle, "out")) for middle in (("left", "right"), ("right", "left"))
-    ]
-    products = (Product("there", (routes[0],)), Product("back", (routes[1],)))
-    table = 1.0 - np.eye(4)
-    return Cell(stations, products, ("there", "back"), table, table, "in")
 
 
 def with_due_times(cell: Cell, after_s: float) -> Cell:
@@ -90,7 +77,7 @@ def test_without_chance_the_times_are_the_same_to_the_last_bit(fms_cell: CellMak
     assert [run.now_s, run.waited_s, run.processed_s] == there.clock.tolist()
 
 
-def test_a_deadlock_costs_more_than_any_finished_run() -> None:
+def test_a_deadlock_costs_more_than_any_finished_run(crossing_cell: Callable[[], Cell]) -> None:
     cell, order = crossing_cell(), iter((0, 1))  # part 1 to the left, then part 2 to the right
     run, arrays, there = walk_both(cell, NO_CHANCE, 0, lambda count: next(order))
     assert run.deadlock() is not None

@@ -15,7 +15,6 @@ from lab.sequencing.cell import Cell
 from lab.sequencing.chance import LAWS, Chance
 from lab.sequencing.events import EpisodeSequenced
 from lab.sequencing.keys import keys_of
-from lab.sequencing.layout import Product, Stage, Station
 from lab.sequencing.objectives import OBJECTIVES, stuck_cost
 from lab.sequencing.search import FACTORS, STATES, VALUES, Search, SrlSettings
 from lab.sequencing.sessions import BLOCK, ROWS, Learned, Learner, learn, learn_compiled, learn_readably
@@ -23,18 +22,6 @@ from lab.sequencing.srl import Srl
 
 CellMaker = Callable[..., Cell]
 SEED = 2**64 - 59
-
-
-def crossing_cell() -> Cell:
-    """Two machines, passed from left to right by one part, from right to left by the other."""
-    stations = tuple(Station(name, "machine", 1, 5.0) for name in ("left", "right"))
-    stations += (Station("in", "storage", 2), Station("out", "storage", 2))
-    routes = [
-        tuple(Stage(name) for name in ("in", *middle, "out")) for middle in (("left", "right"), ("right", "left"))
-    ]
-    products = (Product("there", (routes[0],)), Product("back", (routes[1],)))
-    table = 1.0 - np.eye(4)
-    return Cell(stations, products, ("there", "back"), table, table, "in")
 
 
 def assert_same(one: Learned, other: Learned) -> None:
@@ -80,7 +67,7 @@ def test_compiled_and_readable_are_the_same(
 @pytest.mark.parametrize("state", STATES)
 @pytest.mark.parametrize("method", METHODS)
 def test_they_are_the_same_in_the_thesis_systems(
-    toast_cell: CellMaker, fms_cell: CellMaker, method: str, state: str, values: str
+    toast_cell: CellMaker, fms_cell: CellMaker, method: str, state: str, values: str, crossing_cell: Callable[[], Cell]
 ) -> None:
     """Longer sessions, where most values have been updated many times and most choices are greedy ones."""
     for cell in (toast_cell("I", 3), fms_cell("RSR"), crossing_cell()):
@@ -89,7 +76,7 @@ def test_they_are_the_same_in_the_thesis_systems(
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_deadlocks_are_learned_from_and_never_the_best(method: str) -> None:
+def test_deadlocks_are_learned_from_and_never_the_best(method: str, crossing_cell: Callable[[], Cell]) -> None:
     cell = crossing_cell()
     stuck = stuck_cost(cell, "makespan")
     found = learn(cell, Search(40), SEED, METHODS[method])
