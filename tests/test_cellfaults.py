@@ -94,7 +94,7 @@ WRONG: list[tuple[tuple[str, ...], str, str]] = [  # changes of the fms file, a 
     (('["incoming", "lathe-2-in"', '["outgoing", "lathe-2-in"'), '"outgoing"', "is on the route twice, a cycle"),
     (('routes = [[\n  "incoming",', 'routes = [["incoming"], ['), '[["incoming"]', "has 1 stages; it needs at least 2"),
     (('routes = [[\n  "incoming",', 'routes = [[], ['), "routes = [[]", "has 0 stages; it needs at least 2"),
-    (('station = "mill", pallet', 'station = "mill", palet'), '"mill"', "products.1.routes.0.2.palet: Extra inputs are not"),
+    (('station = "mill", pallet', 'station = "mill", palet'), '"mill"', "products.1.routes.0.2.palet: there is no such key"),
     (('"mill-out",\n  "outgoing"', '"mill-out",\n  7'), "  7", "products.1.routes.0.4: Input should be a valid dictionary"),
     (('name = "sign"', 'name = "rook"', ORDER, 'order = ["rook"]'), 'name = "rook"  ', "product 'rook': the name is used twice"),
     # times
