@@ -49,7 +49,7 @@ class Policy:
     guided: list[bool]
     helped_steps: int
     requests: int
-    optimal_steps: int
+    optimal_steps: int | None
     final_steps: int | None
     solved: bool
     created: str

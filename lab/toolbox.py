@@ -240,10 +240,10 @@ def _dict_of(check: Callable[[Any], bool]) -> Callable[[Any], bool]:
 
 _FIELDS: dict[str, Callable[[Any], bool]] = {
     **dict.fromkeys(("name", "subtask", "task", "signature", "advisor"), _is_text),
-    **dict.fromkeys(("start", "helped_steps", "requests", "optimal_steps"), _is_count),
+    **dict.fromkeys(("start", "helped_steps", "requests"), _is_count),
     **dict.fromkeys(("learner", "gate"), _dict_of(lambda value: isinstance(value, str | int | float))),
     "seed": lambda value: type(value) is int,
-    "final_steps": lambda value: value is None or _is_count(value),
+    **dict.fromkeys(("optimal_steps", "final_steps"), lambda value: value is None or _is_count(value)),
     "solved": _is_flag,
     "created": _is_date,
     "versions": _dict_of(_is_text),

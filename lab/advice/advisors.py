@@ -1,54 +1,18 @@
 """Who advises: simulated advisors of any skill, a person at a terminal, recorded advice, or nobody."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from math import isfinite
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
+from lab.advice.journal import read_journal
+from lab.advice.requests import AdviceRequest, Advisor, Ask
 from lab.errors import BadInput, unknown
 from lab.learning.selection import Draw, uniforms
-from lab.learning.updates import Table
 from lab.mdp import BoolArray, FloatArray, TabularMDP, optimal_values
-
-
-@dataclass(frozen=True, slots=True)
-class AdviceRequest:
-    """What a learner shows when it asks: where it is, what it thinks, how it has been doing, and why it asks.
-
-    q: its live action values, q[state][action], not to be changed; step counts from 1; learner_action: what it
-    would do itself; the means are step counts over the last K episodes and the K before, None (like the rate)
-    before there are 2K; why: the gate's reason in words.
-    """
-
-    mdp: TabularMDP
-    q: Table
-    state: int
-    episode: int
-    step: int
-    learner_action: int
-    improvement_rate: float | None
-    current_mean: float | None
-    previous_mean: float | None
-    why: str = ""
-
-
-class AdvisorLeft(Exception):
-    """The advisor ends its advice for the session."""
-
-
-Ask = Callable[[AdviceRequest], int | None]
-
-
-class Advisor(Protocol):
-    """Whoever can be asked."""
-
-    def advise(self, request: AdviceRequest) -> int | None:
-        """The action to take; None leaves this step to the learner. Raises AdvisorLeft to end advice for good."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,68 +85,8 @@ class RecordedAdvisor:
         return self._said.get(request.state)
 
 
-class Recording:
-    """An advisor whose advice is written to a file as it is given: a JSON line with signature, state and action.
-
-    Raises BadInput when the file cannot be written.
-    """
-
-    def __init__(self, advisor: Advisor, path: Path):
-        self._advisor, self._path = advisor, path
-        try:
-            first = path.read_bytes().splitlines()[:1] if path.exists() else []
-        except OSError as error:
-            raise BadInput(f"record '{path}' (--record): cannot be read: {error.strerror or error}") from error
-        if first and not first[0].startswith(b'{"signature"'):
-            raise BadInput(f"record '{path}' (--record): the file holds something else than advice: choose another one")
-
-    def advise(self, request: AdviceRequest) -> int | None:
-        """The advisor's answer, written down when there is one."""
-        action = self._advisor.advise(request)
-        if action is not None:
-            line = {"signature": request.mdp.signature, "state": request.state, "action": action}
-            try:
-                with self._path.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(line) + "\n")
-            except OSError as error:
-                raise BadInput(f"record '{self._path}' (--record): {error.strerror or error}") from error
-        return action
-
-
-def read_record(path: Path, mdp: TabularMDP) -> dict[int, int]:
-    """What was said by state, the last word counting; advice about other problems is passed over.
-
-    Raises BadInput, with the line, for what is no record, and when nothing in it is about this problem.
-    """
-    said, others = dict[int, int](), 0
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(f"advisor 'recorded:{path}': cannot be read: {error}") from None
-    for number, line in enumerate(lines, start=1):
-        try:
-            entry = json.loads(line)
-            signature, state, action = entry["signature"], entry["state"], entry["action"]
-        except (ValueError, KeyError, TypeError, RecursionError):
-            if number == len(lines):
-                break  # cut off while it was written
-            raise BadInput(f"advisor 'recorded:{path}': line {number} is no record of advice: {line[:60]!r}") from None
-        if signature != mdp.signature:
-            others += 1
-        elif type(state) is int and type(action) is int and 0 <= state < mdp.n_states and 0 <= action < mdp.n_actions:
-            said[state] = action
-        else:
-            raise BadInput(f"advisor 'recorded:{path}': line {number}: state {state!r}, action {action!r} do not exist")
-    if not said:
-        raise BadInput(
-            f"advisor 'recorded:{path}': it holds no advice about this problem ({mdp.signature[:8]})"
-            + (f", {others} lines are about other ones" if others else "")
-        )
-    return said
-
-
-class TerminalAdvisor:
-    """A person, asked through a prompt that a view brings (see lab/view/terminal.py)."""
+class Person:
+    """A person, asked through a prompt or a page that a view brings (see lab/view/terminal.py and lab/view/seat.py)."""
 
     def __init__(self, ask: Ask):
         self._ask = ask
@@ -205,18 +109,23 @@ class LimitedView:
 
 @dataclass(frozen=True)
 class Workbench:
-    """What an advisor is made from: the problem, the learner's discount and episodes, what the advisor sees."""
+    """What an advisor is made from: the problem, the learner's discount and episodes, what the advisor sees.
+
+    people: who can be asked, by name; values: where the optimal action values come from, by default the problem's table.
+    """
 
     mdp: TabularMDP
     discount: float
     rng: np.random.Generator
-    ask: Ask | None = None
+    people: Mapping[str, Ask] = field(default_factory=dict)
     region: BoolArray | None = None
     episodes: int = 1
+    values: Callable[[float], FloatArray] | None = None
 
     def from_table(self, tau: float | Sequence[float], sign: float = 1.0) -> Advisor:
         """A simulated advisor that knows the exact optimal values, or (sign -1) takes the worst for the best."""
-        values = sign * optimal_values(self.mdp, self.discount)
+        known = optimal_values(self.mdp, self.discount) if self.values is None else self.values(self.discount)
+        values = sign * known
         return TableAdvisor(Advice.of(skill(values, tau), self.region), uniforms(self.rng))
 
 
@@ -232,29 +141,46 @@ def _changing(bench: Workbench, first: float, last: float) -> Advisor:
     return bench.from_table(np.geomspace(first, last, bench.episodes).tolist())
 
 
-def _terminal(bench: Workbench) -> Advisor:
-    if bench.ask is None:
-        raise BadInput("advisor 'terminal': this command has no prompt to ask a person through")
-    return TerminalAdvisor(bench.ask)
+def _person(bench: Workbench, name: str) -> Advisor:
+    if name not in bench.people:
+        raise BadInput(f"advisor '{name}': this command has no {PEOPLE[name]} to ask a person through")
+    return Person(bench.people[name])
+
+
+def _recorded(bench: Workbench, path: Path) -> Advisor:
+    found, name = read_journal(path, "--advisor"), f"advisor 'recorded:{path}'"
+    if found.session.signature != bench.mdp.signature:
+        raise BadInput(
+            f"{name}: it is advice about another problem, '{found.session.problem}' ({found.session.signature[:8]}): "
+            f"wanted {bench.mdp.signature[:8]}"
+        )
+    said = found.said()
+    if not said:
+        raise BadInput(f"{name}: nothing was advised in that session")
+    for state, action in said.items():
+        if not (0 <= state < bench.mdp.n_states and 0 <= action < bench.mdp.n_actions):
+            raise BadInput(f"{name}: state {state}, action {action} do not exist")
+    return RecordedAdvisor(said)
 
 
 def _nobody(bench: Workbench) -> None:
     return None
 
 
+PEOPLE = {"terminal": "prompt", "web": "page"}
 SKILLS = {"expert": 0.01, "moderate": 0.1, "limited": 0.3, "novice": 1.0}
 
 ADVISORS: dict[str, Callable[[Workbench], Advisor | None]] = {
     **{name: partial(_skilled, tau=tau) for name, tau in SKILLS.items()},
     "wrong": _wrong,
-    "terminal": _terminal,
+    **{name: partial(_person, name=name) for name in PEOPLE},
     "none": _nobody,
 }
-FORMS = ("tau=X", "tau=X..Y", "recorded:FILE")  # names with something of the user's in them
+FORMS = ("tau=X", "tau=X..Y", "recorded:DIR")  # names with something of the user's in them
 
 
 def parse_advisor(name: str, where: str = "advisor") -> Callable[[Workbench], Advisor | None]:
-    """How to make the advisor of that name: one in ADVISORS, "tau=X", "tau=X..Y" or "recorded:FILE".
+    """How to make the advisor of that name: one in ADVISORS, "tau=X", "tau=X..Y" or "recorded:DIR".
 
     "tau=1..0.01" learns over the session from a novice to an expert. Raises BadInput for any other name.
     """
@@ -263,8 +189,10 @@ def parse_advisor(name: str, where: str = "advisor") -> Callable[[Workbench], Ad
     if name.startswith("recorded:"):
         path = Path(name.removeprefix("recorded:"))
         if not path.name:
-            raise BadInput(f"advisor '{name}' ({where}): it names no file: wanted recorded:FILE")
-        return lambda bench: RecordedAdvisor(read_record(path, bench.mdp))
+            raise BadInput(
+                f"advisor '{name}' ({where}): it names no file: wanted recorded:DIR, the folder of a session"
+            )
+        return partial(_recorded, path=path)
     if not name.startswith("tau="):
         raise unknown("advisor", name, [*ADVISORS, *FORMS], where)
     try:
@@ -281,18 +209,19 @@ def make_advisor(
     mdp: TabularMDP,
     discount: float,
     rng: np.random.Generator,
-    ask: Ask | None = None,
+    people: Mapping[str, Ask] | None = None,
     *,
     region: BoolArray | None = None,
     episodes: int = 1,
+    values: Callable[[float], FloatArray] | None = None,
 ) -> Advisor | None:
     """The advisor of that name for a problem, None for "none".
 
     Simulated advisors know the problem's exact optimal values for `discount`; given a `region` (S,), nobody speaks
-    outside it; `episodes` is the session's length; `ask` is the prompt behind "terminal".
-    Raises BadInput for an unknown name, for "terminal" without `ask`, and for a record that does not fit.
+    outside it; `episodes` is the session's length; `people`: who answers behind "terminal" and "web".
+    Raises BadInput for an unknown name, for a person who is not there, and for a record that does not fit.
     """
-    advisor = parse_advisor(name)(Workbench(mdp, discount, rng, ask, region, episodes))
+    advisor = parse_advisor(name)(Workbench(mdp, discount, rng, people or {}, region, episodes, values))
     if advisor is None or region is None or isinstance(advisor, TableAdvisor):
         return advisor
     return LimitedView(advisor, region)

@@ -81,6 +81,15 @@ SELECTIONS: dict[str, Callable[[Sequence[float], float, float], int]] = {
 }
 
 
+def chances(selection: str, values: Sequence[float], temperature: float) -> list[float]:
+    """The probability with which a selection of that name takes each action; sums to 1."""
+    if selection == "softmax":
+        return softmax(values, temperature)
+    best = [value == max(values) for value in values]
+    explores = min(temperature, 1.0) if selection == "epsilon-greedy" else 0.0
+    return [explores / len(best) + (1.0 - explores) * is_best / sum(best) for is_best in best]
+
+
 def uniforms(rng: np.random.Generator, block: int = 1024) -> Draw:
     """A fast source of uniform numbers in [0, 1): the generator's own stream, drawn in blocks."""
 

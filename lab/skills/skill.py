@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from lab.errors import BadInput, WorkFailed
+from lab.learning.environment import Environment
 from lab.mdp import NoPath, TabularMDP, greedy_path
 from lab.sim import assets
 from lab.sim.kinematics import ToolPose
@@ -38,11 +39,12 @@ class SkillFailed(Exception):
 
 @dataclass(frozen=True)
 class Problem:
-    """What one skill has to learn: its name, the sub-task, the table's problem."""
+    """What one skill has to learn: its name, the sub-task, the table's problem; environment: where its steps are made."""
 
     name: str
     subtask: str
     mdp: TabularMDP
+    environment: Environment | None = None
 
 
 @dataclass
@@ -59,6 +61,12 @@ class Bench:
         half = (yaw + np.pi / 2) % np.pi - np.pi / 2
         z = float(position[2]) + assets.SLICE[2] / 2 - GRASP_DEPTH
         return ToolPose(float(position[0]), float(position[1]), z, float(half))
+
+    def put_slice(self, name: str, pose: ToolPose) -> None:
+        """Put a slice at once to where the tool at `pose` would hold it: to show a scene, without physics."""
+        up = pose.z + GRASP_DEPTH - assets.SLICE[2] / 2
+        turn = (0.0, 0.0, float(np.sin(pose.yaw / 2)), float(np.cos(pose.yaw / 2)))
+        self.scene.world.put(name, (pose.x, pose.y, up), turn)
 
     def upright(self, name: str) -> float:
         """Cosine of a slice's tilt: 1 when it stands."""
@@ -83,6 +91,8 @@ class Skill:
     """One sub-task at one place: it surveys its problem, and carries out a learned policy one physics step at a time."""
 
     subtask: ClassVar[str]
+    problem: Problem  # once it is set up
+    carries = False  # whether a slice is in the gripper meanwhile
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -93,6 +103,19 @@ class Skill:
     def setup(self, surveys: "Surveys") -> Problem:
         """Survey the scene and state the problem to learn. BadInput when it has no solution, naming what is in the way."""
         raise NotImplementedError
+
+    def pose(self, state: int) -> ToolPose:
+        """The tool pose that the motion goes through in a state of the problem; a blocked one may be out of reach."""
+        raise NotImplementedError
+
+    def show(self, bench: Bench, state: int) -> bool:
+        """Put the bench into a state at once, without physics; False, and nothing moves, when the arm cannot reach it."""
+        pose = self.pose(state)
+        if not bench.scene.robot.stand(pose):
+            return False
+        if bench.held is not None:
+            bench.put_slice(bench.held, pose)
+        return True
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Carry the policy out: each `next` sets what one physics step needs; raises SkillFailed."""

@@ -39,7 +39,7 @@ class Curve(Protocol):
     @property
     def guided(self) -> Sequence[bool]: ...
     @property
-    def optimal_steps(self) -> int: ...
+    def optimal_steps(self) -> int | None: ...
 
 
 def learning_curves(policies: Mapping[str, Curve], path: Path) -> None:
@@ -134,15 +134,17 @@ def _draw_curve(axes: "Axes", policy: Curve) -> None:
     guided = np.asarray(policy.guided, dtype=np.bool_)
     axes.plot(episodes, steps, color=BLUE, linewidth=0.9, label="steps")
     axes.plot(episodes[guided], steps[guided], "o", color=ORANGE, markersize=3.5, label="guided episodes")
-    axes.axhline(policy.optimal_steps, color=RED, linestyle="--", linewidth=1.2, label="fewest possible")
+    fewest = policy.optimal_steps or 0
+    if fewest:
+        axes.axhline(fewest, color=RED, linestyle="--", linewidth=1.2, label="fewest possible")
     axes.set(xlabel="episode", ylabel="steps", xlim=(0, 1.02 * max(2, len(episodes))))
-    if max(policy.curve, default=0) > 4 * max(1, policy.optimal_steps):
+    if max(policy.curve, default=0) > 4 * max(1, fewest):
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axes.yaxis.set_major_formatter(ScalarFormatter())
         axes.yaxis.set_minor_locator(NullLocator())
     else:
-        axes.set_ylim(0, 1.15 * max(2, policy.optimal_steps, *policy.curve))
+        axes.set_ylim(0, 1.15 * max(2, fewest, *policy.curve))
         axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.grid()

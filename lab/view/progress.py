@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from lab.learning.session import AdviceRejected, AdviceRequested, Event
+from lab.advice.events import AdviceRejected, AdviceRequested, Event
 from lab.listener import Listener
 from lab.sequencing.events import Move, SequenceResult
 from lab.sequencing.search import Reference
@@ -107,10 +107,10 @@ class RunProgress(Listener):
             curve = sparkline(result.steps.tolist(), bars=self._bars)
             head = Text.assemble("  ", (f"{lesson.source:9}", "cyan"), f" {name:{_NAME}}")
             parts = [
-                f"{curve} {reached + '/' + str(policy.optimal_steps):>5} steps",
+                f"{curve} {reached + '/' + str(policy.optimal_steps or '?'):>5} steps",
                 *self._advice(name, result.requests, result.helped_steps),
             ]
-            if policy.final_steps is not None and policy.final_steps > policy.optimal_steps:
+            if policy.final_steps is not None and policy.final_steps > (policy.optimal_steps or policy.final_steps):
                 parts.insert(1, "not the shortest way")
             self._pack([head, *map(Text, parts)])
         self._advance()

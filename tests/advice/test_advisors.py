@@ -10,18 +10,15 @@ from lab.advice.advisors import (
     ADVISORS,
     SKILLS,
     Advice,
-    AdviceRequest,
-    Advisor,
-    AdvisorLeft,
     RecordedAdvisor,
-    Recording,
     TableAdvisor,
-    TerminalAdvisor,
     make_advisor,
     parse_advisor,
-    read_record,
     skill,
 )
+from lab.advice.events import AdviceGiven
+from lab.advice.journal import FILE, Journal, Session
+from lab.advice.requests import AdviceRequest, Advisor, AdvisorLeft
 from lab.errors import BadInput
 from lab.learning.selection import softmax
 from lab.mdp import FloatArray, TabularMDP, grid, optimal_values, shortest_steps
@@ -95,18 +92,19 @@ def test_nobody_and_a_person() -> None:
     mdp = board()
     rng = np.random.default_rng(0)
     assert make_advisor("none", mdp, 0.99, rng) is None
-    person = make_advisor("terminal", mdp, 0.99, rng, ask=lambda asked: asked.state + 1)
+    person = make_advisor("terminal", mdp, 0.99, rng, {"terminal": lambda asked: asked.state + 1})
     assert person is not None
     assert person.advise(request(mdp, 2)) == 3
-    with pytest.raises(BadInput, match="no prompt"):
-        make_advisor("terminal", mdp, 0.99, rng)
+    for name, missing in (("terminal", "no prompt"), ("web", "no page")):
+        with pytest.raises(BadInput, match=missing):
+            make_advisor(name, mdp, 0.99, rng)
 
 
 def test_a_person_may_leave() -> None:
     def leave(asked: AdviceRequest) -> int:
         raise AdvisorLeft
 
-    person = make_advisor("terminal", board(), 0.99, np.random.default_rng(0), ask=leave)
+    person = make_advisor("terminal", board(), 0.99, np.random.default_rng(0), {"terminal": leave})
     assert person is not None
     with pytest.raises(AdvisorLeft):
         person.advise(request(board(), 0))
@@ -163,33 +161,37 @@ def test_a_skill_needs_a_tau_above_zero(tau: float | list[float]) -> None:
         skill(np.zeros((2, 2)), tau)
 
 
+def recorded(folder: Path, mdp: TabularMDP, said: list[tuple[int, int | None]]) -> str:
+    """A session in which this was advised, (state, action); its name as an advisor."""
+    journal = Journal.begin(folder, Session({}, "board", mdp.signature, "test"))
+    for step, (state, action) in enumerate(said, start=1):
+        journal.tell(AdviceGiven(1, step, state, action, 0))
+    journal.close()
+    return f"recorded:{folder}"
+
+
 def test_recorded_advice_is_said_again_by_state(tmp_path: Path) -> None:
-    mdp, file = board(), tmp_path / "advice.jsonl"
-    person = Recording(TerminalAdvisor(lambda asked: asked.step % 4), file)
-    for state, step in ((3, 1), (5, 2), (3, 3)):
-        person.advise(replace(request(mdp, state), step=step))
-    with file.open("a") as cut:
-        cut.write('{"signature": "ab')  # the last line was cut off
-    said = read_record(file, mdp)
-    assert said == {3: 3, 5: 2}
-    advisor = RecordedAdvisor(said)
+    mdp = board()
+    name = recorded(tmp_path, mdp, [(3, 1), (5, 2), (4, None), (3, 3)])
+    with (tmp_path / FILE).open("a") as cut:
+        cut.write('{"kind": "adv')  # the last line was cut off
+    advisor = made(name, mdp)
+    assert isinstance(advisor, RecordedAdvisor)
     assert [advisor.advise(request(mdp, state)) for state in (3, 4, 5)] == [3, None, 2]
-    assert isinstance(made(f"recorded:{file}", mdp), RecordedAdvisor)
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("nonsense\n{}\n", "line 1 is no record"),
-        ('{"signature": "SIG", "state": 99, "action": 0}\n', "line 1: state 99, action 0 do not exist"),
-        ('{"signature": "other", "state": 0, "action": 0}\n', "no advice about this problem .* 1 lines"),
-        ("", "no advice about this problem"),
-    ],
+    ("said", "message"),
+    [([(99, 0)], "state 99, action 0 do not exist"), ([(0, 4)], "state 0, action 4"), ([], "nothing was advised")],
 )
-def test_a_record_that_does_not_fit(text: str, message: str, tmp_path: Path) -> None:
-    file = tmp_path / "advice.jsonl"
-    file.write_text(text.replace("SIG", board().signature))
+def test_a_record_that_does_not_fit(said: list[tuple[int, int | None]], message: str, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=message):
-        read_record(file, board())
+        made(recorded(tmp_path, board(), said), board())
+
+
+def test_a_record_of_another_problem_or_of_none(tmp_path: Path) -> None:
+    other = grid((2, 2), np.zeros((2, 2), bool), (0, 0), (1, 1))
+    with pytest.raises(BadInput, match="it is advice about another problem, 'board'"):
+        made(recorded(tmp_path, other, [(0, 1)]), board())
     with pytest.raises(BadInput, match="cannot be read"):
-        read_record(tmp_path / "none", board())
+        made(f"recorded:{tmp_path / 'none'}", board())

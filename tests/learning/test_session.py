@@ -6,22 +6,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.advice.advisors import ADVISORS, AdviceRequest, AdvisorLeft, make_advisor
+from lab.advice.advisors import ADVISORS, PEOPLE, make_advisor
+from lab.advice.events import AdviceEnded, AdviceRejected, AdviceRemembered, AdviceRequested, EpisodeEnded, Event
 from lab.advice.gates import GATES
+from lab.advice.requests import AdviceRequest, AdvisorLeft
 from lab.errors import BadInput
-from lab.learning.selection import SELECTIONS
-from lab.learning.session import (
-    AdviceEnded,
-    AdviceRejected,
-    AdviceRequested,
-    EpisodeEnded,
-    Event,
-    SessionResult,
-    run_session,
-)
+from lab.learning.environment import Judged, Step, TableEnvironment
+from lab.learning.selection import SELECTIONS, Draw
+from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES
-from lab.mdp import Rewards, TabularMDP, coverage, greedy_path, grid
+from lab.mdp import FloatArray, Rewards, TabularMDP, coverage, greedy_path, grid, optimal_values
 
 EARLY = GateSettings(first_episode=5, window=2)
 WHOLE_WAYS = ("q-lambda", "sarsa-lambda", "monte-carlo")  # with lambda 1 they learn a whole way at once
@@ -72,11 +67,14 @@ def test_every_learner_solves_small_boards_with_an_expert(learner: str, size: in
         assert result.helped_steps > 0
 
 
+@pytest.mark.parametrize("memory", [False, True])
 @pytest.mark.parametrize("learner", UPDATES)
 @pytest.mark.parametrize("gate", GATES)
-def test_results_fit_together_and_repeat(learner: str, gate: str) -> None:
+def test_results_fit_together_and_repeat(learner: str, gate: str, memory: bool) -> None:
     mdp = board(4)
-    (result, events), (again, events_again) = (session(mdp, "limited", 5, learner=learner, gate=gate) for _ in range(2))
+    (result, events), (again, events_again) = (
+        session(mdp, "limited", 5, learner=learner, gate=gate, memory=memory) for _ in range(2)
+    )
     for name, value in asdict(result).items():
         np.testing.assert_array_equal(value, getattr(again, name))
     assert events == events_again
@@ -98,7 +96,7 @@ def test_results_fit_together_and_repeat(learner: str, gate: str) -> None:
     assert result.final_steps == (len(path[1]) if path[2] else None)
 
 
-@pytest.mark.parametrize("advisor", [name for name in ADVISORS if name != "terminal"])
+@pytest.mark.parametrize("advisor", [name for name in ADVISORS if name not in PEOPLE])
 def test_every_simulated_advisor_can_help(advisor: str) -> None:
     result, _ = session(board(3), advisor, gate="always", episodes=20)
     assert (result.helped_steps > 0) == (advisor != "none")
@@ -264,6 +262,106 @@ def test_start_values_are_used_and_checked() -> None:
     for bad in (np.zeros((2, 2)), np.full((3, 2), np.nan)):
         with pytest.raises(BadInput, match="start values"):
             run_session(mdp, settings, GateSettings(), None, np.random.default_rng(0), q0=bad)
+
+
+@pytest.mark.parametrize("learner", UPDATES)
+def test_with_memory_one_showing_is_enough(learner: str) -> None:
+    right = Scripted(lambda request: 1)
+    gate, events = GateSettings("always", memory=True), list[Event]()
+    settings = LearnerSettings(learner, episodes=40, max_steps=30)
+    result = run_session(corridor(6), settings, gate, right, np.random.default_rng(0), on_event=events.append)
+    assert (result.helped_steps, result.requests, len(right.requests)) == (5, 1, 5)
+    assert [request.state for request in right.requests] == [0, 1, 2, 3, 4]
+    assert result.solved
+    told = [event for event in events if isinstance(event, AdviceRemembered)]
+    assert all(34 <= event.episode < 40 for event in told)  # practice, if any, is in the last 15 %
+
+
+def test_what_was_said_is_done_again_until_it_has_shown_the_goal() -> None:
+    # the advisor speaks in the first two cells only: there the learner does as it was told, elsewhere it is on its own
+    shy = Scripted(lambda request: 1 if request.state < 2 else None)
+    settings, gate = LearnerSettings(episodes=4, max_steps=4), GateSettings("always", memory=True)
+    events: list[Event] = []
+    result = run_session(corridor(9), settings, gate, shy, np.random.default_rng(3), on_event=events.append)
+    assert result.steps.tolist() == [5, 5, 5, 5]  # nine cells are too far for four steps
+    assert result.helped_steps == 2
+    told = [event for event in events if isinstance(event, AdviceRemembered)]
+    assert [event.episode for event in told] == [2, 3]  # not in the last one, which is the learner's own
+    assert all(event.steps >= 2 for event in told)
+    assert [request.state for request in shy.requests[:2]] == [0, 1]
+    assert all(request.state > 1 for request in shy.requests[2:])
+
+
+def test_with_memory_a_wrong_advisor_loses_its_trust_at_once() -> None:
+    back = Scripted(lambda request: 0)  # into the wall, in the first cell
+    gate, events = GateSettings("always", memory=True), list[Event]()
+    result = run_session(corridor(4), SHORT, gate, back, np.random.default_rng(0), on_event=events.append)
+    assert result.helped_steps == 2  # a point of trust for each, and it began with one
+    ended = [event for event in events if isinstance(event, AdviceEnded)]
+    assert ended == [AdviceEnded(1, "misled by what was remembered")]
+    assert not result.guided[1:].any()
+
+
+def test_with_memory_only_episodes_with_help_are_judged() -> None:
+    gate = GateSettings(first_episode=5, window=2, omega=1, lambda_threshold=1.0)
+    silent = Scripted(lambda request: None)
+    settings = replace(SHORT, max_steps=4)  # too few for the way: no episode is better than those before
+    plain = run_session(corridor(9), settings, gate, silent, np.random.default_rng(0))
+    kept = run_session(corridor(9), settings, replace(gate, memory=True), silent, np.random.default_rng(0))
+    assert (plain.misleads, plain.rejected_at_episode) == (2, 6)
+    assert (kept.misleads, kept.rejected_at_episode) == (0, None)
+
+
+def test_what_an_advisor_said_who_has_left_is_kept() -> None:
+    def leave(request: AdviceRequest) -> int:
+        if request.state == 2:
+            raise AdvisorLeft
+        return 1
+
+    settings, gate = LearnerSettings(episodes=4, max_steps=4), GateSettings("always", memory=True)
+    events: list[Event] = []
+    result = run_session(corridor(9), settings, gate, Scripted(leave), np.random.default_rng(3), on_event=events.append)
+    assert result.helped_steps == 2
+    told = [event for event in events if isinstance(event, AdviceRemembered)]
+    assert [event.episode for event in told] == [2, 3]
+
+
+def test_memory_keeps_to_the_budget() -> None:
+    right = Scripted(lambda request: 1)
+    gate = GateSettings("always", budget=3, memory=True)
+    result = run_session(corridor(6), LearnerSettings(episodes=9), gate, right, np.random.default_rng(0))
+    assert result.helped_steps == len(right.requests) == 3
+
+
+class Slides:
+    """A corridor of four cells, no table's: steps are made here, and now and then the floor sends the learner back."""
+
+    def __init__(self) -> None:
+        self.mdp = corridor(4)
+
+    def reset(self, episode: int, draw: Draw) -> int:
+        return 0
+
+    def step(self, state: int, action: int, draw: Draw) -> Step:
+        entered = max(0, state - 1) if draw() < 0.1 else int(self.mdp.successor[state, action])
+        return Step(-0.1 if entered < 3 else 1.5, entered, entered == 3, entered == 3)
+
+    def picture(self, state: int) -> str:
+        return ""
+
+    def values(self, discount: float) -> FloatArray:
+        return optimal_values(self.mdp, discount)
+
+    def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
+        return TableEnvironment(self.mdp).judge(q, learner)
+
+
+def test_memory_works_where_steps_are_left_to_chance() -> None:
+    right, gate = Scripted(lambda request: 1), GateSettings("always", memory=True)
+    place = Slides()
+    result = run_session(place.mdp, SHORT, gate, right, np.random.default_rng(0), environment=place)
+    assert result.solved
+    assert 3 <= result.helped_steps == len(right.requests) < 60
 
 
 def test_unknown_names_and_actions() -> None:

@@ -1,0 +1,107 @@
+"""What happens in a session, as records: what the learner tells whoever teaches, watches or keeps a journal."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class EpisodeEnded:
+    """An episode is over: `steps` is max_steps + 1 when it failed; the rate is None before 2K episodes."""
+
+    episode: int
+    steps: int
+    guided: bool
+    helped_steps: int
+    improvement_rate: float | None
+    reached: bool
+
+
+@dataclass(frozen=True)
+class AdviceRequested:
+    """The learner asks for the first time in this episode; means of step counts over K episodes, None before 2K."""
+
+    episode: int
+    improvement_rate: float | None
+    current_mean: float | None
+    previous_mean: float | None
+
+
+@dataclass(frozen=True)
+class AdviceRejected:
+    """Misled more than `omega` times, the learner asks no more; `steps` was not better than `mean_before`."""
+
+    episode: int
+    misleads: int
+    omega: int
+    steps: int
+    mean_before: float
+
+
+@dataclass(frozen=True)
+class AdviceEnded:
+    """No more advice in this session: `reason` is "converged", "advisor left" or "misled by what was remembered"."""
+
+    episode: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class AdviceGiven:
+    """What came of one question: the state, the advised action (None: nothing was said), the learner's own choice."""
+
+    episode: int
+    step: int
+    state: int
+    action: int | None
+    own: int
+
+
+@dataclass(frozen=True)
+class AdviceRemembered:
+    """In the episode that is over so many steps were made from memory, without asking, practice of a known way included."""
+
+    episode: int
+    steps: int
+
+
+@dataclass(frozen=True)
+class AdvisorsDisagreed:
+    """Several advisors said different things: (name, action) of each that spoke, and the action that was followed."""
+
+    episode: int
+    step: int
+    state: int
+    said: tuple[tuple[str, int], ...]
+    followed: int
+
+
+@dataclass(frozen=True)
+class AdvisorDropped:
+    """One of several advisors is heard no more; trust is the share of its advice that is expected to help."""
+
+    episode: int
+    advisor: str
+    trust: float
+    why: str
+
+
+@dataclass(frozen=True)
+class AdvisorReadmitted:
+    """A dropped advisor is heard again, because of what it said when it was asked now and then."""
+
+    episode: int
+    advisor: str
+    trust: float
+    why: str
+
+
+Event = (
+    EpisodeEnded
+    | AdviceRequested
+    | AdviceRejected
+    | AdviceEnded
+    | AdviceGiven
+    | AdviceRemembered
+    | AdvisorsDisagreed
+    | AdvisorDropped
+    | AdvisorReadmitted
+)
