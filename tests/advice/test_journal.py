@@ -1,0 +1,329 @@
+"""The journal: what is written, read again however it was cut, and how a session is folded out of it."""
+
+import json
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lab.advice.advisors import make_advisor
+from lab.advice.counsel import Counsel
+from lab.advice.events import AdviceGiven, EpisodeEnded, Event
+from lab.advice.journal import (
+    FILE,
+    KINDS,
+    Again,
+    Answer,
+    Closed,
+    Entry,
+    Journal,
+    Session,
+    Undo,
+    Undone,
+    entry_of,
+    line_of,
+    read_journal,
+)
+from lab.advice.requests import AdviceRequest, AdvisorLeft, Ask
+from lab.errors import BadInput, WorkFailed
+from lab.learning.environment import TableEnvironment
+from lab.learning.session import SessionResult, run_session
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.mdp import TabularMDP, grid
+
+LEARNER = LearnerSettings(episodes=30, max_steps=20)
+GATE = GateSettings(first_episode=4, window=2, omega=50)
+HEAD = Session({"subtask": "board"}, "board", "0123456789abcdef", "test")
+
+
+def board() -> TabularMDP:
+    blocked = np.zeros((3, 4), bool)
+    blocked[1, 1] = True
+    return grid(blocked.shape, blocked, (0, 0), (2, 3), action_labels=("up", "down", "left", "right"))
+
+
+def lesson(journal: Journal, ask: Ask, told: list[Event] | None = None) -> SessionResult:
+    """A session with a person behind a journal, from its beginning each time an answer is taken back."""
+    place = TableEnvironment(board())
+    while True:
+        events: list[Event] = []
+
+        def tell(event: Event, events: list[Event] = events) -> None:
+            journal.tell(event)
+            events.append(event)
+
+        rng = np.random.default_rng(5)
+        advisor = Counsel(("terminal",), {"terminal": ask}).gather(place, LEARNER, rng, journal=journal, tell=tell)
+        try:
+            result = run_session(place.mdp, LEARNER, GATE, advisor, rng, on_event=tell)
+        except Again:
+            journal.rewind()
+            continue
+        if told is not None:
+            told += events
+        return result
+
+
+def person(request: AdviceRequest) -> int | None:
+    """Somebody who answers by the state alone, now and then not at all, and goes in the end."""
+    if request.episode > 20:
+        raise AdvisorLeft("enough")
+    return None if request.state == 2 else (request.state + request.episode) % 4
+
+
+def same(one: SessionResult, other: SessionResult) -> bool:
+    pairs = zip(asdict(one).values(), asdict(other).values(), strict=True)
+    return all(np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b for a, b in pairs)
+
+
+def written(folder: Path, ask: Ask = person) -> tuple[SessionResult, list[Event]]:
+    journal, told = Journal.begin(folder, HEAD), list[Event]()
+    result = lesson(journal, ask, told)
+    journal.close()
+    return result, told
+
+
+def test_every_event_and_answer_is_one_line(tmp_path: Path) -> None:
+    _, told = written(tmp_path)
+    read = read_journal(tmp_path, "DIR")
+    assert read.session == HEAD
+    assert [entry for entry in read.entries if not isinstance(entry, Answer)] == told
+    answers = [entry for entry in read.entries if isinstance(entry, Answer)]
+    given = [entry for entry in read.entries if isinstance(entry, AdviceGiven)]
+    assert [(a.episode, a.step, a.state, a.action) for a in answers if not a.left] == [
+        (g.episode, g.step, g.state, g.action) for g in given
+    ]
+    assert (answers[-1].left, answers[-1].why) == (True, "enough")
+    assert read.cut == ""
+    assert read.said() == {g.state: g.action for g in given if g.action is not None}
+
+
+def test_a_journal_cut_at_any_byte_gives_the_same_session(tmp_path: Path) -> None:
+    whole, told = written(tmp_path / "whole")
+    raw = (tmp_path / "whole" / FILE).read_bytes()
+    head = raw.index(b"\n") + 1
+    rng = np.random.default_rng(1)
+    for cut in [head, head + 1, len(raw) - 1, len(raw), *rng.integers(head, len(raw), 40).tolist()]:
+        folder = tmp_path / f"cut {cut}"
+        folder.mkdir(exist_ok=True)
+        (folder / FILE).write_bytes(raw[:cut])
+        read = read_journal(folder, "--resume")
+        assert read.cut.encode() == raw[:cut][raw[:cut].rfind(b"\n") + 1 :]
+        journal, again = Journal.resume(read), list[Event]()
+        assert same(lesson(journal, person, again), whole)
+        journal.close()
+        assert again == told
+        assert (folder / FILE).read_bytes() == raw
+
+
+def test_nobody_is_asked_again_what_was_answered(tmp_path: Path) -> None:
+    written(tmp_path)
+    asked = list[AdviceRequest]()
+
+    def ask(request: AdviceRequest) -> int:
+        asked.append(request)
+        return 0
+
+    journal = Journal.resume(read_journal(tmp_path, "--resume"))
+    lesson(journal, ask)
+    journal.close()
+    assert asked == []
+
+
+class Fickle:
+    """Says 0 at the n-th question, takes it back when asked next, and then answers like `person`."""
+
+    def __init__(self, n: int) -> None:
+        self.left, self.state, self.undone = n, "before", 0
+        self.undoable = list[bool]()
+
+    def __call__(self, request: AdviceRequest) -> int | None:
+        if self.state == "said":
+            self.undoable.append(request.undoable)
+            if request.undoable:
+                self.state = "after"
+                self.undone += 1
+                raise Undo
+            self.state = "after"
+        self.left -= 1
+        if self.left == 0:
+            self.state = "said"
+            return 0
+        return person(request)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 10])
+def test_an_answer_taken_back_was_never_given(tmp_path: Path, n: int) -> None:
+    plain, _ = written(tmp_path / "plain")
+    fickle = Fickle(n)
+    result, _ = written(tmp_path / "fickle", fickle)
+    assert fickle.undoable
+    assert fickle.undone == fickle.undoable[0]
+    if fickle.undone:
+        assert same(result, plain)
+        read = read_journal(tmp_path / "fickle", "DIR")
+        assert sum(isinstance(entry, Undone) for entry in read.entries) == 1
+        assert read.effective() == list(read_journal(tmp_path / "plain", "DIR").entries)
+        journal = Journal.resume(read)
+        assert same(lesson(journal, person), plain)
+        journal.close()
+
+
+def test_an_answer_of_an_earlier_episode_cannot_be_taken_back() -> None:
+    tries = list[tuple[int, int]]()
+
+    def ask(request: AdviceRequest) -> int:
+        if request.step == 1 and len(tries) < 50:
+            assert not request.undoable
+            tries.append((request.episode, request.state))
+            raise Undo
+        return 3
+
+    assert lesson(Journal(), ask).requests > 0
+    assert len(tries) == 50
+    assert len(set(tries)) == 1  # the same question, asked again
+
+
+def test_another_session_is_noticed(tmp_path: Path) -> None:
+    written(tmp_path)
+    entries: list[Entry] = list(read_journal(tmp_path, "DIR").entries)
+    at = next(n for n, entry in enumerate(entries) if isinstance(entry, EpisodeEnded) and entry.episode == 7)
+    entries[at] = EpisodeEnded(7, 3, False, 0, None, True)
+    with pytest.raises(WorkFailed, match=r'cannot be run again.*"episode": 7'):
+        lesson(Journal(None, entries), person)
+
+
+def test_a_replay_writes_nothing_and_ends_with_the_journal(tmp_path: Path) -> None:
+    result, told = written(tmp_path)
+    read = read_journal(tmp_path, "DIR")
+    raw = read.path.read_bytes()
+    half = Journal(None, read.effective()[: len(read.entries) // 2], read_only=True)
+    assert lesson(half, person).interrupted
+    assert same(lesson(Journal(None, read.effective(), read_only=True), person), result)
+    assert read.path.read_bytes() == raw
+    assert told
+
+
+def test_a_closed_session_does_not_go_on(tmp_path: Path) -> None:
+    journal = Journal.begin(tmp_path, HEAD)
+    lesson(journal, person)
+    closed = Closed(30, 5, 5, True, "board")
+    journal.closes(closed)
+    journal.close()
+    read = read_journal(tmp_path, "DIR")
+    assert read.closed == closed
+    with pytest.raises(BadInput, match="is over: look at it again with lab replay"):
+        Journal.resume(read)
+
+
+def test_a_folder_holds_one_session(tmp_path: Path) -> None:
+    Journal.begin(tmp_path, HEAD).close()
+    with pytest.raises(BadInput, match="holds a session already: go on with it"):
+        Journal.begin(tmp_path, HEAD)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BadInput, match="cannot be written"):
+        Journal.begin(tmp_path / "file" / "below", HEAD)
+
+
+GOOD = line_of(HEAD)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "does not begin with a session"),
+        (GOOD, "does not begin with a session"),  # cut in its first line
+        ("{}\n", "schema None: this version of the lab reads schema 1"),
+        (GOOD.replace('"schema": 1', '"schema": 2') + "\n", "schema 2: this version of the lab reads schema 1"),
+        (line_of(Undone(3)) + "\n", "does not begin with a session"),
+        (f"{GOOD}\n{GOOD}\n", "line 2: a second session"),
+        (f"{GOOD}\nhello\n", "line 2: b'hello': Expecting value"),
+        (f"{GOOD}\n[1]\n", "line 2: .*kind None is none of session, request"),
+        (f'{GOOD}\n{{"kind": "undo"}}\n', "line 2: .*episode"),
+        (f'{GOOD}\n{{"kind": "undo", "episode": "3"}}\n', "line 2: .*valid integer"),
+        (f'{GOOD}\n{{"kind": "undo", "episode": 3, "more": 1}}\n', "line 2: .*nexpected"),
+        (f"{GOOD}\n{'[' * 100_000}\n", "line 2"),
+        (f"{GOOD}\n{line_of(Closed(1, 1, 1, True, 'x'))}\n{line_of(Undone(3))}\n", "line 2: a second session"),
+    ],
+)
+def test_what_is_no_journal_is_refused_with_its_line(tmp_path: Path, text: str, reason: str) -> None:
+    (tmp_path / FILE).write_text(text)
+    with pytest.raises(BadInput, match=reason) as refused:
+        read_journal(tmp_path, "--resume")
+    assert "--resume" in str(refused.value)
+    assert len(str(refused.value)) < 500
+
+
+def test_a_journal_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"\(DIR\): cannot be read: No such file"):
+        read_journal(tmp_path / "nothing", "DIR")
+
+
+whole_numbers = st.integers(0, 10**9)
+some_numbers = st.one_of(st.none(), st.floats(allow_nan=False, allow_infinity=False))
+BY_FIELD: dict[str, Any] = {
+    "words": st.dictionaries(st.text(max_size=5), st.one_of(st.none(), st.text(max_size=5), whole_numbers)),
+    "said": st.lists(st.tuples(st.text(max_size=5), whole_numbers), max_size=3).map(tuple),
+    "action": st.one_of(st.none(), whole_numbers),
+    **dict.fromkeys(("improvement_rate", "current_mean", "previous_mean"), some_numbers),
+    **dict.fromkeys(("final_steps", "optimal_steps"), st.one_of(st.none(), whole_numbers)),
+    **dict.fromkeys(("mean_before", "trust"), st.floats(allow_nan=False, allow_infinity=False)),
+    **dict.fromkeys(("guided", "reached", "left", "solved", "continues"), st.booleans()),
+    **dict.fromkeys(("problem", "signature", "lab", "by", "why", "reason", "advisor", "saved_as"), st.text(max_size=9)),
+}
+
+
+def entries() -> st.SearchStrategy[Entry]:
+    def of(kind: type[Any]) -> st.SearchStrategy[Entry]:
+        fields = {name: BY_FIELD.get(name, whole_numbers) for name in kind.__dataclass_fields__}
+        return st.builds(kind, **fields)
+
+    return st.one_of(*map(of, KINDS.values()))
+
+
+@given(entries())
+def test_every_entry_is_read_as_it_was_written(entry: Entry) -> None:
+    line = line_of(entry)
+    assert "\n" not in line
+    assert entry_of(line) == entry
+
+
+@given(st.binary(max_size=200))
+def test_the_reader_never_fails_but_in_words(tmp_path_factory: pytest.TempPathFactory, raw: bytes) -> None:
+    path = tmp_path_factory.mktemp("journal") / FILE
+    path.write_bytes(GOOD.encode() + b"\n" + raw)
+    with suppress(BadInput):
+        read = read_journal(path, "DIR")
+        assert read.whole_bytes <= len(GOOD) + 1 + len(raw)
+        assert read.cut.encode()[:1] == raw[raw.rfind(b"\n") + 1 :].decode("utf-8", "replace").encode()[:1]
+
+
+def test_a_recording_advises_by_state_and_only_about_its_problem(tmp_path: Path) -> None:
+    head = Session(HEAD.words, "board", board().signature, "test")
+    journal = Journal.begin(tmp_path, head)
+    lesson(journal, person)
+    journal.close()
+    said = read_journal(tmp_path, "DIR").said()
+    rng = np.random.default_rng(0)
+    recorded = make_advisor(f"recorded:{tmp_path}", board(), 0.99, rng)
+    assert recorded is not None
+    for state in range(board().n_states):
+        request = AdviceRequest(board(), [[0.0] * 4] * 12, state, 1, 1, 0, None, None, None)
+        assert recorded.advise(request) == said.get(state)
+    other = grid((2, 2), np.zeros((2, 2), bool), (0, 0), (1, 1))
+    with pytest.raises(BadInput, match="it is advice about another problem, 'board'"):
+        make_advisor(f"recorded:{tmp_path}", other, 0.99, rng)
+
+
+def test_json_lines_hold_what_the_documentation_says(tmp_path: Path) -> None:
+    written(tmp_path)
+    lines = [json.loads(line) for line in (tmp_path / FILE).read_text().splitlines()]
+    assert lines[0]["kind"] == "session"
+    assert lines[0]["schema"] == 1
+    kinds = {line["kind"] for line in lines}
+    assert {"request", "answer", "advice", "episode", "ended"} <= kinds <= set(KINDS)
