@@ -69,11 +69,11 @@ class Learned(Record):
         if self.gate.gate not in GATES:
             raise unknown("gate", self.gate.gate, GATES, f"{where}gate")
 
-    def changed(self, learner: str | None, gate: str | None, episodes: int | None) -> Self:
+    def changed(self, learner: str | None, gate: str | None, episodes: int | None, memory: bool | None = None) -> Self:
         """With what the options of a command say, None for what they leave; BadInput for an unknown learner or gate."""
         own, when = self.learner, self.gate
         own = replace(own, learner=own.learner if learner is None else learner, episodes=episodes or own.episodes)
-        when = replace(when, gate=when.gate if gate is None else gate)
+        when = replace(when, gate=gate or when.gate, memory=when.memory if memory is None else memory)
         other = self.model_copy(update={"learner": own, "gate": when})
         other.check_members("--")
         return other

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.advice.advisors import Advice
+from lab.advice.memory import places
 from lab.errors import BadInput, unknown
 from lab.learning import kernels, selection
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -73,6 +74,7 @@ def run_sessions(
         1.0 / np.array(temperatures),
         (0,) * mdp.n_actions,
         _scratch(mdp.n_actions, episodes),
+        _memories(mdp.n_states, rules.max_moves) if gate.memory else None,
         np.zeros((kernels.LANES, size)),
         others,
         steps,
@@ -102,6 +104,15 @@ def _scratch(actions: int, episodes: int) -> kernels.Scratch:
     )
 
 
+def _memories(states: int, moves: int) -> kernels.Memories:
+    def blank(cells: int) -> NDArray[np.int32]:
+        return np.zeros((kernels.LANES, cells), np.int32)
+
+    said, way, on_walk, place = (blank(states) for _ in range(4))
+    walk, did, own = (blank(places(states, moves)) for _ in range(3))
+    return kernels.Memories(said, way, on_walk, place, walk, did, own, np.zeros(kernels.LANES, kernels.NOW))
+
+
 def _problem(mdp: TabularMDP, afterstate: bool) -> kernels.Problem:
     ends = np.where(mdp.goal, 1, np.where(mdp.terminal, 2, 0)).astype(np.uint8)
     starts = np.array(mdp.starts or (mdp.start,), np.int64)
@@ -129,7 +140,7 @@ def _rules(learner: LearnerSettings, gate: GateSettings, somebody: bool) -> kern
         float(gate.enough_steps),
         gate.ensemble,
         gate.budget,
-        gate.judge_unhelped,
+        gate.judge_unhelped and not gate.memory,
     )
 
 

@@ -2,17 +2,18 @@
 
 Many sessions walk side by side: one alone waits for its memory and its exponentials, 24 keep the processor busy.
 Each has uniform numbers of its own (`selection.splitmix`), so its result depends on its seed and on nothing else, and
-equals that of `session.run_session` with the same numbers. Rules come from `selection`, `updates` and `advice.gates`;
-numba's cache knows changes of this file only, so whoever changes a rule there deletes `__pycache__` here.
+equals that of `session.run_session` with the same numbers. Rules come from `selection`, `updates`, `advice.gates` and
+`advice.memory`; numba's cache knows changes of this file only, so whoever changes a rule there deletes `__pycache__` here.
 """
 
+from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from lab.advice import gates
+from lab.advice import gates, memory
 from lab.learning import selection, updates
 from lab.mdp import FloatArray
 
@@ -22,12 +23,20 @@ _NEVER, _CCRL, _COMBINED, _IA, _CQ, _RANDOM, _IMPORTANCE, _UNCERTAINTY = (
     GATE_CODES[name] for name in ("never", "ccrl", "combined", "ia", "cq", "random", "importance", "uncertainty")
 )
 
+_OWN, _REMEMBERED, _ASKED, _PRACTISED = memory.OWN, memory.REMEMBERED, memory.ASKED, memory.PRACTISED
+_NOTHING = memory.NOTHING
+_Memory: Any = memory.Memory
 _BELOW_ONE = selection.BELOW_ONE
 _exp_of: Any = njit(selection.exp_of)
 _window_mean: Any = njit(gates.window_mean)
 _too_slow: Any = njit(gates.too_slow)
 _misled: Any = njit(gates.misled)
 _unsure: Any = njit(gates.unsure)
+_clear: Any = njit(memory.clear)
+_remembers: Any = njit(memory.opens)
+_starts: Any = njit(memory.starts)
+_moved: Any = njit(memory.moved)
+_ended: Any = njit(memory.ended)
 _towards: Any = njit(updates.towards)
 _afterstate_value: Any = njit(updates.afterstate_value)
 
@@ -74,6 +83,22 @@ LANE = np.dtype(
 COUNTS = np.dtype(
     [(name, np.int64) for name in ("requests", "helped_steps", "misleads", "rejected_at_episode", "moves")]
 )
+
+
+NOW = np.dtype([(field.name, np.int64) for field in fields(memory.Now)])
+
+
+class Memories(NamedTuple):
+    """A `memory.Memory` for each lane: the arrays are (LANES, ...), `now` (LANES,) is of NOW."""
+
+    said: NDArray[np.int32]
+    way: NDArray[np.int32]
+    on_walk: NDArray[np.int32]
+    place: NDArray[np.int32]
+    walk: NDArray[np.int32]
+    did: NDArray[np.int32]
+    own: NDArray[np.int32]
+    now: NDArray[np.void]
 
 
 class Scratch(NamedTuple):
@@ -200,6 +225,12 @@ def _begin_session(lane: Any, j: int, n: int, seed: Any, tables: Any, others: An
             others[j, k, i] = _draw(rng, j) - 0.5
 
 
+@njit(inline="always")
+def _of_lane(m: Any, j: int) -> Any:
+    """The memory of one lane."""
+    return _Memory(m.said[j], m.way[j], m.on_walk[j], m.place[j], m.walk[j], m.did[j], m.own[j], m.now[j])
+
+
 @njit
 def _choose(
     values: Any, reward: float, discount: float, per_tau: Any, rng: Any, actions: Any, chosen: Any, widths: Any
@@ -243,6 +274,7 @@ def run(
     temperatures: Any,
     actions: Any,
     scratch: Any,
+    memories: Any,
     all_tables: Any,
     others: Any,
     steps: Any,
@@ -251,6 +283,8 @@ def run(
     kept: Any,
 ) -> None:
     """All sessions: each lane takes the next one when its own is over; all_tables (LANES, size), others: their tables.
+
+    memories None: nothing is remembered, and numba leaves all that is about it out.
 
     What is done in every step is written out here over plain arrays: a call that hands on a record of arrays counts
     references, which costs more than the step itself.
@@ -277,6 +311,8 @@ def run(
                         lanes[j].session = -1  # a lane without a session walks on, and nobody looks
                         if following < sessions:
                             _begin_session(lanes[j], j, following, seeds[following], all_tables, others, rng)
+                            if memories is not None:
+                                _clear(_of_lane(memories, j))
                             following += 1
                     if lanes[j].session >= 0:
                         lane = lanes[j]
@@ -284,9 +320,14 @@ def run(
                         if gate != _NEVER:
                             lane.left = rules.budget - counts[n].helped_steps
                             lane.is_open = _opens(rules, lane, steps[n], counts[n].rejected_at_episode > 0)
+                        if memories is not None:
+                            mine, may = _of_lane(memories, j), lane.is_open == 1
+                            lane.is_open = _remembers(mine, lane.episode, episodes, rules.window, may)
                         per_tau[j], is_open[j] = temperatures[lanes[j].episode - 1], lanes[j].is_open
                         if len(starts) > 1:
                             states[j] = starts[int(_draw(rng, j) * len(starts))]
+                        if memories is not None:
+                            _starts(_of_lane(memories, j), np.int64(states[j]))
         for j in range(LANES):
             base, at = np.uint64(j) * size, states[j] * np.uint64(A)
             for a in range(A):
@@ -295,7 +336,14 @@ def run(
         _choose(values, offset, factor, per_tau, rng, actions, chosen, widths)
         for j in range(LANES):
             state, action, base = states[j], np.uint64(chosen[j]), np.uint64(j) * size
-            if is_open[j] and lanes[j].helped < lanes[j].left:
+            said = np.int64(_NOTHING)
+            source = np.int64(_OWN)
+            if memories is not None:
+                if is_open[j]:
+                    said = np.int64(memories.said[j, state])
+                elif memories.now[j].practises == 1 and memories.way[j, state] != _NOTHING:
+                    action, source = np.uint64(memories.way[j, state]), np.int64(_PRACTISED)
+            if is_open[j] and (said != _NOTHING or lanes[j].helped < lanes[j].left):
                 if gate in (_IA, _COMBINED):
                     asks = _unsure(widths[j], psi)
                 elif gate == _IMPORTANCE:
@@ -306,7 +354,9 @@ def run(
                     asks = _deviation(problem, rules, others[j], np.int64(state)) >= rules.spread
                 else:
                     asks = True
-                if asks:
+                if asks and said != _NOTHING:
+                    action, source = np.uint64(said), np.int64(_REMEMBERED)
+                elif asks:
                     lane = lanes[j]
                     lane.asked = 1
                     if region[state]:
@@ -315,6 +365,9 @@ def run(
                         mark, action = _draw(rng, j) * advice[row, state, A - 1], np.uint64(0)
                         for a in range(A - 1):
                             action += np.uint64(advice[row, state, a] <= mark)
+                        source = np.int64(_ASKED)
+                        if memories is not None:
+                            memories.said[j, state] = action
             step = state * np.uint64(A) + action
             entered = np.uint64(successor[step])
             over = ends[entered]
@@ -332,6 +385,11 @@ def run(
             for k in range(ensemble):
                 if _draw(rng, j) < 0.5:
                     _learn(problem, rules, others[j, k], np.int64(state), np.int64(action))
+            if memories is not None and lanes[j].session >= 0:
+                mine = _of_lane(memories, j)
+                _moved(mine, np.int64(state), np.int64(action), source, np.int64(entered), over != 0, over == 1)
+                if mine.now.trust < 0:
+                    is_open[j] = False
             states[j] = entered
             moves[j] += 1
             if over or moves[j] == max_moves:
@@ -346,6 +404,9 @@ def run(
                     counts[n].moves += moves[j]
                     if lane.is_open and gate in (_CCRL, _COMBINED):
                         _judge(rules, lane, steps[n], counts[n])
+                    if memories is not None:
+                        went = moves[j] if over == 1 else max_moves + 1
+                        _ended(_of_lane(memories, j), episodes, went, over == 1, lane.helped)
                     if lanes[j].episode == episodes:
                         over_all, is_open[j] = over_all + 1, False
                         if len(kept):

@@ -6,59 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.advice.advisors import AdviceRequest, Advisor, AdvisorLeft
+from lab.advice.events import AdviceEnded, AdviceGiven, AdviceRejected, AdviceRequested, EpisodeEnded, Event
 from lab.advice.gates import GATES, Improvement, Surroundings, improvement
+from lab.advice.memory import Recall
+from lab.advice.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked
 from lab.errors import BadInput, unknown
+from lab.learning.environment import Environment, TableEnvironment, check_solvable
 from lab.learning.selection import SELECTIONS, Draw, temperature, uniforms
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES, Update
-from lab.mdp import BoolArray, FloatArray, TabularMDP, greedy_path, shortest_steps
+from lab.mdp import BoolArray, FloatArray, TabularMDP
 
 CountArray = NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-class EpisodeEnded:
-    """An episode is over: `steps` is max_steps + 1 when it failed; the rate is None before 2K episodes."""
-
-    episode: int
-    steps: int
-    guided: bool
-    helped_steps: int
-    improvement_rate: float | None
-    reached: bool
-
-
-@dataclass(frozen=True)
-class AdviceRequested:
-    """The learner asks for the first time in this episode; means of step counts over K episodes, None before 2K."""
-
-    episode: int
-    improvement_rate: float | None
-    current_mean: float | None
-    previous_mean: float | None
-
-
-@dataclass(frozen=True)
-class AdviceRejected:
-    """Misled more than `omega` times, the learner asks no more; `steps` was not better than `mean_before`."""
-
-    episode: int
-    misleads: int
-    omega: int
-    steps: int
-    mean_before: float
-
-
-@dataclass(frozen=True)
-class AdviceEnded:
-    """No more advice in this session: `reason` is "converged" or "advisor left"."""
-
-    episode: int
-    reason: str
-
-
-Event = EpisodeEnded | AdviceRequested | AdviceRejected | AdviceEnded
 OnEvent = Callable[[Event], None]
 
 
@@ -69,9 +30,9 @@ class SessionResult:
     q (S, A) float64, visits (S, A) int64; steps (episodes,) int64, a failed episode as max_steps + 1; guided
     (episodes,) bool: at least one advised step; requests: episodes in which the learner asked; helped_steps:
     advised steps that were carried out; misleads and rejected_at_episode: see lab/advice/gates.py; final_steps:
-    those of the greedy path from the start, None if it does not reach the goal, optimal_steps: the fewest, both
-    counted as in `steps`; solved: they are the same, or, in a problem with several `starts`, the greedy path reaches
-    the goal from each of them; interrupted: stopped by Ctrl-C, only finished episodes count.
+    those of the greedy path from the start, None if it does not reach the goal, optimal_steps: the fewest, None where
+    nobody knows them, both counted as in `steps`; solved: see `Environment.judge`; interrupted: stopped by Ctrl-C, only
+    finished episodes count.
     """
 
     q: FloatArray
@@ -82,7 +43,7 @@ class SessionResult:
     helped_steps: int
     misleads: int
     rejected_at_episode: int | None
-    optimal_steps: int
+    optimal_steps: int | None
     final_steps: int | None
     solved: bool
     interrupted: bool
@@ -98,17 +59,21 @@ def run_session(
     q0: FloatArray | None = None,
     on_event: OnEvent | None = None,
     draw: Draw | None = None,
+    environment: Environment | None = None,
 ) -> SessionResult:
     """Learns one table in `learner.episodes` episodes, asking `advisor` when the gate says so (None: nobody to ask).
 
-    q0: (S, A) start values, default 0. draw: where uniform numbers come from, by default `rng`. An advised action is
-    carried out and learned from as if it were the learner's own choice. KeyboardInterrupt ends the session at once;
+    q0: (S, A) start values, default 0. draw: where uniform numbers come from, by default `rng`. environment: where the
+    steps are made, by default the table itself. An advised action is carried out and learned from as if it were the
+    learner's own choice. An advisor with a method `followed` hears after each episode what it led to.
+    KeyboardInterrupt ends the session at once;
     the result then holds all that was learned so far.
     Raises BadInput for an unknown learner, selection or gate, a q0 that does not fit or an advisor that names no
     action, and NoPath.
     Source: thesis fig. 6.2 with the update rules of section 2.2 and the softmax of section 9.4.
     """
-    session = _Session(mdp, learner, gate, advisor, draw or uniforms(rng), q0, on_event or (lambda event: None))
+    place = environment or TableEnvironment(mdp)
+    session = _Session(place, learner, gate, advisor, draw or uniforms(rng), q0, on_event or (lambda event: None))
     interrupted = False
     try:
         for episode in range(1, learner.episodes + 1):
@@ -123,7 +88,7 @@ class _Session:
 
     def __init__(
         self,
-        mdp: TabularMDP,
+        environment: Environment,
         learner: LearnerSettings,
         gate: GateSettings,
         advisor: Advisor | None,
@@ -137,20 +102,19 @@ class _Session:
             raise unknown("selection", learner.selection, SELECTIONS, "learner settings")
         if gate.gate not in GATES:
             raise unknown("gate", gate.gate, GATES, "gate settings")
-        self.mdp, self.settings, self.gate_settings = mdp, learner, gate
-        self.advisor, self.tell = advisor, on_event
-        self.optimal_steps = shortest_steps(mdp) + learner.count_start
+        check_solvable(environment)
+        self.environment, self.mdp, self.settings, self.gate_settings = environment, environment.mdp, learner, gate
+        self.advisor, self.advised, self.tell = advisor, advisor is not None, on_event
+        mdp = self.mdp
         self.update = UPDATES[learner.learner](_start_values(mdp, q0).tolist(), learner, mdp)
         self.q = self.update.q
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
-        self.successor: list[list[int]] = mdp.successor.tolist()
-        self.reward: list[list[float]] = mdp.reward.tolist()
-        self.discount: list[float] = np.where(mdp.terminal, 0.0, learner.discount).tolist()  # by the state entered
-        self.is_goal: list[bool] = mdp.goal.tolist()
         self.choose, self.draw = SELECTIONS[learner.selection], draw
         around = Surroundings(draw, self._others)
         self.gate = GATES[gate.gate](gate, learner.episodes, learner.max_steps, around)
         self.max_moves = learner.max_steps - learner.count_start
+        self.recall = Recall(mdp.n_states, self.max_moves, learner.episodes, gate.window) if gate.memory else None
+        self.judge_unhelped = gate.judge_unhelped and not gate.memory
         self.steps: list[int] = []
         self.guided: list[bool] = []
         self.requests = self.helped_steps = 0
@@ -158,6 +122,7 @@ class _Session:
         self.tau = 1.0
         self.episode = 0
         self.improved: Improvement | None = None
+        self.trail: list[tuple[int, int, int]] | None = None  # of an episode that an advisor wants to hear of
         self.asked_now = False  # in the episode under way; booked when it has ended
         self.helped_now = 0
 
@@ -174,10 +139,14 @@ class _Session:
         self.episode, self.asked_now, self.helped_now = episode, False, 0
         self.tau = temperature(episode, self.settings.beta, self.settings.exploration)
         was_converged = self.gate.converged
-        is_open = self.gate.opens(episode, self.steps) and self.advisor is not None
+        is_open = self._opens(episode)
         if self.gate.converged and not was_converged and self.advisor is not None:
             self.tell(AdviceEnded(episode, "converged"))
-        moves = self._walk(self._advised_choice if is_open else self._own_choice)
+        followed = getattr(self.advisor, "followed", None)
+        self.trail = [] if is_open and followed is not None else None
+        practises = self.recall is not None and self.recall.practises
+        closed = self._practised_choice if practises else self._own_choice
+        moves = self._walk(self._advised_choice if is_open else closed)
         self.update.end()
         steps = self.settings.max_steps + 1 if moves is None else moves + self.settings.count_start
         helped = self.helped_now
@@ -186,77 +155,124 @@ class _Session:
         self.steps.append(steps)
         self.guided.append(helped > 0)
         self.improved = improvement(self.steps, self.gate_settings.window)
-        self.gate.judges(self.steps, is_open and (helped > 0 or self.gate_settings.judge_unhelped))
+        self.gate.judges(self.steps, is_open and (helped > 0 or self.judge_unhelped))
         rate = self.improved.rate if self.improved else None
+        if self.trail is not None and followed is not None:
+            followed(Walked(episode, self.trail, moves is not None, steps, self._mean_before()))
         self.tell(EpisodeEnded(episode, steps, helped > 0, helped, rate, moves is not None))
         if self.gate.rejected and self.rejected_at is None:
             self.rejected_at = episode
-            before = self.steps[-1 - self.gate_settings.window : -1]
-            mean_before = sum(before) / len(before)
+            mean_before = self._mean_before()
             self.tell(AdviceRejected(episode, self.gate.misleads, self.gate_settings.omega, steps, mean_before))
+        for event in self.recall.ended(moves, helped) if self.recall is not None else ():
+            self.tell(event)
+
+    def _opens(self, episode: int) -> bool:
+        """Whether the gate opens for somebody, and memory does not close it again."""
+        is_open = self.gate.opens(episode, self.steps)
+        if self.recall is None:
+            return is_open and self.advisor is not None
+        return self.recall.opens(episode, is_open and self.advised)  # what somebody said who has left is kept
+
+    def _mean_before(self) -> float:
+        """The mean of the K step counts before the last one, of fewer at the beginning; the step limit before the first."""
+        before = self.steps[-1 - self.gate_settings.window : -1]
+        return sum(before) / len(before) if before else float(self.settings.max_steps + 1)
 
     def _walk(self, choose: Callable[[int, int], int]) -> int | None:
         """Goes from the start until a terminal state or the step limit and learns; the moves to the goal, None if not reached."""
-        successor, reward, discount, visits = self.successor, self.reward, self.discount, self.visits
+        act, draw, discount, visits = self.environment.step, self.draw, self.settings.discount, self.visits
         learn, lookahead, watch = self.update.learn, self.update.lookahead, self.gate.saw if self.gate.watches else None
+        recall = self.recall
         self.update.begin()
-        starts = self.mdp.starts
-        state = starts[int(self.draw() * len(starts))] if starts else self.mdp.start
+        state = self.environment.reset(self.episode, draw)
+        if recall is not None:
+            recall.starts(state)
         action = choose(state, 1)
         for step in range(1, self.max_moves + 1):
-            last = step == self.max_moves
             visits[state][action] += 1
-            entered = successor[state][action]
-            discount_t = discount[entered]
+            reward, entered, over, reached, truncated = act(state, action, draw)
+            if recall is not None:
+                recall.moved(state, action, entered, over, reached)
+            last = truncated or step == self.max_moves
+            discount_t = 0.0 if over else discount
             following = 0
-            if lookahead and discount_t:
+            if lookahead and not over:
                 # the move after the last one is never made: nobody is asked for it
                 following = self._own_choice(entered, step) if last else choose(entered, step + 1)
-            learn(state, action, reward[state][action], discount_t, entered, following)
+            learn(state, action, reward, discount_t, entered, following)
+            if self.trail is not None:
+                self.trail.append((state, action, entered))
             if watch is not None:
-                watch(state, action, reward[state][action], discount_t, entered)
-            if not discount_t:
-                return step if self.is_goal[entered] else None
-            if not last:
-                state, action = entered, following if lookahead else choose(entered, step + 1)
+                watch(state, action, reward, discount_t, entered)
+            if over:
+                return step if reached else None
+            if last:
+                return None
+            state, action = entered, following if lookahead else choose(entered, step + 1)
         return None
 
     def _own_choice(self, state: int, step: int) -> int:
         return self.choose(self.q[state], self.tau, self.draw())
 
-    def _advised_choice(self, state: int, step: int) -> int:
-        """The advisor's action where the gate asks and the advisor answers, else the learner's own."""
+    def _practised_choice(self, state: int, step: int) -> int:
         own = self._own_choice(state, step)
-        within_budget = self.helped_steps + self.helped_now < self.gate_settings.budget
-        if self.advisor is None or not within_budget or not self.gate.asks(state, self.update.gauge(state)):
+        return own if self.recall is None else self.recall.chosen(state, own)
+
+    def _advised_choice(self, state: int, step: int) -> int:
+        """What was said there before or what the advisor says now, where the gate asks, else the learner's own."""
+        own, recall = self._own_choice(state, step), self.recall
+        said = None if recall is None else recall.said(state)
+        advisor = self.advisor if self.helped_steps + self.helped_now < self.gate_settings.budget else None
+        if (advisor is None and said is None) or (recall is not None and not recall.trusts):
             return own
-        means = self.improved
-        rate, current, previous = (means.rate, means.current_mean, means.previous_mean) if means else (None, None, None)
+        if not self.gate.asks(state, self.update.gauge(state)):
+            return own
+        if recall is not None and said is not None:
+            recall.does()
+            return said
+        action = None if advisor is None else self._asks(advisor, state, step, own)
+        if action is None:
+            return own
+        self.helped_now += 1
+        if recall is not None:
+            recall.keeps(state, action)
+        return action
+
+    def _asks(self, advisor: Advisor, state: int, step: int, own: int) -> int | None:
+        """The advisor's action, None when nothing is said."""
+        known = self.improved
+        means: tuple[float | None, float | None, float | None] = (None, None, None)
+        if known:
+            means = (known.rate, known.current_mean, known.previous_mean)
         if not self.asked_now:
             self.asked_now = True
-            self.tell(AdviceRequested(self.episode, rate, current, previous))
+            self.tell(AdviceRequested(self.episode, *means))
+        why, how, place = self.gate.why, self.settings.selection, self.environment
         request = AdviceRequest(
-            self.mdp, self.q, state, self.episode, step, own, rate, current, previous, self.gate.why
+            self.mdp, self.q, state, self.episode, step, own, *means, why, self.tau, how, self._standing(), place
         )
         try:
-            action = self.advisor.advise(request)
+            action = advisor.advise(request)
         except AdvisorLeft:
             self.advisor = None
             self.tell(AdviceEnded(self.episode, "advisor left"))
-            return own
-        if action is None:
-            return own
-        if action not in range(self.mdp.n_actions):
+            return None
+        self.tell(AdviceGiven(self.episode, step, state, action, own))
+        if action is not None and action not in range(self.mdp.n_actions):
             raise BadInput(f"the advisor named action {action}: allowed 0..{self.mdp.n_actions - 1}")
-        self.helped_now += 1
         return action
+
+    def _standing(self) -> Standing:
+        gate, settings = self.gate, self.gate_settings
+        helped = self.helped_steps + self.helped_now
+        return Standing(helped, settings.budget, gate.misleads, settings.omega, settings.lambda_threshold)
 
     def result(self, interrupted: bool) -> SessionResult:
         """What was learned so far; an unfinished episode counts in q and visits only."""
         q = np.array(list(self.q), np.float64)
         finished = len(self.guided)
-        _, actions, reached = greedy_path(q, self.mdp, self.settings.max_steps)
-        final_steps = len(actions) + self.settings.count_start if reached else None
+        final_steps, optimal_steps, solved = self.environment.judge(q, self.settings)
         return SessionResult(
             q=q,
             visits=np.array(self.visits, np.int64),
@@ -266,16 +282,11 @@ class _Session:
             helped_steps=self.helped_steps,
             misleads=self.gate.misleads,
             rejected_at_episode=self.rejected_at,
-            optimal_steps=self.optimal_steps,
+            optimal_steps=optimal_steps,
             final_steps=final_steps,
-            solved=not unreached(q, self.mdp) if self.mdp.starts else final_steps == self.optimal_steps,
+            solved=solved,
             interrupted=interrupted,
         )
-
-
-def unreached(q: FloatArray, mdp: TabularMDP) -> tuple[int, ...]:
-    """The states among the problem's several `starts` from which the greedy path does not reach the goal."""
-    return tuple(start for start in mdp.starts if not greedy_path(q, mdp, mdp.n_states, start)[2])
 
 
 def _start_values(mdp: TabularMDP, q0: FloatArray | None) -> FloatArray:

@@ -9,7 +9,7 @@ import pytest
 from lab.advice.advisors import Advice, TableAdvisor, skill
 from lab.advice.gates import GATES
 from lab.errors import BadInput
-from lab.learning.batch import LEARNERS, run_sessions
+from lab.learning.batch import LEARNERS, Batch, run_sessions
 from lab.learning.kernels import LANES
 from lab.learning.selection import splitmix
 from lab.learning.session import SessionResult, run_session
@@ -39,6 +39,21 @@ def alone(
     return run_session(mdp, learner, gate, advisor, np.random.default_rng(0), draw=draw)
 
 
+def assert_same(batch: Batch, n: int, one: SessionResult) -> None:
+    """A compiled session is the interactive one: tables, steps, and all that is counted."""
+    np.testing.assert_array_equal(batch.steps[n], one.steps)
+    np.testing.assert_array_equal(batch.guided[n], one.guided)
+    np.testing.assert_array_equal(batch.q[n], one.q)
+    counted = (
+        batch.requests[n],
+        batch.helped_steps[n],
+        batch.misleads[n],
+        batch.rejected_at_episode[n],
+        batch.moves[n],
+    )
+    assert counted == (one.requests, one.helped_steps, one.misleads, one.rejected_at_episode or 0, one.visits.sum())
+
+
 @pytest.mark.parametrize("gate", GATES)
 @pytest.mark.parametrize("learner", LEARNERS)
 def test_compiled_and_interactive_sessions_are_the_same(learner: str, gate: str) -> None:
@@ -47,19 +62,43 @@ def test_compiled_and_interactive_sessions_are_the_same(learner: str, gate: str)
     seeds = np.arange(100, 100 + LANES + 6, dtype=np.uint64)
     batch = run_sessions(mdp, settings, how, who, seeds, keep_tables=True)
     for n in (0, 7, LANES + 5):
-        one = alone(mdp, settings, how, who, int(seeds[n]))
-        np.testing.assert_array_equal(batch.steps[n], one.steps)
-        np.testing.assert_array_equal(batch.guided[n], one.guided)
-        np.testing.assert_array_equal(batch.q[n], one.q)
-        counted = (
-            batch.requests[n],
-            batch.helped_steps[n],
-            batch.misleads[n],
-            batch.rejected_at_episode[n],
-            batch.moves[n],
-        )
-        assert counted == (one.requests, one.helped_steps, one.misleads, one.rejected_at_episode or 0, one.visits.sum())
+        assert_same(batch, n, alone(mdp, settings, how, who, int(seeds[n])))
     assert (batch.helped_steps.sum() > 0) == (gate != "never")
+
+
+# the gate "uncertainty" draws its tables also when nobody is there, but not in compiled sessions
+VIEWS = [
+    (gate, view)
+    for gate in GATES
+    for view in ("full", "limited", "nobody")
+    if (gate, view) != ("uncertainty", "nobody")
+]
+
+
+@pytest.mark.parametrize(("gate", "view"), VIEWS)
+@pytest.mark.parametrize("learner", LEARNERS)
+def test_they_are_the_same_with_memory(learner: str, gate: str, view: str) -> None:
+    mdp, settings = board(), replace(SHORT, learner=learner, beta=0.7)  # so warm that its own last result is often long
+    # gates that open again and again, a budget that some sessions use up, advice that leads round and into obstacles
+    how = replace(EAGER, gate=gate, memory=True, lambda_threshold=0.5, rate=0.6, window=2, budget=25)
+    region = np.arange(25) > 4 if view == "limited" else None
+    who = None if view == "nobody" else advice(mdp, 0.4, region)
+    seeds = np.arange(200, 200 + LANES + 6, dtype=np.uint64)
+    batch = run_sessions(mdp, settings, how, who, seeds, keep_tables=True)
+    for n in (0, 3, 7, 11, LANES + 5):
+        assert_same(batch, n, alone(mdp, settings, how, who, int(seeds[n])))
+    assert (batch.helped_steps.sum() > 0) == (gate != "never" and view != "nobody")
+    plain = run_sessions(mdp, settings, replace(how, memory=False), who, seeds)
+    assert (plain.steps != batch.steps).any()  # at the latest when the way is practised
+
+
+def test_memory_is_the_same_where_episodes_begin_anywhere() -> None:
+    anywhere = replace(board(), starts=tuple(np.flatnonzero(~board().terminal).tolist()))
+    how = replace(EAGER, gate="always", memory=True)
+    seeds = np.arange(LANES + 1, dtype=np.uint64)
+    batch = run_sessions(anywhere, SHORT, how, advice(anywhere), seeds, keep_tables=True)
+    for n in (1, LANES):
+        assert_same(batch, n, alone(anywhere, SHORT, how, advice(anywhere), n))
 
 
 def test_unhelped_episodes_may_be_left_unjudged() -> None:
@@ -82,8 +121,9 @@ def test_episodes_may_begin_anywhere() -> None:
     np.testing.assert_array_equal(batch.q[0], one.q)
 
 
-def test_a_session_does_not_depend_on_its_company() -> None:
-    mdp, how = board(), replace(EAGER, gate="combined")
+@pytest.mark.parametrize("memory", [False, True])
+def test_a_session_does_not_depend_on_its_company(memory: bool) -> None:
+    mdp, how = board(), replace(EAGER, gate="combined", memory=memory)
     seeds = np.arange(3 * LANES + 1, dtype=np.uint64)
     together = run_sessions(mdp, SHORT, how, advice(mdp), seeds)
     apart = [run_sessions(mdp, SHORT, how, advice(mdp), part) for part in np.array_split(seeds, 4)]
