@@ -1,0 +1,111 @@
+"""Who advises in a session: one advisor or several, simulated, recorded or people, and how they are brought together."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lab.advice.advisors import make_advisor, parse_advisor
+from lab.advice.events import Event
+from lab.advice.journal import Journal
+from lab.advice.panel import ASKED, DECISIONS, panel_of
+from lab.advice.requests import AdviceRequest, Advisor, Ask, Walked
+from lab.errors import unknown
+from lab.learning.environment import Environment
+from lab.learning.selection import uniforms
+from lab.learning.settings import LearnerSettings
+from lab.mdp import BoolArray, TabularMDP
+
+Watch = Callable[[AdviceRequest, int | None], None]
+
+
+@dataclass(frozen=True)
+class Counsel:
+    """Who is asked in a session, by name, and the people behind such names as "terminal".
+
+    asked: several are asked "together" or "in-turn"; decide: whom to follow, a name in `panel.DECISIONS`; region (S,):
+    where anybody is heard; watch: is shown each question with its answer.
+    """
+
+    names: tuple[str, ...] = ("expert",)
+    people: Mapping[str, Ask] = field(default_factory=dict)
+    asked: str = "together"
+    decide: str = "trust-weighted"
+    region: BoolArray | None = None
+    watch: Watch | None = None
+
+    def __str__(self) -> str:
+        return " + ".join(self.names)
+
+    @property
+    def records(self) -> bool:
+        """Whether anybody speaks only where a record has something: such silence is not held against the advice."""
+        return any(name.startswith("recorded:") for name in self.names)
+
+    def check(self) -> None:
+        """Raises BadInput for a name that no advisor has, and for an unknown way of asking or deciding."""
+        for name in self.names:
+            parse_advisor(name, "--advisor")
+        if self.asked not in ASKED:
+            raise unknown("way of asking", self.asked, ASKED, "--ask")
+        if self.decide not in DECISIONS:
+            raise unknown("way of deciding", self.decide, DECISIONS, "--decide")
+
+    def check_records(self, mdp: TabularMDP) -> None:
+        """Raises BadInput for a record that is not about this problem."""
+        for name in self.names:
+            if name.startswith("recorded:"):
+                make_advisor(name, mdp, 1.0, np.random.default_rng(0))
+
+    def gather(
+        self,
+        environment: Environment,
+        learner: LearnerSettings,
+        rng: np.random.Generator,
+        *,
+        journal: Journal | None = None,
+        tell: Callable[[Event], None] = lambda event: None,
+    ) -> Advisor | None:
+        """The advisors of a session as one, None when there is nobody; people's answers go through the journal.
+
+        Each of several draws from a stream of its own. Raises BadInput as `make_advisor` does.
+        """
+        people = {name: _through(journal, name, ask) for name, ask in self.people.items()}
+        streams = [rng] if len(self.names) == 1 else rng.spawn(len(self.names) + 1)
+        made = [
+            make_advisor(
+                name,
+                environment.mdp,
+                learner.discount,
+                stream,
+                people,
+                region=self.region,
+                episodes=learner.episodes,
+                values=environment.values,
+            )
+            for name, stream in zip(self.names, streams, strict=False)
+        ]
+        if len(made) == 1:
+            one = made[0]
+        else:
+            states, draw = environment.mdp.n_states, uniforms(streams[-1])
+            one = panel_of(self.names, made, states, decide=self.decide, asked=self.asked, draw=draw, tell=tell)
+        return one if one is None or self.watch is None else Watched(one, self.watch)
+
+
+class Watched:
+    """An advisor whose answers somebody else is shown, too."""
+
+    def __init__(self, advisor: Advisor, watch: Watch):
+        self.advisor, self._watch = advisor, watch
+        self.followed: Callable[[Walked], None] | None = getattr(advisor, "followed", None)
+
+    def advise(self, request: AdviceRequest) -> int | None:
+        """The advisor's answer."""
+        action = self.advisor.advise(request)
+        self._watch(request, action)
+        return action
+
+
+def _through(journal: Journal | None, by: str, ask: Ask) -> Ask:
+    return ask if journal is None else lambda request: journal.answer(by, request, ask)

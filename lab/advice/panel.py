@@ -1,0 +1,257 @@
+"""Several advisors at once: who is asked, whose word counts, and who is heard no more (thesis section 10.2.4 iii)."""
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import fsum, log
+
+from lab.advice.events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
+from lab.advice.requests import AdviceRequest, Advisor, AdvisorLeft, Walked
+from lab.advice.trust import Pair, Trail, Ways, bounds, circles, is_bad, is_good, trust, trust_there
+from lab.errors import BadInput, unknown
+from lab.learning.selection import Draw
+from lab.mdp import BoolArray
+
+PROBED = 0.1  # the share of the questions that a dropped advisor is still asked
+ASKED = ("together", "in-turn")
+
+
+def majority(trusts: Sequence[float]) -> float:
+    """As many points as advisors say so."""
+    return float(len(trusts))
+
+
+def best_trusted(trusts: Sequence[float]) -> float:
+    """The trust in the best of those who say so."""
+    return max(trusts)
+
+
+def trust_weighted(trusts: Sequence[float]) -> float:
+    """The log odds of all who say so, added up; one that is trusted less than evenly counts against it.
+
+    Source: Nitzan and Paroush, Int. Econ. Rev. 23 (1982), 289-297: the best weights of independent voters.
+    """
+    return fsum(log(one / (1.0 - one)) for one in trusts)
+
+
+Decide = Callable[[Sequence[float]], float]  # what an action is worth, from the trusts in those who said it
+DECISIONS: dict[str, Decide] = {
+    "majority": majority,
+    "best-trusted": best_trusted,
+    "trust-weighted": trust_weighted,
+}
+
+
+def decided(votes: Mapping[str, int], trusts: Mapping[str, float], own: int, decide: Decide) -> int:
+    """The action that is followed; ties: what the most trusted one says, the learner's own choice, the lowest index."""
+    by_action: dict[int, list[float]] = {}
+    for name, action in votes.items():
+        by_action.setdefault(action, []).append(trusts[name])
+    return max(
+        by_action, key=lambda action: (decide(by_action[action]), max(by_action[action]), action == own, -action)
+    )
+
+
+@dataclass(frozen=True)
+class Member:
+    """How an advisor stands: the expected share of good advice with its 95 % interval, and its judged answers."""
+
+    name: str
+    trust: float
+    low: float
+    high: float
+    dropped: bool
+    good: int
+    bad: int
+
+
+class _Seat:
+    """A member with what it has said since it came, or was dropped or readmitted last."""
+
+    def __init__(self, advisor: Advisor):
+        self.advisor = advisor
+        self.dropped = False
+        self.good = self.bad = 0
+        self._said: dict[int, Counter[int]] = defaultdict(Counter)
+        self._circled: set[Pair] = set()
+        self._now: dict[int, Pair] = {}  # in this episode, by step
+        self._trusts: dict[int, float] = {}  # by state: they change only when an episode has ended
+
+    def begin(self) -> None:
+        """Another episode."""
+        self._now.clear()
+
+    def ask(self, request: AdviceRequest) -> int | None:
+        """What it says, which is kept to be judged. Raises AdvisorLeft."""
+        action = self.advisor.advise(request)
+        if action is not None:
+            self._now[request.step] = request.state, action
+        return action
+
+    def judge(self, trail: Trail, ways: Ways) -> None:
+        """Takes in what was said in an episode and counts anew what is good and bad by the ways known now."""
+        for state, action in self._now.values():
+            self._said[state][action] += 1
+        self._circled |= circles(trail, {step: action for step, (_, action) in self._now.items()})
+        self._now.clear()
+        self._trusts.clear()
+        self.good, self.bad = ways.tally(self._said, self._circled)
+
+    def forget(self) -> None:
+        """From now on only what it says from now on counts."""
+        self.good = self.bad = 0
+        for record in (self._said, self._circled, self._trusts):
+            record.clear()
+
+    def trust_in(self, state: int, ways: Ways) -> float:
+        """How far it is trusted in a state."""
+        if state not in self._trusts:
+            said = {state: self._said[state]} if state in self._said else {}
+            there = ways.tally(said, self._circled)
+            self._trusts[state] = trust_there(trust(self.good, self.bad), *there)
+        return self._trusts[state]
+
+
+class Panel:
+    """Several advisors as one. It hears after each episode what came of it, and trusts them by that (see trust.py).
+
+    decide: a row of DECISIONS; asked: "together", all about each step, or "in-turn", one an episode, and the next one
+    where it says nothing. An advisor whose advice is bad beyond doubt is dropped: it is asked about one question in ten, and
+    not followed; when these answers are good beyond doubt, it is readmitted, and only they count from then on. All chance
+    is from `draw`. Raises BadInput for no members, and for an unknown `decide` or `asked`.
+    """
+
+    def __init__(
+        self,
+        members: Mapping[str, Advisor],
+        states: int,
+        *,
+        decide: str,
+        asked: str,
+        draw: Draw,
+        tell: Callable[[Event], None],
+    ):
+        if not members:
+            raise BadInput("a panel of advisors: it has no member")
+        if decide not in DECISIONS:
+            raise unknown("decision", decide, DECISIONS, "panel of advisors")
+        if asked not in ASKED:
+            raise unknown("order of asking", asked, ASKED, "panel of advisors")
+        self._seats = {name: _Seat(advisor) for name, advisor in members.items()}
+        self._decide, self._in_turn = DECISIONS[decide], asked == "in-turn"
+        self._draw, self._tell = draw, tell
+        self._ways = Ways(states)
+        self._terminal: BoolArray | None = None
+        self._episode = 0
+        self._turn = -1
+
+    def advise(self, request: AdviceRequest) -> int | None:
+        """What the panel has decided; None when nobody who counts has spoken. Raises AdvisorLeft when all have left."""
+        self._terminal = request.mdp.terminal
+        if request.episode != self._episode:
+            self._episode, self._turn = request.episode, self._turn + 1
+            for seat in self._seats.values():
+                seat.begin()
+        votes = self._votes(request)
+        self._probe(request)
+        if not self._seats:
+            raise AdvisorLeft
+        if not votes:
+            return None
+        trusts = {name: seat.trust_in(request.state, self._ways) for name, seat in self._seats.items() if name in votes}
+        action = decided(votes, trusts, request.learner_action, self._decide)
+        if len({*votes.values()}) > 1:
+            self._tell(
+                AdvisorsDisagreed(request.episode, request.step, request.state, tuple(votes.items()), followed=action)
+            )
+        return action
+
+    def _votes(self, request: AdviceRequest) -> dict[str, int]:
+        """What those who count say, by name."""
+        heard = [name for name, seat in self._seats.items() if not seat.dropped]
+        if self._in_turn and heard:
+            first = self._turn % len(heard)
+            heard = heard[first:] + heard[:first]
+        votes: dict[str, int] = {}
+        for name in heard:
+            action = self._ask(name, request)
+            if action is not None:
+                votes[name] = action
+                if self._in_turn:
+                    break
+        return {name: votes[name] for name in self._seats if name in votes}
+
+    def _probe(self, request: AdviceRequest) -> None:
+        """Asks dropped members now and then; what they say is judged later."""
+        for name in [name for name, seat in self._seats.items() if seat.dropped]:
+            if self._draw() < PROBED:
+                self._ask(name, request)
+
+    def _ask(self, name: str, request: AdviceRequest) -> int | None:
+        try:
+            return self._seats[name].ask(request)
+        except AdvisorLeft:
+            del self._seats[name]
+            return None
+
+    def followed(self, walked: Walked) -> None:
+        """Learns from an episode where actions lead and judges all answers by it; drops and readmits."""
+        if not walked.trail:
+            return
+        over = self._terminal is not None and bool(self._terminal[walked.trail[-1][2]])
+        self._ways.walked(walked.trail, walked.reached, over)
+        for name, seat in self._seats.items():
+            seat.judge(walked.trail, self._ways)
+            if not seat.dropped and is_bad(seat.good, seat.bad):
+                self._drop(name, walked.episode)
+            elif seat.dropped and is_good(seat.good, seat.bad):
+                self._readmit(name, walked.episode)
+
+    def _drop(self, name: str, episode: int) -> None:
+        seat = self._seats[name]
+        why = f"{seat.good} of its {seat.good + seat.bad} answers that could be judged led nearer to the goal"
+        self._tell(AdvisorDropped(episode, name, trust(seat.good, seat.bad), why))
+        seat.dropped = True
+        seat.forget()
+
+    def _readmit(self, name: str, episode: int) -> None:
+        seat = self._seats[name]
+        seat.dropped = False
+        why = f"asked now and then, {seat.good} of its {seat.good + seat.bad} answers led nearer to the goal"
+        self._tell(AdvisorReadmitted(episode, name, trust(seat.good, seat.bad), why))
+
+    def standing(self) -> list[Member]:
+        """How the members stand that have not left, in the order in which they came."""
+        return [
+            Member(name, trust(seat.good, seat.bad), *bounds(seat.good, seat.bad), seat.dropped, seat.good, seat.bad)
+            for name, seat in self._seats.items()
+        ]
+
+
+def panel_of(
+    names: Sequence[str],
+    advisors: Sequence[Advisor | None],
+    states: int,
+    *,
+    decide: str,
+    asked: str,
+    draw: Draw,
+    tell: Callable[[Event], None],
+) -> Panel:
+    """A panel of advisors, those that are None left out; two of one name are "expert" and "expert 2".
+
+    Raises BadInput as `Panel` does.
+    """
+    members: dict[str, Advisor] = {}
+    for name, advisor in zip(names, advisors, strict=True):
+        if advisor is not None:
+            members[_free(name, members)] = advisor
+    return Panel(members, states, decide=decide, asked=asked, draw=draw, tell=tell)
+
+
+def _free(name: str, taken: Mapping[str, Advisor]) -> str:
+    number, found = 1, name
+    while found in taken:
+        number += 1
+        found = f"{name} {number}"
+    return found
