@@ -1,0 +1,298 @@
+"""What advice was worth: counted from a session's journal, for whoever gave it (thesis section 10.2.2)."""
+
+import json
+import textwrap
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from lab.advice.events import (
+    AdviceEnded,
+    AdviceGiven,
+    AdviceRejected,
+    AdviceRemembered,
+    AdviceRequested,
+    AdvisorDropped,
+    AdvisorReadmitted,
+    AdvisorsDisagreed,
+    EpisodeEnded,
+)
+from lab.advice.journal import Answer, Entry
+from lab.advice.trust import Difference, Pair, Skill, differences, skill_of, worse
+from lab.learning.settings import GateSettings
+from lab.mdp import FloatArray, TabularMDP
+
+Values = FloatArray | None
+
+WIDTH = 80
+LISTED = 8  # states in which something else was better
+SILENT, OVERRULED, UNHEARD = "nothing was said", "another advisor was followed", "dropped, asked only to be judged"
+
+
+@dataclass(frozen=True)
+class Voice:
+    """One of several advisors, as far as the journal knows.
+
+    whole: all that it said is on record, as of people; of others only what was disagreed about, which shows no skill.
+    said = followed + overruled + unheard; against_best: answers that were not the best, None where nobody knows.
+    """
+
+    name: str
+    whole: bool
+    said: int
+    followed: int
+    overruled: int
+    unheard: int
+    against_best: int | None
+    skill: Skill | None
+
+
+@dataclass(frozen=True)
+class Receipt:
+    """What the advice of a session was worth.
+
+    requests: episodes in which the learner asked; questions: the steps it asked about, taken of them with advice that was
+    carried out; refused: by reason, questions without advice and answers that were not carried out; remembered: steps made
+    from memory, without asking; helped_steps, episodes, guided: of finished episodes; better: guided ones with fewer steps
+    than the mean of the K before; mean_before, mean_after: of the K before the first guided one and the K after the last,
+    None without any; change_percent: from one to the other; agreed: taken, and the learner's own choice, too; into_walls,
+    into_obstacles: taken steps that stayed where they were, or ended the episode short of the goal; sent_back: states in
+    which advice led back to one asked about before in the episode; against_best: taken steps that were not the best,
+    differences: the LISTED most frequent of them, None and nothing where nobody knows; notices: rejections and the like;
+    hints: what would help more next time.
+    """
+
+    requests: int
+    questions: int
+    taken: int
+    refused: dict[str, int]
+    remembered: int
+    helped_steps: int
+    episodes: int
+    guided: int
+    better: int
+    mean_before: float | None
+    mean_after: float | None
+    change_percent: float | None
+    agreed: int
+    into_walls: int
+    into_obstacles: int
+    sent_back: int
+    against_best: int | None
+    differences: tuple[Difference, ...]
+    skill: Skill | None
+    voices: tuple[Voice, ...]
+    notices: tuple[str, ...]
+    hints: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain lists, dictionaries, numbers and text."""
+        document: dict[str, Any] = json.loads(json.dumps(asdict(self), allow_nan=False))
+        return document
+
+    def lines(self) -> list[str]:
+        """Plain text, at most WIDTH wide."""
+        plain = ("".join(one if one.isprintable() else "?" for one in line) for line in _lines(self))
+        return [part for line in plain for part in textwrap.wrap(line, WIDTH, subsequent_indent="    ")]
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What was asked, and who said what; heard: whose word counted where they disagreed."""
+
+    given: AdviceGiven
+    said: dict[str, int]
+    heard: frozenset[str]
+
+
+def receipt(entries: Sequence[Entry], mdp: TabularMDP, values: Values, window: int = GateSettings.window) -> Receipt:
+    """The receipt for the effective entries of a journal; values: optimal ones (S, A), None where nobody knows them.
+
+    window: K of the moving averages. Entries of states and actions that the problem does not have count as answers only.
+    """
+    questions = list(_questions(entries))
+    taken = [(one.given.state, one.given.action) for one in questions if one.given.action is not None]
+    there = _there(taken, mdp)
+    led = [int(mdp.successor[pair]) for pair in there]
+    voices = _voices(questions, {one.by for one in entries if isinstance(one, Answer)}, mdp, values)
+    wrong = None if values is None else worse(there, values)
+    counted = Receipt(
+        requests=sum(isinstance(one, AdviceRequested) for one in entries),
+        questions=len(questions),
+        taken=len(taken),
+        refused=_refused(questions, voices),
+        remembered=sum(one.steps for one in entries if isinstance(one, AdviceRemembered)),
+        agreed=sum(one.given.action == one.given.own for one in questions),
+        into_walls=sum(entered == state for (state, _), entered in zip(there, led, strict=True)),
+        into_obstacles=sum(bool(mdp.terminal[entered] and not mdp.goal[entered]) for entered in led),
+        sent_back=len(_sent_back(questions, mdp)),
+        against_best=None if wrong is None else sum(wrong.values()),
+        differences=() if wrong is None or values is None else differences(wrong, mdp, values, LISTED),
+        skill=None if values is None else skill_of(there, values),
+        voices=voices if len(voices) > 1 else (),
+        notices=tuple(_notices(entries)),
+        **_episodes([one for one in entries if isinstance(one, EpisodeEnded)], window),
+    )
+    return replace(counted, hints=tuple(_hints(counted, entries, window)))
+
+
+def _questions(entries: Iterable[Entry]) -> Iterator[_Question]:
+    """Each question with all that is known of what was said to it."""
+    said: dict[str, int] = {}
+    heard: frozenset[str] = frozenset()
+    for entry in entries:
+        if isinstance(entry, Answer) and entry.action is not None:
+            said[entry.by] = entry.action
+        elif isinstance(entry, AdvisorsDisagreed):
+            said |= dict(entry.said)
+            heard = frozenset(name for name, _ in entry.said)
+        elif isinstance(entry, AdviceGiven | EpisodeEnded):
+            if isinstance(entry, AdviceGiven):
+                yield _Question(entry, said, heard)
+            said, heard = {}, frozenset()
+
+
+def _there(pairs: Iterable[Pair], mdp: TabularMDP) -> list[Pair]:
+    return [(s, a) for s, a in pairs if 0 <= s < mdp.n_states and 0 <= a < mdp.n_actions]
+
+
+def _voices(of: Sequence[_Question], people: Collection[str], mdp: TabularMDP, values: Values) -> tuple[Voice, ...]:
+    found = []
+    for name in dict.fromkeys(name for one in of for name in one.said):
+        own = [one for one in of if name in one.said]
+        followed = sum(one.said[name] == one.given.action for one in own)
+        overruled = sum(one.said[name] != one.given.action and name in one.heard for one in own)
+        said = _there([(one.given.state, one.said[name]) for one in own], mdp)
+        against = None if values is None else sum(worse(said, values).values())
+        skill = skill_of(said, values) if values is not None and name in people else None
+        unheard = len(own) - followed - overruled
+        found.append(Voice(name, name in people, len(own), followed, overruled, unheard, against, skill))
+    return tuple(found)
+
+
+def _refused(questions: Sequence[_Question], voices: Sequence[Voice]) -> dict[str, int]:
+    counts = {
+        SILENT: sum(one.given.action is None for one in questions),
+        OVERRULED: sum(one.overruled for one in voices),
+        UNHEARD: sum(one.unheard for one in voices),
+    }
+    return {reason: count for reason, count in counts.items() if count}
+
+
+def _sent_back(questions: Iterable[_Question], mdp: TabularMDP) -> set[int]:
+    """The states from which advice led back to a state that was asked about before in the same episode."""
+    found: set[int] = set()
+    seen: set[int] = set()
+    episode, last = None, 0
+    for given in (one.given for one in questions):
+        if given.episode != episode or given.step <= last:
+            seen.clear()
+        episode, last = given.episode, given.step
+        for state, action in _there([] if given.action is None else [(given.state, given.action)], mdp):
+            entered = int(mdp.successor[state, action])
+            if entered in seen and entered != state:
+                found.add(state)
+        seen.add(given.state)
+    return found
+
+
+def _mean(episodes: Sequence[EpisodeEnded]) -> float | None:
+    return sum(one.steps for one in episodes) / len(episodes) if episodes else None
+
+
+def _judged(ended: Sequence[EpisodeEnded], window: int) -> list[bool]:
+    """Whether each guided episode was better than the mean of the K before it; the first one cannot be."""
+    means = [_mean(ended[max(0, n - window) : n]) for n in range(len(ended))]
+    return [mean is not None and one.steps < mean for one, mean in zip(ended, means, strict=True) if one.guided]
+
+
+def _episodes(ended: Sequence[EpisodeEnded], window: int) -> dict[str, Any]:
+    guided = [n for n, one in enumerate(ended) if one.guided]
+    before = _mean(ended[max(0, guided[0] - window) : guided[0]]) if guided else None
+    after = _mean(ended[guided[-1] + 1 : guided[-1] + 1 + window]) if guided else None
+    return {
+        "helped_steps": sum(one.helped_steps for one in ended),
+        "episodes": len(ended),
+        "guided": len(guided),
+        "better": sum(_judged(ended, window)),
+        "mean_before": before,
+        "mean_after": after,
+        "change_percent": 100.0 * (after / before - 1.0) if before and after is not None else None,
+    }
+
+
+def _notices(entries: Sequence[Entry]) -> Iterator[str]:
+    """What became of the advice, in words."""
+    for n, entry in enumerate(entries):
+        if isinstance(entry, AdviceRejected):
+            left = sum(isinstance(one, EpisodeEnded) for one in entries[n:])
+            why = f"{_count(entry.misleads, 'episode')} no better than before, {entry.omega} tolerated"
+            yield f"episode {entry.episode}: advice rejected ({why}); alone for the {_count(left, 'episode')} after it"
+        elif isinstance(entry, AdviceEnded):
+            yield f"episode {entry.episode}: no more advice: {entry.reason}"
+        elif isinstance(entry, AdvisorDropped | AdvisorReadmitted):
+            what = "dropped" if isinstance(entry, AdvisorDropped) else "heard again"
+            yield f"episode {entry.episode}: {entry.advisor} {what}: {entry.why}"
+
+
+def _hints(of: Receipt, entries: Sequence[Entry], window: int) -> Iterator[str]:
+    """What would help more next time, each from the numbers that say so."""
+    ended = [one for one in entries if isinstance(one, EpisodeEnded)]
+    if not of.taken:
+        if of.questions:
+            yield f"it asked about {_count(of.questions, 'step')} and was never advised: an answer shows it a way at once"
+        return
+    if 2 * of.agreed > of.taken:
+        yield f"most of your help, {of.agreed} of {of.taken} steps, was what it would have done by itself: help elsewhere"
+    if of.sent_back:
+        yield f"in {_count(of.sent_back, 'state')} your advice sent it back to where it had been in that episode"
+    for steps, what in ((of.into_walls, "against a wall"), (of.into_obstacles, "into an obstacle")):
+        if steps:
+            yield f"{_count(steps, 'step')} of yours went {what}"
+    if of.against_best is not None and 4 * of.against_best > of.taken:
+        yield f"in {of.against_best} of {of.taken} steps another action was better: see the list"
+    if 2 * of.refused.get(SILENT, 0) > of.questions:
+        yield f"you left {of.refused[SILENT]} of {of.questions} questions to it: answer more of them"
+    first = next((one.episode for one in ended if one.guided), 0)
+    late = sum(isinstance(one, AdviceRequested) and one.episode < first for one in entries)
+    if late:
+        yield f"earlier: it had asked in {_count(late, 'episode')} before you helped for the first time"
+    judged = _judged(ended, window)
+    half = len(judged) // 2
+    if half >= 2 and 2 * sum(judged[-half:]) < sum(judged[:half]):
+        early, later = sum(judged[:half]), sum(judged[-half:])
+        yield f"shorter: {early} of the first {half} guided episodes were better than before, {later} of the last {half}"
+
+
+def _lines(of: Receipt) -> Iterator[str]:
+    asked = f"{_count(of.requests, 'episode')} about {_count(of.questions, 'step')}"
+    yield f"advice: it asked in {asked}; {of.taken} of them with your help"
+    if of.refused:
+        yield "  not followed: " + ", ".join(f"{count} ({reason})" for reason, count in of.refused.items())
+    guided = f"{_count(of.guided, 'guided episode')}, {of.better} of them better than before"
+    yield f"  {_count(of.helped_steps, 'helped step')} in {guided}"
+    if of.remembered:
+        yield f"  {_count(of.remembered, 'step')} more from memory, without asking"
+    if of.change_percent is not None:
+        yield (
+            f"  mean steps {of.mean_before:.1f} before the first of them, {of.mean_after:.1f} after the last "
+            f"({of.change_percent:+.0f} %; what it learned by itself is in it)"
+        )
+    yield f"  {of.agreed} of {of.taken} were its own choice, too"
+    if of.skill is not None:
+        yield f"  skill {of.skill}"
+    if of.against_best:
+        yield f"  another action was better in {_count(of.against_best, 'step')}:"
+        for one in of.differences:
+            yield f"    {one.label}: said {one.said}, best {' or '.join(one.best)} ({one.times} x)"
+    for voice in of.voices:
+        against = "" if voice.against_best is None else f", {voice.against_best} times not the best"
+        skill = "" if voice.skill is None else f"; skill {voice.skill}"
+        record = "answer" if voice.whole else "disputed answer"
+        yield f"  {voice.name}: {_count(voice.said, record)}, {voice.followed} followed{against}{skill}"
+    yield from (f"  {notice}" for notice in of.notices)
+    yield from (f"  next time: {hint}" for hint in of.hints)
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + "s" * (number != 1)
