@@ -11,7 +11,7 @@ from lab.studies import STUDIES
 from lab.studies.runner import STORE, Job, Progress
 
 TABLES = ("learned", "exact")
-WITH_ADVISORS = (*(f"table-9.{n}" for n in (2, 3, 4, 5)), "appendix-v", "chapter-9")
+WITH_ADVISORS = (*(f"table-9.{n}" for n in (2, 3, 4, 5)), "appendix-v", "chapter-9", "advice-budget", "advisors")
 
 
 def run_study(

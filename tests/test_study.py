@@ -203,7 +203,7 @@ def test_a_study_to_read(lab: Lab, folder: Path) -> None:
         ),
         ("study rum", "no such command 'rum'"),
         ("task reconstruct --out w.txt", "task file 'w.txt' (--out): its name must end in .toml"),
-        ("teach world-1 --advisor recorded:missing", "advisor 'recorded:missing': cannot be read: "),
+        ("teach world-1 --advisor recorded:missing", "journal 'missing' (--advisor): cannot be read: "),
         ("teach world-1 --advisor recorded:", "advisor 'recorded:"),
     ],
 )
@@ -244,25 +244,19 @@ def test_recorded_advice_leads_another_session(lab: Lab, folder: Path) -> None:
     """An expert is asked about every step, and what was said leads a learner with a toolbox of its own the same way."""
     (folder / "maze.txt").write_text(GRID, encoding="utf-8")
     words = ("teach", "maze.txt", "--gate", "always", "--episodes", "20", "--json")
-    first = lab(*words, "--advisor", "expert", "--record", "said.jsonl")
+    first = lab(*words, "--advisor", "expert", "--out", "said")
     assert (first.code, first.err) == (0, "")
-    said = [json.loads(line) for line in (folder / "said.jsonl").read_text(encoding="utf-8").splitlines()]
+    lines = [json.loads(line) for line in (folder / "said" / "events.jsonl").read_text(encoding="utf-8").splitlines()]
+    said = [line for line in lines if line["kind"] == "advice"]
     assert len(said) == first.json["helped_steps"] == sum(first.json["steps_per_episode"]) >= 100
-    again = lab(*words, "--advisor", "recorded:said.jsonl", "--toolbox", "other")
-    assert (again.code, again.err, again.json["advisor"]) == (0, "", "recorded:said.jsonl")
+    again = lab(*words, "--advisor", "recorded:said", "--toolbox", "other")
+    assert (again.code, again.err, again.json["advisor"]) == (0, "", "recorded:said")
     assert again.json["steps_per_episode"] == [again.json["optimal_steps"]] * 20 == [5] * 20
     assert again.json["helped_steps"] == 100
-
-
-def test_a_record_grows_and_is_of_one_problem(lab: Lab, folder: Path) -> None:
-    (folder / "maze.txt").write_text(GRID, encoding="utf-8")
     (folder / "other.txt").write_text(GRID.replace("##", ".."), encoding="utf-8")
-    words = ("--gate", "always", "--episodes", "2", "--advisor", "expert", "--record", "said.jsonl", "--json")
-    helped = [lab("teach", "maze.txt", *words, "--toolbox", box).json["helped_steps"] for box in ("a", "b")]
-    assert len((folder / "said.jsonl").read_text(encoding="utf-8").splitlines()) == sum(helped)
-    ran = lab("teach", "other.txt", "--advisor", "recorded:said.jsonl")
+    ran = lab("teach", "other.txt", "--advisor", "recorded:said")
     assert (ran.code, ran.out) == (2, "")
-    assert ran.err.startswith("lab: advisor 'recorded:said.jsonl': it holds no advice about this problem (")
+    assert ran.err.startswith("lab: advisor 'recorded:said': it is advice about another problem, 'maze' (")
 
 
 def test_an_advisor_table_where_there_is_none_to_choose(folder: Path) -> None:

@@ -65,6 +65,18 @@ def _flat(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return flat(job, reading)
 
 
+def _advice_budget(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.budget import advice_budget
+
+    return advice_budget(job, reading)
+
+
+def _advisors(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.advisors import advisors
+
+    return advisors(job, reading)
+
+
 def _speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.speed import speed
 
@@ -84,6 +96,8 @@ STUDIES: dict[str, Study] = {
     "readings": Study(
         "Readings of chapter 9: what the thesis leaves open, and what comes nearest", _chapter(9, "readings")
     ),
+    "advice-budget": Study("Success against helped steps: every gate with and without memory", _advice_budget),
+    "advisors": Study("Several advisors at once, beside the best and the worst of them alone", _advisors),
     "table-7.4": Study("Table 7.4: sequencing case I by session length", _chapter(7, "table_7_4")),
     "table-7.5": Study("Table 7.5: sequencing case II by session length", _chapter(7, "table_7_5")),
     "table-7.6": Study("Table 7.6: sequencing case III by session length", _chapter(7, "table_7_6")),

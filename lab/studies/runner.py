@@ -38,6 +38,7 @@ class Setting:
     tau None: nobody advises. lambda_threshold, omega and psi are those of the gates that have them. advisor_table:
     "exact" optimal values, or "learned" (see `learned_values`). beta and learner None: the world's own. judge_unhelped:
     see GateSettings. success: the "last" episode took the shortest way, or "any" did. table_seed: another learned table.
+    memory: advice is remembered, see GateSettings; wrong: the advisor takes the worst action for the best.
     """
 
     world: str
@@ -53,6 +54,8 @@ class Setting:
     judge_unhelped: bool | None = None
     success: Literal["last", "any"] = "last"
     table_seed: int | None = None
+    memory: bool = False
+    wrong: bool = False
 
     def __post_init__(self) -> None:
         for name in ("tau", "lambda_threshold", "psi", "beta"):  # 1 and 1.0 are the same setting
@@ -62,7 +65,16 @@ class Setting:
     def key(self, sessions: int, seed: int) -> str:
         """What names this setting's results among all that are stored."""
         place = world(self.world).model_dump(mode="json")
-        whole = [FORMAT, asdict(self), sessions, seed, place, LEARNED_EPISODES, LEARNED_BETA, LEARNED_SEED]
+        whole = [
+            FORMAT,
+            asdict(self, dict_factory=_named),
+            sessions,
+            seed,
+            place,
+            LEARNED_EPISODES,
+            LEARNED_BETA,
+            LEARNED_SEED,
+        ]
         return sha256(json.dumps(whole).encode()).hexdigest()[:24]
 
 
@@ -85,6 +97,11 @@ class Outcome:
         if not success.shape == helped.shape == requests.shape == (len(success),):
             raise ValueError("three lists of one length are wanted")
         return cls(success.astype(bool), helped, requests)
+
+
+def _named(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """What seeds and stored results go by: a switch that was added later counts only where it is on."""
+    return {name: value for name, value in pairs if name not in ("memory", "wrong") or value}
 
 
 _FIELDS = ("success", "helped_steps", "requests")
@@ -239,7 +256,7 @@ def _exact_values(name: str) -> FloatArray:
 
 def seeds_of(setting: Any, sessions: int, seed: int) -> NDArray[np.uint64]:
     """The seeds (N,) of a setting's sessions, whichever dataclass it is: its own, whoever runs it."""
-    digest = sha256(json.dumps(asdict(setting)).encode()).digest()
+    digest = sha256(json.dumps(asdict(setting, dict_factory=_named)).encode()).digest()
     rng = np.random.default_rng([seed, int.from_bytes(digest[:8], "big")])
     return rng.integers(2**64, size=sessions, dtype=np.uint64)
 
@@ -283,7 +300,10 @@ def _learned(setting: Setting, seeds: NDArray[np.uint64]) -> tuple["Batch", Lear
         learned = setting.advisor_table == "learned"
         seed = LEARNED_SEED if setting.table_seed is None else setting.table_seed
         table = learned_values(setting.world, seed) if learned else _exact_values(setting.world)
-        advice = Advice.of(skill(table, setting.tau), place.region() if setting.view == "limited" else None)
+        advice = Advice.of(
+            skill(-table if setting.wrong else table, setting.tau),
+            place.region() if setting.view == "limited" else None,
+        )
     gate = gate_of(setting, place.gate)
     return run_sessions(_problem(setting.world), learner, gate, advice, seeds), learner
 
@@ -292,7 +312,7 @@ def gate_of(setting: Setting, gate: GateSettings) -> GateSettings:
     """The world's gate with what the setting says."""
     changes: dict[str, Any] = {
         name: getattr(setting, name)
-        for name in ("gate", "lambda_threshold", "omega", "psi", "judge_unhelped")
+        for name in ("gate", "lambda_threshold", "omega", "psi", "judge_unhelped", "memory")
         if getattr(setting, name) is not None
     }
     return replace(gate, **changes)

@@ -96,6 +96,8 @@ CHANGES: dict[str, Any] = {
     "advisor_table": "exact",
     "learner": "q",
     "judge_unhelped": False,
+    "memory": True,
+    "wrong": True,
     "success": "any",
     "table_seed": 5,
 }
