@@ -1,16 +1,20 @@
 """The prompt that asks a person which part to move next."""
 
+import threading
 from collections.abc import Iterator
 from io import StringIO
 
 import pytest
+from prompt_toolkit.input import create_pipe_input
+from prompt_toolkit.output import DummyOutput
 from rich.console import Console
 
-from lab.advice.advisors import AdvisorLeft
+from lab.advice.requests import AdvisorLeft
 from lab.sequencing.advised import SequenceRequest
 from lab.sequencing.run import Run
 from lab.taskfile import load_cell
 from lab.view.order_prompt import OrderPrompt
+from lab.view.reader import TerminalReader
 
 
 def request(own: int = 1, episode: int = 30) -> SequenceRequest:
@@ -20,7 +24,7 @@ def request(own: int = 1, episode: int = 30) -> SequenceRequest:
     return SequenceRequest(run, run.allowed(), own, episode, 0.012, 606.0, 613.4, "its improvement is +1.2%, below 5%")
 
 
-def prompt(*lines: str) -> tuple[OrderPrompt, StringIO]:
+def prompt(*lines: str, width: int = 100, plain: bool = False) -> tuple[OrderPrompt, StringIO]:
     said: Iterator[str] = iter(lines)
 
     def read_line(text: str) -> str:
@@ -30,7 +34,7 @@ def prompt(*lines: str) -> tuple[OrderPrompt, StringIO]:
             raise EOFError from None
 
     written = StringIO()
-    return OrderPrompt(Console(file=written, width=100, no_color=True), read_line), written
+    return OrderPrompt(Console(file=written, width=width, height=25, no_color=True), read_line, plain), written
 
 
 @pytest.mark.parametrize(("line", "expected"), [("2", 2), (" 3 ", 3), ("", 1), ("skip", None), ("SKIP", None)])
@@ -55,9 +59,59 @@ def test_what_is_shown() -> None:
     assert means in " ".join(shown.split())
     assert "57 s: the robot is at toaster." in shown  # 21 s from the buffer to the plate, 36 s to the toaster
     rows = [line.split() for line in shown.splitlines() if line.strip().startswith(("1 ", "2 ", "3 "))]
-    assert rows[0] == ["1", "toast", "1", "toaster", "butter_applier", "60", "s"]
+    assert rows[0] == ["1", "toast", "1", "toaster", "butter_applier", "60", "s", "its", "own", "choice"]
     assert rows[1] == ["2", "toast", "2", "plate", "toaster_buffer", "now"]
-    assert "'9' is none of the moves: type 1, 2, 3, enter, skip, auto, ?" in shown
+    assert "'9' is none of the moves: type 1, 2, 3, enter, why, skip, auto, quit or ?" in shown
     assert "auto: it goes on alone from here" in shown
     ask(request())
     assert written.getvalue().count("Episode 30") == 1, "an episode is announced once"
+
+
+def test_quit_ends_the_session() -> None:
+    ask, _ = prompt("quit")
+    with pytest.raises(KeyboardInterrupt):
+        ask(request())
+
+
+def test_why_and_undo_are_answered_and_the_question_waits() -> None:
+    ask, written = prompt("why", "undo", "qiut", "2\x1b[2J", "3")
+    assert ask(request()) == 3
+    shown = " ".join(written.getvalue().split())
+    assert "It asks because its improvement is +1.2%, below 5%: the last episodes cost 606 on average" in shown
+    assert "It would move toast 1 to butter_applier itself (1), one of 3 moves." in shown
+    assert "An order cannot be taken back here" in shown
+    assert "'qiut' is none of the moves: did you mean 'quit'? type 1, 2, 3, enter" in shown
+    assert "\x1b" not in shown
+
+
+@pytest.mark.parametrize(("width", "plain"), [(34, False), (80, True)])
+def test_narrow_and_plain_consoles_get_words(width: int, plain: bool) -> None:
+    ask, written = prompt("?", "1", width=width, plain=plain)
+    assert ask(request()) == 1
+    shown = written.getvalue()
+    assert max(map(len, shown.splitlines())) <= width
+    assert "Move 1: toast 1 from toaster to butter_applier, ready in 60 s, its own choice." in " ".join(shown.split())
+    assert "Move 2: toast 2 from plate to toaster_buffer, ready now." in " ".join(shown.split())
+
+
+def test_a_page_may_answer_instead() -> None:
+    """A real thread speaks once the terminal's prompt is drawn."""
+    drawn = threading.Event()
+
+    class Screen(DummyOutput):
+        def write(self, data: str) -> None:
+            drawn.set()
+
+    console = Console(file=StringIO(), width=100)
+    with create_pipe_input() as pipe:
+        ask = OrderPrompt(console, TerminalReader(console, pipe, Screen()))
+        ask.answer_from_outside("3")  # nothing waits
+
+        def page() -> None:
+            drawn.wait()
+            ask.answer_from_outside("2")
+
+        thread = threading.Thread(target=page)
+        thread.start()
+        assert ask(request()) == 2
+        thread.join()
