@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from getpass import getuser
 from importlib.util import find_spec
 from pathlib import Path
+from secrets import token_urlsafe
 from socket import gethostname
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -22,10 +23,16 @@ from lab.view.frames import Body, Camera, Frame, Recording
 
 if TYPE_CHECKING:
     from lab.view.keyframes import Motion, Track
-    from lab.view.server import Server
+    from lab.view.server import File, Server
+    from lab.view.server_page import Panel
 
 HERE = Path(__file__).parent
-RULES = "default-src 'none'; img-src data: blob:; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'"
+# meshcat's viewer, and dat.gui in it, bring their styles as elements of their own: nothing else may be inline when served
+SERVED = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "
+    "connect-src 'self' ws://127.0.0.1:* ws://localhost:*; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+RULES = "default-src 'none'; img-src data: blob:; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
 OFFLINE = f'<meta http-equiv="Content-Security-Policy" content="{RULES}">'
 
 
@@ -33,24 +40,28 @@ class LiveView:
     """A page on 127.0.0.1 that shows what happens while it happens; a context manager.
 
     `port` 0 takes any free one. `replay`: serve this file of `replay_html` instead of a live page. Entering raises
-    BadInput for a port it cannot have and a replay that cannot be read. Nothing that a page does reaches the run: a slow
-    page skips frames, what it sends is dropped, and leaving the context never waits longer than about 3 s.
+    BadInput for a port it cannot have and a replay that cannot be read. Only who knows `url`, with the token in it, gets
+    the page. Nothing that a page does reaches the run: a slow page skips frames, what it sends is dropped unless there is
+    a panel to hear it, and leaving the context never waits longer than about 3 s.
     """
+
+    _panel: "Panel | None" = None
 
     def __init__(self, port: int = 0, *, title: str = "Teaching lab, live", replay: Path | None = None) -> None:
         self._wanted, self._title, self._replay = port, title, replay
         self._server: Server | None = None
+        self._token = ""
         self._shown: dict[str, tuple[float, ...] | None] = {}
 
     def __enter__(self) -> Self:
-        from lab.view.server import Server
+        from lab.view.server import File, Server
 
-        script = viewer_script()
+        self._token = token_urlsafe(16)
         if self._replay is None:
-            page = _page(self._title, {}, viewer=f'<script src="{script.name}"></script>')
+            files = self._files()
         else:
-            page = _read(self._replay)
-        self._server = Server(self._wanted, page, script)
+            files = {"": File(_read(self._replay).encode(), "text/html", f"{RULES}; frame-ancestors 'none'")}
+        self._server = Server(self._wanted, files, self._token, self._panel)
         self._server.start()
         return self
 
@@ -59,6 +70,27 @@ class LiveView:
     ) -> None:
         self.close()
 
+    def _files(self) -> "dict[str, File]":
+        """The page and what it loads, each by an address with the token in it."""
+        from lab.view.server import File
+
+        panel = self._panel is not None
+        scripts = [
+            "main.min.js",
+            *(["seat_draw.js", "seat_side.js", "seat_map.js", "seat.js"] if panel else []),
+            "page.js",
+        ]
+        styles = ["page.css", *(["seat.css"] if panel else [])]
+        ask = f"?token={self._token}"
+        viewer = "\n".join(f'<script src="{name}{ask}"></script>' for name in scripts)
+        looks = "\n".join(f'<link rel="stylesheet" href="{name}{ask}">' for name in styles)
+        seat = (HERE / "seat.html").read_text(encoding="utf-8") if panel else ""
+        page = _page(self._title, {}, styles=looks, scripts=viewer, panel=seat)
+        files = {"": File(page.encode(), "text/html", SERVED)}
+        files |= {name: File((HERE / name).read_bytes(), "text/css") for name in styles}
+        files |= {name: File((HERE / name).read_bytes(), "text/javascript") for name in scripts[1:]}
+        return files | {"main.min.js": File(viewer_script().read_bytes(), "text/javascript")}
+
     @property
     def port(self) -> int:
         """The port that it listens on."""
@@ -66,8 +98,8 @@ class LiveView:
 
     @property
     def url(self) -> str:
-        """The page's address on this computer."""
-        return f"http://127.0.0.1:{self.port}/"
+        """The page's address on this computer, with the token that it wants."""
+        return f"http://127.0.0.1:{self.port}/?token={self._token}"
 
     @property
     def hint(self) -> str:
@@ -84,7 +116,7 @@ class LiveView:
         Raises BadInput for a mesh that cannot be read and for two bodies of one name.
         """
         from lab.view.scene import describe
-        from lab.view.server import News
+        from lab.view.server_page import News
 
         scene = describe(bodies, camera or Camera())
         self._shown = {body.name: None for body in bodies}
@@ -95,7 +127,7 @@ class LiveView:
 
         Returns at once; after `close` it does nothing. Raises BadInput when it names a body that was not shown.
         """
-        from lab.view.server import News
+        from lab.view.server_page import News
 
         for name in (*frame.poses, *frame.colors, *frame.visible):
             if name not in self._shown:
@@ -145,10 +177,12 @@ def replay_html(recording: Recording, path: Path, speed: float = 8.0, title: str
     start_s = recording.frames[0].time_s if recording.frames else 0.0
     data = {"scene": scene, "speed": speed, "start_s": start_s, "duration_s": recording.duration_s}
     script = viewer_script()
-    viewer = f"<script>{script.read_text(encoding='utf-8')}</script>"
+    own = (HERE / "page.js").read_text(encoding="utf-8")
+    scripts = f"<script>{script.read_text(encoding='utf-8')}</script>\n<script>{own}</script>"
+    styles = f"<style>{(HERE / 'page.css').read_text(encoding='utf-8')}</style>"
     notice = script.with_name(f"{script.name}.LICENSE.txt")
     licences = notice.read_text(encoding="utf-8") if notice.is_file() else ""
-    text = _page(title, data, viewer=viewer, policy=OFFLINE, licences=licences)
+    text = _page(title, data, styles=styles, scripts=scripts, policy=OFFLINE, licences=licences)
     _write(Path(path), text)
     return Path(path)
 
@@ -180,17 +214,27 @@ def viewer_script() -> Path:
     )
 
 
-def _page(title: str, data: Mapping[str, Any], *, viewer: str, policy: str = "", licences: str = "") -> str:
+def _page(
+    title: str,
+    data: Mapping[str, Any],
+    *,
+    styles: str,
+    scripts: str,
+    panel: str = "",
+    policy: str = "",
+    licences: str = "",
+) -> str:
     """page.html with its places filled; the title is text, and data cannot end the script element that holds it."""
     parts = {
         "title": html.escape(title),
         "data": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
-        "viewer": viewer,
+        "styles": styles,
+        "scripts": scripts,
+        "panel": panel,
         "policy": policy,
         "licences": f"<!-- meshcat, (c) 2018 Robin Deits, MIT licence, with:\n{licences.replace('--', '- -')}\n-->"
         if licences
         else "",
-        "script": (HERE / "page.js").read_text(encoding="utf-8"),
     }
     return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], (HERE / "page.html").read_text(encoding="utf-8"))
 

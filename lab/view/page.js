@@ -5,8 +5,22 @@
 const data = JSON.parse(document.getElementById("lab-data").textContent);
 const THREE = MeshCat.THREE;
 const LAB = "lab";
+const panel = typeof seat === "undefined" ? null : seat; // seat.js, on pages with a teaching seat
 var viewer; // a global by this name, as on meshcat's own pages
-let floorPending = true;
+const SLOW_MS = 40; // a picture that takes longer is made plainer
+const PLAINER = [
+  () => {
+    viewer.renderer.shadowMap.type = THREE.BasicShadowMap;
+    viewer.renderer.setPixelRatio(0.75 * window.devicePixelRatio);
+    const { shadow } = viewer.scene_tree.find(["Lights", "Lamp", "<object>"]).object;
+    shadow.mapSize.set(1024, 1024);
+    if (shadow.map) shadow.map.dispose();
+    shadow.map = null;
+  },
+  () => { viewer.renderer.shadowMap.enabled = false; },
+];
+let floorPending = true, timed = false;
+let lookedFrom = "";
 
 function note(text) {
   document.getElementById("note").textContent = text;
@@ -113,7 +127,8 @@ function showScene(scene) {
       place([LAB, body.name, String(number)], shape.pose);
     });
   }
-  lookFrom(scene.camera);
+  if (lookedFrom !== JSON.stringify(scene.camera)) lookFrom(scene.camera); // after a reconnection: where it was turned to
+  lookedFrom = JSON.stringify(scene.camera);
   floorPending = true;
   viewer.set_dirty();
 }
@@ -128,16 +143,58 @@ function showFrame(frame) {
   viewer.set_dirty();
 }
 
-function follow() {
-  const socket = new WebSocket(new URL("frames", location.href.replace(/^http/, "ws")));
-  note("waiting for the first frame");
-  socket.onmessage = (event) => {
-    const { scene, frame } = JSON.parse(event.data);
-    if (scene) showScene(scene);
-    showFrame(frame);
-    if (frame.time_s !== null) note(`${frame.time_s.toFixed(1)} s`);
+// Milliseconds for a picture that is really drawn
+function drawingTime() {
+  const gl = viewer.renderer.getContext(), pixel = new Uint8Array(4);
+  const draw = () => {
+    viewer.render();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
   };
-  socket.onclose = () => note("the run has ended: this is its last picture");
+  draw(); // shaders are compiled first
+  const began = performance.now();
+  draw();
+  return performance.now() - began;
+}
+
+// Without a GPU pictures take long: on a page that is answered, plainer ones follow the robot in time
+function keepUp(steps) {
+  if (!steps.length || drawingTime() < SLOW_MS) return;
+  steps[0]();
+  panel.spare();
+  viewer.scene.traverse((object) => { if (object.material) object.material.needsUpdate = true; });
+  viewer.set_dirty();
+  setTimeout(keepUp, 0, steps.slice(1));
+}
+
+function follow(pause = 300) {
+  const socket = new WebSocket(new URL(`frames${location.search}`, location.href.replace(/^http/, "ws")));
+  socket.onopen = () => {
+    pause = 300;
+    if (panel) panel.connected((message) => socket.send(JSON.stringify(message)));
+  };
+  socket.onmessage = (event) => {
+    const { scene, frame, seat: parts, refusal } = JSON.parse(event.data);
+    if (scene && viewer) showScene(scene);
+    if (frame && viewer) showFrame(frame);
+    if (panel && viewer && !timed && !floorPending) {
+      timed = true;
+      setTimeout(keepUp, 0, PLAINER);
+    }
+    if (frame && frame.time_s !== null) note(`${frame.time_s.toFixed(1)} s`);
+    if (panel && scene) panel.hasScene();
+    if (panel && parts) panel.update(parts);
+    if (panel && refusal) panel.refused(refusal);
+  };
+  socket.onclose = ({ code, reason }) => {
+    if (code === 1001 && reason) {
+      note(`${reason}: this is its last picture`);
+      if (panel) panel.over();
+      return;
+    }
+    note("connection lost: trying again");
+    if (panel) panel.lost();
+    setTimeout(follow, pause, Math.min(2 * pause, 3000));
+  };
 }
 
 function smoothTrack(name, type, { times, values }) {
@@ -214,16 +271,28 @@ function steer(animator, start_s, duration_s) {
   show();
 }
 
+// The picture fills its pane, whatever the pane does; meshcat's own way takes the window's height
+function fitPane(pane) {
+  const fit = viewer.set_3d_pane_size.bind(viewer);
+  viewer.set_3d_pane_size = () => fit(pane.clientWidth || 1, pane.clientHeight || 1);
+  new ResizeObserver(viewer.set_3d_pane_size).observe(pane);
+}
+
 function begin() {
   try {
     viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+    furnish();
+    fitPane(document.getElementById("meshcat-pane"));
   } catch (reason) {
     note(`this page needs WebGL: ${reason.message}`);
-    return;
+    if (data.scene) return;
   }
-  furnish();
-  if (data.scene) replay(data);
-  else follow();
+  if (data.scene) {
+    replay(data);
+  } else {
+    note("waiting for the first frame");
+    follow();
+  }
 }
 
 begin();

@@ -1,69 +1,70 @@
 """The live page's server: HTTP and a websocket for each page on 127.0.0.1, in a thread of its own.
 
 A page gets what changed since it was last sent something, at most 60 times a second: a slow page skips frames, it
-neither holds up the run nor lets messages pile up. What a page sends is dropped.
+neither holds up the run nor lets messages pile up. What a page sends goes to the panel, if there is one.
 """
 
 import asyncio
-import json
+import secrets
 import socket
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
+from urllib.parse import urlsplit
 
-from tornado.httpserver import HTTPServer
-from tornado.iostream import StreamClosedError
-from tornado.web import Application, RequestHandler, StaticFileHandler
-from tornado.websocket import WebSocketClosedError, WebSocketHandler
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.websockets import WebSocket
+from uvicorn import Config
+from uvicorn import Server as Uvicorn
 
 from lab.errors import BadInput, WorkFailed
+from lab.view.server_page import PAUSE_S, News, Page, Panel
 
 ADDRESS = "127.0.0.1"
-HOSTS = r"(127\.0\.0\.1|localhost)"  # also through a forwarded port; no other name may lead here
-FLUSH_S, STOP_S = 0.5, 3.0
-PAUSE_S = 1 / 60
+HOSTS = ("127.0.0.1", "localhost")  # also through a forwarded port; no other name may lead here
+FLUSH_S, GRACE_S, STOP_S = 0.5, 1, 3.0
+POLL_S = 0.2  # how often the panel is asked whether there is something new
+READ_S = 0.005  # between two messages from a page: one that floods is heard slowly
+MAX_PAGES = 32
+MAX_MESSAGE = 1 << 16  # bytes; a longer one ends the connection
+NO_TOKEN = "This page needs the token of its address: open the whole link that the lab printed.\n"
+HEADERS = {
+    "Cache-Control": "no-store",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
 
 
-@dataclass
-class News:
-    """What a page has to be told: a whole new scene, or None, and after it what is where, in which colour, visible."""
+@dataclass(frozen=True)
+class File:
+    """What is served under a name: its bytes, its media type, and the rules that the browser enforces on it."""
 
-    scene: Mapping[str, Any] | None = None
-    time_s: float | None = None
-    poses: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    colors: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    visible: dict[str, bool] = field(default_factory=dict)
-
-    def merge(self, later: "News") -> None:
-        """Take over what `later` says; its scene, if it has one, ends what was known."""
-        if later.scene is not None:
-            self.scene = later.scene
-            self.poses, self.colors, self.visible = {}, {}, {}
-        self.time_s = self.time_s if later.time_s is None else later.time_s
-        self.poses.update(later.poses)
-        self.colors.update(later.colors)
-        self.visible.update(later.visible)
-
-    def text(self) -> str:
-        """The JSON message of `page.js`."""
-        frame = {"time_s": self.time_s, "poses": self.poses, "colors": self.colors, "visible": self.visible}
-        return json.dumps({"frame": frame} if self.scene is None else {"scene": self.scene, "frame": frame})
+    content: bytes
+    kind: str
+    policy: str = "default-src 'none'"
 
 
 class Server:
-    """Serves `page` at / and the viewer's script beside it; `send` may be called from any thread.
+    """Serves `files`, "" being the page, to who has the token; `send` and `wake` may be called from any thread.
 
     Raises BadInput for a port that it cannot have.
     """
 
-    def __init__(self, port: int, page: str, script: Path) -> None:
+    def __init__(self, port: int, files: Mapping[str, File], token: str, panel: Panel | None = None) -> None:
         self._socket = _listen(port)
         self.port: int = self._socket.getsockname()[1]
         self.connected = threading.Event()
-        self.pages: set[Page] = set()
-        self._page, self._script = page, script
+        self._files, self._token, self._panel = files, token, panel
+        self._pages: set[Page] = set()
+        self._opened = 0
         self._known = News()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="live view", daemon=True)
         self._ready = threading.Event()
@@ -79,6 +80,10 @@ class Server:
     def send(self, news: News) -> None:
         """Have every page told, now or when it connects; returns at once."""
         self._call(self._publish, news)
+
+    def wake(self) -> None:
+        """Have every page told at once what the panel has that is new."""
+        self._call(self._wake)
 
     def stop(self) -> None:
         """Give pages half a second to take the last frame, then close all; at most about 3 s, whatever pages do."""
@@ -97,45 +102,130 @@ class Server:
 
     def _publish(self, news: News) -> None:
         self._known.merge(news)
-        for page in self.pages:
+        for page in self._pages:
             page.offer(news)
 
-    def welcome(self, page: "Page") -> None:
-        """Tell a page that has just connected all that is known."""
-        self.pages.add(page)
-        self.connected.set()
-        page.offer(self._known)
-
-    def farewell(self, page: "Page") -> None:
-        """Forget a page that has left."""
-        self.pages.discard(page)
-        if not self.pages:
-            self.connected.clear()
+    def _wake(self) -> None:
+        for page in self._pages:
+            page.wake.set()
 
     async def _serve(self) -> None:
         self._loop, self._stopped = asyncio.get_running_loop(), asyncio.Event()
-        application = Application(log_function=lambda handler: None, websocket_max_message_size=1024)
-        application.add_handlers(
-            HOSTS,
-            [
-                (r"/", Front, {"page": self._page}),
-                (r"/frames", Page, {"server": self}),
-                (rf"/({self._script.name})", StaticFileHandler, {"path": str(self._script.parent)}),
-            ],
-        )
-        server = HTTPServer(application)
-        server.add_sockets([self._socket])
+        server = Uvicorn(self._config())
+        serving = asyncio.create_task(server.serve(sockets=[self._socket]))
+        polling = asyncio.create_task(self._poll())
         self._ready.set()
         await self._stopped.wait()
-        server.stop()
-        if sending := [page.sending for page in self.pages if page.sending]:
-            await asyncio.wait(sending, timeout=FLUSH_S)
-        for page in list(self.pages):
-            page.close(1001, "the run has ended")
+        polling.cancel()
+        for page in self._pages:
+            page.last = True
+            page.wake.set()
+        if self._pages:
+            await asyncio.wait([page.sending for page in self._pages], timeout=FLUSH_S)
+        server.should_exit = True
+        await serving
+        for connection in list(server.server_state.connections):  # one that does not answer is cut off
+            connection.transport.abort()
+        await asyncio.sleep(0)
+
+    def _config(self) -> Config:
+        return Config(
+            self._application(),
+            loop="asyncio",
+            http="h11",
+            ws="websockets-sansio",
+            ws_max_size=MAX_MESSAGE,
+            ws_per_message_deflate=False,
+            lifespan="off",
+            log_config=None,
+            log_level="critical",
+            access_log=False,
+            proxy_headers=False,
+            server_header=False,
+            date_header=False,
+            headers=[*HEADERS.items()],
+            timeout_graceful_shutdown=GRACE_S,
+        )
+
+    def _application(self) -> Starlette:
+        guards = [
+            Middleware(TrustedHostMiddleware, allowed_hosts=HOSTS, www_redirect=False),
+            Middleware(_Guard, self._token),
+        ]
+        routes = [Route("/{name}", self._file), Route("/", self._file), WebSocketRoute("/frames", self._page)]
+        return Starlette(routes=routes, middleware=guards)
+
+    async def _file(self, request: Request) -> Response:
+        file = self._files.get(request.path_params.get("name", ""))
+        if file is None:
+            return PlainTextResponse("There is no such page.\n", 404)
+        return Response(file.content, headers={"Content-Security-Policy": file.policy}, media_type=file.kind)
+
+    async def _poll(self) -> None:
+        """Look for what nobody was in a hurry to tell."""
+        while True:
+            await asyncio.sleep(POLL_S)
+            if self._pages and self._panel is not None and self._panel.stirred():
+                self._wake()
+
+    async def _page(self, socket: WebSocket) -> None:
+        """One open page, from its first message to its last."""
+        if len(self._pages) >= MAX_PAGES:
+            await socket.send_denial_response(PlainTextResponse(f"{MAX_PAGES} pages are open: close one.\n", 503))
+            return
+        await socket.accept()
+        self._opened += 1
+        page = Page(self._opened, socket, self._panel)
+        page.offer(self._known)
+        if self._panel is not None:
+            self._panel.joined(page.number)
+        self._pages.add(page)
+        page.sending = asyncio.create_task(page.send())
+        self.connected.set()
+        self._wake()  # the others see that there is one more
         try:
-            await asyncio.wait_for(server.close_all_connections(), FLUSH_S)
-        except TimeoutError:
-            return  # a page that does not answer; the loop's end cuts it off
+            await self._hear(page)
+        finally:
+            page.sending.cancel()
+            self._pages.discard(page)
+            if not self._pages:
+                self.connected.clear()
+            if self._panel is not None:
+                self._panel.left(page.number)
+                self._wake()
+
+    async def _hear(self, page: "Page") -> None:
+        while True:
+            heard = await page.socket.receive()
+            if heard["type"] == "websocket.disconnect":
+                return
+            if self._panel is not None:
+                self._panel.said(page.number, heard.get("text") or heard.get("bytes") or "")
+                asyncio.get_running_loop().call_later(PAUSE_S, self._wake)  # what the run says to it goes first
+            await asyncio.sleep(READ_S)
+
+
+class _Guard:
+    """Lets nobody in without the token, and no websocket that another site's page has opened."""
+
+    def __init__(self, app: ASGIApp, token: str) -> None:
+        self._app, self._token = app, token.encode()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        asked = HTTPConnection(scope)
+        given = asked.query_params.get("token", "").encode()
+        if not secrets.compare_digest(given, self._token):
+            await PlainTextResponse(NO_TOKEN, 403)(scope, receive, send)
+        elif scope["type"] == "websocket" and not _from_here(asked):
+            await PlainTextResponse("Another site's page may not connect.\n", 403)(scope, receive, send)
+        else:
+            await self._app(scope, receive, send)
+
+
+def _from_here(asked: HTTPConnection) -> bool:
+    """Whether a page of this server opens the websocket, or what is no browser."""
+    origin = asked.headers.get("origin")
+    return origin is None or urlsplit(origin)[:2] == ("http", asked.headers.get("host", ""))
 
 
 def _listen(port: int) -> socket.socket:
@@ -151,54 +241,3 @@ def _listen(port: int) -> socket.socket:
         allowed = "choose a free one within 1024..65535, or 0 for any"
         raise BadInput(f"port {port} for the live view: {text}: {allowed}") from None
     return own
-
-
-class Front(RequestHandler):
-    """The page itself."""
-
-    def initialize(self, page: str) -> None:
-        """Keep the text to serve."""
-        self._text = page
-
-    def get(self) -> None:
-        """Answer with the page."""
-        self.set_header("Cache-Control", "no-store")
-        self.finish(self._text)
-
-
-class Page(WebSocketHandler):
-    """One open page. What it sends is dropped; tornado refuses connections that another site's page opens."""
-
-    def initialize(self, server: Server) -> None:
-        """Nothing waits yet."""
-        self._server = server
-        self._waiting: News | None = None
-        self.sending: asyncio.Task[None] | None = None
-
-    def open(self, *_: str, **__: str) -> None:
-        """A browser has the page."""
-        self.set_nodelay(True)
-        self._server.welcome(self)
-
-    def on_message(self, message: str | bytes) -> None:
-        """Drop it: a page only watches."""
-
-    def on_close(self) -> None:
-        """The browser has left."""
-        self._server.farewell(self)
-
-    def offer(self, news: News) -> None:
-        """Send `news`, or keep it with what waits already while a message is under way."""
-        self._waiting = self._waiting or News()
-        self._waiting.merge(news)
-        if self.sending is None or self.sending.done():
-            self.sending = asyncio.create_task(self._send())
-
-    async def _send(self) -> None:
-        while self._waiting is not None:
-            news, self._waiting = self._waiting, None
-            try:
-                await self.write_message(news.text())
-            except (WebSocketClosedError, StreamClosedError):
-                return
-            await asyncio.sleep(PAUSE_S)

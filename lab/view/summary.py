@@ -56,13 +56,28 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
     final = "does not reach the goal" if lesson["final_steps"] is None else f"{lesson['final_steps']} steps"
     lines = [
         f"{lesson['skill']}: {lesson['episodes']} episodes   {sparkline(lesson['steps_per_episode'], 40)}",
-        f"learned way: {final}, the shortest takes {lesson['optimal_steps']}: {_verdict(lesson)}",
+        f"learned way: {final}{_shortest(lesson)}: {_verdict(lesson)}",
         _advice(lesson),
         *(["it went on from what was left unfinished"] if lesson["source"] == "continued" else []),
+        *lesson["receipt"]["lines"],
         f"saved as '{lesson['saved_as']}' (seed {lesson['seed']})",
+        f"its journal: {lesson['session']} (lab replay shows it again)",
         *lesson["files"].values(),
     ]
     return Group(*map(Text, lines))
+
+
+def replay_summary(replay: Mapping[str, Any]) -> RenderableType:
+    """The end of `lab replay`, from its JSON document."""
+    closed = replay["closed"]
+    over = "it is not over: lab teach --resume goes on with it"
+    if closed is not None:
+        over = f"over after {closed['episodes']} episodes, {'solved' if closed['solved'] else 'not solved'}"
+    return Group(*map(Text, [f"{replay['problem']} in {replay['session']}: {over}", *replay["receipt"]["lines"]]))
+
+
+def _shortest(lesson: Mapping[str, Any]) -> str:
+    return "" if lesson["optimal_steps"] is None else f", the shortest takes {lesson['optimal_steps']}"
 
 
 def _verdict(lesson: Mapping[str, Any]) -> str:
@@ -72,7 +87,7 @@ def _verdict(lesson: Mapping[str, Any]) -> str:
         return "solved"
     if lesson["final_steps"] is None:
         return "not solved"
-    longer = lesson["final_steps"] > lesson["optimal_steps"]
+    longer = lesson["optimal_steps"] is not None and lesson["final_steps"] > lesson["optimal_steps"]
     return "not solved, it is longer" if longer else "not solved, it is not there from every start"
 
 

@@ -1,5 +1,6 @@
 """The live page and the replay in a real browser: poses as the page's scene tree has them. Skipped without Chromium."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from lab.view.meshcat import LiveView, replay_html
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
+Until = Callable[["Page", str], None]
 HALF = 0.5**0.5
 WHITE, BROWN = (1.0, 1.0, 1.0, 1.0), (0.5, 0.0, 0.0, 0.5)
 # where the slice is at the simulated seconds 3, 4 and 5, the last turned by a quarter about z
@@ -85,51 +87,51 @@ def drawn_colors(page: "Page") -> int:
     return found
 
 
-def test_the_live_page_shows_bodies_where_they_are(browser_page: "Page", recording: Recording) -> None:
+def test_the_live_page_shows_bodies_where_they_are(browser_page: "Page", recording: Recording, until: Until) -> None:
     with LiveView(title="Toast & more") as view:
         view.show(recording.bodies)
         view.update(recording.frames[0])
         browser_page.goto(view.url)
         assert view.wait_for_page(20)
-        browser_page.wait_for_function("document.getElementById('note').textContent === '3.0 s'")
+        until(browser_page, "document.getElementById('note').textContent === '3.0 s'")
         assert pose_of(browser_page, "slice 1") == pytest.approx(POSES[0], abs=1e-5)
         assert pose_of(browser_page, "arm", "1")[:3] == pytest.approx([0, 0, 0.8], abs=1e-5)
         assert size_of(browser_page, "arm", "0") == pytest.approx([0.1, 0.1, 0.8], abs=1e-3)  # it stands along z
         assert size_of(browser_page, "slice 1", "0") == pytest.approx([0.12, 0.03, 0.12], abs=1e-5)
 
         view.update(recording.frames[1])
-        browser_page.wait_for_function("document.getElementById('note').textContent === '4.0 s'")
+        until(browser_page, "document.getElementById('note').textContent === '4.0 s'")
         assert pose_of(browser_page, "slice 1") == pytest.approx(POSES[1], abs=1e-5)
         look = look_of(browser_page, "slice 1")
         assert [*look["color"], look["opacity"]] == pytest.approx(BROWN, abs=1e-3)
         assert look_of(browser_page, "arm")["visible"] is False
 
         view.update(recording.frames[2])
-    browser_page.wait_for_function("document.getElementById('note').textContent.startsWith('the run has ended')")
+    until(browser_page, "document.getElementById('note').textContent.startsWith('the run has ended')")
     assert pose_of(browser_page, "slice 1") == pytest.approx(POSES[2], abs=1e-5)
     assert browser_page.inner_text("#caption").startswith("Toast & more")
     assert drawn_colors(browser_page) > 100
 
 
-def test_a_new_scene_replaces_the_old_one(browser_page: "Page", recording: Recording) -> None:
+def test_a_new_scene_replaces_the_old_one(browser_page: "Page", recording: Recording, until: Until) -> None:
     with LiveView() as view:
         view.show(recording.bodies)
         browser_page.goto(view.url)
-        browser_page.wait_for_function("viewer.scene_tree.children.lab")
+        until(browser_page, "viewer.scene_tree.children.lab")
         view.show([Body("plate", (Shape("box", (1, 1, 1)),))])
-        browser_page.wait_for_function("viewer.scene_tree.children.lab?.children.plate")
+        until(browser_page, "viewer.scene_tree.children.lab?.children.plate")
         assert browser_page.evaluate("Object.keys(viewer.scene_tree.children.lab.children)") == ["plate"]
 
 
 def test_the_replay_plays_from_disk_without_a_network(
-    browser_page: "Page", recording: Recording, tmp_path: Path
+    browser_page: "Page", recording: Recording, tmp_path: Path, until: Until
 ) -> None:
     path = replay_html(recording, tmp_path / "replay.html", speed=2, title="Toast <b>bold</b>")
     asked: list[str] = []
     browser_page.on("request", lambda request: asked.append(request.url))
     browser_page.context.set_offline(True)
     browser_page.goto(path.as_uri())
-    browser_page.wait_for_function("viewer.animator.playing && viewer.animator.time > 0")
+    until(browser_page, "viewer.animator.playing && viewer.animator.time > 0")
     assert "2 × real time" in browser_page.inner_text("#caption")
     assert browser_page.inner_text("#caption").startswith("Toast <b>bold</b>")
 
@@ -144,10 +146,12 @@ def test_the_replay_plays_from_disk_without_a_network(
     assert [url for url in asked if not url.startswith(("data:", "blob:"))] == [path.as_uri()]
 
 
-def test_colours_and_visibility_step_in_the_replay(browser_page: "Page", recording: Recording, tmp_path: Path) -> None:
+def test_colours_and_visibility_step_in_the_replay(
+    browser_page: "Page", recording: Recording, tmp_path: Path, until: Until
+) -> None:
     recording.frames[2] = Frame(5.0, {"slice 1": POSES[2]}, {"slice 1": WHITE}, {"arm": True})
     browser_page.goto(replay_html(recording, tmp_path / "replay.html").as_uri())
-    browser_page.wait_for_function("viewer.animator.playing")
+    until(browser_page, "viewer.animator.playing")
     browser_page.evaluate("viewer.animator.pause()")
     start = (*recording.bodies[2].shapes[0].rgba, True)
     for time_s, expected in ((0.5, start), (1.5, (*BROWN, False)), (2.5, (*WHITE, True)), (0.2, start)):
@@ -157,12 +161,12 @@ def test_colours_and_visibility_step_in_the_replay(browser_page: "Page", recordi
         assert look_of(browser_page, "arm")["visible"] is expected[4]
 
 
-def test_the_slider_moves_the_replay(browser_page: "Page", recording: Recording, tmp_path: Path) -> None:
+def test_the_slider_moves_the_replay(browser_page: "Page", recording: Recording, tmp_path: Path, until: Until) -> None:
     browser_page.goto(replay_html(recording, tmp_path / "replay.html").as_uri())
     browser_page.click("#play")
     browser_page.evaluate("const s = document.getElementById('seek'); s.value = 1; s.dispatchEvent(new Event('input'))")
     assert pose_of(browser_page, "slice 1") == pytest.approx(POSES[1], abs=3e-4)
-    browser_page.wait_for_function("document.getElementById('note').textContent.startsWith('4.0 s')")
+    until(browser_page, "document.getElementById('note').textContent.startsWith('4.0 s')")
 
 
 def test_a_still_recording_has_no_player(browser_page: "Page", recording: Recording, tmp_path: Path) -> None:

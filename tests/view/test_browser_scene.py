@@ -1,6 +1,7 @@
 """The toast scene itself in a real browser: the arm and the slices are where the physics has them. Skipped without Chromium."""
 
-from collections.abc import Iterator
+import json
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from lab.view.meshcat import LiveView, replay_html
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
+Until = Callable[["Page", str], None]
 ABOVE_THE_PLATE = (ToolPose(0.07, 0.8, 0.3), ToolPose(0.07, 0.8, 0.2))
 PLACES = "names => names.map(name => viewer.scene_tree.find(['lab', name]).object.position.toArray())"
 SEEN = ("robot tool", "robot forearm", "slice 1", "slice 2")
@@ -46,20 +48,22 @@ def on_page(page: "Page", expected: list[list[float]]) -> bool:
     return np.allclose(found, expected, atol=5e-4)
 
 
-def test_the_live_page_shows_the_arm_and_the_slices(browser_page: "Page", scene: Scene) -> None:
+def test_the_live_page_shows_the_arm_and_the_slices(browser_page: "Page", scene: Scene, until: Until) -> None:
     with LiveView() as live:
         recorder = Recorder(scene.world, 2, live)
         browser_page.goto(live.url)
         assert live.wait_for_page(20)
         for pose in ABOVE_THE_PLATE:
             expected = move(scene, pose, recorder)
-            script = "([names, places]) => names.every((name, n) => viewer.scene_tree.find(['lab', name]).object"
-            script += ".position.toArray().every((value, k) => Math.abs(value - places[n][k]) < 5e-4))"
-            browser_page.wait_for_function(script, arg=[list(SEEN), expected])
+            script = "(([names, places]) => names.every((name, n) => viewer.scene_tree.find(['lab', name]).object"
+            script += ".position.toArray().every((value, k) => Math.abs(value - places[n][k]) < 5e-4)))"
+            until(browser_page, f"{script}({json.dumps([SEEN, expected])})")
             assert on_page(browser_page, expected)
 
 
-def test_the_replay_shows_the_arm_and_the_slices_offline(browser_page: "Page", scene: Scene, tmp_path: Path) -> None:
+def test_the_replay_shows_the_arm_and_the_slices_offline(
+    browser_page: "Page", scene: Scene, tmp_path: Path, until: Until
+) -> None:
     recorder = Recorder(scene.world, 2)
     first = move(scene, ABOVE_THE_PLATE[0], recorder)
     scene.world.steps += 240
@@ -69,7 +73,7 @@ def test_the_replay_shows_the_arm_and_the_slices_offline(browser_page: "Page", s
     browser_page.context.set_offline(True)
     page = replay_html(recorder.recording, tmp_path / "replay.html").as_uri()
     browser_page.goto(page)
-    browser_page.wait_for_function("viewer.animator.playing")
+    until(browser_page, "viewer.animator.playing")
     browser_page.click("#play")  # pauses
     for time_s, expected in ((0.0, first), (1.0, last)):
         browser_page.evaluate("time => viewer.animator.seek(time)", time_s)

@@ -1,29 +1,20 @@
-"""The live page's server and the replay's file, without a browser."""
+"""The live view and the replay's file, without a browser; how it is served: test_server.py."""
 
-import asyncio
 import json
 import re
-import socket
-import threading
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from urllib.error import HTTPError
-from urllib.request import Request, urlopen
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
-from tornado.httpclient import HTTPClientError, HTTPRequest
-from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 from lab.errors import BadInput, WorkFailed
 from lab.view.frames import IDENTITY, Body, Frame, Recording, Shape
 from lab.view.meshcat import LiveView, replay_html, viewer_script
-from lab.view.server import News
 
 BODIES = tuple(Body(name, (Shape("box", (0.1, 0.1, 0.1)),)) for name in ("table", "slice 1"))
-AHEAD = (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @pytest.fixture
@@ -33,163 +24,19 @@ def view() -> Iterator[LiveView]:
         yield running
 
 
-async def hear(connection: WebSocketClientConnection) -> dict[str, Any]:
-    text = await asyncio.wait_for(connection.read_message(), 5)
-    assert isinstance(text, str)
-    message = json.loads(text)
-    assert isinstance(message, dict)
-    return message
-
-
-@asynccontextmanager
-async def page_of(view: LiveView, **headers: str) -> AsyncIterator[WebSocketClientConnection]:
-    connection = await websocket_connect(HTTPRequest(f"{view.url.replace('http', 'ws')}frames", headers=headers))
-    yield connection
-    ended = connection.close_code is not None  # by the server, and that was read
-    connection.close()
-    while not ended and await asyncio.wait_for(connection.read_message(), 5) is not None:
-        pass
-
-
-def test_the_page_and_the_viewer_are_served(view: LiveView) -> None:
-    with urlopen(view.url) as answer:
-        page = answer.read().decode()
-    assert 'id="meshcat-pane"' in page
-    assert "{{" not in page
-    with urlopen(view.url + "main.min.js") as answer:
-        assert answer.read() == viewer_script().read_bytes()
-
-
-def test_it_listens_on_one_loopback_address_only(view: LiveView) -> None:
-    """127.0.0.2 is this computer too: a server on every interface would answer there."""
-    with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.2", view.port), timeout=5)
-    listening = [
-        row.split()[1]
-        for table in (Path("/proc/net/tcp"), Path("/proc/net/tcp6"))
-        if table.exists()
-        for row in table.read_text().splitlines()[1:]
-        if row.split()[3] == "0A" and row.split()[1].endswith(f":{view.port:04X}")
-    ]
-    assert listening == [f"0100007F:{view.port:04X}"]
-
-
-def test_another_name_for_this_computer_gets_nothing(view: LiveView) -> None:
-    with pytest.raises(HTTPError, match="404") as refused:
-        urlopen(Request(view.url, headers={"Host": "elsewhere.example"}))
-    refused.value.close()
-
-    async def intrude() -> None:
-        async with page_of(view, Origin="http://elsewhere.example"):
-            pass
-
-    with pytest.raises(HTTPClientError, match="403"):
-        asyncio.run(intrude())
-
-
-def test_a_page_gets_the_scene_and_then_what_moved(view: LiveView) -> None:
-    async def watch() -> None:
-        async with page_of(view) as page:
-            first = await hear(page)
-            assert [body["name"] for body in first["scene"]["bodies"]] == ["table", "slice 1"]
-            assert view.wait_for_page(5)
-            view.update(Frame(0.0, {"table": IDENTITY, "slice 1": IDENTITY}))
-            second = await hear(page)
-            assert "scene" not in second
-            assert second["frame"]["poses"] == {"table": list(IDENTITY), "slice 1": list(IDENTITY)}
-            view.update(Frame(0.1, {"table": IDENTITY, "slice 1": AHEAD}, {"table": (1, 0, 0, 1)}, {"table": False}))
-            assert (await hear(page))["frame"] == {
-                "time_s": 0.1,
-                "poses": {"slice 1": list(AHEAD)},
-                "colors": {"table": [1, 0, 0, 1]},
-                "visible": {"table": False},
-            }
-
-    asyncio.run(watch())
-
-
-def test_a_late_page_gets_everything_at_once(view: LiveView) -> None:
-    view.update(Frame(0.0, {"table": AHEAD}, visible={"slice 1": False}))
-    view.update(Frame(0.5, {"slice 1": AHEAD}))
-
-    async def watch() -> dict[str, Any]:
-        async with page_of(view) as page:
-            return await hear(page)
-
-    message = asyncio.run(watch())
-    assert message["frame"]["poses"] == {"table": list(AHEAD), "slice 1": list(AHEAD)}
-    assert message["frame"]["visible"] == {"slice 1": False}
-    assert message["frame"]["time_s"] == 0.5
-
-
-def test_what_a_page_says_is_dropped(view: LiveView) -> None:
-    async def talk() -> None:
-        async with page_of(view) as page:
-            await hear(page)
-            for message in ('{"type": "img", "data": "x,y"}', "no json", b"\x00\xff"):
-                await page.write_message(message, binary=isinstance(message, bytes))
-            view.update(Frame(1.0, {"table": AHEAD}))
-            assert (await hear(page))["frame"]["poses"] == {"table": list(AHEAD)}
-
-    asyncio.run(talk())
-
-
-def test_a_page_that_reads_slowly_skips_frames_and_ends_with_the_last(view: LiveView) -> None:
-    async def watch() -> None:
-        async with page_of(view) as page:
-            await hear(page)
-            for number in range(1, 1001):
-                view.update(Frame(number / 10, {"slice 1": (float(number), 0, 0, 0, 0, 0, 1)}))
-            frame = (await hear(page))["frame"]
-            while frame["time_s"] < 100:
-                frame = (await hear(page))["frame"]
-            assert frame["poses"]["slice 1"][0] == 1000
-
-    asyncio.run(watch())
-
-
-def test_the_last_frame_arrives_before_the_end() -> None:
-    async def watch() -> None:
-        view = LiveView().__enter__()
-        view.show(BODIES)
-        async with page_of(view) as page:
-            await hear(page)
-            view.update(Frame(9.0, {"table": AHEAD}))
-            await asyncio.to_thread(view.close)
-            assert (await hear(page))["frame"]["time_s"] == 9.0
-            assert await page.read_message() is None
-        view.close()
-        view.update(Frame(10.0, {"table": IDENTITY}))
-
-    asyncio.run(watch())
-
-
-def test_leaving_does_not_wait_for_a_page_that_hangs() -> None:
-    with LiveView() as view, socket.create_connection(("127.0.0.1", view.port)) as mute:
-        request = (
-            f"GET /frames HTTP/1.1\r\nHost: 127.0.0.1:{view.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        )
-        mute.sendall(f"{request}Sec-WebSocket-Key: {'A' * 22}==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode())
-        assert view.wait_for_page(5)
-        view.show([Body(f"body {number}", BODIES[0].shapes * 20) for number in range(2000)])  # more than a socket holds
-        running = next(thread for thread in threading.enumerate() if thread.name == "live view")
-        view.close()
-        assert not running.is_alive()
-
-
-def test_a_new_scene_ends_the_old_one() -> None:
-    known = News({"bodies": ["old"]}, 1.0, {"a": AHEAD}, {"a": (1, 1, 1, 1)}, {"a": False})
-    known.merge(News({"bodies": ["new"]}))
-    assert (known.scene, known.poses, known.colors, known.visible) == ({"bodies": ["new"]}, {}, {}, {})
-
-
-def test_without_pages_nothing_waits(view: LiveView) -> None:
-    assert not view.wait_for_page(0)
-
-
 def test_the_hint_forwards_the_port_in_one_line(view: LiveView) -> None:
     assert re.fullmatch(rf"ssh -L {view.port}:127\.0\.0\.1:{view.port} \S+@\S+", view.hint)
-    assert view.url == f"http://127.0.0.1:{view.port}/"
+
+
+def test_each_view_has_an_address_of_its_own(view: LiveView) -> None:
+    with LiveView() as other:
+        tokens = [
+            re.fullmatch(rf"http://127\.0\.0\.1:{one.port}/\?token=([\w-]{{20,}})", one.url) for one in (view, other)
+        ]
+        assert all(tokens)
+        assert tokens[0] is not None
+        assert tokens[1] is not None
+        assert tokens[0][1] != tokens[1][1]
 
 
 def test_unknown_bodies_are_named(view: LiveView) -> None:
@@ -197,24 +44,18 @@ def test_unknown_bodies_are_named(view: LiveView) -> None:
         view.update(Frame(0, {"slice 2": IDENTITY}))
 
 
-@pytest.mark.parametrize("port", [-1, 65536, 10**9])
-def test_ports_that_do_not_exist_are_refused(port: int) -> None:
-    with pytest.raises(BadInput, match=f"port {port}"), LiveView(port):
-        pass
-
-
-def test_a_taken_port_is_refused(view: LiveView) -> None:
-    with (
-        pytest.raises(BadInput, match=f"port {view.port} for the live view: Address already in use"),
-        LiveView(view.port),
-    ):
-        pass
-
-
 def test_outside_its_context_there_is_no_page() -> None:
     view = LiveView()
     with pytest.raises(WorkFailed, match="not running"):
         view.show(BODIES)
+
+
+def test_after_its_end_nothing_is_shown() -> None:
+    view = LiveView().__enter__()
+    view.show(BODIES)
+    view.close()
+    view.close()
+    view.update(Frame(10.0, {"table": IDENTITY}))
 
 
 # ---- the replay -------------------------------------------------------------------------------------------------

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from lab.learning.session import AdviceRejected, AdviceRequested, SessionResult, run_session
+from lab.advice.events import AdviceRejected, AdviceRequested
+from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.policy import Policy

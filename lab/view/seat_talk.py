@@ -1,0 +1,93 @@
+"""What pages may say, and who of those that watch has the seat. Whatever a page sends ends as a message or a refusal."""
+
+import json
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+MAX_CHARS = 1024
+WORDS = ("skip", "auto", "undo", "quit")
+
+
+class Refused(Exception):
+    """What a page said is ignored; the text says why."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """An answer to a question, by its number: an action, or one of WORDS."""
+
+    question: int
+    action: int | None = None
+    word: str = ""
+
+
+@dataclass(frozen=True)
+class Seat:
+    """The page wants the seat, or gives it away."""
+
+    wish: Literal["take", "give"]
+
+
+@dataclass(frozen=True)
+class Layer:
+    """The page wants to see a layer of the grid; None: the robot's."""
+
+    layer: int | None
+
+
+def understood(message: str | bytes) -> Answer | Seat | Layer:
+    """What a page says. Raises Refused for anything else."""
+    if isinstance(message, bytes) or len(message) > MAX_CHARS:
+        raise Refused("That was no message of this page: text of at most 1024 characters is wanted.")
+    try:
+        said = json.loads(message)
+    except (ValueError, RecursionError):
+        said = None
+    match said:
+        case {"answer": {"question": int(number), "action": int(action), **rest}, **more} if not (rest or more):
+            if not isinstance(number, bool) and not isinstance(action, bool):
+                return Answer(number, action)
+        case {"answer": {"question": int(number), "word": str(word), **rest}, **more} if not (rest or more):
+            if not isinstance(number, bool) and word in WORDS:
+                return Answer(number, None, word)
+        case {"seat": "take" | "give" as wish, **more} if not more:
+            return Seat(wish)
+        case {"layer": int() | None as layer, **more} if not more and not isinstance(layer, bool):
+            return Layer(layer)
+    raise Refused("That was no message of this page: it is ignored.")
+
+
+@dataclass
+class Chair:
+    """One seat for many pages: the first to come has it; once it is free, whoever comes, or takes it."""
+
+    pages: list[int] = field(default_factory=list)
+    holder: int | None = None
+
+    def joined(self, page: int) -> None:
+        """A page has come."""
+        self.pages.append(page)
+        if self.holder is None:
+            self.holder = page
+
+    def left(self, page: int) -> None:
+        """A page has gone, and the seat is free if it was its own."""
+        if page in self.pages:
+            self.pages.remove(page)
+        if self.holder == page:
+            self.holder = None
+
+    def wish(self, page: int, seat: Seat) -> None:
+        """Give the seat away, or take it. Raises Refused when it is not free, or not the page's own."""
+        if seat.wish == "give":
+            if self.holder != page:
+                raise Refused("This page has not the seat: there is nothing to hand over.")
+            self.holder = None
+        elif self.holder not in (None, page):
+            raise Refused("Another page has the seat: it has to hand it over first.")
+        else:
+            self.holder = page
+
+    def view(self, page: int) -> dict[str, Any]:
+        """What a page is told of the seat."""
+        return {"seat": self.holder == page, "free": self.holder is None, "pages": len(self.pages)}
