@@ -7,6 +7,7 @@ import numpy as np
 
 from lab.mdp import coverage
 from lab.sim import assets
+from lab.sim.kinematics import ToolPose
 from lab.sim.world import TIME_STEP, Array
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path
 from lab.skills.surveys import Surveys
@@ -18,6 +19,7 @@ SHAPE = (3, 3)  # rows from the top, columns along the slice's width
 CELL_M = assets.SLICE[0] / 3
 JOINTS = ("head_x", "head_z")
 REST = (0.0, 0.0)  # where the head waits, low, out of the gripper's way
+HEAD_BEHIND_M = 0.03  # the head's frame behind the nozzle's plane
 _RAY_M = 0.2
 
 
@@ -38,14 +40,29 @@ class Butter(Skill):
         self.problem = Problem(self.name, self.subtask, mdp)
         return self.problem
 
+    def head(self, state: int) -> tuple[float, float]:
+        """The head's joints in a state [m]: across from the slice's middle, and up from the applier's floor."""
+        row, column = self.problem.mdp.state_cell(state)
+        return ((column - 1) * CELL_M, (SHAPE[0] - 1 - row + 0.5) * CELL_M)
+
+    def pose(self, state: int) -> ToolPose:
+        """Where the applier's head is; the arm has no part in this sub-task."""
+        x, y, yaw = self.surveys.task.station(self.station).pose
+        across, up = self.head(state)
+        return ToolPose(x, y, assets.APPLIER_FLOOR, yaw).local(across, assets.NOZZLE_OUT - HEAD_BEHIND_M, up)
+
+    def show(self, bench: Bench, state: int) -> bool:
+        """Put the head over the state's cell at once, without physics."""
+        bench.scene.world.set_joints(self.station, JOINTS, self.head(state))
+        return True
+
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Move the head along the learned cells, stay on each, note where the nozzle's ray meets the slice, and go to rest."""
         mdp = self.problem.mdp
         station = self.surveys.task.station(self.station)
-        cells = [mdp.state_cell(state) for state in learned_path(policy, mdp, mdp.start)]
         self.covered = []
-        for cell in cells:
-            yield from self._slide(bench, _joints(cell), station.head_speed_m_s)
+        for state in learned_path(policy, mdp, mdp.start):
+            yield from self._slide(bench, self.head(state), station.head_speed_m_s)
             for _ in range(round(station.dwell_s / TIME_STEP)):
                 yield
             met = self._met(bench)
@@ -85,12 +102,6 @@ class Butter(Skill):
         row = int((assets.SLICE[2] / 2 - local[2]) // CELL_M)
         column = int((local[0] + assets.SLICE[0] / 2) // CELL_M)
         return (row, column) if 0 <= row < SHAPE[0] and 0 <= column < SHAPE[1] else None
-
-
-def _joints(cell: tuple[int, ...]) -> tuple[float, float]:
-    """The head's joints over a cell [m]: across from the middle, and up from the applier's floor."""
-    row, column = cell
-    return ((column - 1) * CELL_M, (SHAPE[0] - 1 - row + 0.5) * CELL_M)
 
 
 def _unrotated(vector: Array, turn: Array) -> Array:

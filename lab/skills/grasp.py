@@ -9,6 +9,7 @@ import numpy as np
 from lab.errors import BadInput
 from lab.mdp import NoPath, TabularMDP, grid
 from lab.sim.kinematics import ToolPose, inverse
+from lab.sim.scene import spots
 from lab.sim.survey import Survey
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
@@ -44,6 +45,11 @@ class Grasp(Skill):
         self.problem = Problem(self.name, self.subtask, from_above(mdp))
         return self.problem
 
+    def pose(self, state: int, goal: ToolPose | None = None) -> ToolPose:
+        """Around a slice that `goal` would hold, by default one that stands on the station's first spot."""
+        around = goal or spots(self.surveys.task.station(self.station))[0].grasp()
+        return near_pose(around, self.problem.mdp.state_cell(state))
+
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Open, go above the slice, follow the learned cells down, close, lift, and see that the slice came along."""
         robot, mdp, name = bench.scene.robot, self.problem.mdp, self.slice
@@ -56,8 +62,8 @@ class Grasp(Skill):
         if tool.z < approach.z - 0.01 or hypot(tool.x - approach.x, tool.y - approach.y) > FAR_M:
             yield from over_everything(bench, approach)
         entry = entry_cell(goal, robot.tool())
-        cells = [mdp.state_cell(s) for s in learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))]
-        poses = [near_pose(goal, cell) for cell in cells]
+        path = learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))
+        poses = [self.pose(state, goal) for state in path]
         high = max(robot.tool().z, poses[0].z)
         yield from robot.follow([ToolPose(poses[0].x, poses[0].y, high, poses[0].yaw)], slow=_SLOW)
         yield from robot.follow(poses, blend=_BLEND_M, slow=_SLOW)

@@ -36,6 +36,7 @@ class Insert(Skill):
     """Carry the slice in the gripper from the grid's start to the toaster's slot and let it go there."""
 
     subtask: ClassVar[str] = "insert"
+    carries = True
 
     def __init__(self, station: str) -> None:
         super().__init__(f"insert at {station}")
@@ -87,6 +88,11 @@ class Insert(Skill):
         places = zip(task.obstacles, self.surveys.layout.obstacles, strict=True)
         return min(places, key=lambda place: hypot(place[1][0] - x, place[1][1] - y))[0].name
 
+    def pose(self, state: int) -> ToolPose:
+        """Over the middle of the grid's cell."""
+        i, j = self.problem.mdp.state_cell(state)
+        return ToolPose(*self.seen.view.centre((i, j)), self.surveys.task.insert.height_m, 0.0)
+
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Cell by cell, each time seen by the camera; then above the slot, down, let go, and see that the slice is in it."""
         task, robot, mdp, name = self.surveys.task, bench.scene.robot, self.problem.mdp, bench.held
@@ -96,9 +102,9 @@ class Insert(Skill):
         yield from self._to_start(bench)
         self._same_picture(bench)
         for state in learned_path(policy, mdp, mdp.start):
-            x, y = self.seen.view.centre((mdp.state_cell(state)[0], mdp.state_cell(state)[1]))
-            yield from robot.follow([ToolPose(x, y, task.insert.height_m, 0.0)])
-            self._check_camera(bench, x, y)
+            pose = self.pose(state)
+            yield from robot.follow([pose])
+            self._check_camera(bench, pose.x, pose.y)
         spot = self._slot(task)
         goal = release_pose(bench, name, spot)
         yield from robot.follow([ToolPose(goal.x, goal.y, task.insert.height_m, goal.yaw)], slow=_SLOW)
@@ -115,10 +121,9 @@ class Insert(Skill):
 
     def _to_start(self, bench: Bench) -> Iterator[None]:
         """Where the tool is not at the grid's start, as when trying again: over everything and down to it."""
-        task, tool = self.surveys.task, bench.scene.robot.tool()
-        x, y = self.seen.view.centre(self.seen.start)
-        if hypot(tool.x - x, tool.y - y, tool.z - task.insert.height_m) >= task.insert.cell_m:
-            yield from over_everything(bench, ToolPose(x, y, task.insert.height_m))
+        start, tool = self.pose(self.problem.mdp.start), bench.scene.robot.tool()
+        if hypot(tool.x - start.x, tool.y - start.y, tool.z - start.z) >= self.surveys.task.insert.cell_m:
+            yield from over_everything(bench, start)
 
     def _same_picture(self, bench: Bench) -> None:
         """A new snapshot must show the cubes and the toaster where they were learned around, and no others."""

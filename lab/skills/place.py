@@ -26,6 +26,7 @@ class Place(Skill):
     """Set a slice down at one station: the table holds the tool's position relative to the spot (x, y, z)."""
 
     subtask: ClassVar[str] = "place"
+    carries = True
 
     def __init__(self, station: str) -> None:
         super().__init__(f"place at {station}")
@@ -44,16 +45,24 @@ class Place(Skill):
         self.problem = Problem(self.name, self.subtask, from_above(mdp))
         return self.problem
 
+    def pose(self, state: int, goal: ToolPose | None = None) -> ToolPose:
+        """Around where the tool lets go, `goal`, by default that of a slice held in its middle."""
+        around = goal or self._spot().grasp().shifted(dz=RELEASE_ABOVE)
+        return near_pose(around, self.problem.mdp.state_cell(state))
+
+    def _spot(self) -> Spot:
+        return self.spot or spots(self.surveys.task.station(self.station))[0]
+
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Go above the spot, follow the learned cells down, let go, rise, and see that the slice stands."""
         robot, mdp, name = bench.scene.robot, self.problem.mdp, bench.held
-        spot = self.spot or spots(self.surveys.task.station(self.station))[0]
+        spot = self._spot()
         if name is None:
             raise SkillFailed(f"nothing in the gripper to place at '{self.station}'")
         goal = release_pose(bench, name, spot)
         entry = entry_cell(goal, robot.tool())[:3]
-        cells = [mdp.state_cell(s) for s in learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))]
-        poses = [near_pose(goal, cell) for cell in cells]
+        path = learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))
+        poses = [self.pose(state, goal) for state in path]
         high = max(robot.tool().z, poses[0].z)
         yield from robot.follow([ToolPose(poses[0].x, poses[0].y, high, goal.yaw)], slow=_SLOW)
         yield from robot.follow(poses, blend=_BLEND_M, slow=_SLOW)

@@ -121,7 +121,7 @@ class Surveys:
         spot = spots(station)[0]
         with World() as world:
             scene = Scene(world, self.task, 0, Layout(self.layout.obstacles, ()))
-            for name, beside in _neighbours(station, spot).items():
+            for name, beside in neighbours(station, spot).items():
                 scene.add_slice(name, beside)
                 scene.solid.append(name)
             goal = spot.grasp()
@@ -240,7 +240,7 @@ def _toaster_offset(task: Task) -> tuple[float, float]:
     return (np.sin(yaw) * across - np.cos(yaw) * along, -np.sin(yaw) * along - np.cos(yaw) * across)
 
 
-def _neighbours(station: Station, spot: Spot) -> dict[str, Spot]:
+def neighbours(station: Station, spot: Spot) -> dict[str, Spot]:
     """The spots beside one spot: slices may stand there, except in a machine."""
     if station.kind == "machine":
         return {}

@@ -24,6 +24,7 @@ class Transfer(Skill):
     def __init__(self, origin: str, target: str, *, loaded: bool) -> None:
         super().__init__(f"transfer {origin} to {target}{' with slice' if loaded else ''}")
         self.origin, self.target, self.loaded = origin, target, loaded
+        self.carries = loaded
 
     def setup(self, surveys: Surveys) -> Problem:
         """The workspace as a 3D grid: cells that are out of reach or too near to something are blocked."""
@@ -44,11 +45,14 @@ class Transfer(Skill):
         self.problem = Problem(self.name, self.subtask, mdp)
         return self.problem
 
+    def pose(self, state: int) -> ToolPose:
+        """In the middle of the workspace's cell."""
+        return self.surveys.cell_pose(self.problem.mdp.state_cell(state))
+
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Along the learned cells from where the tool is, then to the target's approach."""
         mdp = self.problem.mdp
-        cells = [mdp.state_cell(state) for state in learned_path(policy, mdp, mdp.start)]
-        poses = [self.surveys.cell_pose(cell) for cell in cells]
+        poses = [self.pose(state) for state in learned_path(policy, mdp, mdp.start)]
         end = self.surveys.approach(self.target)
         robot = bench.scene.robot
         yield from robot.follow(
