@@ -1,0 +1,93 @@
+"""The values of Gymnasium's discrete spaces, numbered from 0, so that they can stand for the rows and columns of a table."""
+
+from collections.abc import Iterator
+from math import prod
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+SUPPORTED = "Discrete, MultiDiscrete, MultiBinary, and Tuple or Dict of these"
+
+Digit = tuple[int, int]  # how many values it has, and the first of them
+
+
+class Unsupported(Exception):
+    """A space that is not discrete."""
+
+
+class Numbering:
+    """The values of a space in order, the last digit running fastest; `sizes`: the values of each digit.
+
+    A Discrete space is one digit. Raises Unsupported for a space that holds anything continuous, text or lists.
+    """
+
+    def __init__(self, space: spaces.Space[Any]):
+        self._space = space
+        digits = list(_digits(space))
+        self.sizes = tuple(size for size, _ in digits)
+        self.count = prod(self.sizes)
+        self._firsts = tuple(first for _, first in digits)
+
+    def number(self, value: Any) -> int:
+        """The number of a value; raises ValueError for one that is not in the space."""
+        total = 0
+        for given, size, first in zip(_values(self._space, value), self.sizes, self._firsts, strict=True):
+            digit = int(given) - first
+            if not 0 <= digit < size:
+                raise ValueError(f"{value!r} is not in {self._space}")
+            total = total * size + digit
+        return total
+
+    def value(self, number: int) -> Any:
+        """The value with a number."""
+        digits = np.unravel_index(number, self.sizes) if self.sizes else ()
+        return _built(self._space, iter([int(d) + first for d, first in zip(digits, self._firsts, strict=True)]))
+
+
+def _digits(space: spaces.Space[Any]) -> Iterator[Digit]:
+    match space:
+        case spaces.Discrete():
+            yield int(space.n), int(space.start)
+        case spaces.MultiDiscrete():
+            yield from zip(space.nvec.ravel().tolist(), space.start.ravel().tolist(), strict=True)
+        case spaces.MultiBinary():
+            yield from [(2, 0)] * prod(space.shape)
+        case spaces.Tuple() | spaces.Dict():
+            for part in _parts(space):
+                yield from _digits(part)
+        case _:
+            raise Unsupported
+
+
+def _parts(space: spaces.Tuple[Any] | spaces.Dict) -> list[spaces.Space[Any]]:
+    return list(space.spaces.values() if isinstance(space, spaces.Dict) else space.spaces)
+
+
+def _values(space: spaces.Space[Any], value: Any) -> Iterator[Any]:
+    """The values of the digits, as they stand in a value."""
+    match space:
+        case spaces.Discrete():
+            yield value
+        case spaces.Tuple():
+            for part, given in zip(space.spaces, value, strict=True):
+                yield from _values(part, given)
+        case spaces.Dict():
+            for key, part in space.spaces.items():
+                yield from _values(part, value[key])
+        case _:
+            yield from np.asarray(value).ravel().tolist()
+
+
+def _built(space: spaces.Space[Any], digits: Iterator[int]) -> Any:
+    """The value that the next digits make."""
+    match space:
+        case spaces.Discrete():
+            return next(digits)
+        case spaces.Tuple():
+            return tuple(_built(part, digits) for part in space.spaces)
+        case spaces.Dict():
+            return {key: _built(part, digits) for key, part in space.spaces.items()}
+        case _:
+            shape = space.shape or ()
+            return np.array([next(digits) for _ in range(prod(shape))], space.dtype).reshape(shape)
