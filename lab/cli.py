@@ -3,8 +3,8 @@
 import json
 import os
 import sys
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import wraps
 from io import TextIOWrapper
 from pathlib import Path
@@ -17,9 +17,9 @@ from lab.errors import BadInput, LabError
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-    from lab.sequencing.advised import SequenceRequest
+    from lab.classroom import Classroom
+    from lab.sessions import KeptSession
     from lab.teaching import Teacher
-    from lab.view.progress import RunProgress
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help="Teach a robot.")
 toolbox_app = typer.Typer(no_args_is_help=True, help="The policies that were learned.")
@@ -39,13 +39,26 @@ ToolboxFolder = Annotated[
     Path | None,
     typer.Option("--toolbox", envvar="LAB_TOOLBOX", help="Where policies are kept; default: your data folder."),
 ]
-AdvisorName = Annotated[
-    str,
+AdvisorNames = Annotated[
+    list[str] | None,
     typer.Option(
         "--advisor",
         help="Who advises: expert, moderate, limited, novice, tau=X, tau=X..Y (changing over the episodes), wrong, "
-        "terminal, recorded:FILE, none.",
+        "terminal, web, recorded:DIR (a session's folder), none; several times for several advisors.",
     ),
+]
+Asked = Annotated[str, typer.Option("--ask", help="Several advisors are asked: together, in-turn.")]
+Decide = Annotated[
+    str, typer.Option("--decide", help="Whom of several to follow: majority, best-trusted, trust-weighted.")
+]
+Plain = Annotated[bool, typer.Option("--plain", help="Plain sentences instead of pictures, as screen readers want.")]
+ShowPage = Annotated[
+    bool, typer.Option("--page", help="Show the lesson on a page on 127.0.0.1, too, where it can be answered as well.")
+]
+Port = Annotated[int, typer.Option("--port", min=0, max=65535, help="Of the page; 0: any free one.")]
+Wait = Annotated[
+    float | None,
+    typer.Option("--wait", min=1.0, help="Seconds to wait for an answer on the page; then the learner goes on alone."),
 ]
 Toasts = Annotated[int, typer.Option("--toasts", "-n", help="How many slices, 1 to 50.")]
 
@@ -113,36 +126,71 @@ def _show(document: dict[str, Any], as_json: bool, render: Callable[[dict[str, A
     print(text if console.encoding.lower().startswith("utf") else text.translate(_PLAIN))
 
 
-def _teacher(toolbox: Path | None, advisor: str, seed: int, progress: "RunProgress") -> "Teacher":
-    """The teacher that the options describe; a person is asked on the terminal, with the progress bar out of the way."""
-    from lab.advice.advisors import AdviceRequest, parse_advisor
-    from lab.learning.session import Event
-    from lab.teaching import Teacher
-    from lab.toolbox import Toolbox
+@contextmanager
+def _seat(
+    names: Sequence[str], *, page: bool = False, port: int = 0, wait_s: float | None = None, plain: bool = False
+) -> Iterator["Classroom"]:
+    """Who sits in the lessons of a command: the progress lines, and, when they are wanted, the prompt and the page."""
+    from contextlib import ExitStack
+
+    from lab.classroom import Classroom
+    from lab.view.progress import RunProgress
     from lab.view.terminal import TeachingPrompt
 
-    parse_advisor(advisor, "--advisor")
-    prompt = TeachingPrompt(progress.console) if advisor == "terminal" else None
+    progress = RunProgress(_console())
+    with ExitStack() as stack:
+        shown = None
+        if page or "web" in names:
+            from lab.view.seat import SeatPage
 
-    def ask(request: AdviceRequest) -> int | None:
-        assert prompt is not None
-        with progress.paused():
-            return prompt(request)
+            shown = stack.enter_context(SeatPage(port, wait_s=wait_s))
+            progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
+        prompt = TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
+        room = Classroom(progress, prompt, shown, plain=plain)
+        stack.callback(room.leave)
+        yield room
 
-    def on_event(name: str, event: Event) -> None:
-        progress.learning(name, event)
-        if prompt is not None:
-            prompt.on_event(event, name)
 
-    return Teacher(Toolbox(toolbox), advisor, seed, ask if prompt else None, on_event)
+def _teacher(
+    toolbox: Path | None,
+    names: Sequence[str],
+    seed: int,
+    room: "Classroom",
+    asked: str = "together",
+    decide: str = "trust-weighted",
+) -> "Teacher":
+    """The teacher that the options describe; raises BadInput for options and folders that cannot be."""
+    from lab.advice.counsel import Counsel
+    from lab.teaching import Teacher
+    from lab.toolbox import Toolbox
+
+    counsel = Counsel(tuple(names), room.people(), asked, decide, watch=room.passing)
+    counsel.check()
+    teacher = Teacher(Toolbox(toolbox), counsel, seed, room)
+    teacher.toolbox.check()
+    return teacher
+
+
+def _kept(folder: Path, where: str, *, read_only: bool = False) -> "KeptSession":
+    """A session that was kept; what was cut off at its end is said."""
+    from lab.sessions import KeptSession
+
+    kept = KeptSession(folder, where, read_only=read_only)
+    if kept.read.cut:
+        _complain(f"journal '{kept.read.path}': its last line was cut off and is left out: {kept.read.cut[:60]!r}")
+    return kept
 
 
 @command(app, "run", "lab run toast --toasts 3")
 def run(
     task: Annotated[str, typer.Argument(help="A task that ships, or a .toml file.")] = "toast",
     toasts: Toasts = 3,
-    advisor: AdvisorName = "expert",
+    advisor: AdvisorNames = None,
+    asked: Asked = "together",
+    decide: Decide = "trust-weighted",
     view: Annotated[bool, typer.Option("--view/--no-view", help="Stream the scene to a page on 127.0.0.1.")] = False,
+    port: Port = 0,
+    wait: Wait = None,
     seed: Seed = 0,
     toolbox: ToolboxFolder = None,
     out: Annotated[
@@ -151,29 +199,23 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Find or learn the skills, time them, find their best order, and carry them out in physics."""
-    from contextlib import ExitStack
-
     from lab import taskfile
+    from lab.advice.counsel import Counsel
     from lab.report import check_out
     from lab.run import prepare
     from lab.run import run as run_task
-    from lab.view.meshcat import LiveView
-    from lab.view.progress import RunProgress
     from lab.view.summary import run_summary
 
     loaded = taskfile.load(task)
     folder = out or Path(f"{loaded.name}-run")
     check_out(folder)
-    progress = RunProgress(_console())
-    teacher = _teacher(toolbox, advisor, seed, progress)
-    teacher.toolbox.check()
+    names = advisor or ["expert"]
+    Counsel(tuple(names), asked=asked, decide=decide).check()
     prepared = prepare(loaded, toasts, seed)
-    with ExitStack() as stack:
-        viewer = stack.enter_context(LiveView()) if view else None
-        if viewer is not None:
-            progress.console.print(f"live page: {viewer.url}\nfrom another machine: {viewer.hint}", soft_wrap=True)
-        stack.enter_context(progress)
-        report = run_task(prepared, teacher, folder, listener=progress, viewer=viewer)
+    with _seat(names, page=view, port=port, wait_s=wait) as room:
+        teacher = _teacher(toolbox, names, seed, room, asked, decide)
+        with room.progress:
+            report = run_task(prepared, teacher, folder, listener=room.listener, viewer=room.viewer)
     _show(report.to_json(), as_json, run_summary)
     if not report.success:
         _end(report.outcome.failure or f"{len(report.outcome.delivered)} of {toasts} toasts were delivered", 1)
@@ -182,12 +224,12 @@ def run(
 @command(app, "teach", "lab teach insert --advisor terminal")
 def teach(
     subtask: Annotated[
-        str,
+        str | None,
         typer.Argument(
-            help="transfer, grasp, insert, butter, place, one skill by its full name, or a world: its name, a .toml "
-            "file, a .txt grid, random:SHAPE:DENSITY:SEED."
+            help="transfer, grasp, insert, butter, place, one skill by its full name; a world: its name, a .toml file, a "
+            ".txt grid, random:SHAPE:DENSITY:SEED; a Gymnasium environment: gym:ID, such as gym:FrozenLake-v1."
         ),
-    ],
+    ] = None,
     task: Annotated[
         str | None, typer.Option("--task", help="A task that ships, or a .toml file; default: toast. None for a world.")
     ] = None,
@@ -205,7 +247,13 @@ def teach(
             help="When it asks: ccrl, ia, combined, cq, always, never, random, importance, uncertainty; default: the task's.",
         ),
     ] = None,
-    advisor: AdvisorName = "expert",
+    memory: Annotated[
+        bool | None,
+        typer.Option("--memory/--no-memory", help="Remember advice and use it again unasked; default: the task's."),
+    ] = None,
+    advisor: AdvisorNames = None,
+    asked: Asked = "together",
+    decide: Decide = "trust-weighted",
     episodes: Annotated[
         int | None,
         typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the task's."),
@@ -215,29 +263,41 @@ def teach(
         str | None,
         typer.Option("--view", help="Of a world: full, or limited to the region that its file gives; default: full."),
     ] = None,
-    record: Annotated[
-        Path | None, typer.Option("--record", help="A file that the advice is added to, for recorded:FILE.")
+    resume: Annotated[
+        Path | None, typer.Option("--resume", help="Go on with the session in this folder, as it was begun.")
     ] = None,
+    page: ShowPage = False,
+    port: Port = 0,
+    wait: Wait = None,
+    plain: Plain = False,
     seed: Seed = 0,
     toolbox: ToolboxFolder = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for the learning curve (and the value map).")
+        Path | None,
+        typer.Option("--out", help="Folder for the session's journal, receipt, learning curve (and value map)."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """One teaching session: learn one sub-task, or a world, with an advisor, and keep the policy."""
-    from lab.lesson import teach_words
+    """One teaching session: learn one sub-task, a world or a Gymnasium environment with an advisor, and keep the policy.
+
+    Each session keeps a journal: --resume goes on with one that was broken off, lab replay shows it again.
+    """
+    from lab.lesson import teach as teach_session
     from lab.report import check_out
-    from lab.view.progress import RunProgress
+    from lab.sessions import Words
     from lab.view.summary import lesson_summary
 
-    session = teach_words(subtask, task, view)
-    if out is not None:
-        check_out(out)
-    progress = RunProgress(_console())
-    teacher = replace(_teacher(toolbox, advisor, seed, progress), record=record)
-    teacher.toolbox.check()
-    document = session(teacher, learner=learner, gate=gate, episodes=episodes, name=save, out=out)
+    advisors = tuple(advisor or ())
+    given = Words(subtask or "", task, view, learner, gate, memory, advisors, asked, decide, episodes, seed, save)
+    kept = None if resume is None else _kept(resume, "--resume")
+    words = given.complete() if kept is None else kept.same(given)
+    folder = out if kept is None else kept.folder
+    if folder is not None:
+        check_out(folder)
+    with _seat(words.advisors, page=page, port=port, wait_s=wait, plain=plain) as room:
+        teacher = _teacher(toolbox, words.advisors, words.seed, room, words.asked, words.decide)
+        document = teach_session(words, teacher, folder, kept)
+        room.ends(document)
     _show(document, as_json, lesson_summary)
     if document["failure"] is not None:
         _end(document["failure"], 1)
@@ -247,6 +307,41 @@ def teach(
             "try another advisor, more --episodes or another --learner",
             1,
         )
+
+
+@command(app, "replay", "lab replay lesson")
+def replay(
+    folder: Annotated[
+        Path | None,
+        typer.Argument(help="The folder of a session (--out of lab teach); none: lists those in the toolbox."),
+    ] = None,
+    pause: Annotated[
+        float, typer.Option("--pause", min=0.0, max=3600.0, help="Seconds between two answers; default: half a second.")
+    ] = 0.5,
+    page: ShowPage = False,
+    port: Port = 0,
+    plain: Plain = False,
+    toolbox: ToolboxFolder = None,
+    as_json: Json = False,
+) -> None:
+    """Show a kept teaching session again: each question, what was answered, what came of it, and what it was worth."""
+    from lab.lesson import replay as replay_session
+    from lab.sessions import session_rows
+    from lab.toolbox import Toolbox
+    from lab.view.summary import replay_summary, table_of
+
+    if folder is None:
+        rows = session_rows(Toolbox(toolbox))
+        _show(
+            {"sessions": rows}, as_json, lambda d: table_of(d["sessions"], ("session", "problem", "advisor", "state"))
+        )
+        return
+    kept = _kept(folder, "DIR", read_only=True)
+    with _seat(["terminal"], page=page, port=port, plain=plain) as room:
+        document = replay_session(kept, room.replaying(0.0 if as_json else pause), room.watch)
+        room.ends(document)
+        _show(document, as_json, replay_summary)
+        room.stay()
 
 
 @command(app, "sequence", "lab sequence toast --case II --toasts 4 --gantt order.svg")
@@ -284,7 +379,7 @@ def sequence(
         str,
         typer.Option(
             "--advisor",
-            help="Who srl may ask which part to move: expert, moderate, limited, novice, tau=X, wrong, terminal.",
+            help="Who srl may ask which part to move: expert, moderate, limited, novice, tau=X, wrong, terminal, web.",
         ),
     ] = "none",
     gate: Annotated[str, typer.Option("--gate", help="When srl asks: ccrl, always, never.")] = "ccrl",
@@ -292,30 +387,24 @@ def sequence(
         Path | None, typer.Option("--plot", help="A .png or .svg file for the costs of the episodes.")
     ] = None,
     gantt: Annotated[Path | None, typer.Option("--gantt", help="A .png or .svg file for the Gantt chart.")] = None,
+    page: ShowPage = False,
+    port: Port = 0,
+    wait: Wait = None,
+    plain: Plain = False,
     seed: Seed = 0,
     toolbox: ToolboxFolder = None,
     as_json: Json = False,
 ) -> None:
     """The high level alone: the order of the robot's transfers, beside the proven optimum."""
     from lab.sequence import Wanted, sequence_named
-    from lab.view.order_prompt import OrderPrompt
-    from lab.view.progress import RunProgress
     from lab.view.summary import sequence_summary
 
-    progress = RunProgress(_console())
-    teacher = _teacher(toolbox, "expert", seed, progress)
-    teacher.toolbox.check()
-    prompt = OrderPrompt(progress.console) if advisor == "terminal" else None
-
-    def ask(request: "SequenceRequest") -> int | None:
-        assert prompt is not None
-        with progress.paused():
-            return prompt(request)
-
-    wanted = Wanted(method, episodes, objective, sessions, seed, stochastic, advisor, gate, ask if prompt else None)
-    files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
-    with progress:
-        document = sequence_named(task, case, toasts, wanted, teacher=teacher, listener=progress, files=files)
+    with _seat([advisor], page=page, port=port, wait_s=wait, plain=plain) as room:
+        teacher = _teacher(toolbox, ["expert"], seed, room)
+        wanted = Wanted(method, episodes, objective, sessions, seed, stochastic, advisor, gate, room.orderers())
+        files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
+        with room.progress:
+            document = sequence_named(task, case, toasts, wanted, teacher=teacher, listener=room.listener, files=files)
     _show(document, as_json, sequence_summary)
     if document["interrupted"]:
         _end("stopped by Ctrl-C; the best order until then is above", 130)

@@ -1,33 +1,123 @@
 """Single commands about lessons: one teaching session in a sub-task or a world, the order alone."""
 
+import json
 from collections.abc import Callable
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import asdict, replace
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from lab.advice.advisors import PEOPLE
+from lab.advice.counsel import Counsel, Watch
+from lab.advice.journal import line_of
+from lab.advice.requests import AdviceRequest, AdvisorLeft
 from lab.errors import BadInput, unknown
 from lab.gridworld import GridWorld
 from lab.mdp import greedy_path
+from lab.record import write_whole
+from lab.sessions import KeptSession, NewSession, Words
 from lab.taskfile import Task, load, load_world, names_file, names_of
-from lab.teaching import Lesson, Teacher, check_name, plain_name, world_problem
+from lab.teaching import Audience, Interrupted, Lesson, Teacher, check_name, plain_name, world_problem
+from lab.toolbox import Toolbox
 
 if TYPE_CHECKING:
+    from lab.gymworld import GymWorld
     from lab.policy import Policy
     from lab.skills.skill import Problem, Skill
 
 
-def teach_words(subtask: str, task: str | None, view: str | None) -> Callable[..., dict[str, Any]]:
-    """What the words of `lab teach` ask for: `teach_one` or `teach_world` with its first arguments. BadInput for bad ones."""
-    if not names_file(subtask):
-        if view is not None:
-            raise BadInput(f"view '{view}' (--view): only a world has one, '{subtask}' is none")
-        return partial(teach_one, load(task or "toast"), subtask)
-    world = load_world(subtask)
-    if task is not None:
-        raise BadInput(f"task '{task}' (--task): the world '{subtask}' belongs to no task: leave --task away")
-    return partial(teach_world, world, view=view or "full")
+GYM = "gym:"
+
+
+def teach(words: Words, teacher: Teacher, out: Path | None, kept: KeptSession | None = None) -> dict[str, Any]:
+    """The session that these words ask for, or `kept` gone on with, with its journal; the document of `lab teach --json`.
+
+    Pictures and the receipt go to `out`. Raises BadInput for bad words, WorkFailed, and Interrupted, which says how to go
+    on.
+    """
+    subject = _subject(words)
+    session = kept or NewSession(out, teacher.toolbox, words)
+    teacher = replace(teacher, keep=session.keep, begun=None if kept is None else kept.begun)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+    try:
+        document = subject(
+            teacher,
+            learner=words.learner,
+            gate=words.gate,
+            memory=words.memory,
+            episodes=words.episodes,
+            name=words.save,
+            out=out,
+        )
+    except Interrupted as stopped:
+        raise Interrupted(f"{stopped}; go on with: lab teach --resume {session.folder}") from None
+    return document | _worth(session)
+
+
+def replay(kept: KeptSession, audience: Audience, watch: Watch) -> dict[str, Any]:
+    """Shows a kept session again, each question with its answer, to `audience` and `watch`; nothing is learned or written.
+
+    Returns the document of `lab replay --json`. Raises BadInput when the session's problem is not there any more.
+    """
+    words, read = kept.words, kept.read
+    people = dict.fromkeys(PEOPLE, _nobody)  # the journal answers for them
+    counsel = Counsel(words.advisors, people, words.asked, words.decide, watch=watch)
+    subject = _subject(words)
+    with TemporaryDirectory() as folder:
+        teacher = Teacher(Toolbox(folder), counsel, words.seed, audience, keep=kept.keep, begun=kept.begun)
+        options = {name: getattr(words, name) for name in ("learner", "gate", "memory", "episodes")}
+        with suppress(Interrupted):  # it was not over
+            subject(teacher, **options, name=words.save, out=None)
+    worth = kept.receipt()
+    return {
+        "session": str(kept.folder),
+        "problem": read.session.problem,
+        "words": read.session.words,
+        "seed": words.seed,
+        "lab": read.session.lab,
+        "closed": None if read.closed is None else asdict(read.closed),
+        "cut": read.cut,
+        "events": [json.loads(line_of(entry)) for entry in read.entries],
+        "receipt": worth.to_json() | {"lines": worth.lines()},
+    }
+
+
+def _nobody(request: AdviceRequest) -> int | None:
+    raise AdvisorLeft
+
+
+def _worth(session: NewSession | KeptSession) -> dict[str, Any]:
+    """Where the session is kept, and what its advice was worth; the receipt is written beside the journal."""
+    assert session.folder is not None
+    worth = session.receipt()
+    path = session.folder / "receipt.json"
+    write_whole(path, json.dumps(worth.to_json(), indent=1, allow_nan=False) + "\n")
+    return {"session": str(session.folder), "receipt": worth.to_json() | {"lines": worth.lines()}}
+
+
+def _subject(words: Words) -> Callable[..., dict[str, Any]]:
+    """What the words ask for: one of the functions below with its first argument. BadInput for bad ones."""
+    if words.subtask.startswith(GYM):
+        from lab.gymworld import gym_world
+
+        for option, value in (("--task", words.task), ("--view", words.view)):
+            if value is not None:
+                raise BadInput(f"{option} {value}: a Gymnasium environment, '{words.subtask}', has none: leave it away")
+        return partial(teach_gym, gym_world(words.subtask))
+    if not names_file(words.subtask):
+        if words.view is not None:
+            raise BadInput(f"view '{words.view}' (--view): only a world has one, '{words.subtask}' is none")
+        return partial(teach_one, load(words.task or "toast"), words.subtask)
+    world = load_world(words.subtask)
+    if words.task is not None:
+        raise BadInput(
+            f"task '{words.task}' (--task): the world '{words.subtask}' belongs to no task: leave --task away"
+        )
+    return partial(teach_world, world, view=words.view or "full")
 
 
 def teach_one(
@@ -37,6 +127,7 @@ def teach_one(
     *,
     learner: str | None = None,
     gate: str | None = None,
+    memory: bool | None = None,
     episodes: int | None = None,
     name: str | None = None,
     out: Path | None = None,
@@ -55,10 +146,11 @@ def teach_one(
 
     toasts = fitting(task, 2)
     wanted = find_skill(Crew.of(task, toasts).skills, subtask)  # before the scene is surveyed
-    settings = task.subtask(wanted.subtask).changed(learner, gate, episodes)
+    settings = task.subtask(wanted.subtask).changed(learner, gate, episodes, memory)
     check_name(name)
     prepared = prepare(task, toasts, teacher.seed, wanted.name)
     skill, problem = prepared.crew.skills[wanted.name], prepared.problems[wanted.name]
+    teacher.audience.stands(prepared, problem)
     earlier = teacher.toolbox.find(problem.subtask, problem.mdp.signature, name or plain_name(problem))
     lesson = teacher.one_session(problem, settings, task.name, name)
     policy = prepared.crew.policies[skill.name] = lesson.policy
@@ -81,6 +173,7 @@ def teach_world(
     view: str = "full",
     learner: str | None = None,
     gate: str | None = None,
+    memory: bool | None = None,
     episodes: int | None = None,
     name: str | None = None,
     out: Path | None = None,
@@ -93,15 +186,38 @@ def teach_world(
         raise unknown("view", view, ("full", "limited"), "--view")
     if view == "limited" and world.view is None:
         raise BadInput(f"view 'limited' (--view): the file of world '{world.name}' has no [view]")
-    settings, problem = world.changed(learner, gate, episodes), world_problem(world)
+    settings, problem = world.changed(learner, gate, episodes, memory), world_problem(world)
     check_name(name)
-    teacher = replace(teacher, region=world.region() if view == "limited" else None)
+    region = world.region() if view == "limited" else None
+    teacher = replace(teacher, counsel=replace(teacher.counsel, region=region))
+    teacher.audience.stands(world, problem)
     lesson = teacher.one_session(problem, settings, world.name, name)
     document = _document(problem, lesson, teacher, None) | {"view": view}
     if out is not None:
         document["files"] = _draw_curve(world.name, lesson.policy, out)
         if len(world.shape) == 2:
             document["files"]["value_map"] = _draw_world(world, lesson.policy, out / "value-map.png")
+    return document
+
+
+def teach_gym(
+    world: "GymWorld",
+    teacher: Teacher,
+    *,
+    learner: str | None = None,
+    gate: str | None = None,
+    memory: bool | None = None,
+    episodes: int | None = None,
+    name: str | None = None,
+    out: Path | None = None,
+) -> dict[str, Any]:
+    """One session in a Gymnasium environment with discrete states and actions, as `teach_world`."""
+    settings, problem = world.changed(learner, gate, episodes, memory), world.problem()
+    check_name(name)
+    lesson = teacher.one_session(problem, settings, world.name, name)
+    document = _document(problem, lesson, teacher, None)
+    if out is not None:
+        document["files"] = _draw_curve(world.name, lesson.policy, out)
     return document
 
 
@@ -116,6 +232,7 @@ def _document(problem: "Problem", lesson: Lesson, teacher: Teacher, failure: str
         "learner": policy.learner["learner"],
         "gate": policy.gate["gate"],
         "advisor": teacher.advisor,
+        "memory": policy.gate["memory"],
         "seed": teacher.seed,
         "episodes": len(result.steps),
         "steps_per_episode": result.steps.tolist(),

@@ -1,7 +1,8 @@
 """Who hears how a run goes on: the composer and the teacher tell, a view or nobody listens."""
 
-from lab.learning.session import Event
-from lab.sequencing.events import Move, SequenceResult
+from lab.advice.events import Event
+from lab.learning.settings import GateSettings
+from lab.sequencing.events import EpisodeSequenced, Move, SequenceResult
 from lab.sequencing.search import Reference
 from lab.teaching import Lesson
 
@@ -24,6 +25,12 @@ class Listener:
     def measured(self, name: str, seconds: float) -> None:
         """A move was timed."""
 
+    def sequences(self, episodes: int, known: Reference | None, gate: GateSettings | None) -> None:
+        """A sequencer begins to try orders; gate: when it asks which part to move, None: it asks nobody."""
+
+    def tried(self, order: EpisodeSequenced) -> None:
+        """An order was tried."""
+
     def sequenced(self, best: SequenceResult, known: Reference | None) -> None:
         """An order was found."""
 
@@ -32,3 +39,50 @@ class Listener:
 
     def retried(self, text: str) -> None:
         """A step failed and is tried again."""
+
+
+class Both(Listener):
+    """Tells everything to two listeners."""
+
+    def __init__(self, one: Listener, other: Listener) -> None:
+        self._listeners = (one, other)
+
+    def phase(self, name: str, parts: int) -> None:
+        for listener in self._listeners:
+            listener.phase(name, parts)
+
+    def skipped(self, what: str) -> None:
+        for listener in self._listeners:
+            listener.skipped(what)
+
+    def lesson(self, name: str, lesson: Lesson) -> None:
+        for listener in self._listeners:
+            listener.lesson(name, lesson)
+
+    def learning(self, name: str, event: Event) -> None:
+        for listener in self._listeners:
+            listener.learning(name, event)
+
+    def measured(self, name: str, seconds: float) -> None:
+        for listener in self._listeners:
+            listener.measured(name, seconds)
+
+    def sequences(self, episodes: int, known: Reference | None, gate: GateSettings | None) -> None:
+        for listener in self._listeners:
+            listener.sequences(episodes, known, gate)
+
+    def tried(self, order: EpisodeSequenced) -> None:
+        for listener in self._listeners:
+            listener.tried(order)
+
+    def sequenced(self, best: SequenceResult, known: Reference | None) -> None:
+        for listener in self._listeners:
+            listener.sequenced(best, known)
+
+    def moved(self, move: Move) -> None:
+        for listener in self._listeners:
+            listener.moved(move)
+
+    def retried(self, text: str) -> None:
+        for listener in self._listeners:
+            listener.retried(text)

@@ -1,6 +1,6 @@
 """The order of the robot's transfers: of a task, over measured durations, or of a cell file."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from lab.cellfile import CellFile, order_from_word, toast_case
 from lab.cellparts import Sequencing
 from lab.errors import BadInput, unknown
 from lab.gridworld import GridWorld
+from lab.learning.settings import GateSettings
 from lab.listener import Listener
 from lab.planner import check_method, find_sequence, search_for
 from lab.sequence_drawn import stochastic
@@ -45,7 +46,7 @@ class Wanted:
     stochastic: bool = False
     advisor: str = "none"
     gate: str = "ccrl"
-    ask: "Ask | None" = None
+    people: "Mapping[str, Ask]" = field(default_factory=dict)
 
 
 def sequence_named(
@@ -85,7 +86,7 @@ def sequence_named(
         )
     check_objective(wanted.objective or loaded.sequencing.objective, cell)
     listener.phase("sequence", wanted.sessions)
-    document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, on_session=listener.sequenced)
+    document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, listener=listener)
     document = {"task": loaded.name} | document
     draw(cell, document, found, files)
     return document
@@ -127,7 +128,7 @@ def sequence_cell(
     wanted: Wanted,
     chance: Chance,
     *,
-    on_session: Callable[[SequenceResult, Reference | None], None] | None = None,
+    listener: Listener | None = None,
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     """Sessions of one method on a cell, beside what cannot be beaten; the document of `lab sequence`, and the sessions.
 
@@ -145,8 +146,11 @@ def sequence_cell(
     known = reference(cell, search.objective)
     found = []
     interrupted = False
+    listener = listener or Listener()
+    shown = known if search.chance == NO_CHANCE else None
     for session in range(wanted.sessions):
-        heard = _Heard()
+        heard = _Heard(listener)
+        listener.sequences(search.episodes, shown, None if wanted.advisor == "none" else GateSettings(wanted.gate))
         try:
             found.append(_session(cell, method, replace(search, on_episode=heard), wanted, session))
         except KeyboardInterrupt:
@@ -155,8 +159,7 @@ def sequence_cell(
                 raise KeyboardInterrupt("stopped by Ctrl-C before an order was found") from None
             found += [] if heard.best is None else [heard.result()]
             break
-        if on_session is not None:
-            on_session(found[-1], known if search.chance == NO_CHANCE else None)
+        listener.sequenced(found[-1], shown)
     document = _document(cell, method, search, found, known, wanted) | {"interrupted": interrupted}
     if wanted.stochastic and not interrupted:
         document["stochastic"] = stochastic(cell, method, search, min(found, key=_cost), chance, wanted.seed)
@@ -165,14 +168,16 @@ def sequence_cell(
 
 @dataclass
 class _Heard:
-    """Keeps what a session has found so far, for when it is stopped."""
+    """Keeps what a session has found so far, for when it is stopped, and tells of it."""
 
+    listener: Listener
     best: EpisodeSequenced | None = None
     costs: list[float] = field(default_factory=list)
 
     def __call__(self, event: EpisodeSequenced) -> None:
         self.costs.append(event.cost)
         self.best = event if event.best else self.best
+        self.listener.tried(event)
 
     def result(self) -> SequenceResult:
         assert self.best is not None
@@ -187,11 +192,10 @@ def _session(cell: Cell, method: str, search: Search, wanted: Wanted, session: i
 
 def _advised(cell: Cell, method: str, search: Search, wanted: Wanted, session: int) -> "AdvisedResult":
     """A session of SRL with advice."""
-    from lab.learning.settings import GateSettings
     from lab.sequencing.advised import advised_srl, sequence_advisor
 
     rng = np.random.default_rng([wanted.seed, 2, session])
-    advisor = sequence_advisor(wanted.advisor, cell, np.random.default_rng([wanted.seed, 3, session]), wanted.ask)
+    advisor = sequence_advisor(wanted.advisor, cell, np.random.default_rng([wanted.seed, 3, session]), wanted.people)
     return advised_srl(cell, search, rng, GateSettings(wanted.gate), advisor)
 
 

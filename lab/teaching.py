@@ -1,20 +1,23 @@
 """Find a skill in the toolbox, or teach it: learning sessions with a gate and an advisor, kept whatever happens."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from math import inf
-from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 from zlib import crc32
 
 import numpy as np
 
-from lab.advice.advisors import Advisor, Ask, Recording, make_advisor
+from lab.advice.counsel import Counsel
+from lab.advice.events import AdviceEnded, AdviceRejected, Event
+from lab.advice.journal import Again, Closed, Journal
+from lab.advice.requests import Advisor
 from lab.errors import BadInput, WorkFailed
 from lab.gridworld import GridWorld
-from lab.learning.session import AdviceEnded, AdviceRejected, Event, SessionResult, run_session, unreached
+from lab.learning.environment import TableEnvironment, unreached
+from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.mdp import BoolArray, FloatArray, TabularMDP, greedy_path
+from lab.mdp import FloatArray, TabularMDP, greedy_path
 from lab.policy import MAX_NAME_LENGTH, Policy, is_name
 from lab.record import Learned
 from lab.skills.skill import Problem
@@ -25,6 +28,7 @@ MAX_SESSIONS = 20  # to reach the goal at all; further sessions go on from the t
 MORE_SESSIONS = 3  # to find a shorter way once the goal is reached
 _UNFINISHED = " unfinished"
 _LONGEST_PROBLEM = MAX_NAME_LENGTH - 20  # characters of a policy's name; the rest is for its signature and state
+Keep = Callable[[Problem, LearnerSettings, GateSettings, Policy | None], Journal]
 Source = Literal["learned", "reused", "continued"]
 
 
@@ -41,22 +45,42 @@ class Lesson:
     result: SessionResult | None = None
 
 
+class Audience:
+    """Who hears how lessons go on; the base hears nothing."""
+
+    def begins(self, problem: Problem, learner: LearnerSettings, gate: GateSettings, journal: Journal) -> None:
+        """A lesson begins, or begins again because an answer was taken back: what it told before is told again."""
+
+    def meets(self, advisor: Advisor | None) -> None:
+        """Who advises in the session that begins now, several as a `Panel`."""
+
+    def hears(self, name: str, event: Event, is_new: bool) -> None:
+        """Something happened in the lesson of that name; not new: it is told again."""
+
+    def stands(self, where: Any, problem: Problem) -> None:
+        """Where the next lesson takes place, for those who show it: a prepared task, a world."""
+
+
 @dataclass(frozen=True)
 class Teacher:
-    """How to teach: who advises, with which seed, whom to tell, and where policies are kept.
+    """How to teach: who advises, with which seed, whom to tell, and where policies and journals are kept.
 
-    `ask` is the prompt behind the advisor 'terminal'; `on_event(problem name, event)` hears of episodes and requests;
-    `region` (S,) bool: the states in which the advisor sees the robot and is asked, all by default; `record`: the file
-    that advice is added to.
+    `audience` hears how lessons go on; `keep(problem, learner, gate, the policy that is learned on)` gives the journal of a
+    lesson, by default one that is not written; `begun(problem)`, in a lesson that is resumed: the policy that it once
+    went on from.
     """
 
     toolbox: Toolbox
-    advisor: str = "expert"
+    counsel: Counsel = field(default_factory=Counsel)
     seed: int = 0
-    ask: Ask | None = None
-    on_event: Callable[[str, Event], None] | None = None
-    region: BoolArray | None = None
-    record: Path | None = None
+    audience: Audience = field(default_factory=Audience)
+    keep: Keep = lambda problem, learner, gate, unfinished: Journal()
+    begun: Callable[[Problem], Policy | None] | None = None
+
+    @property
+    def advisor(self) -> str:
+        """Who advises, in words."""
+        return str(self.counsel)
 
     def find_or_teach(
         self, problem: Problem, settings: Subtask, task: str, known: Mapping[tuple[str, str], Policy]
@@ -69,7 +93,7 @@ class Teacher:
         found = known.get((problem.subtask, problem.mdp.signature))
         if found is not None and not _belongs(found, problem.mdp):
             found = None
-        if found is not None and found.solved and fits(found.q, problem.mdp):
+        if found is not None and found.solved and fits(found.q, problem, settings.learner):
             return Lesson(found, "reused")
         return self.teach(problem, settings.learner, settings.gate, task, unfinished=found)
 
@@ -93,9 +117,12 @@ class Teacher:
                     f"policy name '{name}' (--save): it is the name of a policy for '{row['subtask']}' in another "
                     f"problem ({row['signature'][:8]}): choose another name, or remove that policy"
                 )
-        found = self.unfinished(problem, name)
-        if found is not None and not self._same(found, settings):
-            found = None  # another learner, gate or advisor begins anew, so that they can be compared
+        if self.begun is not None:
+            found = self.begun(problem)
+        else:
+            found = self.unfinished(problem, name)
+            if found is not None and not self._same(found, settings):
+                found = None  # another learner, gate or advisor begins anew, so that they can be compared
         return self.teach(problem, settings.learner, settings.gate, task, unfinished=found, name=name, sessions=1)
 
     def _same(self, policy: Policy, settings: Learned) -> bool:
@@ -121,33 +148,64 @@ class Teacher:
         Once the path leads to the goal, at most MORE_SESSIONS further ones look for a shorter one. A table that leads
         to the goal is never given up for a worse one. `unfinished`, a policy of this very problem, is learned on.
         """
-        result = self._learn(problem, learner, gate, unfinished, sessions)
-        reaches = fits(result.q, problem.mdp)
-        whole = result if unfinished is None else _after(unfinished, result)
-        policy = self._policy(whole, problem, learner, gate, task, name or self._free_name(problem, result.solved))
-        self.toolbox.save(policy)
+        self.counsel.check_records(problem.mdp)
+        journal = self.keep(problem, learner, gate, unfinished)
+        try:
+            result = self._run_through(problem, learner, gate, unfinished, sessions, journal)
+            whole = result if unfinished is None else _after(unfinished, result)
+            policy = self._policy(whole, problem, learner, gate, task, name or self._free_name(problem, result.solved))
+            self.toolbox.save(policy)
+            if not result.interrupted:
+                ended = (len(result.steps), result.final_steps, result.optimal_steps, result.solved)
+                journal.closes(Closed(*ended, saved_as=policy.name))
+        finally:
+            journal.close()
         if policy.solved and unfinished is not None and unfinished.name == f"{policy.name}{_UNFINISHED}":
             self.toolbox.remove(unfinished.name)  # it is finished now, under its plain name
         if result.interrupted:
             raise Interrupted(
                 f"stopped by Ctrl-C after {len(result.steps)} episodes of '{problem.name}'; what was learned is kept"
             )
-        if sessions > 1 and not reaches:
+        if sessions > 1 and not fits(result.q, problem, learner):
             raise WorkFailed(
                 f"'{problem.name}' was not learned in {len(result.steps)} episodes with the advisor '{self.advisor}'; "
                 "what was learned is kept: try a better advisor, or more episodes in the task file"
             )
         return Lesson(policy, "learned" if unfinished is None else "continued", result)
 
+    def _run_through(
+        self,
+        problem: Problem,
+        learner: LearnerSettings,
+        gate: GateSettings,
+        unfinished: Policy | None,
+        sessions: int,
+        journal: Journal,
+    ) -> SessionResult:
+        """The lesson, from its beginning each time an answer is taken back."""
+        while True:
+            self.audience.begins(problem, learner, gate, journal)
+            try:
+                return self._learn(problem, learner, gate, unfinished, sessions, journal)
+            except Again:
+                journal.rewind()
+
     def _learn(
-        self, problem: Problem, learner: LearnerSettings, gate: GateSettings, unfinished: Policy | None, sessions: int
+        self,
+        problem: Problem,
+        learner: LearnerSettings,
+        gate: GateSettings,
+        unfinished: Policy | None,
+        sessions: int,
+        journal: Journal,
     ) -> SessionResult:
         """All sessions of one lesson as one, with the best table of these and of `unfinished`."""
-        mdp = problem.mdp
+        place = problem.environment or TableEnvironment(problem.mdp)
+        gate = replace(gate, judge_unhelped=False) if self.counsel.records else gate
         lived = 0 if unfinished is None else len(unfinished.curve)  # what did not help before is not drawn again
         rng = np.random.default_rng([self.seed, crc32(problem.name.encode()), lived])
         kept: SessionResult | Policy | None = unfinished
-        moves = before = inf if unfinished is None else _moves(unfinished.q, mdp)
+        moves = before = inf if unfinished is None else _moves(unfinished.q, problem, learner)
         left = sessions if moves == inf else min(sessions, MORE_SESSIONS)
         whole: SessionResult | None = None
         alone = False  # the advisor left or was rejected: nobody is asked about this skill again
@@ -156,19 +214,19 @@ class Teacher:
             nonlocal alone
             left_for_good = isinstance(event, AdviceEnded) and event.reason == "advisor left"
             alone = alone or left_for_good or isinstance(event, AdviceRejected)
-            if self.on_event is not None:
-                self.on_event(problem.name, event)
+            self.audience.hears(problem.name, event, journal.tell(event))
 
         def advisor() -> Advisor | None:
-            region, episodes = self.region, learner.episodes
-            made = make_advisor(self.advisor, mdp, learner.discount, rng, self.ask, region=region, episodes=episodes)
-            return made if made is None or self.record is None else Recording(made, self.record)
+            made = self.counsel.gather(place, learner, rng, journal=journal, tell=tell)
+            self.audience.meets(made)
+            return made
 
         while left:
             left -= 1
             table = None if kept is None else kept.q
-            result = run_session(mdp, learner, gate, None if alone else advisor(), rng, q0=table, on_event=tell)
-            whole, now = _joined(whole, result), _moves(result.q, mdp)
+            asked = None if alone else advisor()
+            result = run_session(problem.mdp, learner, gate, asked, rng, q0=table, on_event=tell, environment=place)
+            whole, now = _joined(whole, result), _moves(result.q, problem, learner)
             if now <= moves:
                 if now < moves == inf:
                     left = MORE_SESSIONS if sessions > 1 else 0
@@ -218,13 +276,17 @@ class Teacher:
         )
 
 
-def fits(q: FloatArray, mdp: TabularMDP) -> bool:
+def fits(q: FloatArray, problem: Problem, learner: LearnerSettings) -> bool:
     """Whether greedy steps lead from every start of the problem to its goal."""
-    return _moves(q, mdp) < inf
+    return _moves(q, problem, learner) < inf
 
 
-def _moves(q: FloatArray, mdp: TabularMDP) -> float:
+def _moves(q: FloatArray, problem: Problem, learner: LearnerSettings) -> float:
     """The moves of the greedy path from the start; infinite when it, or that from another start, misses the goal."""
+    if problem.environment is not None:
+        steps = problem.environment.judge(q, learner).final_steps
+        return inf if steps is None else steps
+    mdp = problem.mdp
     _, actions, reached = greedy_path(q, mdp, mdp.n_states)
     return len(actions) if reached and not unreached(q, mdp) else inf
 

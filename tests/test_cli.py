@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.advice import advisors, gates
+from lab.advice import advisors, gates, panel
 from lab.errors import WorkFailed
 from lab.learning.session import run_session
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -81,7 +81,7 @@ def test_every_command_has_help_with_an_example(lab: Lab, words: list[str]) -> N
     assert "--json" in ran.out
 
 
-ORDER_ADVISORS = [*advisors.SKILLS, "tau=X", "wrong", "terminal"]
+ORDER_ADVISORS = [*advisors.SKILLS, "tau=X", "wrong", *advisors.PEOPLE]
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,10 @@ ORDER_ADVISORS = [*advisors.SKILLS, "tau=X", "wrong", "terminal"]
     [
         ("teach", "--learner", "--gate", UPDATES),
         ("teach", "--gate", "--advisor", gates.GATES),
-        ("teach", "--advisor", "--episodes", [*advisors.ADVISORS, *advisors.FORMS]),
+        ("teach", "--advisor", "--ask", [*advisors.ADVISORS, *advisors.FORMS]),
+        ("teach", "--ask", "--decide", panel.ASKED),
+        ("teach", "--decide", "--episodes", panel.DECISIONS),
+        ("run", "--advisor", "--ask", [*advisors.ADVISORS, *advisors.FORMS]),
         ("sequence", "--objective", "--episodes", OBJECTIVES),
         ("sequence", "--advisor", "--gate", ORDER_ADVISORS),
         ("sequence", "--gate", "--plot", FITTING),
@@ -446,7 +449,85 @@ def test_a_random_world_is_written_checked_and_learned(lab: Lab, folder: Path) -
     assert lab("task", "check", "w.toml").out == "w.toml is sound\n"
     ran = lab("teach", "w.toml", "--out", "pictures", "--json")
     assert (ran.code, ran.json["solved"]) == (0, True)
-    assert tree(folder / "pictures") == ["learning-curve.png", "value-map.png"]
+    assert tree(folder / "pictures") == ["events.jsonl", "learning-curve.png", "receipt.json", "value-map.png"]
+
+
+def test_a_session_is_replayed_listed_and_not_gone_on_with_when_it_is_over(lab: Lab, folder: Path) -> None:
+    (folder / "w.txt").write_text("S..\n.#.\n..G\n")
+    taught = lab(
+        "teach", "w.txt", "--advisor", "terminal", "--gate", "always", "--out", "lesson", stdin="right\nauto\n"
+    )
+    assert (taught.code, "receipt" in taught.out) == (0, False)
+    ran = lab("replay", "lesson", "--json")
+    assert (ran.code, ran.out.count("\n")) == (0, 1)
+    assert ran.json.keys() == {"session", "problem", "words", "seed", "lab", "closed", "cut", "events", "receipt"}
+    answers = [event for event in ran.json["events"] if event["kind"] == "answer"]
+    assert [(answer["action"], answer["left"]) for answer in answers] == [(3, False), (None, True)]
+    assert ran.json["closed"]["episodes"] == json.loads((folder / "lesson" / "receipt.json").read_text())["episodes"]
+    shown = lab("replay", "lesson", "--pause", "0")
+    assert shown.code == 0
+    assert "w in lesson: over after" in shown.out
+    assert "right" in shown.err
+    again = lab("teach", "--resume", "lesson")
+    assert (again.code, again.err) == (2, "lab: the session in 'lesson' is over: look at it again with lab replay\n")
+    lab("teach", "w.txt", "--advisor", "none", "--episodes", "3")
+    (row,) = lab("replay", "--json").json["sessions"]
+    assert (row["problem"], row["advisor"], Path(row["session"]).name) == ("w", "none", "w-1")
+
+
+def test_a_session_goes_on_from_another_folder(lab: Lab, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "w.txt").write_text("S..\n.#.\n..G\n")
+    whole = lab("teach", "w.txt", "--advisor", "expert", "--gate", "always", "--out", "lesson", "--json").json
+    journal = folder / "lesson" / "events.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[:7]) + lines[7][:11])
+    (folder / "elsewhere").mkdir()
+    monkeypatch.chdir(folder / "elsewhere")
+    ran = lab("teach", "--resume", "../lesson", "--json")
+    assert ran.code == 0
+    assert "its last line was cut off and is left out" in ran.err
+    kept = ("steps_per_episode", "helped_steps", "solved", "saved_as")
+    assert [ran.json[name] for name in kept] == [whole[name] for name in kept]
+    assert journal.read_bytes() == b"".join(lines)
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ("teach", "nothing to learn (SUBTASK): name a sub-task, a world or gym:ID, or go on with --resume DIR"),
+        ("teach --resume nowhere", "journal 'nowhere' (--resume): cannot be read: No such file or directory"),
+        ("replay nowhere", "journal 'nowhere' (DIR): cannot be read: No such file or directory"),
+        (
+            "teach world-1 --resume lesson",
+            "subtask 'world-1' beside --resume lesson: a session goes on as it was begun",
+        ),
+        ("teach world-1 --advisor recorded:lesson", "it is advice about another problem, 'w'"),
+        ("teach world-1 --ask all", "unknown way of asking 'all' (--ask): known: in-turn, together"),
+        ("teach world-1 --decide majorit", "unknown way of deciding 'majorit' (--decide): did you mean 'majority'?"),
+        ("teach world-1 --wait 0", "invalid value for '--wait'"),
+        ("teach gym:FrozenLak-v1", "FrozenLake-v1"),
+        ("teach gym:Pendulum-v1", "its observation space is Box"),
+        ("teach gym:Pendulum-v1", "supported are Discrete, MultiDiscrete, MultiBinary"),
+        (
+            "teach gym:FrozenLake-v1 --task toast",
+            "--task toast: a Gymnasium environment, 'gym:FrozenLake-v1', has none",
+        ),
+    ],
+)
+def test_bad_words_about_sessions(lab: Lab, folder: Path, words: str, reason: str) -> None:
+    (folder / "w.txt").write_text("S.G\n")
+    lab("teach", "w.txt", "--out", "lesson", "--episodes", "2", "--gate", "always")
+    before = tree(folder)
+    ran = lab(*words.split())
+    assert (ran.code, ran.out) == (2, "")
+    assert reason in ran.err
+    assert ran.err.count("\n") == 1
+    assert tree(folder) == before
+
+
+def test_a_gymnasium_environment_is_taught(lab: Lab, folder: Path) -> None:
+    ran = lab("teach", "gym:FrozenLake-v1?is_slippery=false", "--advisor", "expert", "--json")
+    assert (ran.code, ran.json["solved"], ran.json["final_steps"]) == (0, True, 6)
 
 
 def test_a_world_without_a_way_is_not_sound(lab: Lab, folder: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.advice.advisors import AdviceRequest
+from lab.advice.requests import AdviceRequest
 from lab.errors import BadInput
 from lab.gridworld import MAX_DENSITY, GridWorld, View, from_text, from_words, parse_shape, random_world
 from lab.learning.settings import LearnerSettings

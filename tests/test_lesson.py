@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.advice.advisors import AdviceRequest
+from lab.advice.counsel import Counsel
+from lab.advice.requests import AdviceRequest
 from lab.errors import BadInput
 from lab.gridworld import GridWorld, View
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -31,7 +32,7 @@ def teacher(tmp_path: Path) -> Teacher:
 # ---- teach --------------------------------------------------------------------------------------------------------
 
 TEACH_FIELDS = (
-    *("subtask", "skill", "task", "learner", "gate", "advisor", "seed", "episodes", "steps_per_episode"),
+    *("subtask", "skill", "task", "learner", "gate", "advisor", "memory", "seed", "episodes", "steps_per_episode"),
     *("guided_episodes", "requests", "helped_steps", "misleads", "rejected_at_episode", "optimal_steps"),
     *("final_steps", "solved", "failure", "source", "saved_as", "files"),
 )
@@ -82,7 +83,7 @@ def test_ctrl_c_keeps_the_session(task: Task, tmp_path: Path) -> None:
     def ask(_: object) -> int:
         raise KeyboardInterrupt
 
-    teacher = Teacher(Toolbox(tmp_path), "terminal", ask=ask)
+    teacher = Teacher(Toolbox(tmp_path), Counsel(("terminal",), {"terminal": ask}))
     with pytest.raises(Interrupted, match="stopped by Ctrl-C after 29 episodes of 'insert at toaster'"):
         teach_one(task, "insert", teacher, out=tmp_path / "out")
     (row,) = teacher.toolbox.list()
@@ -96,7 +97,7 @@ def test_an_interrupted_session_is_gone_on_with(task: Task, tmp_path: Path) -> N
 
     toolbox = Toolbox(tmp_path)
     with pytest.raises(Interrupted):
-        teach_one(task, "insert", Teacher(toolbox, "terminal", ask=ask))
+        teach_one(task, "insert", Teacher(toolbox, Counsel(("terminal",), {"terminal": ask})))
     again = teach_one(task, "insert", Teacher(toolbox))
     assert again["episodes"] == 200
     (row,) = toolbox.list()
@@ -201,7 +202,7 @@ def test_with_a_limited_view_a_person_is_asked_inside_it_only(world: GridWorld, 
             states.add(request.state)
             return request.learner_action
 
-        teach_world(world, Teacher(Toolbox(tmp_path / view), "terminal", ask=ask), view=view)
+        teach_world(world, Teacher(Toolbox(tmp_path / view), Counsel(("terminal",), {"terminal": ask})), view=view)
     region = set(np.flatnonzero(world.region()).tolist())
     assert world.mdp().start in asked["full"]
     assert asked["limited"] & region == asked["limited"] != set()

@@ -741,7 +741,7 @@ def test_what_was_found_until_ctrl_c_is_told() -> None:
     def ask(request: object) -> int | None:
         raise KeyboardInterrupt
 
-    wanted = Wanted("srl", 60, advisor="terminal", ask=ask)
+    wanted = Wanted("srl", 60, advisor="terminal", people={"terminal": ask})
     document, found = sequence_cell(file.cell(3), file.sequencing, wanted, Chance())
     assert document["interrupted"] is True
     assert (document["episodes"], len(found)) == (29, 1)
@@ -756,5 +756,8 @@ def test_ctrl_c_before_an_order_was_found() -> None:
 
     with pytest.raises(KeyboardInterrupt, match="before an order was found"):
         sequence_cell(
-            file.cell(3), file.sequencing, Wanted("srl", 60, advisor="terminal", gate="always", ask=ask), Chance()
+            file.cell(3),
+            file.sequencing,
+            Wanted("srl", 60, advisor="terminal", gate="always", people={"terminal": ask}),
+            Chance(),
         )

@@ -7,15 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.advice.advisors import AdviceRequest, AdvisorLeft
+from lab.advice.counsel import Counsel
+from lab.advice.events import AdviceRejected, EpisodeEnded, Event
+from lab.advice.requests import AdviceRequest, AdvisorLeft
 from lab.errors import WorkFailed
-from lab.learning.session import AdviceRejected, EpisodeEnded, SessionResult, run_session
+from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, greedy_path, grid
 from lab.policy import Policy
 from lab.skills.skill import Problem
 from lab.taskfile import Subtask
-from lab.teaching import MAX_SESSIONS, MORE_SESSIONS, Interrupted, Teacher, fits
+from lab.teaching import MAX_SESSIONS, MORE_SESSIONS, Audience, Interrupted, Teacher, fits
 from lab.toolbox import Toolbox
 
 QUICK = LearnerSettings(episodes=60, max_steps=40)
@@ -181,7 +183,7 @@ def test_who_left_or_was_rejected_is_not_asked_in_further_sessions(tmp_path: Pat
         asked.append(request)
         raise AdvisorLeft
 
-    teacher = Teacher(Toolbox(tmp_path), "terminal", ask=leave)
+    teacher = Teacher(Toolbox(tmp_path), Counsel(("terminal",), {"terminal": leave}))
     slow = Subtask(learner=HOPELESS, gate=GateSettings("always"))
     for times in (1, 2):  # each skill asks once
         with pytest.raises(WorkFailed):
@@ -192,15 +194,25 @@ def test_who_left_or_was_rejected_is_not_asked_in_further_sessions(tmp_path: Pat
         asked.append(request)
         return 0  # into the wall
 
-    events: list[object] = []
+    events: list[tuple[str, Event]] = []
     wary = GateSettings(first_episode=5, window=2, omega=0, lambda_threshold=1.0)
     short = LearnerSettings(episodes=8, max_steps=2)
     asked.clear()
-    teacher = Teacher(Toolbox(tmp_path), "terminal", ask=stay, on_event=lambda _, event: events.append(event))
+    teacher = Teacher(Toolbox(tmp_path), Counsel(("terminal",), {"terminal": stay}), audience=Hearing(events))
     with pytest.raises(WorkFailed):
         teacher.find_or_teach(problem(columns=6), Subtask(learner=short, gate=wary), "toast", {})
-    assert sum(isinstance(event, AdviceRejected) for event in events) == 1
+    assert sum(isinstance(event, AdviceRejected) for _, event in events) == 1
     assert {request.episode for request in asked} == {5}
+
+
+class Hearing(Audience):
+    """Keeps what it hears, and from which lesson."""
+
+    def __init__(self, heard: list[tuple[str, Event]]) -> None:
+        self.heard = heard
+
+    def hears(self, name: str, event: Event, is_new: bool) -> None:
+        self.heard.append((name, event))
 
 
 class Person:
@@ -219,7 +231,9 @@ class Person:
 def test_ctrl_c_keeps_what_was_learned_and_the_next_run_goes_on(tmp_path: Path) -> None:
     toolbox = Toolbox(tmp_path)
     with pytest.raises(Interrupted) as stopped:
-        Teacher(toolbox, "terminal", ask=Person(50)).teach(problem(), QUICK, GateSettings("always"), "toast")
+        Teacher(toolbox, Counsel(("terminal",), {"terminal": Person(50)})).teach(
+            problem(), QUICK, GateSettings("always"), "toast"
+        )
     assert isinstance(stopped.value, KeyboardInterrupt)
     index, _ = toolbox.index()
     (kept,) = index.values()
@@ -231,7 +245,7 @@ def test_ctrl_c_keeps_what_was_learned_and_the_next_run_goes_on(tmp_path: Path) 
     assert str(stopped.value) == f"stopped by Ctrl-C {after}; what was learned is kept"
     on = Teacher(toolbox).find_or_teach(problem(), settings(), "toast", index)
     assert on.source in ("continued", "reused")
-    assert fits(on.policy.q, problem().mdp)
+    assert fits(on.policy.q, problem(), QUICK)
 
 
 def test_the_unfinished_never_replaces_the_finished(teacher: Teacher) -> None:
@@ -261,10 +275,8 @@ def test_a_long_skill_name_fits(teacher: Teacher) -> None:
 
 def test_several_sessions_are_one_lesson(teacher: Teacher) -> None:
     slow = LearnerSettings(episodes=2, max_steps=8)
-    events: list[tuple[str, object]] = []
-    lesson = replace(teacher, on_event=lambda name, event: events.append((name, event))).teach(
-        problem(), slow, GATE, "toast"
-    )
+    events: list[tuple[str, Event]] = []
+    lesson = replace(teacher, audience=Hearing(events)).teach(problem(), slow, GATE, "toast")
     assert lesson.result is not None
     episodes = len(lesson.result.steps)
     assert episodes in (4, 6, 8, 10, 12)

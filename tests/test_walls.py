@@ -19,7 +19,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.overhead", "lab.view.frames", "lab.mdp", "lab.sequencing", "lab.learning.settings"),
     ("lab.vision",),
     ("lab.learning.selection",),
-    ("lab.learning.updates",),
+    ("lab.learning.updates", "lab.learning.environment"),
+    ("lab.advice.events", "lab.advice.requests"),
     ("lab.advice",),
     ("lab.learning", "lab.sequencing.advised"),  # SRL that asks: the one sequencer that knows advice
     ("lab.policy",),
@@ -36,8 +37,10 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.composer",),
     ("lab.view",),
     ("lab.report",),
-    ("lab.run", "lab.studies", "lab.gym"),
+    ("lab.run", "lab.studies", "lab.gym", "lab.stage"),
     ("lab.sequence_drawn",),
+    ("lab.sessions", "lab.gymworld"),
+    ("lab.classroom",),
     ("lab.lesson", "lab.study", "lab.look", "lab.sequence"),
     ("lab.task",),
     ("lab.cli",),
@@ -51,6 +54,9 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "PIL": {"lab.vision", "lab.sim.camera"},
     "ortools": {"lab.sequencing.cpsat", "lab.sequencing.cpsat_model"},
     "pymoo": {"lab.sequencing.genetic"},
+    "starlette": {"lab.view.server", "lab.view.server_page"},
+    "uvicorn": {"lab.view.server"},
+    "websockets": set(),  # uvicorn's
     "joblib": {"lab.studies.runner"},  # to work in several processes; its files are pickles, and nobody reads those
 } | {library: set() for library in ("random", "pickle", "dill", "cloudpickle", "shelve", "marshal")}
 NEVER = {  # room -> rooms that it never imports, whatever the layers say
@@ -62,7 +68,7 @@ NEVER = {  # room -> rooms that it never imports, whatever the layers say
 }
 HEAVY = (
     *("numpy", "pydantic", "scipy", "trimesh", "matplotlib", "numba", "meshcat", "cv2", "pybullet", "safetensors"),
-    *("ortools", "pymoo"),
+    *("ortools", "pymoo", "starlette", "uvicorn", "gymnasium"),
 )
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 

@@ -1,13 +1,14 @@
 """SRL with advice: when the makespan stops improving, it asks which part to move next, and rejects who misleads."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from lab.advice.advisors import SKILLS, AdvisorLeft
+from lab.advice.advisors import PEOPLE, SKILLS
 from lab.advice.gates import GATES, Gate, improvement
+from lab.advice.requests import AdvisorLeft
 from lab.errors import BadInput, unknown
 from lab.learning.selection import softmax
 from lab.learning.settings import GateSettings
@@ -90,7 +91,7 @@ class AskedAdvisor:
 
 def check_advice(name: str, gate: str) -> None:
     """BadInput for an advisor that `sequence_advisor` does not know, and for a gate that does not judge by episodes."""
-    if name not in (*SKILLS, "wrong", "terminal", "none"):
+    if name not in (*SKILLS, "wrong", *PEOPLE, "none"):
         _tau(name)
     if gate not in FITTING and gate in GATES:
         allowed = f"it looks at a table of states, which sequencing has not; allowed here: {', '.join(FITTING)}"
@@ -105,7 +106,7 @@ def _tau(name: str) -> float:
     except ValueError:
         tau = 0.0
     if not 0.0 < tau < np.inf:
-        raise unknown("advisor", name, [*SKILLS, "wrong", "terminal", "none", "tau=X"], "--advisor")
+        raise unknown("advisor", name, [*SKILLS, "wrong", *PEOPLE, "none", "tau=X"], "--advisor")
     return tau
 
 
@@ -113,18 +114,18 @@ def sequence_advisor(
     name: str,
     cell: Cell,
     rng: np.random.Generator,
-    ask: Callable[[SequenceRequest], int | None] | None = None,
+    people: Mapping[str, Callable[[SequenceRequest], int | None]] | None = None,
 ) -> SequenceAdvisor | None:
-    """The advisor of that name: one of the four skills, "tau=X", "wrong", "terminal" (needs `ask`), "none".
+    """The advisor of that name: one of the four skills, "tau=X", "wrong", a person ("terminal", "web"), "none".
 
-    Raises BadInput for other names, for "terminal" without a prompt, and for a cell with too many states to know.
+    Raises BadInput for other names, for a person who is not there, and for a cell with too many states to know.
     """
     if name == "none":
         return None
-    if name == "terminal":
-        if ask is None:
-            raise BadInput("advisor 'terminal': there is no prompt to ask a person through")
-        return AskedAdvisor(ask)
+    if name in PEOPLE:
+        if people is None or name not in people:
+            raise BadInput(f"advisor '{name}': there is no {PEOPLE[name]} to ask a person through")
+        return AskedAdvisor(people[name])
     if name == "wrong":
         return KnowingAdvisor(cell, SKILLS["expert"], rng, sign=-1.0)
     return KnowingAdvisor(cell, SKILLS[name] if name in SKILLS else _tau(name), rng)

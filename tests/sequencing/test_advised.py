@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from lab.advice.advisors import AdvisorLeft
+from lab.advice.requests import AdvisorLeft
 from lab.errors import BadInput
 from lab.learning.settings import GateSettings
 from lab.sequencing.advised import AdvisedResult, SequenceAdvisor, SequenceRequest, advised_srl, sequence_advisor
