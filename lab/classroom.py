@@ -1,8 +1,8 @@
 """Who sits in a lesson: the person at the terminal, the page, and the progress lines, as one audience."""
 
 import time
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from lab.advice.counsel import Watch, Watched
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     OrderAsk = Callable[[SequenceRequest], int | None]
 
+WORTH_S = 2.0  # the shortest time between two receipts of one lesson
 PAGE_S = 30.0  # how long a replay waits for a browser
 SEEN_S = 0.05  # the shortest time between two pictures of a lesson that nobody at the page is asked in
 
@@ -51,9 +52,9 @@ class Classroom(Audience):
         self._problem: Problem | None = None
         self._gate = GateSettings()
         self._discount = 1.0
+        self._valued: Problem | None = None  # whose optimal values these are
         self._values: FloatArray | None = None
-        if page is not None and prompt is not None:
-            page.on_word = prompt.answer_from_outside
+        self._worth_s = -WORTH_S  # when the receipt was made last
 
     @property
     def passing(self) -> Watch | None:
@@ -86,7 +87,7 @@ class Classroom(Audience):
         prompt = OrderPrompt(self.progress.console, plain=self._plain)
 
         def ask_terminal(request: "SequenceRequest") -> int | None:
-            with self.progress.paused():
+            with self._offered(request, prompt.answer_from_outside), self.progress.paused():
                 return prompt(request)
 
         orderers: dict[str, OrderAsk] = {"terminal": ask_terminal}
@@ -101,10 +102,19 @@ class Classroom(Audience):
             with self.progress.paused():
                 return self._prompt(request)
         self.shows(request)
+        with self._offered(request, self._prompt.answer_from_outside), self.progress.paused():
+            return self._prompt(request)
+
+    @contextmanager
+    def _offered(self, request: "AdviceRequest | SequenceRequest", hear: Callable[[str], None]) -> Iterator[None]:
+        """The page shows a question that the terminal asks, and may answer it there."""
+        if self._page is None:
+            yield
+            return
+        self._page.on_word = hear
         self._page.offer(request)
         try:
-            with self.progress.paused():
-                return self._prompt(request)
+            yield
         finally:
             self._page.withdraw()
 
@@ -130,7 +140,7 @@ class Classroom(Audience):
             self._page.show(self._stage.bodies(), self._stage.camera)
 
     def begins(self, problem: Problem, learner: LearnerSettings, gate: GateSettings, journal: Journal) -> None:
-        self._journal, self._problem, self._gate, self._values = journal, problem, gate, None
+        self._journal, self._problem, self._gate = journal, problem, gate
         self._discount = learner.discount
         if self._page is not None:
             self._page.begin(problem, learner, gate)
@@ -154,11 +164,15 @@ class Classroom(Audience):
     def _show_worth(self) -> None:
         """The receipt so far, on the page; of people's answers only, which come slowly enough for it."""
         entries = [] if self._journal is None else self._journal.entries
-        if self._page is None or self._problem is None or not any(isinstance(entry, Answer) for entry in entries):
+        now_s = time.monotonic()
+        if self._page is None or self._problem is None or now_s - self._worth_s < WORTH_S:
             return
-        if self._values is None:
-            self._values = known_values(self._problem, self._discount)
+        if not any(isinstance(entry, Answer) for entry in entries):
+            return
+        if self._valued is not self._problem:
+            self._valued, self._values = self._problem, known_values(self._problem, self._discount)
         worth = receipt(entries, self._problem.mdp, self._values, self._gate.window)
+        self._worth_s = time.monotonic()
         self._page.receipt(worth.to_json() | {"lines": worth.lines()})
 
     def replaying(self, pause_s: float) -> "Classroom":

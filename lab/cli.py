@@ -4,7 +4,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import wraps
 from io import TextIOWrapper
 from pathlib import Path
@@ -58,7 +58,9 @@ ShowPage = Annotated[
 Port = Annotated[int, typer.Option("--port", min=0, max=65535, help="Of the page; 0: any free one.")]
 Wait = Annotated[
     float | None,
-    typer.Option("--wait", min=1.0, help="Seconds to wait for an answer on the page; then the learner goes on alone."),
+    typer.Option(
+        "--wait", min=1.0, help="Seconds to wait for an answer of the advisor web; then the learner goes on alone."
+    ),
 ]
 Toasts = Annotated[int, typer.Option("--toasts", "-n", help="How many slices, 1 to 50.")]
 
@@ -148,7 +150,12 @@ def _seat(
         prompt = TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
         room = Classroom(progress, prompt, shown, plain=plain)
         stack.callback(room.leave)
-        yield room
+        try:
+            yield room
+        except LabError as error:
+            if shown is not None:
+                shown.finished(str(error))
+            raise
 
 
 def _teacher(
@@ -291,6 +298,8 @@ def teach(
     given = Words(subtask or "", task, view, learner, gate, memory, advisors, asked, decide, episodes, seed, save)
     kept = None if resume is None else _kept(resume, "--resume")
     words = given.complete() if kept is None else kept.same(given)
+    if kept is not None and out is not None:
+        raise BadInput(f"--out {out} beside --resume {resume}: a session goes on in its own folder: leave it away")
     folder = out if kept is None else kept.folder
     if folder is not None:
         check_out(folder)
@@ -341,7 +350,8 @@ def replay(
         document = replay_session(kept, room.replaying(0.0 if as_json else pause), room.watch)
         room.ends(document)
         _show(document, as_json, replay_summary)
-        room.stay()
+        with suppress(KeyboardInterrupt):  # that ends it, and nothing is lost
+            room.stay()
 
 
 @command(app, "sequence", "lab sequence toast --case II --toasts 4 --gantt order.svg")

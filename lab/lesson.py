@@ -1,4 +1,4 @@
-"""Single commands about lessons: one teaching session in a sub-task or a world, the order alone."""
+"""Lessons as commands know them: one teaching session in a sub-task, a world or an environment; one shown again."""
 
 import json
 from collections.abc import Callable
@@ -7,6 +7,7 @@ from dataclasses import asdict, replace
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
+from shlex import quote
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ from lab.record import write_whole
 from lab.sessions import KeptSession, NewSession, Words
 from lab.taskfile import Task, load, load_world, names_file, names_of
 from lab.teaching import Audience, Interrupted, Lesson, Teacher, check_name, plain_name, world_problem
-from lab.toolbox import Toolbox
+from lab.toolbox import Toolbox, default_folder
 
 if TYPE_CHECKING:
     from lab.gymworld import GymWorld
@@ -53,9 +54,18 @@ def teach(words: Words, teacher: Teacher, out: Path | None, kept: KeptSession | 
             name=words.save,
             out=out,
         )
-    except Interrupted as stopped:
-        raise Interrupted(f"{stopped}; go on with: lab teach --resume {session.folder}") from None
+    except KeyboardInterrupt as stopped:
+        if session.journal is None:
+            raise
+        what = str(stopped) or "stopped by Ctrl-C; the journal has all that was said"
+        raise Interrupted(f"{what}; go on with: {_resume(session, teacher.toolbox)}") from None
     return document | _worth(session)
+
+
+def _resume(session: NewSession | KeptSession, toolbox: Toolbox) -> str:
+    """The command that goes on with a session."""
+    box = "" if toolbox.folder == default_folder() else f" --toolbox {quote(str(toolbox.folder))}"
+    return f"lab teach --resume {quote(str(session.folder))}{box}"
 
 
 def replay(kept: KeptSession, audience: Audience, watch: Watch) -> dict[str, Any]:

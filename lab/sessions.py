@@ -22,6 +22,11 @@ _MOST = 100_000  # sessions of one name
 
 
 DEFAULT_ADVISORS = ("expert",)
+_OPTIONS = {
+    "subtask": "SUBTASK",
+    "advisors": "--advisor",
+    "asked": "--ask",
+}  # that are called otherwise than their fields
 
 
 @dataclass(frozen=True)
@@ -126,7 +131,15 @@ class NewSession(_InFolder):
         _set_aside(self.folder)
         if unfinished is not None:
             Toolbox(self.folder / _BEGUN).save(unfinished)
-        head = Session(self._words.to_json(), problem.name, problem.mdp.signature, _version(), unfinished is not None)
+        head = Session(
+            self._words.to_json(),
+            problem.name,
+            problem.mdp.signature,
+            _version(),
+            asdict(learner),
+            asdict(gate),
+            "" if unfinished is None else unfinished.name,
+        )
         self.journal = Journal.begin(self.folder, head)
         return self.journal
 
@@ -165,6 +178,13 @@ class KeptSession(_InFolder):
                 f"session '{self.folder}' ({self._where}): it is about '{head.problem}' ({head.signature[:8]}), and the "
                 f"task now gives another problem ({problem.mdp.signature[:8]}): its file or the lab has changed"
             )
+        for what, then, now in (("learner", head.learner, asdict(learner)), ("gate", head.gate, asdict(gate))):
+            if changed := [name for name in now if then.get(name) != now[name]]:
+                name = changed[0]
+                raise BadInput(
+                    f"session '{self.folder}' ({self._where}): its {what} had {name} = {then.get(name)!r}, and the task now "
+                    f"gives {now[name]!r}: its file has changed"
+                )
         entries = self.read.effective()
         self.journal = Journal(None, entries, read_only=True) if self._read_only else Journal.resume(self.read)
         return self.journal
@@ -173,16 +193,18 @@ class KeptSession(_InFolder):
         """The words of the session; BadInput when the command names others."""
         for name, value in asdict(given).items():
             if value != getattr(Words(), name):
+                option = _OPTIONS.get(name, f"--{name}")
                 raise BadInput(
-                    f"{name} {value!r} beside --resume {self.folder}: a session goes on as it was begun: leave it away"
+                    f"{option} beside --resume {self.folder}: a session goes on as it was begun: leave it away"
                 )
         return self.words
 
     def begun(self, problem: Problem) -> Policy | None:
         """The policy that the session went on from when it began. Raises BadInput when it is not there any more."""
-        if not self.read.session.continues:
+        name = self.read.session.continues
+        if not name:
             return None
-        found = Toolbox(self.read.path.parent / _BEGUN).find(problem.subtask, problem.mdp.signature)
+        found = Toolbox(self.read.path.parent / _BEGUN).find(problem.subtask, problem.mdp.signature, name)
         if found is None:
             raise BadInput(f"session '{self.folder}': the policy that it went on from is not in '{_BEGUN}' any more")
         return found

@@ -1,6 +1,7 @@
 """Find a skill in the toolbox, or teach it: learning sessions with a gate and an advisor, kept whatever happens."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from math import inf
 from typing import Any, Literal
@@ -154,14 +155,16 @@ class Teacher:
             result = self._run_through(problem, learner, gate, unfinished, sessions, journal)
             whole = result if unfinished is None else _after(unfinished, result)
             policy = self._policy(whole, problem, learner, gate, task, name or self._free_name(problem, result.solved))
-            self.toolbox.save(policy)
+            if not (result.interrupted and journal.folding):  # what it was before is more
+                self.toolbox.save(policy)
             if not result.interrupted:
                 ended = (len(result.steps), result.final_steps, result.optimal_steps, result.solved)
                 journal.closes(Closed(*ended, saved_as=policy.name))
         finally:
             journal.close()
         if policy.solved and unfinished is not None and unfinished.name == f"{policy.name}{_UNFINISHED}":
-            self.toolbox.remove(unfinished.name)  # it is finished now, under its plain name
+            with suppress(BadInput):  # it may be gone already
+                self.toolbox.remove(unfinished.name)  # it is finished now, under its plain name
         if result.interrupted:
             raise Interrupted(
                 f"stopped by Ctrl-C after {len(result.steps)} episodes of '{problem.name}'; what was learned is kept"
@@ -212,7 +215,7 @@ class Teacher:
 
         def tell(event: Event) -> None:
             nonlocal alone
-            left_for_good = isinstance(event, AdviceEnded) and event.reason == "advisor left"
+            left_for_good = isinstance(event, AdviceEnded) and event.reason != "converged"
             alone = alone or left_for_good or isinstance(event, AdviceRejected)
             self.audience.hears(problem.name, event, journal.tell(event))
 

@@ -499,11 +499,16 @@ def test_a_session_goes_on_from_another_folder(lab: Lab, folder: Path, monkeypat
         ("replay nowhere", "journal 'nowhere' (DIR): cannot be read: No such file or directory"),
         (
             "teach world-1 --resume lesson",
-            "subtask 'world-1' beside --resume lesson: a session goes on as it was begun",
+            "SUBTASK beside --resume lesson: a session goes on as it was begun",
         ),
         ("teach world-1 --advisor recorded:lesson", "it is advice about another problem, 'w'"),
         ("teach world-1 --ask all", "unknown way of asking 'all' (--ask): known: in-turn, together"),
         ("teach world-1 --decide majorit", "unknown way of deciding 'majorit' (--decide): did you mean 'majority'?"),
+        ("teach --resume lesson --ask in-turn", "--ask beside --resume lesson: a session goes on as it was begun"),
+        (
+            "teach --resume lesson --out other",
+            "--out other beside --resume lesson: a session goes on in its own folder",
+        ),
         ("teach world-1 --wait 0", "invalid value for '--wait'"),
         ("teach gym:FrozenLak-v1", "FrozenLake-v1"),
         ("teach gym:Pendulum-v1", "its observation space is Box"),

@@ -1,4 +1,4 @@
-"""Who advises: simulated advisors of any skill, a person at a terminal, recorded advice, or nobody."""
+"""Who advises: simulated advisors of any skill, a person at a terminal or a page, recorded advice, or nobody."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

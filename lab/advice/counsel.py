@@ -35,7 +35,8 @@ class Counsel:
     watch: Watch | None = None
 
     def __str__(self) -> str:
-        return " + ".join(self.names)
+        several = f" ({self.asked}, {self.decide})" if len(self.names) > 1 else ""
+        return " + ".join(self.names) + several
 
     @property
     def records(self) -> bool:

@@ -5,8 +5,10 @@ on after a break, or to take an answer back, the session is run again from its b
 people, and everything else that it tells is held against what was written.
 """
 
+import fcntl
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -44,14 +46,17 @@ class Again(Exception):
 class Session:
     """What a session was: the words that began it, the problem, and whether it went on from an earlier table.
 
-    words: the options of `lab teach` by name; signature: of the problem; lab: the version that wrote it.
+    words: the options of `lab teach` by name; signature: of the problem; learner and gate: their settings by name; lab: the
+    version that wrote it; continues: the name of the policy that it went on from, "" for none.
     """
 
     words: dict[str, Any]
     problem: str
     signature: str
     lab: str
-    continues: bool = False
+    learner: dict[str, Any] = field(default_factory=dict)
+    gate: dict[str, Any] = field(default_factory=dict)
+    continues: str = ""
     schema: int = SCHEMA
 
 
@@ -70,8 +75,9 @@ class Answer:
 
 @dataclass(frozen=True)
 class Undone:
-    """The last answer, and all that came of it, was taken back."""
+    """The last answer of a person, and all that came of it, was taken back."""
 
+    by: str
     episode: int
 
 
@@ -129,7 +135,13 @@ def entry_of(line: str) -> Entry:
     kind = record.pop("kind", None) if isinstance(record, dict) else None
     if kind not in KINDS:
         raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
-    found = _reader(kind).validate_json(json.dumps(record))
+    from pydantic import ValidationError
+
+    try:
+        found = _reader(kind).validate_json(json.dumps(record))
+    except ValidationError as error:
+        wrong = [f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors(include_url=False)]
+        raise ValueError(f"{kind}: {'; '.join(wrong)}") from None
     entry: Entry = KINDS[kind](**{name: getattr(found, name) for name in found.__dataclass_fields__})
     return entry
 
@@ -149,21 +161,34 @@ class Read:
         kept: list[Entry] = []
         for entry in self.entries:
             if isinstance(entry, Undone):
-                last = max((n for n, one in enumerate(kept) if isinstance(one, Answer)), default=None)
-                del kept[last if last is not None else len(kept) :]
+                last = undoable(kept, entry.by)
+                del kept[len(kept) if last is None else last :]
             else:
                 kept.append(entry)
         return kept
 
     def said(self) -> dict[int, int]:
-        """What was advised by state, the last word counting."""
-        return {e.state: e.action for e in self.effective() if isinstance(e, AdviceGiven) and e.action is not None}
+        """What was advised by state, the last word counting: by people, where any have answered, else by whoever did."""
+        kept = self.effective()
+        people = {e.state: e.action for e in kept if isinstance(e, Answer) and e.action is not None}
+        return people or {e.state: e.action for e in kept if isinstance(e, AdviceGiven) and e.action is not None}
 
     @property
     def closed(self) -> Closed | None:
         """The session's last word, None when it is not over."""
         last = self.entries[-1] if self.entries else None
         return last if isinstance(last, Closed) else None
+
+
+def undoable(entries: Sequence[Entry], by: str) -> int | None:
+    """The place of the answer that a person may take back: the last one in the episode under way; None: there is none."""
+    for place in range(len(entries) - 1, -1, -1):
+        entry = entries[place]
+        if isinstance(entry, EpisodeEnded):
+            return None
+        if isinstance(entry, Answer) and entry.by == by and not entry.left:
+            return place
+    return None
 
 
 def read_journal(folder: Path, where: str) -> Read:
@@ -238,6 +263,7 @@ class Journal:
             ) from None
         except OSError as error:
             raise BadInput(f"journal '{path}' cannot be written: {error.strerror or error}") from error
+        journal._lock()
         journal._write(session)
         return journal
 
@@ -249,10 +275,20 @@ class Journal:
         journal = cls(found.path, found.effective())
         try:
             journal._file = os.open(found.path, os.O_WRONLY | os.O_APPEND)
+            journal._lock()
             os.ftruncate(journal._file, found.whole_bytes)
         except OSError as error:
             raise BadInput(f"journal '{found.path}' cannot be written: {error.strerror or error}") from error
         return journal
+
+    def _lock(self) -> None:
+        """Raises BadInput when another command is writing the journal."""
+        assert self._file is not None
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self.close()
+            raise BadInput(f"journal '{self.path}': another command is writing it: wait until that has ended") from None
 
     @property
     def folding(self) -> bool:
@@ -275,15 +311,20 @@ class Journal:
             return True
         before = self.entries[self._at]
         if before != entry:
-            raise WorkFailed(
-                f"journal '{self.path}': it cannot be run again: it says {line_of(before)[:200]}, and now comes "
-                f"{line_of(entry)[:200]}: another version of the lab made it, or its task or toolbox has changed"
-            )
+            raise self._differs(entry)
         self._at += 1
         return False
 
+    def _differs(self, entry: Entry) -> WorkFailed:
+        return WorkFailed(
+            f"journal '{self.path}': it cannot be run again: it says {line_of(self.entries[self._at])[:200]}, and now "
+            f"comes {line_of(entry)[:200]}: another version of the lab made it, or what it was made with has changed"
+        )
+
     def closes(self, closed: Closed) -> None:
-        """The session is over."""
+        """The session is over. Raises WorkFailed when it was over sooner than it once was."""
+        if self.folding and not isinstance(self.entries[self._at], Closed):
+            raise self._differs(closed)
         if not self.read_only and not self.folding:
             self._append(closed)
 
@@ -305,19 +346,18 @@ class Journal:
     def _asked(self, by: str, request: AdviceRequest, ask: Ask) -> Answer:
         if self.read_only:
             raise KeyboardInterrupt  # the replay is over
-        last = next((entry for entry in reversed(self.entries) if isinstance(entry, Answer)), None)
-        undoable = last is not None and last.episode == request.episode
+        last = undoable(self.entries, by)
         while True:
             try:
-                action = ask(replace(request, undoable=undoable))
+                action = ask(replace(request, undoable=last is not None))
                 return Answer(by, request.episode, request.step, request.state, action)
             except AdvisorLeft as left:
                 return Answer(by, request.episode, request.step, request.state, None, True, str(left))
             except Undo:
-                if last is None or not undoable:
+                if last is None:
                     continue
-                self._write(Undone(request.episode))
-                del self.entries[next(n for n, entry in enumerate(self.entries) if entry is last) :]
+                self._write(Undone(by, request.episode))
+                del self.entries[last:]
                 raise Again from None
 
     def _append(self, entry: Entry) -> None:

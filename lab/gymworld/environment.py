@@ -51,6 +51,7 @@ class GymEnvironment:
         self.live = live
         self.model = believed(live)
         self.mdp: TabularMDP = table_of(live, self.model)
+        self._fresh = live.again()  # each session begins in a copy of it, whatever an environment keeps over its resets
         self._state, self._best = -1, -np.inf
         self._known: dict[float, FloatArray] = {}
         self._best_played: dict[tuple[float, int], Played] = {}
@@ -59,7 +60,7 @@ class GymEnvironment:
         """Where the environment begins; in episode 1 it is seeded."""
         seed = None
         if episode == 1:
-            seed, self._best = int(draw() * 2**32), -np.inf
+            seed, self._best, self.live = int(draw() * 2**32), -np.inf, self._fresh.again()
         self._state = self.live.begin(seed)
         return self._state
 

@@ -66,8 +66,7 @@ def run_session(
     q0: (S, A) start values, default 0. draw: where uniform numbers come from, by default `rng`. environment: where the
     steps are made, by default the table itself. An advised action is carried out and learned from as if it were the
     learner's own choice. An advisor with a method `followed` hears after each episode what it led to.
-    KeyboardInterrupt ends the session at once;
-    the result then holds all that was learned so far.
+    KeyboardInterrupt ends the session at once; the result then holds all that was learned so far.
     Raises BadInput for an unknown learner, selection or gate, a q0 that does not fit or an advisor that names no
     action, and NoPath.
     Source: thesis fig. 6.2 with the update rules of section 2.2 and the softmax of section 9.4.

@@ -28,6 +28,7 @@ from lab.advice.journal import (
     entry_of,
     line_of,
     read_journal,
+    undoable,
 )
 from lab.advice.requests import AdviceRequest, AdvisorLeft, Ask
 from lab.errors import BadInput, WorkFailed
@@ -240,15 +241,18 @@ GOOD = line_of(HEAD)
         (GOOD, "does not begin with a session"),  # cut in its first line
         ("{}\n", "schema None: this version of the lab reads schema 1"),
         (GOOD.replace('"schema": 1', '"schema": 2') + "\n", "schema 2: this version of the lab reads schema 1"),
-        (line_of(Undone(3)) + "\n", "does not begin with a session"),
+        (line_of(Undone("terminal", 3)) + "\n", "does not begin with a session"),
         (f"{GOOD}\n{GOOD}\n", "line 2: a second session"),
         (f"{GOOD}\nhello\n", "line 2: b'hello': Expecting value"),
         (f"{GOOD}\n[1]\n", "line 2: .*kind None is none of session, request"),
         (f'{GOOD}\n{{"kind": "undo"}}\n', "line 2: .*episode"),
-        (f'{GOOD}\n{{"kind": "undo", "episode": "3"}}\n', "line 2: .*valid integer"),
-        (f'{GOOD}\n{{"kind": "undo", "episode": 3, "more": 1}}\n', "line 2: .*nexpected"),
+        (f'{GOOD}\n{{"kind": "undo", "by": "x", "episode": "3"}}\n', "line 2: .*valid integer"),
+        (f'{GOOD}\n{{"kind": "undo", "by": "x", "episode": 3, "more": 1}}\n', "line 2: .*nexpected"),
         (f"{GOOD}\n{'[' * 100_000}\n", "line 2"),
-        (f"{GOOD}\n{line_of(Closed(1, 1, 1, True, 'x'))}\n{line_of(Undone(3))}\n", "line 2: a second session"),
+        (
+            f"{GOOD}\n{line_of(Closed(1, 1, 1, True, 'x'))}\n{line_of(Undone('terminal', 3))}\n",
+            "line 2: a second session",
+        ),
     ],
 )
 def test_what_is_no_journal_is_refused_with_its_line(tmp_path: Path, text: str, reason: str) -> None:
@@ -267,14 +271,19 @@ def test_a_journal_that_cannot_be_read(tmp_path: Path) -> None:
 whole_numbers = st.integers(0, 10**9)
 some_numbers = st.one_of(st.none(), st.floats(allow_nan=False, allow_infinity=False))
 BY_FIELD: dict[str, Any] = {
-    "words": st.dictionaries(st.text(max_size=5), st.one_of(st.none(), st.text(max_size=5), whole_numbers)),
+    **dict.fromkeys(
+        ("words", "learner", "gate"),
+        st.dictionaries(st.text(max_size=5), st.one_of(st.none(), st.text(max_size=5), whole_numbers)),
+    ),
     "said": st.lists(st.tuples(st.text(max_size=5), whole_numbers), max_size=3).map(tuple),
     "action": st.one_of(st.none(), whole_numbers),
     **dict.fromkeys(("improvement_rate", "current_mean", "previous_mean"), some_numbers),
     **dict.fromkeys(("final_steps", "optimal_steps"), st.one_of(st.none(), whole_numbers)),
     **dict.fromkeys(("mean_before", "trust"), st.floats(allow_nan=False, allow_infinity=False)),
-    **dict.fromkeys(("guided", "reached", "left", "solved", "continues"), st.booleans()),
-    **dict.fromkeys(("problem", "signature", "lab", "by", "why", "reason", "advisor", "saved_as"), st.text(max_size=9)),
+    **dict.fromkeys(("guided", "reached", "left", "solved"), st.booleans()),
+    **dict.fromkeys(
+        ("problem", "signature", "lab", "by", "why", "reason", "advisor", "saved_as", "continues"), st.text(max_size=9)
+    ),
 }
 
 
@@ -327,3 +336,22 @@ def test_json_lines_hold_what_the_documentation_says(tmp_path: Path) -> None:
     assert lines[0]["schema"] == 1
     kinds = {line["kind"] for line in lines}
     assert {"request", "answer", "advice", "episode", "ended"} <= kinds <= set(KINDS)
+
+
+def test_a_person_takes_only_own_words_of_this_episode_back() -> None:
+    ended = EpisodeEnded(1, 3, True, 1, None, True)
+    first, mine, theirs = Answer("terminal", 1, 1, 0, 2), Answer("terminal", 2, 1, 0, 2), Answer("web", 2, 2, 4, 1)
+    left = Answer("terminal", 2, 3, 5, None, left=True)
+    assert undoable([first, ended], "terminal") is None
+    assert undoable([first, ended, mine, theirs], "terminal") == 2
+    assert undoable([first, ended, mine, theirs, left], "terminal") == 2  # who has left does not come back
+    assert undoable([first, ended, mine, theirs], "web") == 3
+    assert undoable([first, ended, theirs], "terminal") is None
+
+
+def test_two_commands_do_not_write_one_journal(tmp_path: Path) -> None:
+    journal = Journal.begin(tmp_path, HEAD)
+    with pytest.raises(BadInput, match="another command is writing it"):
+        Journal.resume(read_journal(tmp_path, "--resume"))
+    journal.close()
+    Journal.resume(read_journal(tmp_path, "--resume")).close()
