@@ -1,6 +1,5 @@
 """Who hears how a run goes on: the composer and the teacher tell, a view or nobody listens."""
 
-from lab.advice.events import Event
 from lab.learning.settings import GateSettings
 from lab.sequencing.events import EpisodeSequenced, Move, SequenceResult
 from lab.sequencing.search import Reference
@@ -18,9 +17,6 @@ class Listener:
 
     def lesson(self, name: str, lesson: Lesson) -> None:
         """A skill was found or learned."""
-
-    def learning(self, name: str, event: Event) -> None:
-        """Something happened in a session."""
 
     def measured(self, name: str, seconds: float) -> None:
         """A move was timed."""
@@ -58,10 +54,6 @@ class Both(Listener):
     def lesson(self, name: str, lesson: Lesson) -> None:
         for listener in self._listeners:
             listener.lesson(name, lesson)
-
-    def learning(self, name: str, event: Event) -> None:
-        for listener in self._listeners:
-            listener.learning(name, event)
 
     def measured(self, name: str, seconds: float) -> None:
         for listener in self._listeners:

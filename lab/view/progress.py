@@ -93,6 +93,7 @@ class RunProgress(Listener):
         self._say(("  skipped: ", "yellow"), what)
 
     def learning(self, name: str, event: Event) -> None:
+        """Something happened in a lesson; told in the line that `lesson` writes."""
         if isinstance(event, AdviceRequested):
             self._asked[name].append(event.episode)
         elif isinstance(event, AdviceRejected):

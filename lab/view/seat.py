@@ -161,16 +161,6 @@ class SeatPage(LiveView):
             self._panel.known.receipt, self._panel.known.ended = None, ""
             self._new(made)
 
-    def again(self) -> None:
-        """The session is run again from its beginning: what it told before is told again."""
-        with self._panel.lock:
-            old = self._panel.known.learning
-            kept = {
-                name: getattr(old, name)
-                for name in ("title", "kind", "unit", "mdp", "learner", "gate", "episodes", "optimal")
-            }
-            self._new(Learning(**kept))
-
     def begin_order(
         self, title: str, episodes: int, gate: GateSettings | None = None, optimal: float | None = None, unit: str = "s"
     ) -> None:

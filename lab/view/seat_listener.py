@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Protocol
 
-from lab.advice.events import Event
 from lab.learning.settings import GateSettings
 from lab.listener import Listener
 from lab.sequencing.events import EpisodeSequenced, Move, SequenceResult
@@ -18,9 +17,6 @@ SHOWN_MOVES = 24
 
 class Shows(Protocol):
     """The page, as far as a run's listener needs it."""
-
-    def on_event(self, event: Event, skill: str = "") -> None:
-        """Something happened in a lesson."""
 
     def begin_order(self, title: str, episodes: int, gate: GateSettings | None, optimal: float | None) -> None:
         """A session of a sequencer begins."""
@@ -61,10 +57,6 @@ class SeatListener(Listener):
         best = "" if reached is None or fewest is None or reached <= fewest else f", the fewest are {fewest}"
         helped = "" if lesson.result is None else f", {lesson.result.helped_steps} of all moves advised"
         self._say(f"{lesson.source} {name}: {steps}{best}{helped}")
-
-    def learning(self, name: str, event: Event) -> None:
-        """Something happened in a session."""
-        self._page.on_event(event, name)
 
     def measured(self, name: str, seconds: float) -> None:
         """A move was timed."""

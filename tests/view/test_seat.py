@@ -355,7 +355,7 @@ def test_a_lesson_that_begins_again_begins_anew(page: SeatPage, mdp: TabularMDP,
     page.on_event(ended, "row")
     with opens(page) as browser:
         browser.hear_until(lambda seat: seat.get("curve", {}).get("count") == 1 and seat["notices"])
-        page.again()
+        page.begin(Problem("row", "world", mdp), LEARNER, ALWAYS)
         seat = browser.hear_until(lambda seat: seat["curve"]["count"] == 0)
         assert seat["notices"] == []
         assert seat["lesson"]["title"] == "row"
