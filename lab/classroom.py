@@ -14,6 +14,7 @@ from lab.advice.requests import AdviceRequest, Advisor, Ask
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.listener import Both, Listener
 from lab.mdp import FloatArray
+from lab.policy import Policy
 from lab.sessions import known_values
 from lab.skills.skill import Problem
 from lab.teaching import Audience
@@ -145,6 +146,10 @@ class Classroom(Audience):
         if self._page is not None:
             self._page.begin(problem, learner, gate)
 
+    def goes_on(self, unfinished: Policy) -> None:
+        told = f"'{unfinished.name}' was left unfinished after {len(unfinished.curve)} episodes: it is learned on"
+        self.progress.console.print(told, soft_wrap=True)
+
     def meets(self, advisor: Advisor | None) -> None:
         inner = advisor.advisor if isinstance(advisor, Watched) else advisor
         self._panel = inner if isinstance(inner, Panel) else None
@@ -171,7 +176,8 @@ class Classroom(Audience):
             return
         if self._valued is not self._problem:
             self._valued, self._values = self._problem, known_values(self._problem, self._discount)
-        worth = receipt(entries, self._problem.mdp, self._values, self._gate.window)
+        certain = self._problem.environment is None
+        worth = receipt(entries, self._problem.mdp, self._values, self._gate.window, certain=certain)
         self._worth_s = time.monotonic()
         self._page.receipt(worth.to_json() | {"lines": worth.lines()})
 

@@ -173,6 +173,8 @@ def _teacher(
 
     counsel = Counsel(tuple(names), room.people(), asked, decide, watch=room.passing)
     counsel.check()
+    for journal in counsel.cut_records():
+        _complain(f"journal '{journal.path}': its last line was cut off and is left out: {journal.cut[:60]!r}")
     teacher = Teacher(Toolbox(toolbox), counsel, seed, room)
     teacher.toolbox.check()
     return teacher
@@ -289,6 +291,7 @@ def teach(
 
     Each session keeps a journal: --resume goes on with one that was broken off, lab replay shows it again.
     """
+    from lab.lesson import check
     from lab.lesson import teach as teach_session
     from lab.report import check_out
     from lab.sessions import Words
@@ -300,6 +303,7 @@ def teach(
     words = given.complete() if kept is None else kept.same(given)
     if kept is not None and out is not None:
         raise BadInput(f"--out {out} beside --resume {resume}: a session goes on in its own folder: leave it away")
+    check(words)
     folder = out if kept is None else kept.folder
     if folder is not None:
         check_out(folder)

@@ -33,6 +33,12 @@ if TYPE_CHECKING:
 GYM = "gym:"
 
 
+def check(words: Words) -> None:
+    """Raises BadInput for words that ask for nothing that is there, before anybody is asked or shown anything."""
+    Counsel(words.advisors, asked=words.asked, decide=words.decide).check()
+    _subject(words)
+
+
 def teach(words: Words, teacher: Teacher, out: Path | None, kept: KeptSession | None = None) -> dict[str, Any]:
     """The session that these words ask for, or `kept` gone on with, with its journal; the document of `lab teach --json`.
 
@@ -43,7 +49,10 @@ def teach(words: Words, teacher: Teacher, out: Path | None, kept: KeptSession | 
     session = kept or NewSession(out, teacher.toolbox, words)
     teacher = replace(teacher, keep=session.keep, begun=None if kept is None else kept.begun)
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise BadInput(f"output folder '{out}' (--out): {error.strerror or error}") from error
     try:
         document = subject(
             teacher,

@@ -102,7 +102,8 @@ class _InFolder:
         assert self.problem is not None
         assert self.journal is not None
         values = known_values(self.problem, self.learner.discount)
-        return receipt(self.journal.entries, self.problem.mdp, values, self.gate.window)
+        certain = self.problem.environment is None
+        return receipt(self.journal.entries, self.problem.mdp, values, self.gate.window, certain=certain)
 
 
 def known_values(problem: Problem, discount: float) -> FloatArray | None:

@@ -58,6 +58,9 @@ class Audience:
     def hears(self, name: str, event: Event, is_new: bool) -> None:
         """Something happened in the lesson of that name; not new: it is told again."""
 
+    def goes_on(self, unfinished: Policy) -> None:
+        """The next lesson goes on from what was left unfinished."""
+
     def stands(self, where: Any, problem: Problem) -> None:
         """Where the next lesson takes place, for those who show it: a prepared task, a world."""
 
@@ -122,8 +125,10 @@ class Teacher:
             found = self.begun(problem)
         else:
             found = self.unfinished(problem, name)
-            if found is not None and not self._same(found, settings):
+            if found is not None and (self.counsel.records or not self._same(found, settings)):
                 found = None  # another learner, gate or advisor begins anew, so that they can be compared
+            if found is not None:
+                self.audience.goes_on(found)
         return self.teach(problem, settings.learner, settings.gate, task, unfinished=found, name=name, sessions=1)
 
     def _same(self, policy: Policy, settings: Learned) -> bool:

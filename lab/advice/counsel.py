@@ -2,15 +2,16 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
-from lab.advice.advisors import make_advisor, parse_advisor
+from lab.advice.advisors import PEOPLE, make_advisor, parse_advisor
 from lab.advice.events import Event
-from lab.advice.journal import Journal
+from lab.advice.journal import Journal, Read, read_journal
 from lab.advice.panel import ASKED, DECISIONS, panel_of
 from lab.advice.requests import AdviceRequest, Advisor, Ask, Walked
-from lab.errors import unknown
+from lab.errors import BadInput, unknown
 from lab.learning.environment import Environment
 from lab.learning.selection import uniforms
 from lab.learning.settings import LearnerSettings
@@ -47,10 +48,20 @@ class Counsel:
         """Raises BadInput for a name that no advisor has, and for an unknown way of asking or deciding."""
         for name in self.names:
             parse_advisor(name, "--advisor")
+        if "none" in self.names and len(self.names) > 1:
+            raise BadInput(f"advisor 'none' (--advisor) beside {len(self.names) - 1} more: it is nobody or somebody")
+        for name in PEOPLE:
+            if self.names.count(name) > 1:
+                raise BadInput(f"advisor '{name}' (--advisor) is named {self.names.count(name)} times: once is enough")
         if self.asked not in ASKED:
             raise unknown("way of asking", self.asked, ASKED, "--ask")
         if self.decide not in DECISIONS:
             raise unknown("way of deciding", self.decide, DECISIONS, "--decide")
+
+    def cut_records(self) -> list[Read]:
+        """The journals among the advisors whose last line was cut off. Raises BadInput for what is no journal."""
+        folders = [Path(name.removeprefix("recorded:")) for name in self.names if name.startswith("recorded:")]
+        return [read for read in (read_journal(folder, "--advisor") for folder in folders) if read.cut]
 
     def check_records(self, mdp: TabularMDP) -> None:
         """Raises BadInput for a record that is not about this problem."""

@@ -336,6 +336,11 @@ class Journal:
         if self.folding:
             before = self.entries[self._at]
             known = before if isinstance(before, Answer) else Answer(by, 0, 0, 0, None)
+            if known.action is not None and not 0 <= known.action < request.mdp.n_actions:
+                allowed = f"allowed 0..{request.mdp.n_actions - 1}"
+                raise BadInput(
+                    f"journal '{self.path}': {line_of(known)}: action {known.action}: {allowed}: it was edited"
+                )
             self.tell(replace(known, by=by, episode=request.episode, step=request.step, state=request.state))
             return _said(known)
         given = self._asked(by, request, ask)

@@ -105,15 +105,23 @@ class _Question:
     heard: frozenset[str]
 
 
-def receipt(entries: Sequence[Entry], mdp: TabularMDP, values: Values, window: int = GateSettings.window) -> Receipt:
+def receipt(
+    entries: Sequence[Entry],
+    mdp: TabularMDP,
+    values: Values,
+    window: int = GateSettings.window,
+    *,
+    certain: bool = True,
+) -> Receipt:
     """The receipt for the effective entries of a journal; values: optimal ones (S, A), None where nobody knows them.
 
-    window: K of the moving averages. Entries of states and actions that the problem does not have count as answers only.
+    window: K of the moving averages; certain: steps lead where the table says, so that an advisor answers for walls,
+    obstacles and circles. Entries of states and actions that the problem does not have count as answers only.
     """
     questions = list(_questions(entries))
     taken = [(one.given.state, one.given.action) for one in questions if one.given.action is not None]
     there = _there(taken, mdp)
-    led = [int(mdp.successor[pair]) for pair in there]
+    led = [int(mdp.successor[pair]) for pair in there] if certain else []
     voices = _voices(questions, {one.by for one in entries if isinstance(one, Answer)}, mdp, values)
     wrong = None if values is None else worse(there, values)
     counted = Receipt(
@@ -123,9 +131,9 @@ def receipt(entries: Sequence[Entry], mdp: TabularMDP, values: Values, window: i
         refused=_refused(questions, voices),
         remembered=sum(one.steps for one in entries if isinstance(one, AdviceRemembered)),
         agreed=sum(one.given.action == one.given.own for one in questions),
-        into_walls=sum(entered == state for (state, _), entered in zip(there, led, strict=True)),
+        into_walls=sum(entered == state for (state, _), entered in zip(there, led, strict=False)),
         into_obstacles=sum(bool(mdp.terminal[entered] and not mdp.goal[entered]) for entered in led),
-        sent_back=len(_sent_back(questions, mdp)),
+        sent_back=len(_sent_back(questions, mdp)) if certain else 0,
         against_best=None if wrong is None else sum(wrong.values()),
         differences=() if wrong is None or values is None else differences(wrong, mdp, values, LISTED),
         skill=None if values is None else skill_of(there, values),

@@ -2,7 +2,7 @@
 
 import json
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -197,6 +197,14 @@ def test_another_session_is_noticed(tmp_path: Path) -> None:
     entries[at] = EpisodeEnded(7, 3, False, 0, None, True)
     with pytest.raises(WorkFailed, match=r'cannot be run again.*"episode": 7'):
         lesson(Journal(None, entries), person)
+
+
+def test_an_edited_answer_that_is_no_action_is_refused(tmp_path: Path) -> None:
+    written(tmp_path)
+    read = read_journal(tmp_path, "DIR")
+    entries: list[Entry] = [replace(one, action=77) if isinstance(one, Answer) else one for one in read.entries]
+    with pytest.raises(BadInput, match=r"action 77: allowed 0\.\.3: it was edited"):
+        lesson(Journal(None, entries, read_only=True), person)
 
 
 def test_a_replay_writes_nothing_and_ends_with_the_journal(tmp_path: Path) -> None:

@@ -100,6 +100,8 @@ LESSON: dict[str, Any] = {
     "failure": None,
     "source": "learned",
     "saved_as": "insert at toaster 1a2b",
+    "session": "box/sessions/insert-1",
+    "receipt": {"lines": ["advice: it asked in 5 episodes"]},
     "seed": 0,
     "files": {"learning_curve": "out/learning-curve.png"},
 }
@@ -110,7 +112,9 @@ def test_a_lesson() -> None:
         f"insert at toaster: 4 episodes   {'█' * 10}{'▅' * 10}{'▃' * 20}",
         "learned way: 16 steps, the shortest takes 16: solved",
         "asked in 5 episodes, 80 helped steps, 3 misleads",
+        "advice: it asked in 5 episodes",
         "saved as 'insert at toaster 1a2b' (seed 0)",
+        "its journal: box/sessions/insert-1 (lab replay shows it again)",
         "out/learning-curve.png",
     ]
 
