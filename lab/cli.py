@@ -208,11 +208,15 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Find or learn the skills, time them, find their best order, and carry them out in physics."""
+    from dataclasses import replace
+
     from lab import taskfile
+    from lab.advice.advisors import PEOPLE
     from lab.advice.counsel import Counsel
     from lab.report import check_out
     from lab.run import prepare
     from lab.run import run as run_task
+    from lab.sessions import Words, kept_by
     from lab.view.summary import run_summary
 
     loaded = taskfile.load(task)
@@ -223,6 +227,9 @@ def run(
     prepared = prepare(loaded, toasts, seed)
     with _seat(names, page=view, port=port, wait_s=wait) as room:
         teacher = _teacher(toolbox, names, seed, room, asked, decide)
+        if any(name in PEOPLE for name in names):
+            words = Words(task=task, advisors=tuple(names), asked=asked, decide=decide, seed=seed)
+            teacher = replace(teacher, keep=kept_by(teacher.toolbox, words))
         with room.progress:
             report = run_task(prepared, teacher, folder, listener=room.listener, viewer=room.viewer)
     _show(report.to_json(), as_json, run_summary)

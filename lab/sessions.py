@@ -14,6 +14,7 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray
 from lab.policy import Policy
 from lab.skills.skill import Problem
+from lab.teaching import Keep
 from lab.toolbox import Toolbox, slug
 
 SESSIONS = "sessions"  # the folder in the toolbox
@@ -157,6 +158,16 @@ class NewSession(_InFolder):
                 raise BadInput(f"toolbox {self._toolbox.folder}: {folder}: {error.strerror or error}") from error
             return folder
         raise BadInput(f"toolbox {self._toolbox.folder}: it holds {_MOST} sessions of '{problem.name}': remove some")
+
+
+def kept_by(toolbox: Toolbox, words: Words) -> Keep:
+    """Keeps the journal of each lesson of a run in the toolbox; what people said can be replayed, and advise again."""
+
+    def keep(problem: Problem, learner: LearnerSettings, gate: GateSettings, unfinished: Policy | None) -> Journal:
+        session = NewSession(None, toolbox, replace(words, subtask=problem.name))
+        return session.keep(problem, learner, gate, unfinished)
+
+    return keep
 
 
 class KeptSession(_InFolder):

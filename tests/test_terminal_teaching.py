@@ -177,6 +177,8 @@ def test_a_run_asks_with_the_bar_out_of_the_way(terminal: Callable[..., Terminal
     assert run.end() == 130
     assert "asks for advice about 'grasp at plate'" in run.screen
     assert "turn right / turn left: " in run.screen.lower()
+    (journal,) = (tmp_path / "toolbox" / "sessions").glob("grasp-at-plate-1/events.jsonl")
+    assert journal.read_text().count('"kind": "answer"') == 2
     (row,) = Toolbox(tmp_path / "toolbox").list()
     assert (row["subtask"], row["helped_steps"]) == ("grasp", 0)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["maze.txt", "toolbox"]
