@@ -6,8 +6,9 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from lab.advice.counsel import Watch, Watched
+from lab.advice.entries import Answer
 from lab.advice.events import EpisodeEnded, Event
-from lab.advice.journal import Answer, Journal
+from lab.advice.journal import Journal
 from lab.advice.panel import Panel
 from lab.advice.receipt import receipt
 from lab.advice.requests import AdviceRequest, Advisor, Ask

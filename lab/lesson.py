@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from lab.advice.advisors import PEOPLE
 from lab.advice.counsel import Counsel, Watch
-from lab.advice.journal import line_of
+from lab.advice.entries import line_of
 from lab.advice.requests import AdviceRequest, AdvisorLeft
 from lab.errors import BadInput, unknown
 from lab.gridworld import GridWorld

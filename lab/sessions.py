@@ -6,7 +6,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from lab.advice.journal import FILE, Answer, Journal, Read, Session, read_journal
+from lab.advice.entries import FILE, Answer, Read, Session, read_journal
+from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment

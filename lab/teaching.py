@@ -10,8 +10,9 @@ from zlib import crc32
 import numpy as np
 
 from lab.advice.counsel import Counsel
+from lab.advice.entries import Closed
 from lab.advice.events import AdviceEnded, AdviceRejected, Event
-from lab.advice.journal import Again, Closed, Journal
+from lab.advice.journal import Again, Journal
 from lab.advice.requests import Advisor
 from lab.errors import BadInput, WorkFailed
 from lab.gridworld import GridWorld

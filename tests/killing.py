@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lab.advice.counsel import Counsel
-from lab.advice.journal import FILE, read_journal
+from lab.advice.entries import FILE, read_journal
 from lab.advice.requests import AdviceRequest
 from lab.lesson import teach
 from lab.sessions import KeptSession, Words

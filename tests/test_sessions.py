@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 
 from lab.advice.counsel import Counsel
+from lab.advice.entries import FILE, Answer, Session, read_journal
 from lab.advice.events import AdviceGiven
-from lab.advice.journal import FILE, Answer, Journal, Session, read_journal
+from lab.advice.journal import Journal
 from lab.advice.receipt import SILENT
 from lab.advice.requests import AdviceRequest, Ask
 from lab.errors import BadInput

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lab.advice.journal import read_journal
+from lab.advice.entries import read_journal
 from lab.advice.requests import AdviceRequest, Advisor, Ask
 from lab.errors import BadInput, unknown
 from lab.learning.selection import Draw, uniforms

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from lab.advice.advisors import PEOPLE, make_advisor, parse_advisor
+from lab.advice.entries import Read, read_journal
 from lab.advice.events import Event
-from lab.advice.journal import Journal, Read, read_journal
+from lab.advice.journal import Journal
 from lab.advice.panel import ASKED, DECISIONS, panel_of
 from lab.advice.requests import AdviceRequest, Advisor, Ask, Walked
 from lab.errors import BadInput, unknown

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from lab.advice.entries import Answer, Entry
 from lab.advice.events import (
     AdviceEnded,
     AdviceGiven,
@@ -17,7 +18,6 @@ from lab.advice.events import (
     AdvisorsDisagreed,
     EpisodeEnded,
 )
-from lab.advice.journal import Answer, Entry
 from lab.advice.trust import Difference, Pair, Skill, differences, skill_of, worse
 from lab.learning.settings import GateSettings
 from lab.mdp import FloatArray, TabularMDP

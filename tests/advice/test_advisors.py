@@ -16,8 +16,9 @@ from lab.advice.advisors import (
     parse_advisor,
     skill,
 )
+from lab.advice.entries import FILE, Session
 from lab.advice.events import AdviceGiven
-from lab.advice.journal import FILE, Journal, Session
+from lab.advice.journal import Journal
 from lab.advice.requests import AdviceRequest, Advisor, AdvisorLeft
 from lab.errors import BadInput
 from lab.learning.selection import softmax

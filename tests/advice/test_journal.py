@@ -13,23 +13,21 @@ from hypothesis import strategies as st
 
 from lab.advice.advisors import make_advisor
 from lab.advice.counsel import Counsel
-from lab.advice.events import AdviceGiven, EpisodeEnded, Event
-from lab.advice.journal import (
+from lab.advice.entries import (
     FILE,
     KINDS,
-    Again,
     Answer,
     Closed,
     Entry,
-    Journal,
     Session,
-    Undo,
     Undone,
     entry_of,
     line_of,
     read_journal,
     undoable,
 )
+from lab.advice.events import AdviceGiven, EpisodeEnded, Event
+from lab.advice.journal import Again, Journal, Undo
 from lab.advice.requests import AdviceRequest, AdvisorLeft, Ask
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment

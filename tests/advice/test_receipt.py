@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.advice.advisors import Person, make_advisor
+from lab.advice.entries import Answer, Closed, Entry
 from lab.advice.events import (
     AdviceEnded,
     AdviceGiven,
@@ -21,7 +22,7 @@ from lab.advice.events import (
     EpisodeEnded,
     Event,
 )
-from lab.advice.journal import Answer, Closed, Entry, Journal
+from lab.advice.journal import Journal
 from lab.advice.panel import panel_of
 from lab.advice.receipt import OVERRULED, SILENT, UNHEARD, WIDTH, Receipt, receipt
 from lab.advice.requests import AdviceRequest, AdvisorLeft

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from lab.advice.entries import Entry
 from lab.advice.events import AdviceGiven, AdviceRequested, EpisodeEnded
-from lab.advice.journal import Entry
 from lab.advice.receipt import receipt
 from lab.advice.requests import AdviceRequest
 from lab.learning.settings import GateSettings

@@ -1,0 +1,218 @@
+"""What a session's journal holds: its entries, one line of JSON each, and the reader that takes them in again."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from lab.advice.events import (
+    AdviceEnded,
+    AdviceGiven,
+    AdviceRejected,
+    AdviceRemembered,
+    AdviceRequested,
+    AdvisorDropped,
+    AdvisorReadmitted,
+    AdvisorsDisagreed,
+    EpisodeEnded,
+    Event,
+)
+from lab.errors import BadInput
+
+SCHEMA = 1
+FILE = "events.jsonl"
+MAX_LINE_BYTES = 1 << 20
+
+
+@dataclass(frozen=True)
+class Session:
+    """What a session was: the words that began it, the problem, and whether it went on from an earlier table.
+
+    words: the options of `lab teach` by name; signature: of the problem; learner and gate: their settings by name; lab: the
+    version that wrote it; continues: the name of the policy that it went on from, "" for none.
+    """
+
+    words: dict[str, Any]
+    problem: str
+    signature: str
+    lab: str
+    learner: dict[str, Any] = field(default_factory=dict)
+    gate: dict[str, Any] = field(default_factory=dict)
+    continues: str = ""
+    schema: int = SCHEMA
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a person said: an action, None for "skip"; left: nothing more in this session, and why."""
+
+    by: str
+    episode: int
+    step: int
+    state: int
+    action: int | None
+    left: bool = False
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Undone:
+    """The last answer of a person, and all that came of it, was taken back."""
+
+    by: str
+    episode: int
+
+
+@dataclass(frozen=True)
+class Closed:
+    """The session is over: its last word."""
+
+    episodes: int
+    final_steps: int | None
+    optimal_steps: int | None
+    solved: bool
+    saved_as: str
+
+
+Entry = Session | Answer | Undone | Closed | Event
+
+KINDS: dict[str, type[Any]] = {
+    "session": Session,
+    "request": AdviceRequested,
+    "answer": Answer,
+    "advice": AdviceGiven,
+    "remembered": AdviceRemembered,
+    "undo": Undone,
+    "episode": EpisodeEnded,
+    "rejected": AdviceRejected,
+    "ended": AdviceEnded,
+    "disagreed": AdvisorsDisagreed,
+    "dropped": AdvisorDropped,
+    "readmitted": AdvisorReadmitted,
+    "closed": Closed,
+}
+_KIND_OF = {kind: name for name, kind in KINDS.items()}
+
+
+def line_of(entry: Entry) -> str:
+    """An entry as one line of JSON, without the line's end."""
+    return json.dumps({"kind": _KIND_OF[type(entry)], **asdict(entry)}, allow_nan=False)
+
+
+@cache
+def _reader(kind: str) -> Any:
+    from pydantic import ConfigDict, TypeAdapter
+
+    model = KINDS[kind]
+    strict = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+    return TypeAdapter(type(model.__name__, (model,), {"__pydantic_config__": strict, "__doc__": model.__doc__}))
+
+
+def entry_of(line: str) -> Entry:
+    """What a line holds. Raises ValueError for anything but an entry."""
+    try:
+        record = json.loads(line)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    kind = record.pop("kind", None) if isinstance(record, dict) else None
+    if kind not in KINDS:
+        raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
+    from pydantic import ValidationError
+
+    try:
+        found = _reader(kind).validate_json(json.dumps(record))
+    except ValidationError as error:
+        wrong = [f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors(include_url=False)]
+        raise ValueError(f"{kind}: {'; '.join(wrong)}") from None
+    entry: Entry = KINDS[kind](**{name: getattr(found, name) for name in found.__dataclass_fields__})
+    return entry
+
+
+@dataclass(frozen=True)
+class Read:
+    """A journal as it was found: its head, its entries, how many bytes are whole lines, what was cut off at the end."""
+
+    path: Path
+    session: Session
+    entries: tuple[Entry, ...]
+    whole_bytes: int
+    cut: str = ""
+
+    def effective(self) -> list[Entry]:
+        """The entries without those that were taken back."""
+        kept: list[Entry] = []
+        for entry in self.entries:
+            if isinstance(entry, Undone):
+                last = undoable(kept, entry.by)
+                del kept[len(kept) if last is None else last :]
+            else:
+                kept.append(entry)
+        return kept
+
+    def said(self) -> dict[int, int]:
+        """What was advised by state, the last word counting: by people, where any have answered, else by whoever did."""
+        kept = self.effective()
+        people = {e.state: e.action for e in kept if isinstance(e, Answer) and e.action is not None}
+        return people or {e.state: e.action for e in kept if isinstance(e, AdviceGiven) and e.action is not None}
+
+    @property
+    def closed(self) -> Closed | None:
+        """The session's last word, None when it is not over."""
+        last = self.entries[-1] if self.entries else None
+        return last if isinstance(last, Closed) else None
+
+
+def undoable(entries: Sequence[Entry], by: str) -> int | None:
+    """The place of the answer that a person may take back: the last one in the episode under way; None: there is none."""
+    for place in range(len(entries) - 1, -1, -1):
+        entry = entries[place]
+        if isinstance(entry, EpisodeEnded):
+            return None
+        if isinstance(entry, Answer) and entry.by == by and not entry.left:
+            return place
+    return None
+
+
+def read_journal(folder: Path, where: str) -> Read:
+    """A journal from its folder, or its file; a last line that was cut off is left out and said.
+
+    Raises BadInput, naming `where` it was asked for and the line, for what is no journal or of another schema.
+    """
+    path = folder / FILE if folder.is_dir() else folder
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise BadInput(f"journal '{path}' ({where}): cannot be read: {error.strerror or error}") from None
+    whole = raw.rfind(b"\n") + 1
+    entries: list[Entry] = []
+    for number, line in enumerate(raw[:whole].split(b"\n")[:-1], start=1):
+        try:
+            if len(line) > MAX_LINE_BYTES:
+                raise ValueError(f"{len(line)} bytes long, allowed {MAX_LINE_BYTES}")
+            entries.append(entry_of(line.decode("utf-8")))
+        except ValueError as error:
+            if number == 1:
+                _refuse_schema(line, path, where)
+            why = " ".join(str(error).split())[:160]
+            raise BadInput(f"journal '{path}' ({where}): line {number}: {line[:60]!r}: {why}") from None
+    if not entries or not isinstance(entries[0], Session):
+        raise BadInput(f"journal '{path}' ({where}): it does not begin with a session: no journal of lab teach")
+    if entries[0].schema != SCHEMA:
+        _refuse_schema(raw.split(b"\n", 1)[0], path, where)
+    for number, entry in enumerate(entries[1:], start=2):
+        if isinstance(entry, Session) or (isinstance(entry, Closed) and number < len(entries)):
+            raise BadInput(f"journal '{path}' ({where}): line {number}: a second session in one journal")
+    cut = raw[whole:].decode("utf-8", "replace")
+    return Read(path, entries[0], tuple(entries[1:]), whole, cut)
+
+
+def _refuse_schema(line: bytes, path: Path, where: str) -> None:
+    """Raises BadInput when a journal's head is of a schema that this version does not know."""
+    try:
+        schema = json.loads(line).get("schema")
+    except (ValueError, AttributeError, RecursionError):
+        return
+    if schema != SCHEMA:
+        raise BadInput(f"journal '{path}' ({where}): schema {schema!r}: this version of the lab reads schema {SCHEMA}")
