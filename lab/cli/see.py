@@ -1,0 +1,27 @@
+"""`lab see`: picture to grid."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lab.cli.options import Json
+from lab.cli.output import show
+
+
+def see(
+    image: Annotated[Path, typer.Argument(help="A PNG or JPEG picture from above, with round markers.")],
+    grid: Annotated[str | None, typer.Option("--grid", help="Rows x columns; default: 12x12, or the task's.")] = None,
+    task: Annotated[
+        str | None, typer.Option("--task", help="Taken by this task's camera; else the frame is the grid.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="A .png file for the picture with the grid drawn on it.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Picture to grid: find the gripper (magenta), the toaster (cyan) and the obstacles (green)."""
+    from lab.look import see_picture
+    from lab.view.summary import grid_summary
+
+    show(see_picture(image, grid, task, out), as_json, grid_summary)
