@@ -262,6 +262,7 @@ def _document(problem: "Problem", lesson: Lesson, teacher: Teacher, failure: str
         "rejected_at_episode": result.rejected_at_episode,
         "optimal_steps": result.optimal_steps,
         "final_steps": result.final_steps,
+        "steps_are_means": problem.environment is not None,  # both are means over drawn starts and steps
         "solved": result.solved and failure is None,
         "failure": failure,
         "source": lesson.source,

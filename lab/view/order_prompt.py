@@ -15,7 +15,7 @@ from lab.view.screen import folded, room
 
 HELP = (
     "Type a number of the list: that move is made next. Enter: what the learner would do. why: why it asks, with the "
-    "numbers. skip: leave this step to the learner. auto: it goes on alone from here. quit, or Ctrl-C, ends the session "
+    "numbers. skip: leave this step to the learner. auto: it goes on alone from here. quit, q or Ctrl-C ends the session "
     "and shows the best order so far."
 )
 NO_UNDO = "An order cannot be taken back here: the episode goes on, and the next one begins anew."
@@ -62,7 +62,7 @@ class OrderPrompt:
             match word:
                 case "auto" | "done":
                     raise AdvisorLeft
-                case "quit":
+                case "quit" | "q":
                     raise KeyboardInterrupt
                 case "skip":
                     return None

@@ -90,7 +90,7 @@ def test_a_question_shows_picture_numbers_and_choice() -> None:
     shown = ask("\n")[1].splitlines()
     assert shown[1].rstrip() == "Episode 31, step 2: at (0, 0)"
     assert shown[2].startswith(" R → · ·     ↑ up     ██▌         25%")
-    assert "The learner itself would go → right (25%); all moves are alike to it here." in shown[7]
+    assert "Alone the learner would now go → right, drawn at random: all moves are alike to it here" in shown[7]
     assert "lately 39.5, before that 40.0; improvement +1.2%, threshold 0%." in " ".join(shown[8:11])
     assert shown[-1] == f"{QUESTION} "
 
