@@ -4,12 +4,13 @@ import sys
 from collections.abc import Callable
 from functools import wraps
 from io import TextIOWrapper
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from lab.cli import replay, run, see, sequence, study, task, teach, toolbox, view
-from lab.cli.output import complain, end, silence
+from lab import __version__
+from lab.cli import glossary, replay, run, see, sequence, study, task, teach, toolbox, view
+from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError
 
 STOPPED = "stopped by Ctrl-C; what was learned is kept"
@@ -18,24 +19,34 @@ GROUPS = {
     "task": "Task files.",
     "study": "The thesis's tables and figures again, and comparisons of our own.",
 }
-COMMANDS: dict[str, tuple[Callable[..., None], str]] = {  # what is typed after `lab` -> what it calls, an example
-    "run": (run.run, "lab run toast --toasts 3"),
-    "teach": (teach.teach, "lab teach insert --advisor terminal"),
-    "replay": (replay.replay, "lab replay lesson"),
-    "sequence": (sequence.sequence, "lab sequence toast --case II --toasts 4 --gantt order.svg"),
-    "see": (see.see, "lab see overhead.png --task toast"),
-    "view": (view.view, "lab view toast"),
-    "toolbox list": (toolbox.toolbox_list, "lab toolbox list"),
-    "toolbox show": (toolbox.toolbox_show, "lab toolbox show 'insert at toaster 1a2b3c4d'"),
-    "toolbox verify": (toolbox.toolbox_verify, "lab toolbox verify"),
-    "toolbox remove": (toolbox.toolbox_remove, "lab toolbox remove 'insert at toaster 1a2b3c4d'"),
-    "task list": (task.task_list, "lab task list"),
-    "task show": (task.task_show, "lab task show toast"),
-    "task random": (task.task_random, "lab task random 10x10x10 --density 0.06 --seed 7 --out my-world.toml"),
-    "task reconstruct": (task.task_reconstruct, "lab task reconstruct --seed 0 --out world-2.toml"),
-    "task check": (task.task_check, "lab task check my-toast.toml"),
-    "study list": (study.study_list, "lab study list"),
-    "study run": (study.study_run, "lab study run table-9.2 --workers 2"),
+
+
+class Command(NamedTuple):
+    """What a command calls, an example of its use, and what its help says below that."""
+
+    function: Callable[..., None]
+    example: str
+    more: str = ""
+
+
+COMMANDS = {  # what is typed after `lab` -> the command
+    "run": Command(run.run, "lab run toast --toasts 3"),
+    "teach": Command(teach.teach, "lab teach insert --advisor terminal", glossary.help_text()),
+    "replay": Command(replay.replay, "lab replay lesson"),
+    "sequence": Command(sequence.sequence, "lab sequence toast --case II --toasts 4 --gantt order.svg"),
+    "see": Command(see.see, "lab see overhead.png --task toast"),
+    "view": Command(view.view, "lab view toast"),
+    "toolbox list": Command(toolbox.toolbox_list, "lab toolbox list"),
+    "toolbox show": Command(toolbox.toolbox_show, "lab toolbox show 'insert at toaster 1a2b3c4d'"),
+    "toolbox verify": Command(toolbox.toolbox_verify, "lab toolbox verify"),
+    "toolbox remove": Command(toolbox.toolbox_remove, "lab toolbox remove 'insert at toaster 1a2b3c4d'"),
+    "task list": Command(task.task_list, "lab task list"),
+    "task show": Command(task.task_show, "lab task show toast"),
+    "task random": Command(task.task_random, "lab task random 10x10x10 --density 0.06 --seed 7 --out my-world.toml"),
+    "task reconstruct": Command(task.task_reconstruct, "lab task reconstruct --seed 0 --out world-2.toml"),
+    "task check": Command(task.task_check, "lab task check my-toast.toml"),
+    "study list": Command(study.study_list, "lab study list"),
+    "study run": Command(study.study_run, "lab study run table-9.2 --workers 2"),
 }
 
 
@@ -59,13 +70,29 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
     return run_guarded
 
 
+def _version(wanted: bool) -> None:
+    if wanted:
+        write(f"lab {__version__}\n")
+        raise typer.Exit
+
+
+def _lab(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Teach a robot."""
+
+
 def made() -> typer.Typer:
     """The command `lab` as the tables say."""
-    app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help="Teach a robot.")
+    app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
     groups = {name: typer.Typer(no_args_is_help=True, help=text) for name, text in GROUPS.items()}
-    for words, (function, example) in COMMANDS.items():
+    app.callback()(_lab)
+    for words, command in COMMANDS.items():
         group, _, name = words.rpartition(" ")
-        (groups[group] if group else app).command(name, epilog=f"Example: {example}")(guarded(function))
+        epilog = "\n\n".join(filter(None, [f"Example: {command.example}", command.more]))
+        (groups[group] if group else app).command(name, epilog=epilog)(guarded(command.function))
     for name, group_app in groups.items():
         app.add_typer(group_app, name=name)
     return app
@@ -75,10 +102,11 @@ def main() -> None:
     """The `lab` command; typer's own complaints come in one line, too."""
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: a name must not end a command
+    begin()
     try:
         code = made()(prog_name="lab", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
-        complain(STOPPED)
+        fail(STOPPED, 130)
         code = 130
     except Exception as error:
         code = _usage(error)
@@ -95,5 +123,5 @@ def _usage(error: Exception) -> int:
     else:
         path = context.command_path if context is not None else "lab"
         text = " ".join(str(explain()).split()).rstrip(".")
-        complain(f"{text[:1].lower()}{text[1:]} (see {path} --help)")
+        fail(f"{text[:1].lower()}{text[1:]} (see {path} --help)", 2)
     return 2

@@ -28,7 +28,7 @@ Decide = Annotated[
 ]
 Plain = Annotated[bool, typer.Option("--plain", help="Plain sentences instead of pictures, as screen readers want.")]
 ShowPage = Annotated[
-    bool, typer.Option("--page", help="Show the lesson on a page on 127.0.0.1, too, where it can be answered as well.")
+    bool, typer.Option("--page", help="Show it on a page on 127.0.0.1, too, where questions can be answered as well.")
 ]
 Port = Annotated[int, typer.Option("--port", min=0, max=65535, help="Of the page; 0: any free one.")]
 Wait = Annotated[

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from lab.cli.lessons import kept_session, lesson_room
-from lab.cli.options import Json, Plain, Port, ShowPage, ToolboxFolder
+from lab.cli.options import Json, Plain, Port, ToolboxFolder
 from lab.cli.output import show
 
 
@@ -19,7 +19,7 @@ def replay(
     pause: Annotated[
         float, typer.Option("--pause", min=0.0, max=3600.0, help="Seconds between two answers; default: half a second.")
     ] = 0.5,
-    page: ShowPage = False,
+    page: Annotated[bool, typer.Option("--page", help="Show it on a page on 127.0.0.1, too.")] = False,
     port: Port = 0,
     plain: Plain = False,
     toolbox: ToolboxFolder = None,
@@ -36,7 +36,7 @@ def replay(
         show({"sessions": rows}, as_json, lambda d: table_of(d["sessions"], ("session", "problem", "advisor", "state")))
         return
     kept = kept_session(folder, "DIR", read_only=True)
-    with lesson_room(["terminal"], page=page, port=port, plain=plain) as room:
+    with lesson_room([] if as_json else ["terminal"], page=page, port=port, plain=plain) as room:
         document = replay_session(kept, room.replaying(0.0 if as_json else pause), room.watch)
         room.ends(document)
         show(document, as_json, replay_summary)

@@ -6,8 +6,9 @@ from typing import Annotated
 import typer
 
 from lab.cli.lessons import lesson_room, teacher_of
-from lab.cli.options import AdvisorNames, Asked, Decide, Json, Port, Seed, Toasts, ToolboxFolder, Wait
+from lab.cli.options import AdvisorNames, Asked, Decide, Json, Port, Seed, ShowPage, Toasts, ToolboxFolder, Wait
 from lab.cli.output import end, show
+from lab.errors import counted
 
 
 def run(
@@ -16,7 +17,8 @@ def run(
     advisor: AdvisorNames = None,
     asked: Asked = "together",
     decide: Decide = "trust-weighted",
-    view: Annotated[bool, typer.Option("--view/--no-view", help="Stream the scene to a page on 127.0.0.1.")] = False,
+    page: ShowPage = False,
+    view: Annotated[bool, typer.Option("--view/--no-view", hidden=True)] = False,  # the old word for --page
     port: Port = 0,
     wait: Wait = None,
     seed: Seed = 0,
@@ -44,7 +46,7 @@ def run(
     names = advisor or ["expert"]
     Counsel(tuple(names), asked=asked, decide=decide).check()
     prepared = prepare(loaded, toasts, seed)
-    with lesson_room(names, page=view, port=port, wait_s=wait) as room:
+    with lesson_room(names, page=page or view, port=port, wait_s=wait) as room:
         teacher = teacher_of(toolbox, names, seed, room, asked, decide)
         if any(name in PEOPLE for name in names):
             words = Words(task=task, advisors=tuple(names), asked=asked, decide=decide, seed=seed)
@@ -53,4 +55,4 @@ def run(
             report = run_task(prepared, teacher, folder, listener=room.listener, viewer=room.viewer)
     show(report.to_json(), as_json, run_summary)
     if not report.success:
-        end(report.outcome.failure or f"{len(report.outcome.delivered)} of {toasts} toasts were delivered", 1)
+        end(report.outcome.failure or f"{len(report.outcome.delivered)} of {counted(toasts, 'toast')} delivered", 1)

@@ -16,7 +16,7 @@ def sequence(
         str | None,
         typer.Option("--case", help="toast: I, II or III of the thesis. A cell: its order by initials, such as RSR."),
     ] = None,
-    toasts: Annotated[int | None, typer.Option("--toasts", help="How many parts of the only product.")] = None,
+    toasts: Annotated[int | None, typer.Option("--toasts", "-n", help="How many parts of the only product.")] = None,
     method: Annotated[
         str | None,
         typer.Option(

@@ -1,14 +1,13 @@
 """`lab task`: task files."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from lab.cli.options import Json, Seed
-from lab.cli.output import console, show
-from lab.errors import BadInput
+from lab.cli.output import console, end, show, write, write_json
+from lab.errors import counted
 
 
 def task_list(as_json: Json = False) -> None:
@@ -26,7 +25,10 @@ def task_show(task: str, as_json: Json = False) -> None:
     from lab.task import describe
 
     text, document = describe(task)
-    print(json.dumps(document) if as_json else text, end="\n" if as_json else "")
+    if as_json:
+        write_json(document)
+    else:
+        write(text)
 
 
 def task_random(
@@ -41,7 +43,8 @@ def task_random(
 
     def told(d: dict[str, Any]) -> str:
         return (
-            f"{d['file']}: {d['obstacles']} obstacles, the shortest way takes {d['optimal_steps']} moves (seed {seed})"
+            f"{d['file']}: {counted(d['obstacles'], 'obstacle')}, the shortest way takes "
+            f"{counted(d['optimal_steps'], 'move')} (seed {seed})"
         )
 
     show(write_random(shape, density, seed, out), as_json, told)
@@ -80,4 +83,4 @@ def task_check(
     if as_json or not errors:
         show({"valid": not errors, "errors": errors}, as_json, lambda _: f"{file} is sound")
     if errors:
-        raise BadInput(errors[0])
+        end(errors[0], 2)

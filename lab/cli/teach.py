@@ -20,7 +20,7 @@ from lab.cli.options import (
     Wait,
 )
 from lab.cli.output import end, show
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 
 
 def teach(
@@ -60,10 +60,14 @@ def teach(
         typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the task's."),
     ] = None,
     save: Annotated[str | None, typer.Option("--save", help="Name of the policy in the toolbox.")] = None,
-    view: Annotated[
+    sight: Annotated[
         str | None,
-        typer.Option("--view", help="Of a world: full, or limited to the region that its file gives; default: full."),
+        typer.Option(
+            "--sight",
+            help="Where in a world the advisor sees the robot: full, or limited to the region in its file; default: full.",
+        ),
     ] = None,
+    view: Annotated[str | None, typer.Option("--view", hidden=True)] = None,  # the old word for --sight
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the session in this folder, as it was begun.")
     ] = None,
@@ -90,7 +94,9 @@ def teach(
     from lab.view.summary import lesson_summary
 
     advisors = tuple(advisor or ())
-    given = Words(subtask or "", task, view, learner, gate, memory, advisors, asked, decide, episodes, seed, save)
+    given = Words(
+        subtask or "", task, sight or view, learner, gate, memory, advisors, asked, decide, episodes, seed, save
+    )
     kept = None if resume is None else kept_session(resume, "--resume")
     words = given.complete() if kept is None else kept.same(given)
     if kept is not None and out is not None:
@@ -108,7 +114,7 @@ def teach(
         end(document["failure"], 1)
     if document["final_steps"] is None:
         end(
-            f"'{document['skill']}' does not reach its goal after {document['episodes']} episodes: "
+            f"'{document['skill']}' does not reach its goal after {counted(document['episodes'], 'episode')}: "
             "try another advisor, more --episodes or another --learner",
             1,
         )

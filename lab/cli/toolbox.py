@@ -2,6 +2,7 @@
 
 from lab.cli.options import Json, ToolboxFolder
 from lab.cli.output import end, show
+from lab.errors import counted
 
 
 def toolbox_list(toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
@@ -32,7 +33,8 @@ def toolbox_verify(toolbox: ToolboxFolder = None, as_json: Json = False) -> None
     document = {"folder": str(box.folder), "files": rows, "damaged": len(damaged)}
     show(document, as_json, verify_summary)
     if damaged:
-        end(f"{len(damaged)} of {len(rows)} files in the toolbox are damaged", 1)
+        are = "is" if len(rows) == 1 else "are"
+        end(f"{len(damaged)} of {counted(len(rows), 'file')} in the toolbox {are} damaged", 1)
 
 
 def toolbox_remove(name: str, toolbox: ToolboxFolder = None, as_json: Json = False) -> None:

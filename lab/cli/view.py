@@ -1,12 +1,11 @@
 """`lab view`: a scene or a replay on a page."""
 
-import json
 from typing import Annotated
 
 import typer
 
 from lab.cli.options import Json, Seed, Toasts
-from lab.cli.output import end
+from lab.cli.output import end, write, write_json
 
 
 def view(
@@ -23,9 +22,9 @@ def view(
 
     def tell(url: str, hint: str) -> None:
         if as_json:
-            print(json.dumps({"url": url, "hint": hint}), flush=True)
+            write_json({"url": url, "hint": hint})
         else:
-            print(f"{url}\nfrom another machine: {hint}\nCtrl-C ends it", flush=True)
+            write(f"{url}\nfrom another machine: {hint}\nCtrl-C ends it\n")
 
     try:
         show(what, toasts, seed, port, tell)

@@ -150,7 +150,9 @@ def test_hints_come_from_the_numbers() -> None:
 
 def test_only_a_person_is_spoken_to() -> None:
     """The same lesson, each answer a person's; with another advisor beside, the advice is not all theirs."""
-    person: list[Entry] = [one for e in LESSON for one in ([_said(e), e] if isinstance(e, AdviceGiven) else [e])]
+    person: list[Entry] = []
+    for entry in LESSON:
+        person += [_said(entry), entry] if isinstance(entry, AdviceGiven) else [entry]
     found = receipt(person, corridor(), VALUES, window=2)
     assert found.yours
     assert found.lines()[0] == "advice: it asked in 2 episodes about 5 steps; 3 of them with your help"

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from lab import __version__
 from lab.advice import advisors, gates, panel
 from lab.errors import WorkFailed
 from lab.learning.updates import UPDATES
@@ -61,6 +62,36 @@ def test_help_names_all_members(lab: Lab, command: str, option: str, following: 
     assert {name.strip(";.") for name in listed[0].split(", ")} == {*members}
 
 
+def test_the_version_is_told(lab: Lab) -> None:
+    ran = lab("--version")
+    assert (ran.code, ran.out, ran.err) == (0, f"lab {__version__}\n", "")
+
+
+def test_the_shell_completes_commands(root: Path) -> None:
+    """As the script of `lab --show-completion` asks for it."""
+    code = "from lab.cli import main; main()"
+    asked = {"_LAB_COMPLETE": "complete_bash", "COMP_WORDS": "lab t", "COMP_CWORD": "1", "PYTHONPATH": str(root)}
+    env = {**os.environ, **asked}
+    ran = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout.split(), ran.stderr) == (0, ["teach", "toolbox", "task"], "")
+
+
+def test_old_words_go_on_working_unseen(lab: Lab) -> None:
+    """--view was the page of a run and the sight of an advisor."""
+    for command, new in (("run", "--page"), ("teach", "--sight")):
+        text = lab(command, "--help").out
+        assert new in text
+        assert "--view" not in text
+    assert lab("run", "toas", "--view").err == lab("run", "toas", "--page").err
+    assert lab("run", "toas", "--no-view").err == lab("run", "toas").err
+    assert lab("teach", "world-1", "--view", "half").err.startswith("lab: unknown sight 'half' (--sight)")
+
+
+@pytest.mark.parametrize("command", ["run", "view", "sequence", "task check"])
+def test_toasts_have_one_short_name(lab: Lab, command: str) -> None:
+    assert lab(*command.split(), "toast", "-n", "0").err == "lab: 0 toasts (--toasts): allowed are 1 to 50\n"
+
+
 def test_no_words_give_help(lab: Lab) -> None:
     for words in ([], ["toolbox"], ["task"]):
         ran = lab(*words)
@@ -105,7 +136,8 @@ def test_a_failed_piece_of_work_ends_with_1(lab: Lab, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr("lab.run.prepare", fail)
     ran = lab("run", "--json")
-    assert (ran.code, ran.out, ran.err) == (1, "", r"lab: the arm is stuck\nat the table" + "\n")
+    why = r"the arm is stuck\nat the table"
+    assert (ran.code, ran.json, ran.err) == (1, {"error": why, "exit_code": 1}, f"lab: {why}\n")
 
 
 @pytest.mark.parametrize(
@@ -120,7 +152,8 @@ def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: 
     monkeypatch.setattr("lab.lesson.load", stop)
     monkeypatch.setattr("lab.look.load", stop)
     ran = lab(*words.split(), "--json")
-    assert (ran.code, ran.out, ran.err) == (130, "", f"lab: stopped by Ctrl-C{said}\n")
+    why = f"stopped by Ctrl-C{said}"
+    assert (ran.code, ran.json, ran.err) == (130, {"error": why, "exit_code": 130}, f"lab: {why}\n")
 
 
 def test_what_the_system_refuses_is_one_line(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,7 +162,15 @@ def test_what_the_system_refuses_is_one_line(lab: Lab, monkeypatch: pytest.Monke
 
     monkeypatch.setattr("lab.run.prepare", full)
     ran = lab("run")
-    assert (ran.code, ran.err) == (1, "lab: [Errno 28] No space left on device: 'x'\n")
+    assert (ran.code, ran.out, ran.err) == (1, "", "lab: [Errno 28] No space left on device: 'x'\n")
+
+
+def test_what_was_told_is_the_only_document(lab: Lab, folder: Path) -> None:
+    """A lesson that fails to reach its goal has its own document, and no second one for the error."""
+    (folder / "w.txt").write_text("S" + "." * 30 + "G\n")
+    ran = lab("teach", "w.txt", "--advisor", "none", "--episodes", "1", "--json")
+    assert (ran.code, ran.out.count("\n"), ran.json["final_steps"]) == (1, 1, None)
+    assert "does not reach its goal after 1 episode:" in ran.err
 
 
 @pytest.mark.parametrize("words", ["teach world-1", "sequence fms --method fifo --gantt order.svg"])

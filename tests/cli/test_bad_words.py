@@ -85,16 +85,16 @@ ADVISORS, LEARNERS, GATES = (
             f"no task file 'no.txt': give a file that exists, .toml or a .txt grid, or what ships: {SHIPPED}",
         ),
         ("teach world-1 --task toast", "task 'toast' (--task): the world 'world-1' belongs to no task: leave --task"),
-        ("teach world-1 --view half", "unknown view 'half' (--view): known: full, limited"),
+        ("teach world-1 --sight half", "unknown sight 'half' (--sight): known: full, limited"),
         (
             "teach world-1 --learner afterstat",
             f"unknown learner 'afterstat' (--learner): did you mean 'afterstate'? {LEARNERS}",
         ),
         ("teach world-1 --save ", "policy name '' (--save): wanted 1 to 100 printable characters"),
-        ("teach insert --view full", "view 'full' (--view): only a world has one, 'insert' is none"),
+        ("teach insert --sight full", "sight 'full' (--sight): only a world has one, 'insert' is none"),
         (
-            "teach random:3x3:0:0 --view limited",
-            "view 'limited' (--view): the file of world 'random-3x3-0-0' has no [view]",
+            "teach random:3x3:0:0 --sight limited",
+            "sight 'limited' (--sight): the file of world 'random-3x3-0-0' has no [view]",
         ),
         ("teach random:3x3", "world 'random:3x3': wanted random:SHAPE:DENSITY:SEED, such as random:10x10x10:0.06:7"),
         ("teach random:3x3:0.9:1", "random world 3x3: density 0.9: allowed are 0 to 0.6"),
@@ -109,8 +109,9 @@ ADVISORS, LEARNERS, GATES = (
 )
 @pytest.mark.parametrize("json_too", [False, True], ids=["", "json"])
 def test_bad_words(lab: Lab, folder: Path, words: str, line: str, json_too: bool, tree: Tree) -> None:
-    ran = lab(*words.split(" "), *(["--json"] if json_too and not words.startswith("rnu") else []))
-    assert (ran.code, ran.out) == (2, "")
+    ran = lab(*words.split(" "), *(["--json"] if json_too else []))
+    assert (ran.code, ran.out == "") == (2, not json_too)
+    assert not json_too or ran.json == {"error": ran.err.removeprefix("lab: ").rstrip("\n"), "exit_code": 2}
     assert ran.err.startswith(f"lab: {line}")
     assert len(ran.err.splitlines()) == 1
     assert tree(folder) == []
@@ -167,7 +168,7 @@ TOASTER = '[[route]]\nstation = "toaster"'
 def test_bad_task_files(lab: Lab, folder: Path, toml: str, old: str, new: str, line: str, tree: Tree) -> None:
     (folder / "t.toml").write_text(changed(toml, old, new))
     ran = lab("run", "t.toml", "--json")
-    assert (ran.code, ran.out) == (2, "")
+    assert (ran.code, ran.json["exit_code"]) == (2, 2)
     assert ran.err.startswith(f"lab: {line}")
     assert len(ran.err.splitlines()) == 1
     assert tree(folder) == ["t.toml"]
@@ -197,7 +198,7 @@ def test_folders_and_files_that_cannot_be_used(lab: Lab, folder: Path, words: st
     (folder / "folder.png").mkdir()
     before = tree(folder)
     ran = lab(*words.split(), "--json")
-    assert (ran.code, ran.out, ran.err) == (2, "", f"lab: {line}\n")
+    assert (ran.code, ran.json, ran.err) == (2, {"error": line, "exit_code": 2}, f"lab: {line}\n")
     assert tree(folder) == before
 
 

@@ -45,7 +45,7 @@ def test_a_world_is_shown_checked_and_learned(lab: Lab, folder: Path, root: Path
     shown = lab("task", "show", "world-1", "--json").json
     assert (shown["kind"], shown["shape"], len(shown["obstacles"])) == ("world", [10, 10, 10], 59)
     assert lab("task", "check", "world-1").out == "world-1 is sound\n"
-    ran = lab("teach", "world-1", "--view", "limited", "--json")
+    ran = lab("teach", "world-1", "--sight", "limited", "--json")
     assert (ran.code, ran.err) == (0, "")
     assert (ran.json["subtask"], ran.json["view"], ran.json["optimal_steps"]) == ("world", "limited", 13)
     (row,) = lab("toolbox", "list", "--json").json["policies"]
