@@ -34,7 +34,7 @@ def teacher(tmp_path: Path) -> Teacher:
 TEACH_FIELDS = (
     *("subtask", "skill", "task", "learner", "gate", "advisor", "memory", "seed", "episodes", "steps_per_episode"),
     *("guided_episodes", "requests", "helped_steps", "misleads", "rejected_at_episode", "optimal_steps"),
-    *("final_steps", "solved", "failure", "source", "saved_as", "files"),
+    *("final_steps", "steps_are_means", "solved", "failure", "source", "saved_as", "files"),
 )
 
 
