@@ -307,7 +307,7 @@ def _lines(of: Receipt) -> Iterator[str]:
         for one in of.differences:
             yield f"    {one.label}: said {one.said}, best {' or '.join(one.best)} ({one.times} x)"
     for voice in of.voices:
-        against = "" if voice.against_best is None else f", {voice.against_best} times not the best"
+        against = "" if voice.against_best is None else f", {counted(voice.against_best, 'time')} not the best"
         skill = "" if voice.skill is None else f"; skill {voice.skill}"
         record = "answer" if voice.whole else "disputed answer"
         yield f"  {voice.name}: {counted(voice.said, record)}, {voice.followed} followed{against}{skill}"

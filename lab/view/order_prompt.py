@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from lab.advice.requests import AdvisorLeft
+from lab.errors import counted
 from lab.sequencing.advised import SequenceRequest
 from lab.sequencing.positions import part_of
 from lab.sequencing.run import Run
@@ -105,7 +106,9 @@ class OrderPrompt:
         self._say(_progress(request))
         run = request.run
         name, target = _row(run, request.own)[1], _row(run, request.own)[3]
-        self._say(f"It would move {name} to {target} itself ({request.own}), one of {len(request.allowed)} moves.")
+        self._say(
+            f"It would move {name} to {target} itself ({request.own}), one of {counted(len(request.allowed), 'move')}."
+        )
         self._say("After the episode it compares its cost with the mean of those before it.")
 
     def _say(self, text: str, style: str = "") -> None:

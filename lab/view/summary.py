@@ -60,7 +60,7 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
     lines = [
         f"{lesson['skill']}: {counted(lesson['episodes'], 'episode')}   {sparkline(lesson['steps_per_episode'], 40)}",
         f"learned way: {_way(lesson)}: {_verdict(lesson)}",
-        _advice(lesson),
+        *([_advice(lesson)] if lesson["requests"] else []),  # else the receipt says that it asked nobody
         *(["it went on from what was left unfinished"] if lesson["source"] == "continued" else []),
         *lesson["receipt"]["lines"],
         f"saved as '{lesson['saved_as']}' (seed {lesson['seed']})",
@@ -103,8 +103,6 @@ def _verdict(lesson: Mapping[str, Any]) -> str:
 
 
 def _advice(lesson: Mapping[str, Any]) -> str:
-    if not lesson["requests"]:
-        return "the learner asked nobody"
     counts = {"helped step": lesson["helped_steps"], "mislead": lesson["misleads"]}
     asked = f"asked in {counted(lesson['requests'], 'episode')}"
     text = ", ".join([asked, *(counted(number, what) for what, number in counts.items())])

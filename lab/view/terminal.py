@@ -88,8 +88,8 @@ class TeachingPrompt:
         self._print([*gap, *screen(request, self._marks, width, height - len(gap) - 1 - len(asked) // width)])
 
     def told(self, request: AdviceRequest, action: int | None) -> None:
-        """Says what was answered to a request, such as "You said: right"; None: the step was left to the learner."""
-        self._say(f"You said: {'skip' if action is None else self._marks.named(request.mdp, action)}", "bold")
+        """Says what was answered to a request, such as "Answer: right"; None: the step was left to the learner."""
+        self._say(f"Answer: {'skip' if action is None else self._marks.named(request.mdp, action)}", "bold")
 
     # ---- what the person says ---------------------------------------------------------------------------------------
 

@@ -133,7 +133,7 @@ def test_a_lesson() -> None:
 @pytest.mark.parametrize(
     ("change", "line"),
     [
-        ({"requests": 0}, "the learner asked nobody"),
+        ({"requests": 0, "receipt": {"lines": ["advice: it asked nobody"]}}, "advice: it asked nobody"),
         (
             {"requests": 1, "helped_steps": 1, "misleads": 1},
             "asked in 1 episode, 1 helped step, 1 mislead",

@@ -353,7 +353,7 @@ def test_a_question_can_be_shown_with_its_answer() -> None:
     prompt.told(request(), None)
     assert "Episode 31, step 2: at (0, 0)" in said(shown)
     assert "Which way?" not in said(shown)
-    assert said(shown).splitlines()[-2:] == ["You said: → right", "You said: skip"]
+    assert said(shown).splitlines()[-2:] == ["Answer: → right", "Answer: skip"]
 
 
 def test_plain_sentences_for_a_screen_reader() -> None:
