@@ -123,13 +123,13 @@ def _subject(words: Words) -> Callable[..., dict[str, Any]]:
     if words.subtask.startswith(GYM):
         from lab.gymworld import gym_world
 
-        for option, value in (("--task", words.task), ("--view", words.view)):
+        for option, value in (("--task", words.task), ("--sight", words.view)):
             if value is not None:
                 raise BadInput(f"{option} {value}: a Gymnasium environment, '{words.subtask}', has none: leave it away")
         return partial(teach_gym, gym_world(words.subtask))
     if not names_file(words.subtask):
         if words.view is not None:
-            raise BadInput(f"view '{words.view}' (--view): only a world has one, '{words.subtask}' is none")
+            raise BadInput(f"sight '{words.view}' (--sight): only a world has one, '{words.subtask}' is none")
         return partial(teach_one, load(words.task or "toast"), words.subtask)
     world = load_world(words.subtask)
     if words.task is not None:
@@ -202,9 +202,9 @@ def teach_world(
     Draws the value map of a world with two axes. BadInput for an unknown view, and when the world has no limited one.
     """
     if view not in ("full", "limited"):
-        raise unknown("view", view, ("full", "limited"), "--view")
+        raise unknown("sight", view, ("full", "limited"), "--sight")
     if view == "limited" and world.view is None:
-        raise BadInput(f"view 'limited' (--view): the file of world '{world.name}' has no [view]")
+        raise BadInput(f"sight 'limited' (--sight): the file of world '{world.name}' has no [view]")
     settings, problem = world.changed(learner, gate, episodes, memory), world_problem(world)
     check_name(name)
     region = world.region() if view == "limited" else None
@@ -262,6 +262,7 @@ def _document(problem: "Problem", lesson: Lesson, teacher: Teacher, failure: str
         "rejected_at_episode": result.rejected_at_episode,
         "optimal_steps": result.optimal_steps,
         "final_steps": result.final_steps,
+        "steps_are_means": problem.environment is not None,  # both are means over drawn starts and steps
         "solved": result.solved and failure is None,
         "failure": failure,
         "source": lesson.source,

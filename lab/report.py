@@ -10,7 +10,7 @@ from typing import Any
 
 from lab.composer import Outcome
 from lab.crew import Crew, Durations
-from lab.errors import BadInput, WorkFailed
+from lab.errors import BadInput, WorkFailed, counted
 from lab.files import nearest
 from lab.policy import Policy
 from lab.sequencing.cell import Cell
@@ -188,7 +188,7 @@ def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) 
     if insert is not None:
         draw_value_map(insert, taught.lessons[insert.name].policy, paths["value_map"])
         write_picture(paths["overhead"], insert.picture)
-    title = f"{prepared.task.title or prepared.task.name}: {prepared.toasts} toasts"
+    title = f"{prepared.task.title or prepared.task.name}: {counted(prepared.toasts, 'toast')}"
     replay_html(report.recording, paths["replay"], title=title)
     _write_json(paths["sequence"], _sequence_document(taught, report))
     report.wall_s = time.perf_counter() - report.began_s

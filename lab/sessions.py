@@ -28,6 +28,7 @@ _OPTIONS = {
     "subtask": "SUBTASK",
     "advisors": "--advisor",
     "asked": "--ask",
+    "view": "--sight",
 }  # that are called otherwise than their fields
 
 

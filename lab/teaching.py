@@ -14,7 +14,7 @@ from lab.advice.entries import Closed
 from lab.advice.events import AdviceEnded, AdviceRejected, Event
 from lab.advice.journal import Again, Journal
 from lab.advice.requests import Advisor
-from lab.errors import BadInput, WorkFailed
+from lab.errors import BadInput, WorkFailed, counted
 from lab.gridworld import GridWorld
 from lab.learning.environment import TableEnvironment, unreached
 from lab.learning.session import SessionResult, run_session
@@ -173,11 +173,11 @@ class Teacher:
                 self.toolbox.remove(unfinished.name)  # it is finished now, under its plain name
         if result.interrupted:
             raise Interrupted(
-                f"stopped by Ctrl-C after {len(result.steps)} episodes of '{problem.name}'; what was learned is kept"
+                f"stopped by Ctrl-C after {counted(len(result.steps), 'episode')} of '{problem.name}'; what was learned is kept"
             )
         if sessions > 1 and not fits(result.q, problem, learner):
             raise WorkFailed(
-                f"'{problem.name}' was not learned in {len(result.steps)} episodes with the advisor '{self.advisor}'; "
+                f"'{problem.name}' was not learned in {counted(len(result.steps), 'episode')} with the advisor '{self.advisor}'; "
                 "what was learned is kept: try a better advisor, or more episodes in the task file"
             )
         return Lesson(policy, "learned" if unfinished is None else "continued", result)

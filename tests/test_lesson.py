@@ -34,7 +34,7 @@ def teacher(tmp_path: Path) -> Teacher:
 TEACH_FIELDS = (
     *("subtask", "skill", "task", "learner", "gate", "advisor", "memory", "seed", "episodes", "steps_per_episode"),
     *("guided_episodes", "requests", "helped_steps", "misleads", "rejected_at_episode", "optimal_steps"),
-    *("final_steps", "solved", "failure", "source", "saved_as", "files"),
+    *("final_steps", "steps_are_means", "solved", "failure", "source", "saved_as", "files"),
 )
 
 
@@ -217,9 +217,9 @@ def test_with_a_limited_view_simulated_advice_helps_less(world: GridWorld, teach
 
 
 def test_a_view_that_is_none(world: GridWorld, teacher: Teacher) -> None:
-    with pytest.raises(BadInput, match=r"^unknown view 'part' .--view.: known: full, limited$"):
+    with pytest.raises(BadInput, match=r"^unknown sight 'part' .--sight.: known: full, limited$"):
         teach_world(world, teacher, view="part")
-    with pytest.raises(BadInput, match=r"^view 'limited' .--view.: the file of world 'small' has no \[view\]$"):
+    with pytest.raises(BadInput, match=r"^sight 'limited' .--sight.: the file of world 'small' has no \[view\]$"):
         teach_world(world.model_copy(update={"view": None}), teacher, view="limited")
     assert not teacher.toolbox.folder.exists()
 

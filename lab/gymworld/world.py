@@ -5,7 +5,7 @@ from typing import Literal, Self
 
 from pydantic import PrivateAttr
 
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 from lab.gymworld.environment import ALONE, GymEnvironment
 from lab.gymworld.live import Live
 from lab.gymworld.made import parse_name
@@ -31,7 +31,9 @@ class GymWorld(Learned):
         learner, gate = fitting(environment)
         mdp, model = environment.mdp, environment.model
         steps = "steps learned from" if model is None else "certain steps" if model.certain else "steps left to chance"
-        title = f"{environment.live.name.id}: {mdp.n_states} states, {mdp.n_actions} actions, {steps}"
+        title = (
+            f"{environment.live.name.id}: {counted(mdp.n_states, 'state')}, {counted(mdp.n_actions, 'action')}, {steps}"
+        )
         made = cls(name=str(environment.live.name), title=title, learner=learner, gate=gate)
         made._environment = environment
         return made

@@ -6,6 +6,7 @@ import numpy as np
 from rich.text import Text
 
 from lab.advice.requests import AdviceRequest, Standing
+from lab.errors import counted
 from lab.learning.environment import TableEnvironment
 from lab.mdp import TabularMDP
 from lab.view.board import Marks, Picture, is_map, nearest_goal, points_by_name
@@ -20,11 +21,6 @@ def percent(share: float) -> str:
     if 0.0 < share < 0.005:
         return "<1%"
     return ">99%" if 0.995 <= share < 1.0 else f"{share:.0%}"
-
-
-def counted(number: int, what: str) -> str:
-    """ "1 move", "2 moves"."""
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def is_known(mdp: TabularMDP) -> bool:
@@ -57,7 +53,7 @@ def leads(request: AdviceRequest, action: int) -> str:
 
 
 def choice(request: AdviceRequest, marks: Marks, brief: bool = False) -> str:
-    """What the learner would do itself, how sure it is, and what it likes better when it is only trying something.
+    """What the learner drew for this step, and which move it rates best.
 
     brief: only where that leads, "" when that is nothing special; the rest stands in the list of moves.
     """
@@ -66,13 +62,14 @@ def choice(request: AdviceRequest, marks: Marks, brief: bool = False) -> str:
     where = leads(request, own)
     if brief:
         return f"{marks.named(request.mdp, own)} {where}." if where else ""
-    said = f"The learner itself would go {marks.named(request.mdp, own)} ({percent(chances[own])})"
-    said += f", which {where}" if where else ""
+    said = f"Alone the learner would now go {marks.named(request.mdp, own)}"
+    where = f"; that {where}" if where else ""
     if max(chances) - min(chances) < ALIKE and len(chances) > 1:
-        return f"{said}; all moves are alike to it here."
+        return f"{said}, drawn at random: all moves are alike to it here ({percent(chances[own])} each){where}."
     if chances[best] - chances[own] < ALIKE:
-        return f"{said}."
-    return f"{said}; it prefers {marks.named(request.mdp, best)} ({percent(chances[best])})."
+        return f"{said}, the move it rates best ({percent(chances[own])}){where}."
+    rated = f"the move it rates best is {marks.named(request.mdp, best)} ({percent(chances[best])})"
+    return f"{said}, drawn at random ({percent(chances[own])}){where}; {rated}."
 
 
 def moves(request: AdviceRequest, marks: Marks) -> list[Text]:
@@ -128,7 +125,7 @@ def standing(request: AdviceRequest, brief: bool = False) -> str:
     allowed = f" of {now.budget}" if now.budget < Standing().budget else ""
     said = f"{now.helped_steps}{allowed} moves" if allowed else counted(now.helped_steps, "move")
     if brief:
-        return f"Advised {said}; misled {now.misleads} of {now.omega}."
+        return f"Advised {said}; misled {now.misleads}" + (f" of {now.omega}." if now.omega else ", none allowed.")
     return f"Advised so far: {said}; episodes misled: {now.misleads}, tolerated: {now.omega}."
 
 
@@ -287,5 +284,5 @@ def _verdict(now: Standing, guided: int) -> str:
 
 def misled(misleads: int, guided: int, whose: str = "Your advice") -> str:
     """ "Your advice did not help in 3 of 4 episodes"; of how many is left out where that is not known."""
-    of = f"{misleads} of {guided} episodes" if guided >= misleads else counted(misleads, "episode")
+    of = f"{misleads} of {counted(guided, 'episode')}" if guided >= misleads else counted(misleads, "episode")
     return f"{whose} did not help in {of}"

@@ -26,7 +26,7 @@ from lab.view.seat_panel import CLOSED, SeatPanel
 from lab.view.seat_state import Learning, Pending, Progress, standing_of
 from lab.view.seat_talk import Answer
 
-TITLE = "Teaching lab: the seat"
+TITLE = "Teaching lab"
 MOST_STATES = 50_000  # of problems whose shortest way is looked for
 
 

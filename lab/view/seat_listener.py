@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Protocol
 
+from lab.errors import counted
 from lab.learning.settings import GateSettings
 from lab.listener import Listener
 from lab.sequencing.events import EpisodeSequenced, Move, SequenceResult
@@ -53,7 +54,7 @@ class SeatListener(Listener):
     def lesson(self, name: str, lesson: Lesson) -> None:
         """A skill was found or learned."""
         reached, fewest = lesson.policy.final_steps, lesson.policy.optimal_steps
-        steps = "the goal is not reached" if reached is None else f"{reached} steps"
+        steps = "the goal is not reached" if reached is None else counted(reached, "step")
         best = "" if reached is None or fewest is None or reached <= fewest else f", the fewest are {fewest}"
         helped = "" if lesson.result is None else f", {lesson.result.helped_steps} of all moves advised"
         self._say(f"{lesson.source} {name}: {steps}{best}{helped}")

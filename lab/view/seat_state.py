@@ -11,6 +11,7 @@ from typing import Any
 from lab.advice.events import EpisodeEnded
 from lab.advice.gates import improvement
 from lab.advice.requests import AdviceRequest, Standing
+from lab.errors import counted
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
@@ -65,7 +66,7 @@ class Notice:
         """What is said of a guided episode, in words."""
         if isinstance(told, Notice):
             return told
-        outcome = f"I reached the goal in {told.steps} steps" if told.reached else "I did not reach the goal"
+        outcome = f"I reached the goal in {counted(told.steps, 'step')}" if told.reached else "I did not reach the goal"
         return cls(f"Episode {told.episode}: {outcome}; moves advised: {told.helped_steps}.", "good" * told.reached)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 from lab.sequencing.cell import Cell
 from lab.sequencing.chance import Episode
 from lab.sequencing.run import Run
@@ -187,7 +187,9 @@ def _near(branches: Sequence[Branch]) -> list[Branch]:
             hidden = 0 if branch.optimal or branch.parent is None else below[index]
             parent = None if branch.parent is None else new[branch.parent]
             new[index] = len(found)
-            found.append(replace(branch, parent=parent, when=branch.when + f" (+{hidden} nodes)" * (hidden > 0)))
+            found.append(
+                replace(branch, parent=parent, when=branch.when + f" (+{counted(hidden, 'node')})" * (hidden > 0))
+            )
     return found
 
 

@@ -43,18 +43,26 @@ def test_percents(share: float, text: str) -> None:
 
 def test_the_own_choice_and_what_is_preferred() -> None:
     assert facts.choice(request(), MARKS) == (
-        "The learner itself would go → right (25%); all moves are alike to it here."
+        "Alone the learner would now go → right, drawn at random: all moves are alike to it here (25% each)."
     )
-    assert facts.choice(request(q=(0, 0, 0, 1)), MARKS) == "The learner itself would go → right (100%)."
+    assert facts.choice(request(q=(0, 0, 0, 1)), MARKS) == (
+        "Alone the learner would now go → right, the move it rates best (100%)."
+    )
     assert facts.choice(request(q=(0, 1, 0, 0)), MARKS) == (
-        "The learner itself would go → right (0%); it prefers ↓ down (100%)."
+        "Alone the learner would now go → right, drawn at random (0%); the move it rates best is ↓ down (100%)."
     )
 
 
 def test_where_the_own_choice_leads() -> None:
-    assert "go ↓ down (100%), which leads into an obstacle." in facts.choice(request(None, 1, 1, (0, 1, 0, 0)), MARKS)
-    assert "go → right (100%), which leads to the goal." in facts.choice(request(None, 3, 10, (0, 0, 0, 1)), MARKS)
-    assert "go ↑ up (100%), which leads nowhere." in facts.choice(request(None, 0, 0, (1, 0, 0, 0)), MARKS)
+    assert "go ↓ down, the move it rates best (100%); that leads into an obstacle." in facts.choice(
+        request(None, 1, 1, (0, 1, 0, 0)), MARKS
+    )
+    assert "go → right, the move it rates best (100%); that leads to the goal." in facts.choice(
+        request(None, 3, 10, (0, 0, 0, 1)), MARKS
+    )
+    assert "go ↑ up, the move it rates best (100%); that leads nowhere." in facts.choice(
+        request(None, 0, 0, (1, 0, 0, 0)), MARKS
+    )
     assert facts.choice(request(None, 1, 1), MARKS, brief=True) == "↓ down leads into an obstacle."
     assert facts.choice(request(None, 0), MARKS, brief=True) == "↑ up leads nowhere."
     assert facts.choice(request(), MARKS, brief=True) == ""
@@ -130,7 +138,8 @@ def test_sentences_say_all_without_a_picture() -> None:
         "down: border.",
         "left: free.",
         "right: goal.",
-        "The learner itself would go right (0%), which leads to the goal; it prefers down (100%).",
+        "Alone the learner would now go right, drawn at random (0%); that leads to the goal; the move it rates best is down "
+        "(100%).",
         "Its chances: up 0%, down 100%, left 0%, right 0%.",
         "It asks because its improvement is +1.2%, below 5%: lately 39.5 steps per episode, before that 40.0.",
         "Advised so far: 12 of 150 moves; episodes misled: 3, tolerated: 7.",
@@ -160,7 +169,8 @@ def test_sentences_of_a_map_a_board_and_states_without_a_grid() -> None:
         "wait: leads nowhere.",
         "go: leads to 1.",
         "fall: an end that is no goal.",
-        "The learner itself would go fall (33%), which leads to an end that is no goal; all moves are alike to it here.",
+        "Alone the learner would now go fall, drawn at random: all moves are alike to it here (33% each); that leads to an "
+        "end that is no goal.",
     ]
 
 
@@ -196,7 +206,9 @@ def test_of_a_table_that_knows_nothing_nothing_is_said() -> None:
     no = np.zeros(2, bool)
     mdp = TabularMDP(np.array([[0, 0], [1, 1]]), np.zeros((2, 2)), no, no, 0, ("wait", "go"))
     asked = replace(request(mdp, 1), place=Elsewhere())
-    assert facts.choice(asked, MARKS) == "The learner itself would go go (50%); all moves are alike to it here."
+    assert facts.choice(asked, MARKS) == (
+        "Alone the learner would now go go, drawn at random: all moves are alike to it here (50% each)."
+    )
     assert facts.sentences(asked)[2:4] == ["wait: nobody knows where it leads.", "go: nobody knows where it leads."]
 
 

@@ -67,8 +67,9 @@ def test_what_is_shown() -> None:
     assert written.getvalue().count("Episode 30") == 1, "an episode is announced once"
 
 
-def test_quit_ends_the_session() -> None:
-    ask, _ = prompt("quit")
+@pytest.mark.parametrize("word", ["quit", "q"])
+def test_quit_ends_the_session(word: str) -> None:
+    ask, _ = prompt(word)
     with pytest.raises(KeyboardInterrupt):
         ask(request())
 

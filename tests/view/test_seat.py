@@ -211,7 +211,7 @@ def test_one_page_advises_and_the_others_watch(page: SeatPage, request_1: Advice
             assert second.refused({"answer": {"question": shown["question"]["number"], "action": 0}}) == (
                 "This page only watches."
             )
-            assert "hand it over" in second.refused({"seat": "take"})
+            assert "has to hand over first" in second.refused({"seat": "take"})
             answer(first, action=1)
             assert asked.result(20) == 1
 
@@ -228,7 +228,7 @@ def test_another_page_takes_over_when_the_advisors_has_gone(
         number = second.hear_until(lambda seat: seat.get("you", {}).get("free") and seat["question"])["question"][
             "number"
         ]
-        assert "take it first" in second.refused({"answer": {"question": number, "action": 0}})
+        assert "No page answers yet" in second.refused({"answer": {"question": number, "action": 0}})
         second.say({"seat": "take"})
         second.hear_until(lambda seat: seat["you"]["seat"])
         answer(second, action=2)

@@ -129,7 +129,7 @@ def test_the_receipt_is_shown(tab: "Page", page: SeatPage, until: Until) -> None
     until(tab, "!document.getElementById('receipt').hidden")
     shown = tab.inner_text("#receipt")
     assert "It asked in\n1 episode, about 2 steps" in shown
-    assert "With your help\n1 step, 1 its own choice, too" in shown
+    assert "With advice\n1 step, 1 its own choice, too" in shown
     assert "Not followed\n1: nothing was said" in shown
     assert "Not the best\n0 of 1" in shown
 

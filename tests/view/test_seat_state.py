@@ -175,7 +175,7 @@ def test_a_rejection_is_told_with_its_numbers(known: Known) -> None:
     asked = [AdviceRequested(n, None, None, None) for n in range(4)]
     (text,) = tell(known, [*asked, AdviceRejected(33, 3, 2, 50, 41.25)])
     assert text == (
-        "Your advice did not help in 3 of 4 episodes, 2 are tolerated: I go on alone. "
+        "Advice did not help in 3 of 4 episodes, 2 are tolerated: I go on alone. "
         "Episode 33 took 50 steps, those before it 41.2 on average."
     )
     assert document(known)["standing"]["verdict"] == "rejected"

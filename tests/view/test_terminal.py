@@ -90,7 +90,7 @@ def test_a_question_shows_picture_numbers_and_choice() -> None:
     shown = ask("\n")[1].splitlines()
     assert shown[1].rstrip() == "Episode 31, step 2: at (0, 0)"
     assert shown[2].startswith(" R → · ·     ↑ up     ██▌         25%")
-    assert "The learner itself would go → right (25%); all moves are alike to it here." in shown[7]
+    assert "Alone the learner would now go → right, drawn at random: all moves are alike to it here" in shown[7]
     assert "lately 39.5, before that 40.0; improvement +1.2%, threshold 0%." in " ".join(shown[8:11])
     assert shown[-1] == f"{QUESTION} "
 
@@ -353,7 +353,7 @@ def test_a_question_can_be_shown_with_its_answer() -> None:
     prompt.told(request(), None)
     assert "Episode 31, step 2: at (0, 0)" in said(shown)
     assert "Which way?" not in said(shown)
-    assert said(shown).splitlines()[-2:] == ["You said: → right", "You said: skip"]
+    assert said(shown).splitlines()[-2:] == ["Answer: → right", "Answer: skip"]
 
 
 def test_plain_sentences_for_a_screen_reader() -> None:
