@@ -193,10 +193,11 @@ class KeptSession(_InFolder):
                 f"task now gives another problem ({problem.mdp.signature[:8]}): its file or the lab has changed"
             )
         for what, then, now in (("learner", head.learner, asdict(learner)), ("gate", head.gate, asdict(gate))):
-            if changed := [name for name in now if then.get(name) != now[name]]:
+            then = now | then  # an older journal does not know all settings of today
+            if changed := [name for name in now if then[name] != now[name]]:
                 name = changed[0]
                 raise BadInput(
-                    f"session '{self.folder}' ({self._where}): its {what} had {name} = {then.get(name)!r}, and the task now "
+                    f"session '{self.folder}' ({self._where}): its {what} had {name} = {then[name]!r}, and the task now "
                     f"gives {now[name]!r}: its file has changed"
                 )
         entries = self.read.effective()

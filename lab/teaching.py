@@ -136,7 +136,8 @@ class Teacher:
         """Whether a policy was learned in this way, or broken off before anything can be said of its gate and advisor."""
         length = {"episodes": 0}
         broken_off = len(policy.curve) < policy.learner.get("episodes", 0)
-        alike = (policy.gate, policy.advisor) == (asdict(settings.gate), self.advisor)
+        gate = asdict(settings.gate)
+        alike = (gate | policy.gate, policy.advisor) == (gate, self.advisor)  # an older one does not know all settings
         return policy.learner | length == asdict(settings.learner) | length and (alike or broken_off)
 
     def teach(

@@ -167,6 +167,18 @@ def test_another_world_in_the_file_is_noticed(tmp_path: Path, maze: Path) -> Non
         gone_on(tmp_path, maze)
 
 
+def test_a_journal_of_an_older_version_knows_fewer_settings_and_verdicts(tmp_path: Path, maze: Path) -> None:
+    held(tmp_path, maze)
+    journal = tmp_path / "lesson" / FILE
+    lines = [json.loads(line) for line in journal.read_text().splitlines()]
+    assert lines[0]["gate"].pop("spare_best")
+    for line in lines:
+        line.pop("verdict", None)
+    journal.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    kept = KeptSession(tmp_path / "lesson", "DIR", read_only=True)
+    assert replay(kept, Audience(), lambda request, action: None)["closed"]
+
+
 def test_words_are_the_same_in_another_folder(tmp_path: Path, maze: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     said = Words("maze.txt", advisors=("recorded:lesson", "tau=0.2"), memory=True)

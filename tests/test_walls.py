@@ -19,7 +19,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.overhead", "lab.view.frames", "lab.mdp", "lab.sequencing", "lab.learning.settings"),
     ("lab.vision",),
     ("lab.learning.selection",),
-    ("lab.learning.updates", "lab.learning.environment"),
+    ("lab.learning.updates", "lab.learning.environment", "lab.advice.reasons"),
     ("lab.advice.events", "lab.advice.requests"),
     ("lab.advice",),
     ("lab.learning", "lab.sequencing.advised"),  # SRL that asks: the one sequencer that knows advice

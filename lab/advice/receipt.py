@@ -54,8 +54,9 @@ class Receipt:
 
     requests: episodes in which the learner asked; questions: the steps it asked about, taken of them with advice that was
     carried out; refused: by reason, questions without advice and answers that were not carried out; remembered: steps made
-    from memory, without asking; helped_steps, episodes, guided: of finished episodes; better: guided ones with fewer steps
-    than the mean of the K before; mean_before, mean_after: of the K before the first guided one and the K after the last,
+    from memory, without asking; helped_steps, episodes, guided: of finished episodes; better: guided ones that the
+    gate found better than before, or where it judges none, with fewer steps than the mean of the K before; best: others
+    that were as good as the best so far; mean_before, mean_after: of the K before the first guided one and the K after the last,
     None without any; change_percent: from one to the other; agreed: taken, and the learner's own choice, too; into_walls,
     into_obstacles: taken steps that stayed where they were, or ended the episode short of the goal; sent_back: states in
     which advice led back to one asked about before in the episode; against_best: taken steps that were not the best,
@@ -72,6 +73,7 @@ class Receipt:
     episodes: int
     guided: int
     better: int
+    best: int
     mean_before: float | None
     mean_after: float | None
     change_percent: float | None
@@ -212,20 +214,26 @@ def _mean(episodes: Sequence[EpisodeEnded]) -> float | None:
 
 
 def _judged(ended: Sequence[EpisodeEnded], window: int) -> list[bool]:
-    """Whether each guided episode was better than the mean of the K before it; the first one cannot be."""
+    """Whether each guided episode was a good one: better than the mean of the K before it, or as good as the best."""
     means = [_mean(ended[max(0, n - window) : n]) for n in range(len(ended))]
-    return [mean is not None and one.steps < mean for one, mean in zip(ended, means, strict=True) if one.guided]
+    return [
+        one.verdict != "misled" if one.verdict else mean is not None and one.steps < mean
+        for one, mean in zip(ended, means, strict=True)
+        if one.guided
+    ]
 
 
 def _episodes(ended: Sequence[EpisodeEnded], window: int) -> dict[str, Any]:
     guided = [n for n, one in enumerate(ended) if one.guided]
+    best = sum(ended[n].verdict == "best" for n in guided)
     before = _mean(ended[max(0, guided[0] - window) : guided[0]]) if guided else None
     after = _mean(ended[guided[-1] + 1 : guided[-1] + 1 + window]) if guided else None
     return {
         "helped_steps": sum(one.helped_steps for one in ended),
         "episodes": len(ended),
         "guided": len(guided),
-        "better": sum(_judged(ended, window)),
+        "better": sum(_judged(ended, window)) - best,
+        "best": best,
         "mean_before": before,
         "mean_after": after,
         "change_percent": 100.0 * (after / before - 1.0) if before and after is not None else None,
@@ -290,6 +298,7 @@ def _lines(of: Receipt) -> Iterator[str]:
         yield "  not followed: " + ", ".join(f"{count} ({reason})" for reason, count in of.refused.items())
     if of.guided:
         guided = f"{counted(of.guided, 'guided episode')}, {of.better} of them better than before"
+        guided += f", {of.best} as good as the best" if of.best else ""
         yield f"  {counted(of.helped_steps, 'helped step')} in {guided}"
     if of.remembered:
         yield f"  {counted(of.remembered, 'step')} more from memory, without asking"

@@ -66,11 +66,11 @@ def fitting(environment: GymEnvironment) -> tuple[LearnerSettings, GateSettings]
     mdp, model = environment.mdp, environment.model
     entries, most = mdp.n_states * mdp.n_actions, environment.max_steps
     if model is None or not model.certain:
-        gate = GateSettings(window=20, first_episode=40, omega=30)
+        gate = GateSettings(window=20, first_episode=40, omega=30, spare_best=True)
         return replace(ALONE, episodes=_within(20 * entries, CHANCE_EPISODES), max_steps=most), gate
     beta = 0.2 if mdp.starts else 0.7
     learner = replace(ALONE, alpha=1.0, beta=beta, episodes=_within(8 * entries, CERTAIN_EPISODES), max_steps=most)
-    return learner, GateSettings()
+    return learner, GateSettings(spare_best=True)
 
 
 def _within(number: int, limits: tuple[int, int]) -> int:

@@ -18,10 +18,10 @@ from lab.learning import selection, updates
 from lab.mdp import FloatArray
 
 LANES = 24
-GATE_CODES = {name: code for code, name in enumerate(gates.GATES)}
-_NEVER, _CCRL, _COMBINED, _IA, _CQ, _RANDOM, _IMPORTANCE, _UNCERTAINTY = (
-    GATE_CODES[name] for name in ("never", "ccrl", "combined", "ia", "cq", "random", "importance", "uncertainty")
-)
+LEARNERS = ("afterstate", "q")  # those that are compiled: what chapter 9 needs
+GATES = ("never", "always", "ccrl", "combined", "ia", "cq", "random", "importance", "uncertainty")
+_NEVER, _ALWAYS, _CCRL, _COMBINED, _IA, _CQ, _RANDOM, _IMPORTANCE, _UNCERTAINTY = range(len(GATES))
+JUDGING = ("ccrl", "combined")
 
 _OWN, _REMEMBERED, _ASKED, _PRACTISED = memory.OWN, memory.REMEMBERED, memory.ASKED, memory.PRACTISED
 _NOTHING = memory.NOTHING
@@ -185,7 +185,7 @@ def _opens(rules: Any, lane: Any, steps: Any, rejected: bool) -> bool:
         enough = episode >= rules.first_episode and episode > rules.window
         return bool(enough and _window_mean(steps, episode - 1, rules.window) > rules.enough)
     if gate not in (_CCRL, _COMBINED):
-        return bool(gate != _NEVER)
+        return bool(gate == _ALWAYS)
     if rejected or episode < rules.first_episode or episode <= 2 * rules.window:
         return False
     result = steps[episode - 2]
@@ -353,7 +353,7 @@ def run(
                 elif gate == _UNCERTAINTY:
                     asks = _deviation(problem, rules, others[j], np.int64(state)) >= rules.spread
                 else:
-                    asks = True
+                    asks = gate in (_ALWAYS, _CCRL, _CQ)
                 if asks and said != _NOTHING:
                     action, source = np.uint64(said), np.int64(_REMEMBERED)
                 elif asks:

@@ -8,6 +8,7 @@ import numpy as np
 
 from lab.advice.advisors import PEOPLE, SKILLS
 from lab.advice.gates import GATES, Gate, improvement
+from lab.advice.reasons import Reason
 from lab.advice.requests import AdvisorLeft
 from lab.errors import BadInput, unknown
 from lab.learning.selection import softmax
@@ -39,7 +40,7 @@ class SequenceRequest:
     improvement_rate: float | None
     current_mean: float | None
     previous_mean: float | None
-    why: str
+    why: Reason
 
 
 class SequenceAdvisor(Protocol):

@@ -309,8 +309,8 @@ def _learned(setting: Setting, seeds: NDArray[np.uint64]) -> tuple["Batch", Lear
 
 
 def gate_of(setting: Setting, gate: GateSettings) -> GateSettings:
-    """The world's gate with what the setting says."""
-    changes: dict[str, Any] = {
+    """The world's gate with what the setting says, and its misleads as printed."""
+    changes: dict[str, Any] = {"spare_best": False} | {
         name: getattr(setting, name)
         for name in ("gate", "lambda_threshold", "omega", "psi", "judge_unhelped", "memory")
         if getattr(setting, name) is not None

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from rich.text import Text
 
+from lab.advice.events import EpisodeEnded
+from lab.advice.reasons import TooSlow
 from lab.advice.requests import AdviceRequest, Standing
 from lab.errors import counted
 from lab.learning.environment import TableEnvironment
@@ -106,15 +108,14 @@ def progress(request: AdviceRequest, brief: bool = False) -> list[str]:
     """Why it asks, and the moving averages beside the threshold; brief: the averages alone, in one line."""
     rate, current, previous = request.improvement_rate, request.current_mean, request.previous_mean
     least = request.standing.lambda_threshold
-    why = f"It asks because {request.why}" if request.why and not brief else ""
-    reason = [f"{why}."] if why else []
+    reason = [f"It asks because {request.why}."] if request.why and not brief else []
     if rate is None or current is None or previous is None:
         return [*reason, "Too few episodes for averages." if brief else "Too few episodes so far for moving averages."]
     if brief:
         sign = "<" if rate < least else ">="
         return [f"Steps {previous:.1f}, now {current:.1f}: {rate:+.1%} {sign} {least:.0%}"]
-    if "its improvement" in why:  # that is its rate and the threshold
-        return [f"{why}: lately {current:.1f} steps per episode, before that {previous:.1f}."]
+    if isinstance(request.why, TooSlow):  # that is its rate and the threshold
+        return [f"It asks because {request.why}: lately {current:.1f} steps per episode, before that {previous:.1f}."]
     means = f"lately {current:.1f}, before that {previous:.1f}; improvement {rate:+.1%}, threshold {least:.0%}"
     return [*reason, f"Steps per episode: {means}."]
 
@@ -280,6 +281,23 @@ def _verdict(now: Standing, guided: int) -> str:
     if not now.misleads:
         return f"It tolerates {counted(now.omega, 'episode')} with advice that are no shorter than those before."
     return f"{misled(now.misleads, guided, 'It')}; the learner tolerates {now.omega}, and then asks no more."
+
+
+VERDICTS = {"better": "better than before", "best": "as good as the best so far", "misled": "no better than before"}
+
+
+def verdict(event: EpisodeEnded, mean_before: float | None) -> tuple[bool | None, str]:
+    """Whether an episode with advice was a good one, and in words; mean_before: of the plain step counts before it.
+
+    What the gate says counts; where none judges, the mean does. (None, ""): there is nothing to compare it with.
+    """
+    if mean_before is None:
+        return (None, "") if not event.verdict else (event.verdict != "misled", VERDICTS[event.verdict])
+    shorter = event.steps < mean_before
+    good = event.verdict != "misled" if event.verdict else shorter
+    if event.verdict == "best" or good != shorter:  # the plain mean does not show it: other episodes began elsewhere
+        return good, VERDICTS[event.verdict]
+    return good, f"{'better' if good else 'no better'} than the {mean_before:.1f} before"
 
 
 def misled(misleads: int, guided: int, whose: str = "Your advice") -> str:

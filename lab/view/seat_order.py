@@ -23,7 +23,7 @@ def order_of(request: SequenceRequest) -> Json:
         "at": [],
         "own": request.own,
         "moves": [_allowed(run, decision) for decision in request.allowed],
-        "why": request.why,
+        "why": str(request.why),
         "undoable": False,
         "picture": [],
         **progress_of(request.improvement_rate, request.current_mean, request.previous_mean),

@@ -88,7 +88,7 @@ const seatSide = (() => {
     const rows = [["It asked in", `${count(of.requests, "episode")}, about ${count(of.questions, "step")}`]];
     if (of.taken) rows.push([of.yours ? "With your help" : "With advice", `${count(of.taken, "step")}, ${of.agreed} its own choice, too`]);
     for (const [why, times] of Object.entries(of.refused)) rows.push(["Not followed", `${times}: ${why}`]);
-    if (of.guided) rows.push(["Guided", `${count(of.guided, "episode")}, ${of.better} better than before`]);
+    if (of.guided) rows.push(["Guided", `${count(of.guided, "episode")}, ${of.better} better than before${of.best ? `, ${of.best} as good as the best` : ""}`]);
     if (of.remembered) rows.push(["From memory", count(of.remembered, "step")]);
     if (of.change_percent !== null) rows.push(["Steps an episode", `${seatDraw.nice(of.mean_before)} before, ${seatDraw.nice(of.mean_after)} after (${of.change_percent > 0 ? "+" : ""}${Math.round(of.change_percent)} %)`]);
     if (of.skill) rows.push([of.yours ? "Your skill" : "Skill", `${of.skill.word}: tau ${seatDraw.nice(of.skill.tau)}, ${seatDraw.nice(of.skill.low)} to ${seatDraw.nice(of.skill.high)}`]);

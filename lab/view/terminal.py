@@ -230,14 +230,14 @@ class TeachingPrompt:
     def _episode_ended(self, event: EpisodeEnded) -> None:
         """One line on an episode with advice: its steps beside the mean before it."""
         self._guided += 1
-        style, verdict = "", ""
-        if self._mean_before is not None:
-            better = event.steps < self._mean_before
-            style = "green" if better else "yellow"
-            verdict = f", {'better' if better else 'no better'} than the {self._mean_before:.1f} before"
+        good, verdict = facts.verdict(event, self._mean_before)
+        style = {True: "green", False: "yellow", None: ""}[good]
         outcome = "reached the goal in" if event.reached else "did not reach the goal:"
         steps = counted(event.steps, "step")
-        self._say(f"Episode {event.episode} {outcome} {steps}{verdict}; moves advised: {event.helped_steps}.", style)
+        self._say(
+            f"Episode {event.episode} {outcome} {steps}{verdict and f', {verdict}'}; moves advised: {event.helped_steps}.",
+            style,
+        )
 
     def _disagreed(self, event: AdvisorsDisagreed) -> None:
         """Who said what, and whom the learner follows."""

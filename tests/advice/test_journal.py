@@ -4,7 +4,7 @@ import json
 from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ from lab.advice.entries import (
     read_journal,
     undoable,
 )
-from lab.advice.events import AdviceGiven, EpisodeEnded, Event
+from lab.advice.events import AdviceGiven, EpisodeEnded, Event, Verdict
 from lab.advice.journal import Again, Journal, Undo
 from lab.advice.requests import AdviceRequest, AdvisorLeft, Ask
 from lab.errors import BadInput, WorkFailed
@@ -283,6 +283,7 @@ BY_FIELD: dict[str, Any] = {
     ),
     "said": st.lists(st.tuples(st.text(max_size=5), whole_numbers), max_size=3).map(tuple),
     "action": st.one_of(st.none(), whole_numbers),
+    "verdict": st.sampled_from(get_args(Verdict)),
     **dict.fromkeys(("improvement_rate", "current_mean", "previous_mean"), some_numbers),
     **dict.fromkeys(("final_steps", "optimal_steps"), st.one_of(st.none(), whole_numbers)),
     **dict.fromkeys(("mean_before", "trust"), st.floats(allow_nan=False, allow_infinity=False)),

@@ -1,6 +1,7 @@
 """The receipt: counted by hand in small journals, held against real sessions, and true to any journal at all."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from lab.advice.events import (
     AdvisorsDisagreed,
     EpisodeEnded,
     Event,
+    Verdict,
 )
 from lab.advice.journal import Journal
 from lab.advice.panel import panel_of
@@ -176,6 +178,15 @@ def test_nothing_is_counted_of_nothing() -> None:
     assert not any("0 of 0" in line or "in 0 guided" in line for line in silent.lines())
     one = receipt([asked(1), AdviceGiven(1, 1, 0, RIGHT, RIGHT), ended(1, 5, 1)], corridor(), VALUES).lines()
     assert "  1 of 1 was its own choice, too" in one
+
+
+def test_what_the_gate_makes_of_an_episode_counts() -> None:
+    """Steps 9, then guided 9, 9, 9: the gate found the first two as good as the best, and the last one, a near start, not."""
+    verdicts: tuple[Verdict, ...] = ("", "best", "best", "misled")
+    entries = [replace(ended(n, 9, int(n > 1)), verdict=verdict) for n, verdict in enumerate(verdicts, start=1)]
+    found = receipt(entries, corridor(), VALUES, window=1)
+    assert (found.guided, found.better, found.best) == (3, 0, 2)
+    assert "  3 helped steps in 3 guided episodes, 0 of them better than before, 2 as good" in found.lines()
 
 
 def test_help_that_went_on_for_too_long() -> None:

@@ -203,9 +203,15 @@ def test_a_setting_is_what_the_kernel_gets(small: str, monkeypatch: pytest.Monke
     kernels_run = compiled.run_sessions
     monkeypatch.setattr(compiled, "run_sessions", spied)
     place = runner.world(small)
+    assert place.gate.spare_best  # of lessons in it; studies count misleads as printed
     sessions_of(Setting(small), 2, 0)
     mdp, learner, gate, advice, seeds = calls[0]
-    assert (mdp.n_states, learner, gate, advice) == (18, place.learner, replace(place.gate, gate="never"), None)
+    assert (mdp.n_states, learner, gate, advice) == (
+        18,
+        place.learner,
+        replace(place.gate, gate="never", spare_best=False),
+        None,
+    )
     np.testing.assert_array_equal(seeds, seeds_of(Setting(small), 2, 0))
 
     setting = Setting(small, "limited", "combined", 0.2, 0.3, 2, 0.4, 1.2, "exact", "q", False)

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lab.advice.events import EpisodeEnded, Verdict
+from lab.advice.reasons import TooSlow, ValuesAlike
 from lab.advice.requests import AdviceRequest, Standing
 from lab.learning.environment import TableEnvironment
 from lab.mdp import TabularMDP, coverage, grid
@@ -12,7 +14,7 @@ from lab.view import facts
 from lab.view.board import Marks, picture_of
 
 MARKS = Marks()
-WHY = "its improvement is +1.2%, below 5%"
+WHY = TooSlow(0.012, 0.05)
 
 
 def board() -> TabularMDP:
@@ -86,13 +88,13 @@ def test_the_averages_and_the_threshold() -> None:
         "It asks because its improvement is +1.2%, below 5%: lately 39.5 steps per episode, before that 40.0."
     ]
     assert facts.progress(request(), brief=True) == ["Steps 40.0, now 39.5: +1.2% < 5%"]
-    other = replace(request(), why="the values here span 0.20, at most 1")
+    other = replace(request(), why=ValuesAlike(0.2, 1.0))
     assert facts.progress(other) == [
         "It asks because the values here span 0.20, at most 1.",
         "Steps per episode: lately 39.5, before that 40.0; improvement +1.2%, threshold 5%.",
     ]
-    assert facts.progress(replace(other, why=""))[0].startswith("Steps per episode")
-    early = replace(request(), improvement_rate=None, current_mean=None, previous_mean=None, why="")
+    assert facts.progress(replace(other, why=None))[0].startswith("Steps per episode")
+    early = replace(request(), improvement_rate=None, current_mean=None, previous_mean=None, why=None)
     assert facts.progress(early) == ["Too few episodes so far for moving averages."]
     assert facts.progress(early, brief=True) == ["Too few episodes for averages."]
 
@@ -223,7 +225,7 @@ def test_why_it_asks_with_all_its_numbers() -> None:
         "Advice so far: 12 moves of 150 that it may use. It did not help in 3 of 4 episodes; the learner tolerates 7, and "
         "then asks no more.",
     ]
-    bare = replace(asked, why="", improvement_rate=None, selection="greedy", standing=Standing(1, omega=7))
+    bare = replace(asked, why=None, improvement_rate=None, selection="greedy", standing=Standing(1, omega=7))
     lines = facts.reasons(replace(bare, q=[[0.0] * 4] * 12), MARKS, 0)
     assert lines[0] == "It asks about every step."
     assert lines[1] == "There are too few episodes so far for moving averages."
@@ -231,6 +233,26 @@ def test_why_it_asks_with_all_its_numbers() -> None:
         "Left to itself it may go anywhere, 25% each: chosen by greedy.",
         "Advice so far: 1 move. It tolerates 7 episodes with advice that are no shorter than those before.",
     ]
+
+
+@pytest.mark.parametrize(
+    ("steps", "verdict", "mean", "expected"),
+    [
+        (12, "", 16.0, (True, "better than the 16.0 before")),  # no gate judges it
+        (16, "", 16.0, (False, "no better than the 16.0 before")),
+        (16, "", None, (None, "")),
+        (12, "better", 16.0, (True, "better than the 16.0 before")),
+        (16, "best", 16.0, (True, "as good as the best so far")),
+        (17, "misled", 16.0, (False, "no better than the 16.0 before")),
+        (19, "better", 16.0, (True, "better than before")),  # it began farther away than those before
+        (12, "misled", 16.0, (False, "no better than before")),  # it began nearer
+        (16, "misled", None, (False, "no better than before")),
+    ],
+)
+def test_whether_an_episode_with_advice_was_good(
+    steps: int, verdict: Verdict, mean: float | None, expected: tuple[bool | None, str]
+) -> None:
+    assert facts.verdict(EpisodeEnded(31, steps, True, 4, None, True, verdict), mean) == expected
 
 
 def test_misled_episodes_of_how_many() -> None:

@@ -9,6 +9,7 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from rich.console import Console
 
+from lab.advice.reasons import TooSlow
 from lab.advice.requests import AdvisorLeft
 from lab.sequencing.advised import SequenceRequest
 from lab.sequencing.run import Run
@@ -21,7 +22,7 @@ def request(own: int = 1, episode: int = 30) -> SequenceRequest:
     """At the start of the thesis's case I with 3 toasts, one of them in the toaster."""
     run = Run(load_cell("toast-case-1").cell(3))
     run.move(1)
-    return SequenceRequest(run, run.allowed(), own, episode, 0.012, 606.0, 613.4, "its improvement is +1.2%, below 5%")
+    return SequenceRequest(run, run.allowed(), own, episode, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
 
 
 def prompt(*lines: str, width: int = 100, plain: bool = False) -> tuple[OrderPrompt, StringIO]:

@@ -14,6 +14,7 @@ import pytest
 from lab.advice.advisors import Person
 from lab.advice.events import EpisodeEnded, Event
 from lab.advice.journal import Undo
+from lab.advice.reasons import Reason, TooSlow
 from lab.advice.requests import AdviceRequest, AdvisorLeft
 from lab.errors import BadInput, WorkFailed
 from lab.learning.session import SessionResult, run_session
@@ -48,7 +49,7 @@ def page() -> Iterator[SeatPage]:
 
 @pytest.fixture
 def request_1(mdp: TabularMDP) -> AdviceRequest:
-    return AdviceRequest(mdp, [[0.0] * 4 for _ in range(3)], 0, 1, 1, 2, None, None, None, "it asks about every step")
+    return AdviceRequest(mdp, [[0.0] * 4 for _ in range(3)], 0, 1, 1, 2, None, None, None, Reason())
 
 
 def meanwhile(function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
@@ -317,7 +318,7 @@ def test_a_session_that_is_only_shown_takes_no_answers(
 
 def order_request(*decisions: int) -> SequenceRequest:
     run = follow(load_cell("toast-case-1").cell(3), decisions)
-    return SequenceRequest(run, run.allowed(), 1, 30, 0.012, 606.0, 613.4, "it is slow")
+    return SequenceRequest(run, run.allowed(), 1, 30, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
 
 
 def test_the_order_is_asked_and_the_work_shown(page: SeatPage, opens: "Opens") -> None:

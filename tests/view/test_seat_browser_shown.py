@@ -10,6 +10,7 @@ import pytest
 
 from lab.advice.entries import Entry
 from lab.advice.events import AdviceGiven, AdviceRequested, EpisodeEnded
+from lab.advice.reasons import Reason, TooSlow
 from lab.advice.receipt import receipt
 from lab.advice.requests import AdviceRequest
 from lab.learning.settings import GateSettings
@@ -70,7 +71,7 @@ def space() -> TabularMDP:
 
 def test_a_space_is_shown_in_layers(tab: "Page", page: SeatPage, until: Until) -> None:
     mdp = space()
-    request = AdviceRequest(mdp, [[0.0] * 6 for _ in range(18)], mdp.start, 1, 1, 5, None, None, None, "it wants to")
+    request = AdviceRequest(mdp, [[0.0] * 6 for _ in range(18)], mdp.start, 1, 1, 5, None, None, None, Reason())
     asked = ask(page, request)
     until(tab, "document.getElementById('layer-name').textContent === '1 of 0–2: robot'")
     tab.fill("#layer", "2")
@@ -101,7 +102,7 @@ def test_an_environments_own_drawing_is_shown_as_text(tab: "Page", page: SeatPag
 
 def test_the_order_is_advised(tab: "Page", page: SeatPage, until: Until) -> None:
     run = follow(load_cell("toast-case-1").cell(3), [1])
-    request = SequenceRequest(run, run.allowed(), 1, 30, 0.012, 606.0, 613.4, "its improvement is +1.2%, below 5%")
+    request = SequenceRequest(run, run.allowed(), 1, 30, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
     page.begin_order("toast", 100, GateSettings(), 213.0)
     ThreadPoolExecutor(1).submit(page.ask_order, replace(request, run=follow(run.cell, ()), allowed=(1, 2, 3)))
     until(tab, "document.querySelectorAll('#moves button:enabled').length === 3")

@@ -22,6 +22,7 @@ from lab.advice.events import (
     AdvisorsDisagreed,
     EpisodeEnded,
 )
+from lab.advice.reasons import TooSlow
 from lab.advice.requests import AdviceRequest, AdvisorLeft, Standing
 from lab.mdp import TabularMDP, grid
 from lab.view.reader import PlainReader, TerminalReader
@@ -110,7 +111,7 @@ def test_a_question_mark_explains() -> None:
 
 
 def test_why_explains_with_numbers() -> None:
-    answer, shown = ask("why\nup\n", replace(request(), why="its improvement is +1.2%, below 5%"))
+    answer, shown = ask("why\nup\n", replace(request(), why=TooSlow(0.012, 0.05)))
     assert answer == 0
     assert "It asks because its improvement is +1.2%, below 5%." in shown
     assert "Its last episodes took 39.5 steps on average, those before them 40.0" in shown
@@ -303,6 +304,16 @@ def test_events_are_told_with_their_numbers() -> None:
         "Episode 35: advice has ended; the learner goes on alone.",
         "Episode 36: the learner asks for advice about 'insert at toaster'.",
         "Episode 36 reached the goal in 1 step; moves advised: 1.",  # no mean to compare it with
+    ]
+
+
+def test_an_episode_as_good_as_the_best_is_no_bad_one() -> None:
+    shown = console()
+    prompt = TeachingPrompt(shown)
+    prompt.on_event(AdviceRequested(30, 0.0, 16.0, 16.0))
+    prompt.on_event(EpisodeEnded(30, 16, True, 9, 0.0, True, "best"))
+    assert said(shown).splitlines()[1:] == [
+        "Episode 30 reached the goal in 16 steps, as good as the best so far; moves advised: 9."
     ]
 
 
