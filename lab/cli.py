@@ -228,7 +228,7 @@ def run(
     with _seat(names, page=view, port=port, wait_s=wait) as room:
         teacher = _teacher(toolbox, names, seed, room, asked, decide)
         if any(name in PEOPLE for name in names):
-            words = Words(task=task, advisors=tuple(names), asked=asked, decide=decide, seed=seed)
+            words = Words(task=task, advisors=tuple(names), asked=asked, decide=decide, seed=seed, toasts=toasts)
             teacher = replace(teacher, keep=kept_by(teacher.toolbox, words))
         with room.progress:
             report = run_task(prepared, teacher, folder, listener=room.listener, viewer=room.viewer)
@@ -310,7 +310,7 @@ def teach(
     words = given.complete() if kept is None else kept.same(given)
     if kept is not None and out is not None:
         raise BadInput(f"--out {out} beside --resume {resume}: a session goes on in its own folder: leave it away")
-    check(words)
+    check(words, out)
     folder = out if kept is None else kept.folder
     if folder is not None:
         check_out(folder)

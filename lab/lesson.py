@@ -19,9 +19,9 @@ from lab.errors import BadInput, unknown
 from lab.gridworld import GridWorld
 from lab.mdp import greedy_path
 from lab.record import write_whole
-from lab.sessions import KeptSession, NewSession, Words
-from lab.taskfile import Task, load, load_world, names_file, names_of
-from lab.teaching import Audience, Interrupted, Lesson, Teacher, check_name, plain_name, world_problem
+from lab.sessions import KeptSession, NewSession, Words, check_new
+from lab.taskfile import Task, check_toasts, load, load_world, names_file, names_of
+from lab.teaching import Audience, Interrupted, Lesson, Teacher, check_name, world_problem
 from lab.toolbox import Toolbox, default_folder
 
 if TYPE_CHECKING:
@@ -33,9 +33,14 @@ if TYPE_CHECKING:
 GYM = "gym:"
 
 
-def check(words: Words) -> None:
-    """Raises BadInput for words that ask for nothing that is there, before anybody is asked or shown anything."""
+def check(words: Words, out: Path | None = None) -> None:
+    """Raises BadInput for words that ask for nothing that is there, and for an `out` that holds a session already.
+
+    It is called before anybody is asked or shown anything.
+    """
     Counsel(words.advisors, asked=words.asked, decide=words.decide).check()
+    if out is not None:
+        check_new(out)
     _subject(words)
 
 
@@ -46,6 +51,8 @@ def teach(words: Words, teacher: Teacher, out: Path | None, kept: KeptSession | 
     on.
     """
     subject = _subject(words)
+    if kept is None and out is not None:
+        check_new(out)
     session = kept or NewSession(out, teacher.toolbox, words)
     teacher = replace(teacher, keep=session.keep, begun=None if kept is None else kept.begun)
     if out is not None:
@@ -130,7 +137,8 @@ def _subject(words: Words) -> Callable[..., dict[str, Any]]:
     if not names_file(words.subtask):
         if words.view is not None:
             raise BadInput(f"view '{words.view}' (--view): only a world has one, '{words.subtask}' is none")
-        return partial(teach_one, load(words.task or "toast"), words.subtask)
+        task = load(words.task or "toast")
+        return partial(teach_one, task, words.subtask, toasts=words.toasts, sessions=words.sessions)
     world = load_world(words.subtask)
     if words.task is not None:
         raise BadInput(
@@ -150,37 +158,35 @@ def teach_one(
     episodes: int | None = None,
     name: str | None = None,
     out: Path | None = None,
+    toasts: int | None = None,
+    sessions: int | None = None,
 ) -> dict[str, Any]:
     """One session in one sub-task of a task; the policy is kept. Returns the document of `lab teach --json`.
 
     It goes on from an unfinished policy of the same problem, if there is one. A grasp counts as solved when its slice
-    is also lifted in physics; `failure` says why it was not. BadInput when the policy called `name` is of another
-    problem.
+    is also lifted in physics; `failure` says why it was not. `toasts` and `sessions`: those of the run that the lesson
+    belongs to. BadInput when the policy called `name` is of another problem.
     """
     from lab.crew import Crew
-    from lab.line import try_grasp
     from lab.report import draw_value_map
-    from lab.run import prepare
-    from lab.skills import Grasp, Insert
+    from lab.run import prepare, trial_of
+    from lab.skills import Insert
 
-    toasts = fitting(task, 2)
+    toasts = fitting(task, 2) if toasts is None else toasts
+    check_toasts(toasts, task)
     wanted = find_skill(Crew.of(task, toasts).skills, subtask)  # before the scene is surveyed
     settings = task.subtask(wanted.subtask).changed(learner, gate, episodes, memory)
     check_name(name)
     prepared = prepare(task, toasts, teacher.seed, wanted.name)
     skill, problem = prepared.crew.skills[wanted.name], prepared.problems[wanted.name]
     teacher.audience.stands(prepared, problem)
-    earlier = teacher.toolbox.find(problem.subtask, problem.mdp.signature, name or plain_name(problem))
-    lesson = teacher.one_session(problem, settings, task.name, name)
-    policy = prepared.crew.policies[skill.name] = lesson.policy
-    failure = try_grasp(prepared.crew, prepared.surveys, skill) if isinstance(skill, Grasp) else None
-    if failure is not None and policy.solved:
-        policy = teacher.keep_unsolved(policy, earlier)
-    document = _document(problem, replace(lesson, policy=policy), teacher, failure)
+    teacher = replace(teacher, trial=trial_of(prepared))
+    lesson = teacher.one_session(problem, settings, task.name, name, sessions=sessions or 1)
+    document = _document(problem, lesson, teacher)
     if out is not None:
-        document["files"] = _draw_curve(problem.name, policy, out)
+        document["files"] = _draw_curve(problem.name, lesson.policy, out)
         if isinstance(skill, Insert):
-            draw_value_map(skill, policy, out / "insert-value-map.png")
+            draw_value_map(skill, lesson.policy, out / "insert-value-map.png")
             document["files"]["value_map"] = str(out / "insert-value-map.png")
     return document
 
@@ -211,7 +217,7 @@ def teach_world(
     teacher = replace(teacher, counsel=replace(teacher.counsel, region=region))
     teacher.audience.stands(world, problem)
     lesson = teacher.one_session(problem, settings, world.name, name)
-    document = _document(problem, lesson, teacher, None) | {"view": view}
+    document = _document(problem, lesson, teacher) | {"view": view}
     if out is not None:
         document["files"] = _draw_curve(world.name, lesson.policy, out)
         if len(world.shape) == 2:
@@ -234,13 +240,13 @@ def teach_gym(
     settings, problem = world.changed(learner, gate, episodes, memory), world.problem()
     check_name(name)
     lesson = teacher.one_session(problem, settings, world.name, name)
-    document = _document(problem, lesson, teacher, None)
+    document = _document(problem, lesson, teacher)
     if out is not None:
         document["files"] = _draw_curve(world.name, lesson.policy, out)
     return document
 
 
-def _document(problem: "Problem", lesson: Lesson, teacher: Teacher, failure: str | None) -> dict[str, Any]:
+def _document(problem: "Problem", lesson: Lesson, teacher: Teacher) -> dict[str, Any]:
     """The document of `lab teach --json`, before any file is written."""
     policy, result = lesson.policy, lesson.result
     assert result is not None
@@ -262,8 +268,8 @@ def _document(problem: "Problem", lesson: Lesson, teacher: Teacher, failure: str
         "rejected_at_episode": result.rejected_at_episode,
         "optimal_steps": result.optimal_steps,
         "final_steps": result.final_steps,
-        "solved": result.solved and failure is None,
-        "failure": failure,
+        "solved": result.solved and lesson.failure is None,
+        "failure": lesson.failure,
         "source": lesson.source,
         "saved_as": policy.name,
         "files": {},

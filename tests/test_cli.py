@@ -471,8 +471,13 @@ def test_a_session_is_replayed_listed_and_not_gone_on_with_when_it_is_over(lab: 
     again = lab("teach", "--resume", "lesson")
     assert (again.code, again.err) == (2, "lab: the session in 'lesson' is over: look at it again with lab replay\n")
     lab("teach", "w.txt", "--advisor", "none", "--episodes", "3")
-    (row,) = lab("replay", "--json").json["sessions"]
-    assert (row["problem"], row["advisor"], Path(row["session"]).name) == ("w", "none", "w-1")
+    rows = lab("replay", "--json").json["sessions"]
+    places = [(row["problem"], row["advisor"], Path(row["session"]).name) for row in rows]
+    assert places == [("w", "none", "w-2"), ("w", "terminal", "lesson")]
+    again = lab("teach", "w.txt", "--out", "lesson")
+    assert (again.code, again.out, again.err.count("\n")) == (2, "", 1)
+    assert "'lesson' (--out) holds a session that is over: look at it again (lab replay lesson)" in again.err
+    assert lab("replay", "lesson", "--json").json == ran.json
 
 
 def test_a_session_goes_on_from_another_folder(lab: Lab, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
