@@ -4,7 +4,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import wraps
 from io import TextIOWrapper
 from pathlib import Path
@@ -60,6 +60,12 @@ Wait = Annotated[
     float | None,
     typer.Option(
         "--wait", min=1.0, help="Seconds to wait for an answer of the advisor web; then the learner goes on alone."
+    ),
+]
+TrustModule = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--trust-module", help="A module that the session names (gym:MODULE:ID) may be imported: its code runs."
     ),
 ]
 Toasts = Annotated[int, typer.Option("--toasts", "-n", help="How many slices, 1 to 50.")]
@@ -180,14 +186,20 @@ def _teacher(
     return teacher
 
 
-def _kept(folder: Path, where: str, *, read_only: bool = False) -> "KeptSession":
+def _kept(folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] | None = None) -> "KeptSession":
     """A session that was kept; what was cut off at its end is said."""
     from lab.sessions import KeptSession
 
-    kept = KeptSession(folder, where, read_only=read_only)
+    kept = KeptSession(folder, where, read_only=read_only, trusted=trusted or ())
     if kept.read.cut:
         _complain(f"journal '{kept.read.path}': its last line was cut off and is left out: {kept.read.cut[:60]!r}")
     return kept
+
+
+def _say_outside(kept: "KeptSession") -> None:
+    """Says which files the session has the lab read that are not its own."""
+    if kept.outside:
+        _complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(kept.outside)}")
 
 
 @command(app, "run", "lab run toast --toasts 3")
@@ -282,6 +294,7 @@ def teach(
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the session in this folder, as it was begun.")
     ] = None,
+    trust_module: TrustModule = None,
     page: ShowPage = False,
     port: Port = 0,
     wait: Wait = None,
@@ -306,10 +319,12 @@ def teach(
 
     advisors = tuple(advisor or ())
     given = Words(subtask or "", task, view, learner, gate, memory, advisors, asked, decide, episodes, seed, save)
-    kept = None if resume is None else _kept(resume, "--resume")
+    kept = None if resume is None else _kept(resume, "--resume", trusted=trust_module)
     words = given.complete() if kept is None else kept.same(given)
     if kept is not None and out is not None:
         raise BadInput(f"--out {out} beside --resume {resume}: a session goes on in its own folder: leave it away")
+    if kept is not None:
+        _say_outside(kept)
     check(words, out)
     folder = out if kept is None else kept.folder
     if folder is not None:
@@ -338,6 +353,7 @@ def replay(
     pause: Annotated[
         float, typer.Option("--pause", min=0.0, max=3600.0, help="Seconds between two answers; default: half a second.")
     ] = 0.5,
+    trust_module: TrustModule = None,
     page: ShowPage = False,
     port: Port = 0,
     plain: Plain = False,
@@ -356,13 +372,16 @@ def replay(
             {"sessions": rows}, as_json, lambda d: table_of(d["sessions"], ("session", "problem", "advisor", "state"))
         )
         return
-    kept = _kept(folder, "DIR", read_only=True)
-    with _seat(["terminal"], page=page, port=port, plain=plain) as room:
-        document = replay_session(kept, room.replaying(0.0 if as_json else pause), room.watch)
-        room.ends(document)
-        _show(document, as_json, replay_summary)
-        with suppress(KeyboardInterrupt):  # that ends it, and nothing is lost
+    kept = _kept(folder, "DIR", read_only=True, trusted=trust_module)
+    _say_outside(kept)
+    try:
+        with _seat(["terminal"], page=page, port=port, plain=plain) as room:
+            document = replay_session(kept, room.replaying(0.0 if as_json else pause), room.watch)
+            room.ends(document)
+            _show(document, as_json, replay_summary)
             room.stay()
+    except KeyboardInterrupt:
+        _end("stopped by Ctrl-C", 130)
 
 
 @command(app, "sequence", "lab sequence toast --case II --toasts 4 --gantt order.svg")

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import asdict, replace
 from difflib import get_close_matches
 from functools import partial
@@ -87,7 +86,8 @@ def _resume(session: NewSession | KeptSession, toolbox: Toolbox) -> str:
 def replay(kept: KeptSession, audience: Audience, watch: Watch) -> dict[str, Any]:
     """Shows a kept session again, each question with its answer, to `audience` and `watch`; nothing is learned or written.
 
-    Returns the document of `lab replay --json`. Raises BadInput when the session's problem is not there any more.
+    Returns the document of `lab replay --json`. Raises BadInput when the session's problem is not there any more, and
+    KeyboardInterrupt on Ctrl-C.
     """
     words, read = kept.words, kept.read
     people = dict.fromkeys(PEOPLE, _nobody)  # the journal answers for them
@@ -96,8 +96,11 @@ def replay(kept: KeptSession, audience: Audience, watch: Watch) -> dict[str, Any
     with TemporaryDirectory() as folder:
         teacher = Teacher(Toolbox(folder), counsel, words.seed, audience, keep=kept.keep, begun=kept.begun)
         options = {name: getattr(words, name) for name in ("learner", "gate", "memory", "episodes")}
-        with suppress(Interrupted):  # it was not over
+        try:
             subject(teacher, **options, name=words.save, out=None)
+        except Interrupted:  # by the journal's end, when it was not over, or by Ctrl-C
+            if kept.journal is None or kept.journal.folding:
+                raise KeyboardInterrupt from None
     worth = kept.receipt()
     return {
         "session": str(kept.folder),
