@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,9 @@ import typer
 from lab.errors import BadInput, LabError
 
 if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
+    from types import FrameType
+
     from rich.console import Console, RenderableType
 
     from lab.classroom import Classroom
@@ -29,6 +33,7 @@ study_app = typer.Typer(no_args_is_help=True, help="The thesis's tables and figu
 app.add_typer(task_app, name="task")
 app.add_typer(study_app, name="study")
 
+AGAIN_S = 0.02  # between two looks whether an import is over
 STOPPED = "stopped by Ctrl-C; what was learned is kept"
 MAX_EPISODES = 1_000_000
 MAX_SESSIONS = 10_000
@@ -102,7 +107,7 @@ _PLAIN = str.maketrans("▁▂▃▄▅▆▇█·", "_.-:=+*#.")  # for a stdou
 def _end(message: str, code: int) -> NoReturn:
     if message:
         _complain(message)
-    raise typer.Exit(code)
+    sys.exit(code)
 
 
 def _complain(message: str) -> None:
@@ -198,8 +203,10 @@ def _kept(folder: Path, where: str, *, read_only: bool = False, trusted: Sequenc
 
 def _say_outside(kept: "KeptSession") -> None:
     """Says which files the session has the lab read that are not its own."""
-    if kept.outside:
-        _complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(kept.outside)}")
+    from lab.lesson import outside
+
+    if files := outside(kept):
+        _complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(files)}")
 
 
 @command(app, "run", "lab run toast --toasts 3")
@@ -325,7 +332,7 @@ def teach(
         raise BadInput(f"--out {out} beside --resume {resume}: a session goes on in its own folder: leave it away")
     if kept is not None:
         _say_outside(kept)
-    check(words, out)
+    check(words, out, kept)
     folder = out if kept is None else kept.folder
     if folder is not None:
         check_out(folder)
@@ -664,13 +671,52 @@ def main() -> None:
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: a name must not end a command
     try:
-        code = app(prog_name="lab", standalone_mode=False)
+        with _ctrl_c_is_heard():
+            code = app(prog_name="lab", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
-        _complain(STOPPED)
         code = 130
     except Exception as error:
         code = _usage(error)
+    if code == 130:  # before any command had begun
+        _complain("stopped by Ctrl-C")
     sys.exit(code if isinstance(code, int) else 0)
+
+
+@contextmanager
+def _ctrl_c_is_heard() -> Iterator[None]:
+    """Raises KeyboardInterrupt on Ctrl-C, but not while a library is being imported: there it may be dropped unseen.
+
+    It is raised as soon as that import is over, and again when Python has ignored it (in a callback).
+    """
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:  # somebody else's, or not wanted
+        yield
+        return
+    main_frame = sys._getframe(2)
+
+    def stop(number: int, frame: "FrameType | None") -> None:
+        while frame is not None and frame is not main_frame:
+            if frame.f_code.co_filename.startswith("<frozen importlib"):
+                signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
+                return
+            frame = frame.f_back
+        raise KeyboardInterrupt
+
+    def ignored(what: "UnraisableHookArgs") -> None:
+        if issubclass(what.exc_type, KeyboardInterrupt):
+            signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
+        else:
+            told(what)
+
+    told = sys.unraisablehook
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGALRM)}
+    sys.unraisablehook = ignored
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        sys.unraisablehook = told
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _usage(error: Exception) -> int:

@@ -19,7 +19,7 @@ from lab.gridworld import GridWorld
 from lab.mdp import greedy_path
 from lab.record import write_whole
 from lab.sessions import KeptSession, NewSession, Words, check_new
-from lab.taskfile import Task, check_toasts, load, load_world, names_file, names_of
+from lab.taskfile import Task, check_toasts, is_path, load, load_world, names_file, names_of
 from lab.teaching import Audience, Interrupted, Lesson, Teacher, check_name, world_problem
 from lab.toolbox import Toolbox, default_folder
 
@@ -32,15 +32,29 @@ if TYPE_CHECKING:
 GYM = "gym:"
 
 
-def check(words: Words, out: Path | None = None) -> None:
+def check(words: Words, out: Path | None = None, kept: KeptSession | None = None) -> None:
     """Raises BadInput for words that ask for nothing that is there, and for an `out` that holds a session already.
 
-    It is called before anybody is asked or shown anything.
+    It is called before anybody is asked or shown anything. `kept`: where the words come from, if nobody has typed them.
     """
     Counsel(words.advisors, asked=words.asked, decide=words.decide).check()
     if out is not None:
         check_new(out)
-    _subject(words)
+    _subject(words, kept)
+
+
+def outside(kept: KeptSession) -> list[str]:
+    """The files outside its own folder that a session names, and that are read when it goes on or is shown again."""
+    words = kept.words
+    named: list[object] = [words.subtask, words.task]
+    if words.subtask.startswith(GYM):
+        from lab.gymworld import parse_name
+
+        named = list(parse_name(words.subtask, kept.where).options.values())
+    files = [word for word in named if isinstance(word, str) and is_path(word) and Path(word).is_file()]
+    files += [name.removeprefix("recorded:") for name in words.advisors if name.startswith("recorded:")]
+    here = kept.read.path.parent.resolve()
+    return [name for name in files if not Path(name).resolve().is_relative_to(here)]
 
 
 def teach(words: Words, teacher: Teacher, out: Path | None, kept: KeptSession | None = None) -> dict[str, Any]:
@@ -49,7 +63,7 @@ def teach(words: Words, teacher: Teacher, out: Path | None, kept: KeptSession | 
     Pictures and the receipt go to `out`. Raises BadInput for bad words, WorkFailed, and Interrupted, which says how to go
     on.
     """
-    subject = _subject(words)
+    subject = _subject(words, kept)
     if kept is None and out is not None:
         check_new(out)
     session = kept or NewSession(out, teacher.toolbox, words)
@@ -92,7 +106,7 @@ def replay(kept: KeptSession, audience: Audience, watch: Watch) -> dict[str, Any
     words, read = kept.words, kept.read
     people = dict.fromkeys(PEOPLE, _nobody)  # the journal answers for them
     counsel = Counsel(words.advisors, people, words.asked, words.decide, watch=watch)
-    subject = _subject(words)
+    subject = _subject(words, kept)
     with TemporaryDirectory() as folder:
         teacher = Teacher(Toolbox(folder), counsel, words.seed, audience, keep=kept.keep, begun=kept.begun)
         options = {name: getattr(words, name) for name in ("learner", "gate", "memory", "episodes")}
@@ -128,11 +142,20 @@ def _worth(session: NewSession | KeptSession) -> dict[str, Any]:
     return {"session": str(session.folder), "receipt": worth.to_json() | {"lines": worth.lines()}}
 
 
-def _subject(words: Words) -> Callable[..., dict[str, Any]]:
-    """What the words ask for: one of the functions below with its first argument. BadInput for bad ones."""
-    if words.subtask.startswith(GYM):
-        from lab.gymworld import gym_world
+def _subject(words: Words, kept: KeptSession | None) -> Callable[..., dict[str, Any]]:
+    """What the words ask for: one of the functions below with its first argument. BadInput for bad ones.
 
+    A module whose name comes out of a file, `kept`, is imported only when the user has said that it is trusted.
+    """
+    if words.subtask.startswith(GYM):
+        from lab.gymworld import gym_world, parse_name
+
+        module = "" if kept is None else parse_name(words.subtask, kept.where).module
+        if kept is not None and module and module not in kept.trusted:
+            raise BadInput(
+                f"journal '{kept.read.path}' ({kept.where}): it names the module '{module}', whose code would run: if you "
+                f"trust whoever made it, say --trust-module {quote(module)}"
+            )
         for option, value in (("--task", words.task), ("--view", words.view)):
             if value is not None:
                 raise BadInput(f"{option} {value}: a Gymnasium environment, '{words.subtask}', has none: leave it away")

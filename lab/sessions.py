@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from annotated_types import Ge, Le
 
@@ -20,12 +20,9 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray
 from lab.policy import Policy
 from lab.skills.skill import Problem
-from lab.taskfile import is_path, names_file
+from lab.taskfile import names_file
 from lab.teaching import MAX_SESSIONS, Keep
 from lab.toolbox import Toolbox, slug
-
-if TYPE_CHECKING:
-    from lab.gymworld.made import GymName
 
 SESSIONS = "sessions"  # the folder in the toolbox
 _BEGUN = "begun"  # the folder in a session's folder for the policy that it went on from
@@ -191,42 +188,14 @@ def kept_by(toolbox: Toolbox, words: Words) -> Keep:
 class KeptSession(_InFolder):
     """A session that was kept: to go on with it, or (`read_only`) to look at it again. Raises BadInput for none.
 
-    The session may be somebody else's: a module that it names is imported only when the user has said that it is
-    `trusted`, by name; else it is refused with BadInput, before anything is imported.
+    trusted: modules that the session may name: it may be somebody else's, and code runs when one is imported.
     """
 
     def __init__(self, folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] = ()):
         self.read: Read = read_journal(folder, where)
         self.folder = self.read.path.parent
         self.words = Words.from_json(self.read.session.words, f"journal '{self.read.path}' ({where})")
-        self._read_only, self._where = read_only, where
-        self._check_trust(trusted)
-
-    def _check_trust(self, trusted: Sequence[str]) -> None:
-        name = self._environment()
-        if name is not None and name.module and name.module not in trusted:
-            raise BadInput(
-                f"journal '{self.read.path}' ({self._where}): it names the module '{name.module}', whose code would run: "
-                f"if you trust whoever made it, say --trust-module {quote(name.module)}"
-            )
-
-    def _environment(self) -> "GymName | None":
-        """The Gymnasium environment that the session was held in, None when it was another problem."""
-        if not self.words.subtask.startswith("gym:"):
-            return None
-        from lab.gymworld.made import parse_name
-
-        return parse_name(self.words.subtask, self._where)
-
-    @property
-    def outside(self) -> list[str]:
-        """The files outside its own folder that the session names, and that are read for it."""
-        name = self._environment()
-        words: list[object] = [self.words.subtask, self.words.task] if name is None else [*name.options.values()]
-        files = [word for word in words if isinstance(word, str) and is_path(word) and Path(word).is_file()]
-        records = [name.removeprefix("recorded:") for name in self.words.advisors if name.startswith("recorded:")]
-        here = self.folder.resolve()
-        return [name for name in [*files, *records] if not Path(name).resolve().is_relative_to(here)]
+        self._read_only, self.where, self.trusted = read_only, where, trusted
 
     def keep(
         self, problem: Problem, learner: LearnerSettings, gate: GateSettings, unfinished: Policy | None
@@ -236,14 +205,14 @@ class KeptSession(_InFolder):
         head = self.read.session
         if head.signature != problem.mdp.signature:
             raise BadInput(
-                f"session '{self.folder}' ({self._where}): it is about '{head.problem}' ({head.signature[:8]}), and the "
+                f"session '{self.folder}' ({self.where}): it is about '{head.problem}' ({head.signature[:8]}), and the "
                 f"task now gives another problem ({problem.mdp.signature[:8]}): its file or the lab has changed"
             )
         for what, then, now in (("learner", head.learner, asdict(learner)), ("gate", head.gate, asdict(gate))):
             if changed := [name for name in now if then.get(name) != now[name]]:
                 name = changed[0]
                 raise BadInput(
-                    f"session '{self.folder}' ({self._where}): its {what} had {name} = {then.get(name)!r}, and the task now "
+                    f"session '{self.folder}' ({self.where}): its {what} had {name} = {then.get(name)!r}, and the task now "
                     f"gives {now[name]!r}: its file has changed"
                 )
         entries = self.read.effective()
