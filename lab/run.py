@@ -2,6 +2,7 @@
 
 import hashlib
 import time
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from lab.composer import carry_out
 from lab.crew import Crew, Durations, cell_of
-from lab.line import measure
+from lab.line import measure, try_grasp
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
 from lab.policy import Policy
@@ -18,9 +19,11 @@ from lab.report import Prepared, Report, Taught, write_files
 from lab.sequencing.exact import optimum
 from lab.sequencing.search import Reference
 from lab.sim.scene import Layout, check_apart, draw_layout
+from lab.skills import Grasp
+from lab.skills.skill import Problem
 from lab.skills.surveys import Surveys
 from lab.taskfile import Task, check_toasts
-from lab.teaching import Teacher
+from lab.teaching import Teacher, Trial
 
 _LAB = Path(__file__).resolve().parent  # whose code the kept durations depend on
 
@@ -40,9 +43,23 @@ def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prep
     return Prepared(task, toasts, seed, layout, surveys, crew, problems, time.perf_counter() - began)
 
 
+def trial_of(prepared: Prepared) -> Trial:
+    """What tries a learned skill in physics before it is kept: a grasp must lift its slice; other skills are not tried."""
+
+    def trial(problem: Problem, policy: Policy) -> str | None:
+        skill = prepared.crew.skills[problem.name]
+        if not isinstance(skill, Grasp):
+            return None
+        prepared.crew.policies[skill.name] = policy
+        return try_grasp(prepared.crew, prepared.surveys, skill)
+
+    return trial
+
+
 def teach_all(prepared: Prepared, teacher: Teacher, listener: Listener) -> Taught:
     """Find or learn every skill, then find or measure the durations of every move."""
     task, crew = prepared.task, prepared.crew
+    teacher = replace(teacher, trial=trial_of(prepared))
     known, damaged = teacher.toolbox.index()
     for what in damaged:
         listener.skipped(what)

@@ -30,6 +30,8 @@ from lab.toolbox import Toolbox
 from lab.view.frames import Recording
 from lab.vision import read_picture
 
+Lab = Callable[..., Any]
+
 RUN_FIELDS = (
     *("task", "seed", "toasts", "success", "delivered", "dropped", "failure", "retries", "skills", "sequence"),
     *("predicted_makespan_s", "measured_makespan_s", "optimal_makespan_s", "bound_s"),
@@ -369,3 +371,51 @@ def test_lessons_are_drawn_once_for_each_table(prepared: Prepared, toolbox: Tool
     assert len(drawn) == len({lesson.policy.name for lesson in taught.lessons.values()})
     assert "grasp at plate, starts vary" in drawn
     assert "insert at toaster" in drawn
+
+
+def short_task(root: Path) -> str:
+    """Toast carried from plate to plate; a grasp is learned in short sessions, a person helps for 8 steps in each."""
+    text = (root / "tasks" / "toast.toml").read_text(encoding="utf-8")
+    for station, buffer in (("toaster", "toaster_buffer"), ("butter_applier", "butter_buffer")):
+        text = text.replace(f'[[route]]\nstation = "{station}"\nbuffer = "{buffer}"\n', "")
+    head, grasp, rest = text.partition("[subtasks.grasp]")
+    rest = rest.replace("episodes = 600", "episodes = 200", 1)
+    return (
+        head + grasp + rest.replace("first_episode = 30", "first_episode = 10, budget = 8, judge_unhelped = false", 1)
+    )
+
+
+def test_the_lessons_of_a_run_are_replayed_and_gone_on_with(
+    lab: Lab, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A grasp takes six sessions, and a person answers in each; the long transfer is never learned, and says so."""
+    monkeypatch.setenv("LAB_TOOLBOX", str(tmp_path / "toolbox"))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "short.toml").write_text(short_task(root), encoding="utf-8")
+    typed = ["right", "skip", *[""] * 60]  # an empty line: what the learner would do itself
+    ran = lab("run", "short.toml", "--toasts", "1", "--advisor", "terminal", stdin="\n".join(typed))
+    assert (ran.code, "was not learned in 4000 episodes" in ran.err) == (1, True)
+    rows = {row["problem"]: row for row in lab("replay", "--json").json["sessions"]}
+    assert {problem: row["state"] for problem, row in rows.items()} == {
+        "grasp at plate": "solved",
+        "transfer plate to finished_plate with slice": "over",
+    }
+    for row in rows.values():
+        assert lab("replay", row["session"], "--json").code == 0
+    journal = Path(rows["grasp at plate"]["session"]) / "events.jsonl"
+    whole, box = journal.read_bytes(), Toolbox(tmp_path / "toolbox")
+    lines = whole.splitlines(keepends=True)
+    begun = [n for n, line in enumerate(lines) if b'"kind": "episode", "episode": 1,' in line]
+    answers = [n for n, line in enumerate(lines) if b'"kind": "answer"' in line]
+    assert [sum(first < n for n in answers) for first in begun] == [49, 40, 32, 24, 16, 8]
+    (path,) = tmp_path.glob("toolbox/grasp-*.safetensors")
+    learned = box.load(path)
+    path.unlink()
+    journal.write_bytes(b"".join(lines[: answers[20]]))  # in the third session
+    ran = lab("teach", "--resume", str(journal.parent), "--json", stdin="\n" * 60)
+    assert (ran.code, ran.json["solved"], ran.json["saved_as"]) == (0, True, learned.name)
+    assert journal.read_bytes() == whole
+    again = box.load(path)
+    assert np.array_equal(again.q, learned.q)
+    assert np.array_equal(again.visits, learned.visits)
+    assert (again.curve, again.guided, again.requests) == (learned.curve, learned.guided, learned.requests)

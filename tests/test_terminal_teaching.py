@@ -144,7 +144,7 @@ def test_ctrl_c_in_a_terminal_loses_nothing(terminal: Callable[..., Terminal], t
     teacher.ask("rr\r", after="Episode 2, step 1")
     teacher.ask(key, after="step 3")
     assert teacher.end() == 130
-    assert "lab: stopped by Ctrl-C after 1 episodes of 'maze'; what was learned is kept" in teacher.screen
+    assert "lab: stopped by Ctrl-C after 1 episode of 'maze'; what was learned is kept" in teacher.screen
     assert "Traceback" not in teacher.screen
     (row,) = Toolbox(tmp_path / "toolbox").list()
     assert row["episodes"] == 1

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from errno import EINVAL
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -182,6 +183,8 @@ def read_journal(folder: Path, where: str) -> Read:
     """
     path = folder / FILE if folder.is_dir() else folder
     try:
+        if path.exists() and not path.is_file():
+            raise OSError(EINVAL, "it is no regular file")
         raw = path.read_bytes()
     except OSError as error:
         raise BadInput(f"journal '{path}' ({where}): cannot be read: {error.strerror or error}") from None

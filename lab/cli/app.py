@@ -10,6 +10,7 @@ import typer
 
 from lab import __version__
 from lab.cli import glossary, replay, run, see, sequence, study, task, teach, toolbox, view
+from lab.cli.interrupt import ctrl_c_is_heard
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError
 
@@ -104,9 +105,10 @@ def main() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: a name must not end a command
     begin()
     try:
-        code = made()(prog_name="lab", standalone_mode=False)
-    except (KeyboardInterrupt, typer.Abort):
-        fail(STOPPED, 130)
+        with ctrl_c_is_heard():
+            code = made()(prog_name="lab", standalone_mode=False)
+    except (KeyboardInterrupt, typer.Abort):  # before any command had begun
+        fail("stopped by Ctrl-C", 130)
         code = 130
     except Exception as error:
         code = _usage(error)

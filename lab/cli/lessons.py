@@ -66,11 +66,21 @@ def teacher_of(
     return teacher
 
 
-def kept_session(folder: Path, where: str, *, read_only: bool = False) -> "KeptSession":
+def kept_session(
+    folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] | None = None
+) -> "KeptSession":
     """A session that was kept; what was cut off at its end is said."""
     from lab.sessions import KeptSession
 
-    kept = KeptSession(folder, where, read_only=read_only)
+    kept = KeptSession(folder, where, read_only=read_only, trusted=trusted or ())
     if kept.read.cut:
         complain(f"journal '{kept.read.path}': its last line was cut off and is left out: {kept.read.cut[:60]!r}")
     return kept
+
+
+def say_outside(kept: "KeptSession") -> None:
+    """Says which files the session has the lab read that are not its own."""
+    from lab.lesson import outside
+
+    if files := outside(kept):
+        complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(files)}")

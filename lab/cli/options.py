@@ -37,4 +37,10 @@ Wait = Annotated[
         "--wait", min=1.0, help="Seconds to wait for an answer of the advisor web; then the learner goes on alone."
     ),
 ]
+TrustModule = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--trust-module", help="A module that the session names (gym:MODULE:ID) may be imported: its code runs."
+    ),
+]
 Toasts = Annotated[int, typer.Option("--toasts", "-n", help="How many slices, 1 to 50.")]

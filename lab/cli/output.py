@@ -6,8 +6,6 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
-import typer
-
 from lab.errors import LabError
 
 if TYPE_CHECKING:
@@ -51,7 +49,7 @@ def end(message: str, code: int) -> NoReturn:
     """End the command so. "": there is nothing to say, or nobody to hear it."""
     if message:
         fail(message, code)
-    raise typer.Exit(code)
+    sys.exit(code)
 
 
 def complain(message: str) -> None:

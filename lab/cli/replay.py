@@ -1,14 +1,13 @@
 """`lab replay`: a kept session again."""
 
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from lab.cli.lessons import kept_session, lesson_room
-from lab.cli.options import Json, Plain, Port, ToolboxFolder
-from lab.cli.output import show
+from lab.cli.lessons import kept_session, lesson_room, say_outside
+from lab.cli.options import Json, Plain, Port, ToolboxFolder, TrustModule
+from lab.cli.output import end, show
 
 
 def replay(
@@ -19,6 +18,7 @@ def replay(
     pause: Annotated[
         float, typer.Option("--pause", min=0.0, max=3600.0, help="Seconds between two answers; default: half a second.")
     ] = 0.5,
+    trust_module: TrustModule = None,
     page: Annotated[bool, typer.Option("--page", help="Show it on a page on 127.0.0.1, too.")] = False,
     port: Port = 0,
     plain: Plain = False,
@@ -35,10 +35,13 @@ def replay(
         rows = session_rows(Toolbox(toolbox))
         show({"sessions": rows}, as_json, lambda d: table_of(d["sessions"], ("session", "problem", "advisor", "state")))
         return
-    kept = kept_session(folder, "DIR", read_only=True)
-    with lesson_room([] if as_json else ["terminal"], page=page, port=port, plain=plain) as room:
-        document = replay_session(kept, room.replaying(0.0 if as_json else pause), room.watch)
-        room.ends(document)
-        show(document, as_json, replay_summary)
-        with suppress(KeyboardInterrupt):  # that ends it, and nothing is lost
+    kept = kept_session(folder, "DIR", read_only=True, trusted=trust_module)
+    say_outside(kept)
+    try:
+        with lesson_room([] if as_json else ["terminal"], page=page, port=port, plain=plain) as room:
+            document = replay_session(kept, room.replaying(0.0 if as_json else pause), room.watch)
+            room.ends(document)
+            show(document, as_json, replay_summary)
             room.stay()
+    except KeyboardInterrupt:
+        end("stopped by Ctrl-C", 130)

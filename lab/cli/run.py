@@ -49,7 +49,7 @@ def run(
     with lesson_room(names, page=page or view, port=port, wait_s=wait) as room:
         teacher = teacher_of(toolbox, names, seed, room, asked, decide)
         if any(name in PEOPLE for name in names):
-            words = Words(task=task, advisors=tuple(names), asked=asked, decide=decide, seed=seed)
+            words = Words(task=task, advisors=tuple(names), asked=asked, decide=decide, seed=seed, toasts=toasts)
             teacher = replace(teacher, keep=kept_by(teacher.toolbox, words))
         with room.progress:
             report = run_task(prepared, teacher, folder, listener=room.listener, viewer=room.viewer)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.lessons import kept_session, lesson_room, teacher_of
+from lab.cli.lessons import kept_session, lesson_room, say_outside, teacher_of
 from lab.cli.options import (
     MAX_EPISODES,
     AdvisorNames,
@@ -17,6 +17,7 @@ from lab.cli.options import (
     Seed,
     ShowPage,
     ToolboxFolder,
+    TrustModule,
     Wait,
 )
 from lab.cli.output import end, show
@@ -71,6 +72,7 @@ def teach(
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the session in this folder, as it was begun.")
     ] = None,
+    trust_module: TrustModule = None,
     page: ShowPage = False,
     port: Port = 0,
     wait: Wait = None,
@@ -97,11 +99,13 @@ def teach(
     given = Words(
         subtask or "", task, sight or view, learner, gate, memory, advisors, asked, decide, episodes, seed, save
     )
-    kept = None if resume is None else kept_session(resume, "--resume")
+    kept = None if resume is None else kept_session(resume, "--resume", trusted=trust_module)
     words = given.complete() if kept is None else kept.same(given)
     if kept is not None and out is not None:
         raise BadInput(f"--out {out} beside --resume {resume}: a session goes on in its own folder: leave it away")
-    check(words)
+    if kept is not None:
+        say_outside(kept)
+    check(words, out, kept)
     folder = out if kept is None else kept.folder
     if folder is not None:
         check_out(folder)
