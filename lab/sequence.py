@@ -150,7 +150,9 @@ def sequence_cell(
     shown = known if search.chance == NO_CHANCE else None
     for session in range(wanted.sessions):
         heard = _Heard(listener)
-        listener.sequences(search.episodes, shown, None if wanted.advisor == "none" else GateSettings(wanted.gate))
+        listener.sequences(
+            search.episodes, shown, None if wanted.advisor == "none" else GateSettings(wanted.gate, spare_best=True)
+        )
         try:
             found.append(_session(cell, method, replace(search, on_episode=heard), wanted, session))
         except KeyboardInterrupt:
@@ -196,7 +198,7 @@ def _advised(cell: Cell, method: str, search: Search, wanted: Wanted, session: i
 
     rng = np.random.default_rng([wanted.seed, 2, session])
     advisor = sequence_advisor(wanted.advisor, cell, np.random.default_rng([wanted.seed, 3, session]), wanted.people)
-    return advised_srl(cell, search, rng, GateSettings(wanted.gate), advisor)
+    return advised_srl(cell, search, rng, GateSettings(wanted.gate, spare_best=True), advisor)
 
 
 def reference(cell: Cell, objective: str) -> Reference:

@@ -112,7 +112,6 @@ def _alike(rng: np.random.Generator, seed: int) -> Iterator[GridWorld]:
                 goal=_tuple(goal),
                 obstacles=tuple(_tuple(cell) for cell in np.argwhere(wall)),
                 learner=LEARNER,
-                gate=GateSettings(),
             )
 
 

@@ -65,6 +65,7 @@ class Setting:
     def key(self, sessions: int, seed: int) -> str:
         """What names this setting's results among all that are stored."""
         place = world(self.world).model_dump(mode="json")
+        del place["gate"]["spare_best"]  # no result depends on it: see `gate_of`
         whole = [
             FORMAT,
             asdict(self, dict_factory=_named),

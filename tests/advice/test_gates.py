@@ -228,8 +228,12 @@ def test_uncertainty_falls_where_the_learner_has_been() -> None:
 
 @pytest.mark.parametrize("learner", UPDATES)
 def test_the_ensemble_learns_as_the_learner_does(learner: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A table that learns from every step and starts as the learner does is the learner's own table at the end."""
-    mdp, settings, made = grid((2, 3), np.zeros((2, 3), bool), (0, 0), (1, 2)), LearnerSettings(learner, episodes=9), []
+    """A table that learns from every step and starts as the learner does ends as the learner; some episodes break off."""
+    mdp, settings, made = (
+        grid((2, 3), np.zeros((2, 3), bool), (0, 0), (1, 2)),
+        LearnerSettings(learner, episodes=9, max_steps=5),
+        [],
+    )
 
     def ensemble(of: GateSettings, episodes: int, max_steps: int, around: Surroundings | None) -> Gate:
         tables = [UPDATES[learner](np.zeros((6, 4)).tolist(), settings, mdp) for _ in range(of.ensemble)]

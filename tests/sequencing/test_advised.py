@@ -52,6 +52,17 @@ def test_who_takes_the_worst_for_the_best_is_rejected(toast_cell: CellMaker) -> 
         assert result.requests <= result.rejected_at_episode - GateSettings().first_episode + 1
 
 
+def test_an_optimum_that_cannot_be_beaten_misleads_as_printed_but_not_where_the_best_is_spared(
+    toast_cell: CellMaker,
+) -> None:
+    cell = toast_cell("I", 3)
+    for spare_best in (False, True):
+        gate, advisor = GateSettings(spare_best=spare_best), sequence_advisor("expert", cell, np.random.default_rng(0))
+        result = advised_srl(cell, Search(EPISODES), np.random.default_rng(0), gate, advisor)
+        assert result.helped_steps > 0
+        assert (result.misleads > 0) == (not spare_best)
+
+
 class Person:
     """Says what it is told to, and writes down what it was shown."""
 
