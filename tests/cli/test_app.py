@@ -12,27 +12,24 @@ import pytest
 
 from lab import __version__
 from lab.advice import advisors, gates, panel
+from lab.cli.app import COMMANDS
 from lab.errors import WorkFailed
 from lab.learning.updates import UPDATES
 from lab.sequencing.advised import FITTING
 from lab.sequencing.objectives import OBJECTIVES
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
-COMMANDS = (
-    *(["run"], ["teach"], ["sequence"], ["see"], ["view"]),
-    *(["toolbox", name] for name in ("list", "show", "verify", "remove")),
-    *(["task", name] for name in ("list", "show", "check", "random")),
-)
 
 
 # ---- help ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
-def test_every_command_has_help_with_an_example(lab: Lab, words: list[str]) -> None:
-    ran = lab(*words, "--help")
+@pytest.mark.parametrize("words", COMMANDS)
+def test_every_command_has_help_with_an_example(lab: Lab, words: str) -> None:
+    ran = lab(*words.split(), "--help")
     assert (ran.code, ran.err) == (0, "")
-    assert f"Example: lab {' '.join(words)}" in " ".join(ran.out.split())
+    assert COMMANDS[words].example.startswith(f"lab {words}")
+    assert f"Example: {COMMANDS[words].example}" in " ".join(ran.out.split())
     assert "--json" in ran.out
 
 
@@ -74,6 +71,13 @@ def test_the_shell_completes_commands(root: Path) -> None:
     env = {**os.environ, **asked}
     ran = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stdout.split(), ran.stderr) == (0, ["teach", "toolbox", "task"], "")
+
+
+def test_a_page_is_answered_only_where_somebody_asks(lab: Lab) -> None:
+    for command, answered in (("run", True), ("teach", True), ("sequence", True), ("replay", False)):
+        text = " ".join(lab(command, "--help").out.replace("│", " ").split())
+        assert "Show it on a page on 127.0.0.1, too" in text
+        assert ("can be answered" in text) == answered
 
 
 def test_old_words_go_on_working_unseen(lab: Lab) -> None:
