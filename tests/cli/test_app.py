@@ -12,7 +12,9 @@ import pytest
 
 from lab import __version__
 from lab.advice import advisors, gates, panel
-from lab.cli.app import COMMANDS
+from lab.cli.app import COMMANDS, Command
+from lab.cli.options import Json
+from lab.cli.output import show
 from lab.errors import WorkFailed
 from lab.learning.updates import UPDATES
 from lab.sequencing.advised import FITTING
@@ -57,6 +59,23 @@ def test_help_names_all_members(lab: Lab, command: str, option: str, following: 
     listed = re.search(r"(\S+, )+\S+", told)
     assert listed is not None
     assert {name.strip(";.") for name in listed[0].split(", ")} == {*members}
+
+
+def test_a_command_is_one_row(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With its row in the table a function is in the help, is called, and ends as all commands do."""
+
+    def greet(name: str, as_json: Json = False) -> None:
+        """Greets somebody."""
+        if name == "nobody":
+            raise WorkFailed("nobody to greet")
+        show({"greeted": name}, as_json, lambda document: f"hello {document['greeted']}")
+
+    monkeypatch.setitem(COMMANDS, "greet", Command(greet, "lab greet you"))
+    assert "Greets somebody." in lab("--help").out
+    assert "Example: lab greet you" in lab("greet", "--help").out
+    assert lab("greet", "you").out == "hello you\n"
+    assert lab("greet", "you", "--json").json == {"greeted": "you"}
+    assert (lab("greet", "nobody").code, lab("greet", "nobody").err) == (1, "lab: nobody to greet\n")
 
 
 def test_the_version_is_told(lab: Lab) -> None:
