@@ -537,7 +537,7 @@ KNOWN = ", ".join(sorted(SEQUENCERS))
 def test_what_is_refused_at_once(lab: Lab, folder: Path, words: str, line: str, json_too: bool) -> None:
     before = listed(folder)
     ran = lab("sequence", *words.split(), *(["--json"] if json_too else []))
-    assert (ran.code, ran.out) == (2, "")
+    assert (ran.code, ran.gave_nothing) == (2, True)
     assert line in ran.err
     assert re.fullmatch(r"lab: .*\n", ran.err), "one line"
     assert listed(folder) == before
@@ -579,7 +579,7 @@ def test_what_does_not_fit_is_refused(lab: Lab, folder: Path, words: str, line: 
     before = listed(folder)
     for more in ([], ["--json"]):
         ran = lab("sequence", "oven.toml", *words.split(), *more)
-        assert (ran.code, ran.out) == (2, "")
+        assert (ran.code, ran.gave_nothing) == (2, True)
         assert ran.err.startswith(f"lab: {line}")
         assert len(ran.err.splitlines()) == 1
     assert listed(folder) == before
@@ -608,7 +608,7 @@ def test_a_folder_for_a_picture(lab: Lab, folder: Path) -> None:
 def test_a_deadlock_is_work_that_failed(lab: Lab) -> None:
     """The queue puts both products into the machines at once; a search that looks further gets around it."""
     ran = lab("sequence", "crossing.toml", "--method", "fifo", "--json")
-    assert (ran.code, ran.out) == (1, "")
+    assert (ran.code, ran.gave_nothing) == (1, True)
     assert ran.err.splitlines()[-1] == "lab: no sequence for 2 parts came to its end in 1 episodes: deadlocks"
     document = asked(lab, "crossing.toml --method random --episodes 50")
     assert document["makespan_s"] < max(document["episode_costs"])

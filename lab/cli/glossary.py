@@ -27,6 +27,7 @@ TERMS = {
     "Lambda": "the improvement that is enough: below it ccrl asks",
     "Omega": "how many misleads are tolerated before an advisor is rejected",
     "psi": "the distance between values with which ia, combined and importance compare",
+    "trust": "the share of an advisor's answers that led nearer to the goal, as far as the learner can tell",
     "tau": "the skill of a simulated advisor, the smaller the better: .01 an expert, .1 moderate, .3 limited, 1 a novice",
     "sight": "where in a world a simulated advisor sees the robot, and so can advise: everywhere, or in a region",
 }

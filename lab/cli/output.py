@@ -42,7 +42,10 @@ def fail(message: str, code: int) -> None:
     line = LabError(" ".join(message.split()))
     complain(str(line))
     if "--json" in sys.argv[1:] and not Stdout.told:
-        write_json({"error": str(line), "exit_code": code})
+        try:
+            write_json({"error": str(line), "exit_code": code})
+        except BrokenPipeError:
+            silence()
 
 
 def end(message: str, code: int) -> NoReturn:

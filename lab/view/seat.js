@@ -84,16 +84,16 @@ const seat = (() => {
 
   function detail() {
     const own = ownMove(), leads = { nowhere: ", which leads nowhere", goal: ", to the goal", obstacle: ", into an obstacle" }[own.leads] || "";
-    const would = shown.kind === "order" ? `I would move ${own.label} from ${own.from} to ${own.to}.` : `Alone I would now go ${named(own)}${rated(own)}${leads}.`;
-    return `${would}${shown.why ? ` I ask because ${shown.why}.` : ""}${shown.offered ? " The terminal asks, too." : ""}`;
+    const would = shown.kind === "order" ? `Alone it would move ${own.label} from ${own.from} to ${own.to}.` : `Alone it would now go ${named(own)}${rated(own)}${leads}.`;
+    return `${would}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered ? " The terminal asks, too." : ""}`;
   }
 
   // What was drawn for this step, beside the move it rates best
   function rated(own) {
     const chances = shown.moves.map((move) => move.chance), top = Math.max(...chances);
-    if (chances.length > 1 && top === Math.min(...chances)) return `, drawn at random: all moves are alike to me here (${percent(top)} each)`;
-    if (own.chance === top) return `, the move I rate best (${percent(top)})`;
-    return `, drawn at random (${percent(own.chance)}; I rate ${named(shown.moves.find((move) => move.chance === top))} best, ${percent(top)})`;
+    if (chances.length > 1 && top === Math.min(...chances)) return `, drawn at random: all moves are alike to it here (${percent(top)} each)`;
+    if (own.chance === top) return `, the move it rates best (${percent(top)})`;
+    return `, drawn at random (${percent(own.chance)}; it rates ${named(shown.moves.find((move) => move.chance === top))} best, ${percent(top)})`;
   }
 
   function countDown() {

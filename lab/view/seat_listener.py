@@ -10,6 +10,7 @@ from lab.listener import Listener
 from lab.sequencing.events import EpisodeSequenced, Move, SequenceResult
 from lab.sequencing.search import Reference
 from lab.teaching import Lesson
+from lab.view.figures import beside
 from lab.view.progress import PHASES
 from lab.view.seat_state import MOST_LINES, Progress
 
@@ -73,11 +74,13 @@ class SeatListener(Listener):
 
     def sequenced(self, best: SequenceResult, known: Reference | None) -> None:
         """An order was found."""
-        unit = " s" if known is None else known.unit
         order = " ".join(map(str, best.sequence[:SHOWN_MOVES]))
         more = f" and {len(best.sequence) - SHOWN_MOVES} more" if len(best.sequence) > SHOWN_MOVES else ""
-        bound = "" if known is None else f"; no order takes less than {known.bound:.1f}{unit}"
-        self._say(f"order {order}{more}: {best.cost:.1f}{unit}{bound}")
+        cost, bound = f"{best.cost:.1f} s", ""
+        if known is not None:
+            cost, least = beside(best.cost, known.bound, known.unit, 1)
+            bound = f"; no order takes less than {least}"
+        self._say(f"order {order}{more}: {cost}{bound}")
 
     def moved(self, move: Move) -> None:
         """A toast was brought on."""

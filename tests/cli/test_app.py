@@ -12,27 +12,26 @@ import pytest
 
 from lab import __version__
 from lab.advice import advisors, gates, panel
+from lab.cli.app import COMMANDS, Command
+from lab.cli.options import Json
+from lab.cli.output import show
 from lab.errors import WorkFailed
 from lab.learning.updates import UPDATES
 from lab.sequencing.advised import FITTING
 from lab.sequencing.objectives import OBJECTIVES
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
-COMMANDS = (
-    *(["run"], ["teach"], ["sequence"], ["see"], ["view"]),
-    *(["toolbox", name] for name in ("list", "show", "verify", "remove")),
-    *(["task", name] for name in ("list", "show", "check", "random")),
-)
 
 
 # ---- help ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
-def test_every_command_has_help_with_an_example(lab: Lab, words: list[str]) -> None:
-    ran = lab(*words, "--help")
+@pytest.mark.parametrize("words", COMMANDS)
+def test_every_command_has_help_with_an_example(lab: Lab, words: str) -> None:
+    ran = lab(*words.split(), "--help")
     assert (ran.code, ran.err) == (0, "")
-    assert f"Example: lab {' '.join(words)}" in " ".join(ran.out.split())
+    assert COMMANDS[words].example.startswith(f"lab {words}")
+    assert f"Example: {COMMANDS[words].example}" in " ".join(ran.out.split())
     assert "--json" in ran.out
 
 
@@ -62,6 +61,23 @@ def test_help_names_all_members(lab: Lab, command: str, option: str, following: 
     assert {name.strip(";.") for name in listed[0].split(", ")} == {*members}
 
 
+def test_a_command_is_one_row(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With its row in the table a function is in the help, is called, and ends as all commands do."""
+
+    def greet(name: str, as_json: Json = False) -> None:
+        """Greets somebody."""
+        if name == "nobody":
+            raise WorkFailed("nobody to greet")
+        show({"greeted": name}, as_json, lambda document: f"hello {document['greeted']}")
+
+    monkeypatch.setitem(COMMANDS, "greet", Command(greet, "lab greet you"))
+    assert "Greets somebody." in lab("--help").out
+    assert "Example: lab greet you" in lab("greet", "--help").out
+    assert lab("greet", "you").out == "hello you\n"
+    assert lab("greet", "you", "--json").json == {"greeted": "you"}
+    assert (lab("greet", "nobody").code, lab("greet", "nobody").err) == (1, "lab: nobody to greet\n")
+
+
 def test_the_version_is_told(lab: Lab) -> None:
     ran = lab("--version")
     assert (ran.code, ran.out, ran.err) == (0, f"lab {__version__}\n", "")
@@ -74,6 +90,13 @@ def test_the_shell_completes_commands(root: Path) -> None:
     env = {**os.environ, **asked}
     ran = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stdout.split(), ran.stderr) == (0, ["teach", "toolbox", "task"], "")
+
+
+def test_a_page_is_answered_only_where_somebody_asks(lab: Lab) -> None:
+    for command, answered in (("run", True), ("teach", True), ("sequence", True), ("replay", False)):
+        text = " ".join(lab(command, "--help").out.replace("│", " ").split())
+        assert "Show it on a page on 127.0.0.1, too" in text
+        assert ("can be answered" in text) == answered
 
 
 def test_old_words_go_on_working_unseen(lab: Lab) -> None:

@@ -17,15 +17,19 @@ Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 MakePolicy = Callable[..., Policy]
 
 
-def test_a_reader_that_leaves_early_is_no_drama(root: Path) -> None:
-    code = "import sys; from lab.cli import main; sys.argv = ['lab', 'task', 'show', 'toast']; main()"
+@pytest.mark.parametrize(
+    ("words", "code", "lines"),
+    [("task show toast", 1, 0), ("--version", 1, 0), ("task show toas --json", 2, 1), ("rnu --json", 2, 1)],
+)
+def test_a_reader_that_leaves_early_is_no_drama(root: Path, words: str, code: int, lines: int) -> None:
+    script = f"import sys; from lab.cli import main; sys.argv = ['lab', *{words.split()}]; main()"
     read, write = os.pipe()
     os.close(read)
     ran = subprocess.run(
-        [sys.executable, "-c", code], cwd=root, stdout=write, stderr=subprocess.PIPE, text=True, check=False
+        [sys.executable, "-c", script], cwd=root, stdout=write, stderr=subprocess.PIPE, text=True, check=False
     )
     os.close(write)
-    assert (ran.returncode, ran.stderr) == (1, "")
+    assert (ran.returncode, ran.stderr.count("\n"), "Traceback" in ran.stderr) == (code, lines, False)
 
 
 def test_a_name_that_ascii_cannot_hold_does_not_end_a_command(root: Path, folder: Path, policy: MakePolicy) -> None:

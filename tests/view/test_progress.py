@@ -162,6 +162,12 @@ def test_a_long_order_is_cut_and_what_is_not_proven_is_not_called_so() -> None:
     assert second == "            300.0 s found in episode 1 of 1, proven bound 150.0 s, gap 100.0%"
 
 
+def test_figures_and_gap_agree() -> None:
+    shown = console(120)
+    RunProgress(shown).sequenced(SequenceResult((1,), 118.86, (118.86,)), Reference(118.84, True, "A*"))
+    assert lines(shown) == ["  parts 1: 118.86 s found in episode 1 of 1, proven optimum 118.84 s, gap 0.02%"]
+
+
 def test_a_bound_of_nothing_has_no_gap() -> None:
     shown = console(120)
     for cost in (0.0, 5.0):

@@ -108,6 +108,9 @@ OVER = "document.getElementById('says').textContent === 'The lesson is over.'"
 
 def test_a_whole_session_by_keys(tab: "Page", page: SeatPage, until: Until) -> None:
     session = Teaching(page).start()
+    until(tab, says(1))
+    assert tab.inner_text("#chair") == "You answer here"
+    assert "drawn at random: all moves are alike to it here (25 % each)" in tab.inner_text("#detail")
     for step, key in enumerate(["ArrowRight", "ArrowRight", "ArrowDown"], start=1):
         until(tab, says(step))
         tab.keyboard.press(key)
