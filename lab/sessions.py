@@ -222,13 +222,14 @@ class KeptSession(_InFolder):
         return self.journal
 
     def same(self, given: Words) -> Words:
-        """The words of the session; BadInput when the command names others."""
+        """The words of the session; BadInput when the command names others, and when the session is over."""
         for name, value in asdict(given).items():
             if value != getattr(Words(), name):
                 option = _OPTIONS.get(name, f"--{name}")
                 raise BadInput(
                     f"{option} beside --resume {self.folder}: a session goes on as it was begun: leave it away"
                 )
+        self.read.check_goes_on()
         return self.words
 
     def begun(self, problem: Problem) -> Policy | None:

@@ -212,10 +212,16 @@ def test_words_are_the_same_in_another_folder(tmp_path: Path, maze: Path, monkey
 
 def test_a_session_goes_on_as_it_was_begun(tmp_path: Path, maze: Path) -> None:
     held(tmp_path, maze)
+    journal = tmp_path / "lesson" / FILE
+    whole = journal.read_bytes()
+    journal.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))
     kept = KeptSession(tmp_path / "lesson", "--resume")
     assert kept.same(Words()) == kept.words == words(maze)
     with pytest.raises(BadInput, match="--seed beside --resume"):
         kept.same(Words(seed=4))
+    journal.write_bytes(whole)
+    with pytest.raises(BadInput, match="is over: look at it again with lab replay"):
+        KeptSession(tmp_path / "lesson", "--resume").same(Words())
 
 
 class Heard(Audience):

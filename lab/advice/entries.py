@@ -164,6 +164,11 @@ class Read:
         last = self.entries[-1] if self.entries else None
         return last if isinstance(last, Closed) else None
 
+    def check_goes_on(self) -> None:
+        """Raises BadInput when the session is over."""
+        if self.closed is not None:
+            raise BadInput(f"the session in '{self.path.parent}' is over: look at it again with lab replay")
+
 
 def undoable(entries: Sequence[Entry], by: str) -> int | None:
     """The place of the answer that a person may take back: the last one in the episode under way; None: there is none."""

@@ -70,8 +70,7 @@ class Journal:
             now = read_journal(found.path, "--resume")
             if now.session != found.session:
                 raise BadInput(f"journal '{found.path}': it was another session's when it was first read")
-            if now.closed is not None:
-                raise BadInput(f"the session in '{found.path.parent}' is over: look at it again with lab replay")
+            now.check_goes_on()
             os.ftruncate(journal._file, now.whole_bytes)
         except OSError as error:
             journal.close()

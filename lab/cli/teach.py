@@ -100,9 +100,9 @@ def teach(
         subtask or "", task, sight or view, learner, gate, memory, advisors, asked, decide, episodes, seed, save
     )
     kept = None if resume is None else kept_session(resume, "--resume", trusted=trust_module)
-    words = given.complete() if kept is None else kept.same(given)
     if kept is not None and out is not None:
         raise BadInput(f"--out {out} beside --resume {resume}: a session goes on in its own folder: leave it away")
+    words = given.complete() if kept is None else kept.same(given)
     if kept is not None:
         say_outside(kept)
     check(words, out, kept)

@@ -1,5 +1,6 @@
 """Ctrl-C is heard wherever it is pressed."""
 
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -58,9 +59,11 @@ def test_ctrl_c_that_a_library_drops_is_heard_all_the_same(
 
     text = CTRL_C.format(on_import=on_import, on_step=on_step)
     (folder / "lab_test_ctrl_c.py").write_text(text, encoding="utf-8")
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it would be ignored
     try:
         ran = lab("teach", "gym:lab_test_ctrl_c:LabTestCtrlC-v0", "--episodes", "50000", "--gate", "never")
     finally:
+        signal.signal(signal.SIGINT, before)
         gymnasium.registry.pop("LabTestCtrlC-v0", None)
         sys.modules.pop("lab_test_ctrl_c", None)
     assert (ran.code, ran.out) == (130, "")
