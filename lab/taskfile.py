@@ -1,5 +1,6 @@
 """Task files: tasks/*.toml -> validated frozen models. The only place where raw text is checked."""
 
+import re
 from itertools import combinations
 from math import hypot
 from pathlib import Path
@@ -12,7 +13,7 @@ from lab.cellparts import Sequencing
 from lab.data import tasks_folder
 from lab.errors import BadInput, unknown
 from lab.gridworld import RANDOM, GridWorld, from_text, from_words
-from lab.record import Count, Learned, Name, Record, as_tuple, read_text
+from lab.record import MAX_SHORT_BYTES, Count, Learned, Name, Record, as_tuple, read_text
 from lab.tomltext import TomlText, explain
 
 MAX_TOASTS = 50
@@ -20,6 +21,8 @@ RESERVED = ("robot", "table", "insert", "the slice", "carried slice")  # names o
 RESERVED_STARTS = ("slice ", "toast ", "toasted ", "butter ", "robot ")
 RESERVED_ENDS = (" marker", " column", " head")
 SUBTASKS = ("transfer", "grasp", "insert", "butter", "place")
+MOST_THINGS = 200  # stations, stages or obstacles: on one table is no room for more
+_SAYS_WORLD = re.compile(r"""^[ \t]*kind[ \t]*=[ \t]*["']world["']""", re.MULTILINE)
 NEAREST_STATIONS_M = 0.16  # two stations nearer than this overlap: a slice is 0.12 m wide
 
 Kind = Literal["task", "cell", "world"]  # of what a file holds
@@ -133,9 +136,9 @@ class Task(Record):
     workspace: Workspace
     camera: CameraSettings
     insert: InsertGrid
-    stations: Annotated[tuple[Station, ...], BeforeValidator(as_tuple), Field(min_length=2)]
-    route: Annotated[tuple[Stage, ...], BeforeValidator(as_tuple), Field(min_length=2)]
-    obstacles: Annotated[tuple[Obstacle, ...], BeforeValidator(as_tuple)] = ()
+    stations: Annotated[tuple[Station, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=MOST_THINGS)]
+    route: Annotated[tuple[Stage, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=MOST_THINGS)]
+    obstacles: Annotated[tuple[Obstacle, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
     subtasks: dict[str, Subtask] = Field(default={})
     sequencing: Sequencing = Sequencing()
 
@@ -285,7 +288,10 @@ def _kind(toml: TomlText) -> Kind:
 
 
 def _toml(path: Path) -> TomlText:
-    return TomlText.parsed(path, read_text(path))
+    text = read_text(path)
+    if len(text) > MAX_SHORT_BYTES and not _SAYS_WORLD.search(text):  # before seconds are spent on its values
+        raise BadInput(f"{path}: {len(text)} characters: a file that holds no world has up to {MAX_SHORT_BYTES}")
+    return TomlText.parsed(path, text)
 
 
 def _checked(model: type[Model], toml: TomlText) -> Model:

@@ -14,8 +14,10 @@ from pydantic import ValidationError
 
 from lab.data import tasks_folder
 from lab.errors import BadInput
+from lab.record import MAX_FILE_BYTES, MAX_SHORT_BYTES
 from lab.taskfile import (
     MAX_TOASTS,
+    MOST_THINGS,
     RESERVED,
     SUBTASKS,
     Task,
@@ -466,3 +468,22 @@ def test_both_ends_of_the_route_must_hold_the_toasts() -> None:
     check_toasts(2, small)
     message = refusal(lambda: check_toasts(3, small))
     assert message == "3 toasts (--toasts) do not fit on 'finished_plate': its capacity in the task file is 2"
+
+
+def test_a_file_too_long_to_be_a_task_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "long.toml"
+    path.write_text("".join(f"k{n} = {n}\n" for n in range(100_000)))
+    assert refusal(lambda: load_any(str(path))).endswith("characters: a file that holds no world has up to 1000000")
+    path.write_text(WORLD + "#" * MAX_SHORT_BYTES)
+    assert load_world(str(path)).name == "world-1"
+    with path.open("wb") as file:
+        file.truncate(MAX_FILE_BYTES + 1)
+    assert refusal(lambda: load_any(str(path))).endswith("bytes: files up to 10000000 bytes are read")
+
+
+def test_more_things_than_a_table_holds_are_refused(tmp_path: Path) -> None:
+    cubes = '\n[[obstacles]]\nname = "pile"\nposition_m = [0.5, 0.0]\n'
+    said = refused(tmp_path, TEXT + cubes * MOST_THINGS)
+    assert said.startswith("obstacles: ")
+    assert "at most 200 items" in said
+    assert len(said) < 400
