@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from lab.durations import Durations
 from lab.policy import Policy
 from lab.sequencing.cell import Cell, needed_moves
 from lab.sequencing.layout import Product, Route, Stage, Station
@@ -12,35 +13,6 @@ from lab.sequencing.positions import Moves
 from lab.skills import Butter, Grasp, Insert, Place, Skill, Transfer
 from lab.skills.surveys import INSERT_START
 from lab.taskfile import Task
-
-
-@dataclass(frozen=True)
-class Durations:
-    """Measured times [s]: the robot's moves by (origin, target), empty and loaded; what each machine takes."""
-
-    empty_s: Mapping[tuple[str, str], float]
-    loaded_s: Mapping[tuple[str, str], float]
-    process_s: Mapping[str, float]
-    sim_s: float = 0.0
-
-    def to_json(self) -> dict[str, object]:
-        """Plain dicts: 'origin > target' -> seconds."""
-        tables = {"empty_s": self.empty_s, "loaded_s": self.loaded_s}
-        flat: dict[str, object] = {name: {" > ".join(k): v for k, v in t.items()} for name, t in tables.items()}
-        return flat | {"process_s": dict(self.process_s)}
-
-    @classmethod
-    def from_json(cls, record: Mapping[str, Mapping[str, float]]) -> "Durations":
-        """What `to_json` wrote."""
-
-        def pairs(name: str) -> dict[tuple[str, str], float]:
-            return {
-                (a, b): float(v)
-                for a, _, b in (k.partition(" > ") for k in record[name])
-                for v in [record[name][f"{a} > {b}"]]
-            }
-
-        return cls(pairs("empty_s"), pairs("loaded_s"), {k: float(v) for k, v in record["process_s"].items()})
 
 
 @dataclass

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 
-from lab.crew import Crew, Durations
+from lab.crew import Crew
+from lab.durations import Durations
 from lab.errors import WorkFailed
 from lab.recorder import Recorder, Viewer
 from lab.sim.scene import Layout, Scene, Spot, spots

@@ -5,13 +5,13 @@ import os
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from lab.composer import Outcome
-from lab.crew import Crew, Durations
+from lab.crew import Crew
+from lab.durations import Durations
 from lab.errors import BadInput, WorkFailed
-from lab.files import nearest
+from lab.files import draft, nearest
 from lab.policy import Policy
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import SequenceResult
@@ -150,11 +150,11 @@ def write_files(prepared: Prepared, taught: Taught, report: Report, out: Path) -
     report.files = {name: str(out / FILES[name]) for name in _names(prepared, report)}
     try:
         out.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=".run-", dir=out) as beside:
-            _draw_all(prepared, taught, report, Path(beside))
+        with draft(out) as beside:
+            _draw_all(prepared, taught, report, beside)
             for name, file in FILES.items():
                 if name in report.files:
-                    os.replace(Path(beside) / file, out / file)
+                    os.replace(beside / file, out / file)
                 else:
                     (out / file).unlink(missing_ok=True)
     except OSError as error:

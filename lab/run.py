@@ -1,28 +1,25 @@
 """The main job: find or learn the skills, measure their durations, sequence, carry out in physics."""
 
-import hashlib
 import time
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
 
 from lab.composer import carry_out
-from lab.crew import Crew, Durations, cell_of
+from lab.crew import Crew, cell_of
+from lab.durations import RECORDS, Durations, durations_key, kept_durations
+from lab.errors import LabError
 from lab.line import measure
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
-from lab.policy import Policy
 from lab.recorder import Viewer, show_scene
 from lab.report import Prepared, Report, Taught, write_files
 from lab.sequencing.exact import optimum
 from lab.sequencing.search import Reference
-from lab.sim.scene import Layout, check_apart, draw_layout
+from lab.sim.scene import check_apart, draw_layout
 from lab.skills.surveys import Surveys
 from lab.taskfile import Task, check_toasts
 from lab.teaching import Teacher
-
-_LAB = Path(__file__).resolve().parent  # whose code the kept durations depend on
 
 
 def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prepared:
@@ -60,46 +57,20 @@ def teach_all(prepared: Prepared, teacher: Teacher, listener: Listener) -> Taugh
 
 def _durations(prepared: Prepared, teacher: Teacher, listener: Listener) -> Durations:
     """The durations measured earlier for exactly these policies in exactly this scene, or measured now and kept."""
-    crew = prepared.crew
-    key = _fingerprint(prepared.task, prepared.layout, crew)
-    kept = _kept_durations(teacher, key, crew)
+    crew, key, kept = prepared.crew, "", None
+    try:
+        key = durations_key(prepared.task, prepared.layout, crew.moves, crew.policies)
+        kept = kept_durations(teacher.toolbox, key, prepared.task, crew.moves)
+    except LabError as error:  # then they are measured: nothing is lost but time
+        listener.skipped(f"durations measured earlier: {error}")
     if kept is not None:
         return kept
     processes = sum(station.process is not None for station in prepared.task.stations)
     listener.phase("measure", len(crew.moves.loaded) + len(crew.moves.empty) + processes)
     durations = measure(crew, prepared.surveys, listener.measured)
-    teacher.toolbox.save_record("durations", key, durations.to_json())
+    if key:
+        teacher.toolbox.save_record(RECORDS, key, durations.to_json())
     return durations
-
-
-def _kept_durations(teacher: Teacher, key: str, crew: Crew) -> Durations | None:
-    """The record of that key; None when there is none, or it is not whole."""
-    record = teacher.toolbox.load_record("durations", key)
-    try:
-        kept = None if record is None else Durations.from_json(record)
-    except (AttributeError, KeyError, TypeError, ValueError):
-        return None
-    if (
-        kept is None
-        or not set(crew.moves.empty) <= kept.empty_s.keys()
-        or not set(crew.moves.loaded) <= kept.loaded_s.keys()
-        or not {station.name for station in crew.task.stations if station.process} <= kept.process_s.keys()
-    ):
-        return None
-    times = (*kept.empty_s.values(), *kept.loaded_s.values(), *kept.process_s.values())
-    return kept if all(isfinite(seconds) and seconds >= 0.0 for seconds in times) else None
-
-
-def _fingerprint(task: Task, layout: Layout, crew: Crew) -> str:
-    """A hash of all that a move's duration depends on: the code, the scene, where things stand, the tables followed."""
-    physical = task.model_dump_json(exclude={"name", "title", "sequencing", "subtasks"})
-    digest = hashlib.sha256(f"{physical}{layout.obstacles}{crew.moves}".encode())
-    for code in sorted([*_LAB.glob("sim/*.py"), *_LAB.glob("skills/*.py"), _LAB / "line.py"]):
-        digest.update(code.read_bytes())
-    for name in sorted(crew.policies):
-        policy: Policy = crew.policies[name]
-        digest.update(f"{name}{policy.signature}".encode() + policy.q.tobytes())
-    return digest.hexdigest()[:24]
 
 
 def run(

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from lab.composer import MAX_TRIES, Outcome, Production, carry_out
-from lab.crew import Crew, Durations, cell_of
+from lab.crew import Crew, cell_of
+from lab.durations import Durations
 from lab.errors import WorkFailed
 from lab.line import Line, measure, try_grasp
 from lab.sequencing.cell import Cell

@@ -1,11 +1,10 @@
 """A task's crew: exactly the skills that its route needs, and the cell that its measured durations make."""
 
-import json
-
 import numpy as np
 import pytest
 
-from lab.crew import Crew, Durations, cell_of, is_toaster, route, stations
+from lab.crew import Crew, cell_of, is_toaster, route, stations
+from lab.durations import Durations
 from lab.errors import BadInput
 from lab.skills import SKILLS, Insert, Place, Transfer
 from lab.skills.surveys import INSERT_START
@@ -101,12 +100,3 @@ def test_a_move_that_was_not_measured_is_missed(task: Task) -> None:
     less = Durations(measured.empty_s, {}, measured.process_s)
     with pytest.raises(BadInput, match="loaded_s 'plate' -> 'toaster' is missing"):
         cell_of(task, less, 2)
-
-
-def test_durations_survive_json(task: Task) -> None:
-    measured = durations(Crew.of(task, 3))
-    back = Durations.from_json(json.loads(json.dumps(measured.to_json())))
-    assert back.empty_s == measured.empty_s
-    assert back.loaded_s == measured.loaded_s
-    assert back.process_s == measured.process_s
-    assert back.sim_s == 0.0  # nothing was simulated when they are read back

@@ -15,7 +15,8 @@ import pytest
 import lab.report
 import lab.run
 from lab.composer import Outcome
-from lab.crew import Crew, Durations
+from lab.crew import Crew
+from lab.durations import Durations
 from lab.errors import BadInput, WorkFailed
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
@@ -189,8 +190,8 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[Crew]:
 
     def measure(crew: Crew, *_: object) -> Durations:
         crews.append(crew)
-        every = dict.fromkeys((*crew.moves.empty, *crew.moves.loaded), 5.0)
-        return Durations(every, every, {"butter_applier": 5.0}, 1.0)
+        empty, loaded = (dict.fromkeys(pairs, 5.0) for pairs in (crew.moves.empty, crew.moves.loaded))
+        return Durations(empty, loaded, {"butter_applier": 5.0}, 1.0)
 
     monkeypatch.setattr(lab.run, "measure", measure)
     return crews
@@ -267,6 +268,8 @@ def test_damaged_policies_are_named_and_learned_again(
         lambda record: record | {"loaded_s": dict.fromkeys(record["loaded_s"], -1.0)},
         lambda record: record | {"process_s": {"butter_applier": "soon"}},
         lambda record: record | {"empty_s": [1, 2]},
+        lambda record: record | {"empty_s": record["empty_s"] | {"plate > elsewhere": 5.0}},
+        lambda record: record | {"process_s": record["process_s"] | {"elsewhere": 5.0}},
     ],
 )
 def test_damaged_durations_are_measured_again(
@@ -275,8 +278,11 @@ def test_damaged_durations_are_measured_again(
     (path,) = (toolbox.folder / "records" / "durations").glob("*.json")
     whole = json.loads(path.read_text(encoding="utf-8"))
     path.write_text(json.dumps(whole | {"record": damage(whole["record"])}), encoding="utf-8")
-    taught = teach_all(prepared, Teacher(toolbox), Listener())
+    heard = Heard()
+    taught = teach_all(prepared, Teacher(toolbox), heard)
     assert len(measured) == 1
+    assert [what for what in heard.damaged if what.startswith("durations measured earlier: record '")] == heard.damaged
+    assert len(heard.damaged) == 1
     assert set(taught.durations.loaded_s.values()) == {5.0}
     teach_all(prepared, Teacher(toolbox), Listener())
     assert len(measured) == 1
@@ -330,6 +336,8 @@ def test_a_failed_run_says_so_and_leaves_no_old_chart(
     assert document["failure"].startswith("toast 1 at 'plate': ")
     (tmp_path / "gantt.png").write_text("old")
     (tmp_path / "mine.txt").write_text("mine")
+    (tmp_path / ".run-k3pt_0ab").mkdir()  # a run that was killed while it drew has left this
+    (tmp_path / ".run-k3pt_0ab" / "gantt.png").write_text("half")
     draw(monkeypatch)
     write_files(prepared, taught, failed, tmp_path)
     assert sorted(failed.files) == sorted(set(FILES) - {"gantt"})

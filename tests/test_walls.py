@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors",),
-    ("lab.data", "lab.files", "lab.tomltext"),
+    ("lab.data", "lab.files", "lab.tomltext", "lab.sources"),
     ("lab.overhead", "lab.view.frames", "lab.mdp", "lab.sequencing", "lab.learning.settings"),
     ("lab.vision",),
     ("lab.learning.selection",),
@@ -31,7 +31,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.cellfile",),
     ("lab.taskfile",),
     ("lab.sim",),
-    ("lab.skills", "lab.recorder"),
+    ("lab.skills", "lab.recorder", "lab.durations"),
     ("lab.teaching", "lab.crew"),
     ("lab.line", "lab.listener", "lab.planner"),
     ("lab.composer",),
