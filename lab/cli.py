@@ -213,9 +213,9 @@ def run(
     from lab import taskfile
     from lab.advice.advisors import PEOPLE
     from lab.advice.counsel import Counsel
-    from lab.report import check_out
-    from lab.run import prepare
-    from lab.run import run as run_task
+    from lab.production.report import check_out
+    from lab.production.run import prepare
+    from lab.production.run import run as run_task
     from lab.sessions import Words, kept_by
     from lab.view.summary import run_summary
 
@@ -300,7 +300,7 @@ def teach(
     """
     from lab.lesson import check
     from lab.lesson import teach as teach_session
-    from lab.report import check_out
+    from lab.production.report import check_out
     from lab.sessions import Words
     from lab.view.summary import lesson_summary
 

@@ -102,7 +102,7 @@ class InsertEnv(TableEnv):
     """The camera's grid around a task's toaster, surveyed in simulation in the scene that a seed lays out. Raises BadInput."""
 
     def __init__(self, task: str = "toast", layout_seed: int = 0, render_mode: str | None = None):
-        from lab.crew import is_toaster
+        from lab.production.skillset import is_toaster
         from lab.sim.scene import draw_layout
         from lab.skills.insert import Insert
         from lab.skills.surveys import Surveys

@@ -157,10 +157,10 @@ def teach_one(
     is also lifted in physics; `failure` says why it was not. BadInput when the policy called `name` is of another
     problem.
     """
-    from lab.crew import Crew
-    from lab.line import try_grasp
-    from lab.report import draw_value_map
-    from lab.run import prepare
+    from lab.production.floor import try_grasp
+    from lab.production.report import draw_value_map
+    from lab.production.run import prepare
+    from lab.production.skillset import Crew
     from lab.skills import Grasp, Insert
 
     toasts = fitting(task, 2)

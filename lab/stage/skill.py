@@ -6,7 +6,7 @@ from math import hypot, radians
 import numpy as np
 
 from lab.mdp import TabularMDP
-from lab.recorder import Recorder
+from lab.production.recorder import Recorder
 from lab.sim import assets
 from lab.sim.scene import Layout, Scene, spots
 from lab.sim.world import World

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from lab.crew import Crew
 from lab.errors import BadInput
 from lab.mdp import greedy_path, optimal_values
+from lab.production.skillset import Crew
 from lab.sim.assets import SLICE as SIZE
 from lab.sim.scene import GRASP_DEPTH, Layout, spots
 from lab.skills import Insert

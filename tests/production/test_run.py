@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-import lab.report
-import lab.run
-from lab.composer import Outcome
-from lab.crew import Crew
-from lab.durations import Durations
+import lab.production.report
+import lab.production.run
 from lab.errors import BadInput, WorkFailed
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
-from lab.report import FILES, Prepared, Report, Taught, check_out, write_files
-from lab.run import prepare, teach_all
+from lab.production.composer import Outcome
+from lab.production.durations import Durations
+from lab.production.report import FILES, Prepared, Report, Taught, check_out, write_files
+from lab.production.run import prepare, teach_all
+from lab.production.skillset import Crew
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.events import Schedule
 from lab.sequencing.exact import optimum
@@ -193,7 +193,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[Crew]:
         empty, loaded = (dict.fromkeys(pairs, 5.0) for pairs in (crew.moves.empty, crew.moves.loaded))
         return Durations(empty, loaded, {"butter_applier": 5.0}, 1.0)
 
-    monkeypatch.setattr(lab.run, "measure", measure)
+    monkeypatch.setattr(lab.production.run, "measure", measure)
     return crews
 
 
@@ -323,7 +323,7 @@ def draw(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) -> 
         if stop is not None:
             raise stop
 
-    monkeypatch.setattr(lab.report, "_draw_all", quick)
+    monkeypatch.setattr(lab.production.report, "_draw_all", quick)
 
 
 def test_a_failed_run_says_so_and_leaves_no_old_chart(
@@ -373,7 +373,7 @@ def test_output_folders(tmp_path: Path) -> None:
 
 def test_lessons_are_drawn_once_for_each_table(prepared: Prepared, toolbox: Toolbox) -> None:
     taught = teach_all(prepared, Teacher(toolbox), Listener())
-    drawn = lab.report._curves(prepared, taught.lessons)
+    drawn = lab.production.report._curves(prepared, taught.lessons)
     assert len(drawn) == len({lesson.policy.name for lesson in taught.lessons.values()})
     assert "grasp at plate, starts vary" in drawn
     assert "insert at toaster" in drawn

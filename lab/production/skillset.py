@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from lab.durations import Durations
 from lab.policy import Policy
+from lab.production.durations import Durations
 from lab.sequencing.cell import Cell, needed_moves
 from lab.sequencing.layout import Product, Route, Stage, Station
 from lab.sequencing.positions import Moves

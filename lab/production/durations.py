@@ -19,7 +19,7 @@ from lab.toolbox import Toolbox
 
 RECORDS = "durations"  # the kind of record in the toolbox
 LONGEST_S = 86_400.0  # of a move or a process
-MEASURED_BY = ("lab.line", "lab.skills")  # the modules that carry moves out, with all that they import
+MEASURED_BY = ("lab.production.floor", "lab.skills")  # the modules that carry moves out, with all that they import
 DECIDED_BY_RESULT = (
     "lab.sequencing",
     "lab.learning",

@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lab.composer import Outcome
-from lab.crew import Crew
-from lab.durations import Durations
 from lab.errors import BadInput, WorkFailed
 from lab.files import draft, nearest
 from lab.policy import Policy
+from lab.production.composer import Outcome
+from lab.production.durations import Durations
+from lab.production.skillset import Crew
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import SequenceResult
 from lab.sequencing.exact import Optimum

@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from lab.composer import carry_out
-from lab.crew import Crew, cell_of
-from lab.durations import RECORDS, Durations, durations_key, kept_durations
 from lab.errors import LabError
-from lab.line import measure
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
-from lab.recorder import Viewer, show_scene
-from lab.report import Prepared, Report, Taught, write_files
+from lab.production.composer import carry_out
+from lab.production.durations import RECORDS, Durations, durations_key, kept_durations
+from lab.production.floor import measure
+from lab.production.recorder import Viewer, show_scene
+from lab.production.report import Prepared, Report, Taught, write_files
+from lab.production.skillset import Crew, cell_of
 from lab.sequencing.exact import optimum
 from lab.sequencing.search import Reference
 from lab.sim.scene import check_apart, draw_layout
@@ -76,7 +76,7 @@ def _durations(prepared: Prepared, teacher: Teacher, listener: Listener) -> Dura
 def run(
     prepared: Prepared, teacher: Teacher, out: Path, *, listener: Listener | None = None, viewer: Viewer | None = None
 ) -> Report:
-    """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.report.check_out`)."""
+    """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.production.report.check_out`)."""
     began = time.perf_counter() - prepared.wall_s
     listener = listener or Listener()
     if viewer is not None:

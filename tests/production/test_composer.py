@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lab.composer import MAX_TRIES, Outcome, Production, carry_out
-from lab.crew import Crew, cell_of
-from lab.durations import Durations
 from lab.errors import WorkFailed
-from lab.line import Line, measure, try_grasp
+from lab.production.composer import MAX_TRIES, Outcome, Production, carry_out
+from lab.production.durations import Durations
+from lab.production.floor import Line, measure, try_grasp
+from lab.production.skillset import Crew, cell_of
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import Move
 from lab.sequencing.run import simulate

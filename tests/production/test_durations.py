@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import lab.data
-from lab.durations import Durations, durations_key
 from lab.errors import BadInput, WorkFailed
 from lab.policy import Policy
+from lab.production.durations import Durations, durations_key
 from lab.sequencing.positions import Moves
 from lab.sim.scene import Layout
 from lab.taskfile import Task, load
@@ -173,7 +173,7 @@ def test_a_key_that_cannot_be_made_is_an_error(task: Task, motion: Path) -> None
 
 
 def test_all_that_moves_the_arm_is_in_the_key() -> None:
-    from lab.durations import DECIDED_BY_RESULT, MEASURED_BY
+    from lab.production.durations import DECIDED_BY_RESULT, MEASURED_BY
     from lab.sources import sources
 
     package = Path(lab.__file__).parent
@@ -183,5 +183,11 @@ def test_all_that_moves_the_arm_is_in_the_key() -> None:
         ".".join(path.relative_to(package.parent).with_suffix("").parts) for path in rooms if path.stem != "__init__"
     }
     assert here <= found.texts.keys()
-    assert {"lab.mdp", "lab.vision", "lab.overhead", "lab.crew", "lab.line"} <= found.texts.keys()
+    assert {
+        "lab.mdp",
+        "lab.vision",
+        "lab.overhead",
+        "lab.production.skillset",
+        "lab.production.floor",
+    } <= found.texts.keys()
     assert {"pybullet", "numpy", "cv2"} <= found.libraries

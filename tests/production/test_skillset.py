@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from lab.crew import Crew, cell_of, is_toaster, route, stations
-from lab.durations import Durations
 from lab.errors import BadInput
+from lab.production.durations import Durations
+from lab.production.skillset import Crew, cell_of, is_toaster, route, stations
 from lab.skills import SKILLS, Insert, Place, Transfer
 from lab.skills.surveys import INSERT_START
 from lab.taskfile import Stage, Task, load

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import hypot
 
-from lab.crew import Crew
-from lab.line import Line, aimed
-from lab.recorder import Viewer
+from lab.production.floor import Line, aimed
+from lab.production.recorder import Viewer
+from lab.production.skillset import Crew
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import Move, Schedule
 from lab.sequencing.run import Run

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable
 
-from lab.crew import Crew
-from lab.durations import Durations
 from lab.errors import WorkFailed
-from lab.recorder import Recorder, Viewer
+from lab.production.durations import Durations
+from lab.production.recorder import Recorder, Viewer
+from lab.production.skillset import Crew
 from lab.sim.scene import Layout, Scene, Spot, spots
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Butter, Grasp, Place, Skill
