@@ -153,35 +153,35 @@ def teach_one(
 ) -> dict[str, Any]:
     """One session in one sub-task of a task; the policy is kept. Returns the document of `lab teach --json`.
 
-    It goes on from an unfinished policy of the same problem, if there is one. A grasp counts as solved when its slice
-    is also lifted in physics; `failure` says why it was not. BadInput when the policy called `name` is of another
+    It goes on from an unfinished policy of the same problem, if there is one. A skill that is tried in physics counts as
+    solved when that succeeds, too; `failure` says why it did not. BadInput when the policy called `name` is of another
     problem.
     """
-    from lab.production.floor import try_grasp
+    from lab.production.floor import try_out
     from lab.production.report import draw_value_map
     from lab.production.run import prepare
-    from lab.production.skillset import Crew
-    from lab.skills import Grasp, Insert
+    from lab.production.skillset import SkillSet
 
     toasts = fitting(task, 2)
-    wanted = find_skill(Crew.of(task, toasts).skills, subtask)  # before the scene is surveyed
+    wanted = find_skill(SkillSet.of(task, toasts).skills, subtask)  # before the scene is surveyed
     settings = task.subtask(wanted.subtask).changed(learner, gate, episodes, memory)
     check_name(name)
     prepared = prepare(task, toasts, teacher.seed, wanted.name)
-    skill, problem = prepared.crew.skills[wanted.name], prepared.problems[wanted.name]
+    skill, problem = prepared.skillset.skills[wanted.name], prepared.problems[wanted.name]
     teacher.audience.stands(prepared, problem)
     earlier = teacher.toolbox.find(problem.subtask, problem.mdp.signature, name or plain_name(problem))
     lesson = teacher.one_session(problem, settings, task.name, name)
-    policy = prepared.crew.policies[skill.name] = lesson.policy
-    failure = try_grasp(prepared.crew, prepared.surveys, skill) if isinstance(skill, Grasp) else None
+    policy = prepared.skillset.policies[skill.name] = lesson.policy
+    failure = try_out(prepared.skillset, prepared.surveys, skill) if skill.tried else None
     if failure is not None and policy.solved:
         policy = teacher.keep_unsolved(policy, earlier)
     document = _document(problem, replace(lesson, policy=policy), teacher, failure)
     if out is not None:
         document["files"] = _draw_curve(problem.name, policy, out)
-        if isinstance(skill, Insert):
-            draw_value_map(skill, policy, out / "insert-value-map.png")
-            document["files"]["value_map"] = str(out / "insert-value-map.png")
+        photo, map_path = skill.photo(), out / f"{skill.subtask}-value-map.png"
+        if photo is not None:
+            draw_value_map(problem.mdp, photo, policy, map_path)
+            document["files"]["value_map"] = str(map_path)
     return document
 
 

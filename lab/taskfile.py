@@ -20,7 +20,6 @@ MAX_TOASTS = 50
 RESERVED = ("robot", "table", "insert", "the slice", "carried slice")  # names of other things in the cell
 RESERVED_STARTS = ("slice ", "toast ", "toasted ", "butter ", "robot ")
 RESERVED_ENDS = (" marker", " column", " head")
-SUBTASKS = ("transfer", "grasp", "insert", "butter", "place")
 MOST_THINGS = 200  # stations, stages or obstacles: on one table is no room for more
 _SAYS_WORLD = re.compile(r"""^[ \t]*kind[ \t]*=[ \t]*["']world["']""", re.MULTILINE)
 NEAREST_STATIONS_M = 0.16  # two stations nearer than this overlap: a slice is 0.12 m wide
@@ -89,7 +88,7 @@ class Station(Record):
     pose: XYZ
     capacity: Count
     processing_s: Time | None = None
-    process: Literal["butter"] | None = None
+    process: Name | None = None
     head_speed_m_s: Annotated[float, Field(ge=0.001, le=2)] = 0.02
     dwell_s: Time = 3.0
 
@@ -100,7 +99,7 @@ class Station(Record):
                 raise ValueError(f"station '{self.name}' is a {self.kind}: only a machine has {field}")
         if self.kind == "machine" and (self.processing_s is None) == (self.process is None):
             raise ValueError(
-                f"machine '{self.name}' needs either processing_s or process = 'butter', not both or neither"
+                f"machine '{self.name}' needs either processing_s or process, a sub-task to learn, not both or neither"
             )
         return self
 
@@ -169,9 +168,6 @@ class Task(Record):
                     raise unknown("station", name, stations, "route")
         if self.robot.start not in stations:
             raise unknown("station", self.robot.start, stations, "robot.start")
-        for name in self.subtasks:
-            if name not in SUBTASKS:
-                raise unknown("sub-task", name, SUBTASKS, "subtasks")
         return self
 
     @model_validator(mode="after")

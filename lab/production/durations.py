@@ -1,25 +1,34 @@
-"""How long a job's moves take: the record of it, and the key under which it is kept, made of all that decides it."""
+"""How long a job's moves take: measured once in physics, kept under a key of all that decides it, and the cell they make."""
 
 import hashlib
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import packages_distributions, version
 from math import isfinite
 from typing import Any
 
+import numpy as np
+
 from lab.data import assets_folder
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.policy import Policy
+from lab.production.floor import Floor
+from lab.production.skillset import SkillSet, route, stations
+from lab.sequencing.cell import Cell
 from lab.sequencing.positions import Moves
 from lab.sim.scene import Layout
+from lab.sim.world import TIME_STEP, World
+from lab.skills import Skill
+from lab.skills.skill import TRIED_WITH, Status
+from lab.skills.surveys import Surveys
 from lab.sources import sources
 from lab.taskfile import Task
 from lab.toolbox import Toolbox
 
 RECORDS = "durations"  # the kind of record in the toolbox
 LONGEST_S = 86_400.0  # of a move or a process
-MEASURED_BY = ("lab.production.floor", "lab.skills")  # the modules that carry moves out, with all that they import
+MEASURED_BY = (__name__,)  # the modules that carry moves out, with all that they import
 DECIDED_BY_RESULT = (
     "lab.sequencing",
     "lab.learning",
@@ -80,6 +89,62 @@ def _times(record: Mapping[str, Any], table: str, wanted: set[str]) -> dict[str,
     if missing := sorted(wanted - times.keys()):
         raise BadInput(f"{table}: the time of '{missing[0]}' is missing")
     return {name: float(seconds) for name, seconds in times.items()}
+
+
+def measure(skillset: SkillSet, surveys: Surveys, on_move: Callable[[str, float], None] | None = None) -> Durations:
+    """Carry every needed move out once in simulation and time it [s]; WorkFailed when one does not succeed."""
+    tell = on_move or (lambda name, seconds: None)
+    loaded: dict[Pair, float] = {}
+    process: dict[str, float] = {}
+    steps = 0
+    for (origin, target), leg in skillset.legs.items():
+        with World() as world:
+            floor = Floor(world, skillset, surveys.layout, 0)
+            leg[0].begin(floor.bench)
+            loaded[origin, target] = _timed(floor, leg)
+            tell(f"{origin} > {target}, loaded", loaded[origin, target])
+            for skill in () if target in process else skillset.processes[target]:
+                process[target] = _timed(floor, [skill])
+                tell(skill.name, process[target])
+            steps += world.steps
+    empty, more = _measure_empty(skillset, surveys, tell)
+    return Durations(empty, loaded, process, (steps + more) * TIME_STEP)
+
+
+def _measure_empty(
+    skillset: SkillSet, surveys: Surveys, tell: Callable[[str, float], None]
+) -> tuple[dict[Pair, float], int]:
+    """The times [s] of all ways of the empty gripper, one after the other in one scene, and the physics steps that took."""
+    empty: dict[Pair, float] = {}
+    with World() as world:
+        floor = Floor(world, skillset, surveys.layout, 0)
+        for (origin, target), way in skillset.travels.items():
+            way[0].begin(floor.bench)
+            empty[origin, target] = _timed(floor, way)
+            tell(f"{origin} > {target}, empty", empty[origin, target])
+        return empty, world.steps
+
+
+def _timed(floor: Floor, skills: Sequence[Skill]) -> float:
+    """How long skills take one after the other with the slice that they are tried with [s]; WorkFailed."""
+    start = floor.now_s
+    for skill in skills:
+        if floor.run(skill.aim(TRIED_WITH)) is not Status.SUCCESS:
+            raise WorkFailed(f"measuring '{skill.name}': {skill.reason}")
+    return floor.now_s - start
+
+
+def cell_of(task: Task, durations: Durations, toasts: int) -> Cell:
+    """The sequencing problem that the measured durations make."""
+    places = stations(task, durations.process_s)
+    names = [place.name for place in places]
+    tables = []
+    for times in (durations.empty_s, durations.loaded_s):
+        table = np.full((len(names), len(names)), np.nan)
+        for (origin, target), seconds in times.items():
+            table[names.index(origin), names.index(target)] = seconds
+        tables.append(table)
+    return Cell.alike(places, route(task), tables[0], tables[1], task.robot.start, toasts)
 
 
 def kept_durations(toolbox: Toolbox, key: str, task: Task, moves: Moves) -> Durations | None:

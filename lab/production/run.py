@@ -9,11 +9,10 @@ from lab.errors import LabError
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
 from lab.production.composer import carry_out
-from lab.production.durations import RECORDS, Durations, durations_key, kept_durations
-from lab.production.floor import measure
+from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
 from lab.production.recorder import Viewer, show_scene
 from lab.production.report import Prepared, Report, Taught, write_files
-from lab.production.skillset import Crew, cell_of
+from lab.production.skillset import SkillSet
 from lab.sequencing.exact import optimum
 from lab.sequencing.search import Reference
 from lab.sim.scene import check_apart, draw_layout
@@ -30,16 +29,16 @@ def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prep
     began = time.perf_counter()
     check_toasts(toasts, task)
     check_apart(task, toasts)
+    skillset = SkillSet.of(task, toasts)
     layout = draw_layout(task, toasts, np.random.default_rng([seed, 1]))
     surveys = Surveys(task, layout)
-    crew = Crew.of(task, toasts)
-    problems = {name: skill.setup(surveys) for name, skill in crew.skills.items() if only in (None, name)}
-    return Prepared(task, toasts, seed, layout, surveys, crew, problems, time.perf_counter() - began)
+    problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items() if only in (None, name)}
+    return Prepared(task, toasts, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
 
 
 def teach_all(prepared: Prepared, teacher: Teacher, listener: Listener) -> Taught:
     """Find or learn every skill, then find or measure the durations of every move."""
-    task, crew = prepared.task, prepared.crew
+    task, skillset = prepared.task, prepared.skillset
     known, damaged = teacher.toolbox.index()
     for what in damaged:
         listener.skipped(what)
@@ -48,7 +47,7 @@ def teach_all(prepared: Prepared, teacher: Teacher, listener: Listener) -> Taugh
     for name, problem in prepared.problems.items():
         lesson = teacher.find_or_teach(problem, task.subtask(problem.subtask), task.name, known)
         known[problem.subtask, problem.mdp.signature] = lesson.policy
-        crew.policies[name] = lesson.policy
+        skillset.policies[name] = lesson.policy
         lessons[name] = lesson
         listener.lesson(name, lesson)
     durations = _durations(prepared, teacher, listener)
@@ -57,17 +56,17 @@ def teach_all(prepared: Prepared, teacher: Teacher, listener: Listener) -> Taugh
 
 def _durations(prepared: Prepared, teacher: Teacher, listener: Listener) -> Durations:
     """The durations measured earlier for exactly these policies in exactly this scene, or measured now and kept."""
-    crew, key, kept = prepared.crew, "", None
+    skillset, key, kept = prepared.skillset, "", None
     try:
-        key = durations_key(prepared.task, prepared.layout, crew.moves, crew.policies)
-        kept = kept_durations(teacher.toolbox, key, prepared.task, crew.moves)
+        key = durations_key(prepared.task, prepared.layout, skillset.moves, skillset.policies)
+        kept = kept_durations(teacher.toolbox, key, prepared.task, skillset.moves)
     except LabError as error:  # then they are measured: nothing is lost but time
         listener.skipped(f"durations measured earlier: {error}")
     if kept is not None:
         return kept
     processes = sum(station.process is not None for station in prepared.task.stations)
-    listener.phase("measure", len(crew.moves.loaded) + len(crew.moves.empty) + processes)
-    durations = measure(crew, prepared.surveys, listener.measured)
+    listener.phase("measure", len(skillset.moves.loaded) + len(skillset.moves.empty) + processes)
+    durations = measure(skillset, prepared.surveys, listener.measured)
     if key:
         teacher.toolbox.save_record(RECORDS, key, durations.to_json())
     return durations
@@ -89,7 +88,7 @@ def run(
     listener.sequenced(found, Reference(proven.bound_s, proven.proven, "A*"))
     listener.phase("carry out", len(found.sequence))
     outcome, recording = carry_out(
-        prepared.crew,
+        prepared.skillset,
         prepared.surveys,
         prepared.layout,
         taught.cell,

@@ -1,66 +1,79 @@
-"""A task's crew: every skill that it needs, what the sequencer is told of it, and the durations measured of its moves."""
+"""A task's skills: which it needs, where each of them is used, and the policies that they follow."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
+from lab.errors import unknown
 from lab.policy import Policy
-from lab.production.durations import Durations
-from lab.sequencing.cell import Cell, needed_moves
+from lab.sequencing.cell import needed_moves
 from lab.sequencing.layout import Product, Route, Stage, Station
 from lab.sequencing.positions import Moves
-from lab.skills import Butter, Grasp, Insert, Place, Skill, Transfer
-from lab.skills.surveys import INSERT_START
+from lab.skills import SKILLS, Skill
 from lab.taskfile import Task
+
+Pair = tuple[str, str]  # origin and target, by name
+Skills = tuple[Skill, ...]
 
 
 @dataclass
-class Crew:
-    """All skills that a task needs, by name, and the policies they carry out."""
+class SkillSet:
+    """All skills that a task needs, by name, in the order in which they are learned; one for each place and way.
+
+    legs: what brings a slice from one station to another, in order. travels: what takes the empty gripper there. picks:
+    what takes a slice up from a station. processes: what a machine does with its slice, once it is learned.
+    """
 
     task: Task
     moves: Moves
-    skills: dict[str, Skill]
+    skills: dict[str, Skill] = field(default_factory=dict)
+    legs: dict[Pair, Skills] = field(default_factory=dict)
+    travels: dict[Pair, Skills] = field(default_factory=dict)
+    picks: dict[str, Skills] = field(default_factory=dict)
+    processes: dict[str, Skills] = field(default_factory=dict)
     policies: dict[str, Policy] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, task: Task, toasts: int) -> "Crew":
-        """One skill instance for each place and way that a run with so many toasts may need.
+    def of(cls, task: Task, toasts: int) -> "SkillSet":
+        """What a run with so many toasts may need; BadInput when the task names an unknown sub-task.
 
         What is set down at the last station may have to be taken up again there, when setting it down failed.
         """
-        moves = needed_moves(stations(task, {}), (Product("toast", (route(task),)),), task.robot.start, toasts)
-        skills: list[Skill] = []
-        for origin, target in moves.loaded:
-            skills += [Grasp(origin), Transfer(origin, _entry(task, target), loaded=True), _arrival(task, target)]
-        skills += [Transfer(origin, target, loaded=False) for origin, target in moves.empty]
-        skills += [Grasp(task.route[-1].station)]
-        skills += [Butter(station.name) for station in task.stations if station.process == "butter"]
-        return cls(task, moves, {skill.name: skill for skill in skills})
+        check_names(task)
+        made = cls(
+            task, needed_moves(stations(task, {}), (Product("toast", (route(task),)),), task.robot.start, toasts)
+        )
+        kinds, last = SKILLS.values(), task.route[-1].station
+        for origin, target in made.moves.loaded:
+            made.picks[origin] = made._own(kind.at_pick(task, origin) for kind in kinds)
+            rest = made._own(kind.on_carry(task, origin, target) for kind in kinds)
+            made.legs[origin, target] = made.picks[origin] + rest
+        for origin, target in made.moves.empty:
+            made.travels[origin, target] = made._own(kind.on_travel(task, origin, target) for kind in kinds)
+        made.picks[last] = made._own(kind.at_pick(task, last) for kind in kinds)
+        for station in task.stations:
+            made.processes[station.name] = made._own(kind.at_machine(task, station.name) for kind in kinds)
+        return made
 
-    def leg(self, origin: str, target: str) -> list[Skill]:
-        """The skills that carry a slice from one station to another, in order."""
-        ways = [Grasp(origin), Transfer(origin, _entry(self.task, target), loaded=True), _arrival(self.task, target)]
-        return [self.skills[skill.name] for skill in ways]
-
-    def empty(self, origin: str, target: str) -> Skill:
-        """The skill that takes the empty gripper from one station to another."""
-        return self.skills[Transfer(origin, target, loaded=False).name]
-
-
-def is_toaster(task: Task, station: str) -> bool:
-    """Whether slices reach this station through the camera's grid: a machine without a process to learn."""
-    place = task.station(station)
-    return place.kind == "machine" and place.process is None
+    def _own(self, found: Iterable[Skill | None]) -> Skills:
+        """The skills found, each the one of its name."""
+        return tuple(self.skills.setdefault(skill.name, skill) for skill in found if skill is not None)
 
 
-def _entry(task: Task, target: str) -> str:
-    return INSERT_START if is_toaster(task, target) else target
+def check_names(task: Task) -> None:
+    """BadInput unless all sub-tasks and processes that a task names are skills."""
+    for name in task.subtasks:
+        if name not in SKILLS:
+            raise unknown("sub-task", name, SKILLS, f"task '{task.name}': subtasks")
+    for station in task.stations:
+        if station.process is not None and not any(kind.at_machine(task, station.name) for kind in SKILLS.values()):
+            known = [name for name in SKILLS if _is_process(task, station.name, name)]
+            raise unknown("process", station.process, known, f"task '{task.name}': station '{station.name}'")
 
 
-def _arrival(task: Task, target: str) -> Skill:
-    return Insert(target) if is_toaster(task, target) else Place(target)
+def _is_process(task: Task, station: str, name: str) -> bool:
+    """Whether a machine would do the skill of this name, were it its process."""
+    places = tuple(s.model_copy(update={"process": name}) if s.name == station else s for s in task.stations)
+    return SKILLS[name].at_machine(task.model_copy(update={"stations": places}), station) is not None
 
 
 def stations(task: Task, process_s: Mapping[str, float]) -> tuple[Station, ...]:
@@ -74,16 +87,3 @@ def stations(task: Task, process_s: Mapping[str, float]) -> tuple[Station, ...]:
 def route(task: Task) -> Route:
     """The task's route as the sequencer knows it."""
     return tuple(Stage(stage.station, stage.buffer) for stage in task.route)
-
-
-def cell_of(task: Task, durations: Durations, toasts: int) -> Cell:
-    """The sequencing problem that the measured durations make."""
-    places = stations(task, durations.process_s)
-    names = [place.name for place in places]
-    tables = []
-    for times in (durations.empty_s, durations.loaded_s):
-        table = np.full((len(names), len(names)), np.nan)
-        for (origin, target), seconds in times.items():
-            table[names.index(origin), names.index(target)] = seconds
-        tables.append(table)
-    return Cell.alike(places, route(task), tables[0], tables[1], task.robot.start, toasts)

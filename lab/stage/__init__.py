@@ -39,7 +39,7 @@ def stage_of(where: "Prepared | GridWorld | None", problem: Problem) -> Stage | 
         return WorldStage(where, problem.mdp)
     if where is None or problem.name not in where.problems:
         return None
-    return SkillStage(where.task, where.toasts, where.layout, where.crew.skills[problem.name])
+    return SkillStage(where.task, where.toasts, where.layout, where.skillset.skills[problem.name])
 
 
 __all__ = ["SkillStage", "Stage", "WorldStage", "stage_of"]
