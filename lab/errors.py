@@ -4,18 +4,26 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 
 MOST_NAMES = 30  # an error lists so many known names at the most
+MOST_CHARACTERS = 1600  # of a message: a screen
+_END = (
+    MOST_CHARACTERS // 2 - 25
+)  # of a longer one that is shown: it says where it comes from first, what is allowed last
 
 
 class LabError(Exception):
     """Any failure the lab explains in one line; `exit_code` is what a command ends with.
 
-    What cannot be printed, such as a line break or an escape code in a bad value, is shown as its escape.
+    What cannot be printed, such as a line break or an escape code in a bad value, is shown as its escape; the middle of a
+    message that fills more than a screen is left out.
     """
 
     exit_code = 1
 
     def __init__(self, message: str = "") -> None:
-        super().__init__("".join(c if c.isprintable() else ascii(c)[1:-1] for c in message))
+        shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in message)
+        if len(shown) > MOST_CHARACTERS:
+            shown = f"{shown[:_END]} ... ({len(shown) - 2 * _END} more characters) ... {shown[-_END:]}"
+        super().__init__(shown)
 
 
 class BadInput(LabError):

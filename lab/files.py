@@ -1,8 +1,16 @@
 """Files are written whole or not at all, and folders are looked at before anything is made."""
 
+import fcntl
 import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
+from shutil import rmtree
+from tempfile import mkdtemp
+
+_DRAFT = ".run-"  # and eight characters: the folder of a draft
 
 
 def write_whole(path: Path, content: bytes) -> None:
@@ -31,3 +39,36 @@ def nearest(folder: Path) -> Path:
     while not place.exists() and place != place.parent:
         place = place.parent
     return place
+
+
+@contextmanager
+def draft(folder: Path) -> Iterator[Path]:
+    """A hidden folder in `folder` for files that are not finished, gone in the end; those that killed ones left go, too.
+
+    One that another process still writes in stays: its writer has locked it. Raises OSError.
+    """
+    for left in folder.iterdir():
+        if re.fullmatch(rf"{re.escape(_DRAFT)}\w{{8}}", left.name) and left.is_dir():
+            with suppress(OSError), _locked(left, fcntl.LOCK_NB):
+                rmtree(left)
+    while True:
+        made = Path(mkdtemp(prefix=_DRAFT, dir=folder))
+        with _locked(made):
+            if not made.exists():  # another process has taken it for one that was left
+                continue
+            try:
+                yield made
+            finally:
+                rmtree(made, ignore_errors=True)
+            return
+
+
+@contextmanager
+def _locked(folder: Path, how: int = 0) -> Iterator[None]:
+    """The lock of a folder, which ends with its holder. Raises BlockingIOError with LOCK_NB when another holds it."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | how)
+        yield
+    finally:
+        os.close(handle)

@@ -102,13 +102,12 @@ class InsertEnv(TableEnv):
     """The camera's grid around a task's toaster, surveyed in simulation in the scene that a seed lays out. Raises BadInput."""
 
     def __init__(self, task: str = "toast", layout_seed: int = 0, render_mode: str | None = None):
-        from lab.crew import is_toaster
-        from lab.sim.scene import draw_layout
+        from lab.sim.scene import draw_layout, is_toaster
         from lab.skills.insert import Insert
         from lab.skills.surveys import Surveys
 
         found = load(task)
-        station = next(stage.station for stage in found.route if is_toaster(found, stage.station))
+        station = next(stage.station for stage in found.route if is_toaster(found.station(stage.station)))
         slices = min(2, *(found.station(stage.station).capacity for stage in (found.route[0], found.route[-1])))
         layout = draw_layout(found, slices, np.random.default_rng([layout_seed, 1]))  # as for a lesson of this seed
         problem = Insert(station).setup(Surveys(found, layout))

@@ -189,31 +189,31 @@ def teach_one(
 ) -> dict[str, Any]:
     """One session in one sub-task of a task; the policy is kept. Returns the document of `lab teach --json`.
 
-    It goes on from an unfinished policy of the same problem, if there is one. A grasp counts as solved when its slice
-    is also lifted in physics; `failure` says why it was not. `toasts` and `sessions`: those of the run that the lesson
+    It goes on from an unfinished policy of the same problem, if there is one. A skill that is tried in physics counts as
+    solved when that succeeds, too; `failure` says why it did not. `toasts` and `sessions`: those of the run that the lesson
     belongs to. BadInput when the policy called `name` is of another problem.
     """
-    from lab.crew import Crew
-    from lab.report import draw_value_map
-    from lab.run import prepare, trial_of
-    from lab.skills import Insert
+    from lab.production.report import draw_value_map
+    from lab.production.run import prepare, trial_of
+    from lab.production.skillset import SkillSet
 
     toasts = fitting(task, 2) if toasts is None else toasts
     check_toasts(toasts, task)
-    wanted = find_skill(Crew.of(task, toasts).skills, subtask)  # before the scene is surveyed
+    wanted = find_skill(SkillSet.of(task, toasts).skills, subtask)  # before the scene is surveyed
     settings = task.subtask(wanted.subtask).changed(learner, gate, episodes, memory)
     check_name(name)
     prepared = prepare(task, toasts, teacher.seed, wanted.name)
-    skill, problem = prepared.crew.skills[wanted.name], prepared.problems[wanted.name]
+    skill, problem = prepared.skillset.skills[wanted.name], prepared.problems[wanted.name]
     teacher.audience.stands(prepared, problem)
     teacher = replace(teacher, trial=trial_of(prepared))
     lesson = teacher.one_session(problem, settings, task.name, name, sessions=sessions or 1)
     document = _document(problem, lesson, teacher)
     if out is not None:
         document["files"] = _draw_curve(problem.name, lesson.policy, out)
-        if isinstance(skill, Insert):
-            draw_value_map(skill, lesson.policy, out / "insert-value-map.png")
-            document["files"]["value_map"] = str(out / "insert-value-map.png")
+        photo, map_path = skill.photo(), out / f"{skill.subtask}-value-map.png"
+        if photo is not None:
+            draw_value_map(problem.mdp, photo, lesson.policy, map_path)
+            document["files"]["value_map"] = str(map_path)
     return document
 
 

@@ -75,7 +75,7 @@ def show(what: str, toasts: int, seed: int, port: int, tell: Callable[[str, str]
     task = load(what)
     import numpy as np
 
-    from lab.recorder import show_scene
+    from lab.production.recorder import show_scene
     from lab.sim.scene import check_scene, draw_layout
 
     check_scene(task)

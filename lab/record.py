@@ -12,6 +12,8 @@ from lab.errors import BadInput, unknown
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import Rewards
 
+MAX_FILE_BYTES = 10_000_000  # of a text file: a world of 100 x 100 x 100 cells has its obstacles in it
+MAX_SHORT_BYTES = 1_000_000  # of one that holds no world: reading a longer one takes seconds
 MAX_REWARD = 1_000_000  # sums of larger ones lose the small ones, and of much larger ones overflow
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$")]
@@ -85,8 +87,11 @@ class Learned(Record):
 
 
 def read_text(path: Path) -> str:
-    """A file's text; raises BadInput when it cannot be read or is no UTF-8."""
+    """A file's text; raises BadInput when it cannot be read, is no UTF-8 or is longer than MAX_FILE_BYTES."""
     try:
+        size = path.stat().st_size
+        if size > MAX_FILE_BYTES:
+            raise BadInput(f"{path}: {size} bytes: files up to {MAX_FILE_BYTES} bytes are read")
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(f"{path}: cannot be read: {error}") from None

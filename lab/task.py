@@ -9,8 +9,8 @@ from lab.errors import BadInput, LabError
 from lab.gridworld import RANDOM, GridWorld, parse_shape, random_world
 from lab.lesson import fitting
 from lab.mdp import shortest_steps
+from lab.production.report import check_out
 from lab.record import read_text, write_whole
-from lab.report import check_out
 from lab.taskfile import check_number, find, load_any
 from lab.teaching import world_problem
 
@@ -40,7 +40,7 @@ def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
         elif isinstance(task, CellFile):
             task.cell(toasts)
         else:
-            from lab.run import prepare
+            from lab.production.run import prepare
 
             prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
     except LabError as error:

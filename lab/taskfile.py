@@ -1,5 +1,6 @@
 """Task files: tasks/*.toml -> validated frozen models. The only place where raw text is checked."""
 
+import re
 from itertools import combinations
 from math import hypot
 from pathlib import Path
@@ -12,14 +13,15 @@ from lab.cellparts import Sequencing
 from lab.data import tasks_folder
 from lab.errors import BadInput, unknown
 from lab.gridworld import RANDOM, GridWorld, from_text, from_words
-from lab.record import Count, Learned, Name, Record, as_tuple, read_text
+from lab.record import MAX_SHORT_BYTES, Count, Learned, Name, Record, as_tuple, read_text
 from lab.tomltext import TomlText, explain
 
 MAX_TOASTS = 50
 RESERVED = ("robot", "table", "insert", "the slice", "carried slice")  # names of other things in the cell
 RESERVED_STARTS = ("slice ", "toast ", "toasted ", "butter ", "robot ")
 RESERVED_ENDS = (" marker", " column", " head")
-SUBTASKS = ("transfer", "grasp", "insert", "butter", "place")
+MOST_THINGS = 200  # stations, stages or obstacles: on one table is no room for more
+_SAYS_WORLD = re.compile(r"""^[ \t]*kind[ \t]*=[ \t]*["']world["']""", re.MULTILINE)
 NEAREST_STATIONS_M = 0.16  # two stations nearer than this overlap: a slice is 0.12 m wide
 
 Kind = Literal["task", "cell", "world"]  # of what a file holds
@@ -86,7 +88,7 @@ class Station(Record):
     pose: XYZ
     capacity: Count
     processing_s: Time | None = None
-    process: Literal["butter"] | None = None
+    process: Name | None = None
     head_speed_m_s: Annotated[float, Field(ge=0.001, le=2)] = 0.02
     dwell_s: Time = 3.0
 
@@ -97,7 +99,7 @@ class Station(Record):
                 raise ValueError(f"station '{self.name}' is a {self.kind}: only a machine has {field}")
         if self.kind == "machine" and (self.processing_s is None) == (self.process is None):
             raise ValueError(
-                f"machine '{self.name}' needs either processing_s or process = 'butter', not both or neither"
+                f"machine '{self.name}' needs either processing_s or process, a sub-task to learn, not both or neither"
             )
         return self
 
@@ -133,9 +135,9 @@ class Task(Record):
     workspace: Workspace
     camera: CameraSettings
     insert: InsertGrid
-    stations: Annotated[tuple[Station, ...], BeforeValidator(as_tuple), Field(min_length=2)]
-    route: Annotated[tuple[Stage, ...], BeforeValidator(as_tuple), Field(min_length=2)]
-    obstacles: Annotated[tuple[Obstacle, ...], BeforeValidator(as_tuple)] = ()
+    stations: Annotated[tuple[Station, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=MOST_THINGS)]
+    route: Annotated[tuple[Stage, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=MOST_THINGS)]
+    obstacles: Annotated[tuple[Obstacle, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
     subtasks: dict[str, Subtask] = Field(default={})
     sequencing: Sequencing = Sequencing()
 
@@ -166,9 +168,6 @@ class Task(Record):
                     raise unknown("station", name, stations, "route")
         if self.robot.start not in stations:
             raise unknown("station", self.robot.start, stations, "robot.start")
-        for name in self.subtasks:
-            if name not in SUBTASKS:
-                raise unknown("sub-task", name, SUBTASKS, "subtasks")
         return self
 
     @model_validator(mode="after")
@@ -286,7 +285,10 @@ def _kind(toml: TomlText) -> Kind:
 
 
 def _toml(path: Path) -> TomlText:
-    return TomlText.parsed(path, read_text(path))
+    text = read_text(path)
+    if len(text) > MAX_SHORT_BYTES and not _SAYS_WORLD.search(text):  # before seconds are spent on its values
+        raise BadInput(f"{path}: {len(text)} characters: a file that holds no world has up to {MAX_SHORT_BYTES}")
+    return TomlText.parsed(path, text)
 
 
 def _checked(model: type[Model], toml: TomlText) -> Model:

@@ -16,6 +16,9 @@ from lab.errors import BadInput
 
 Loc = tuple[str | int, ...]  # the way to a value: keys of tables, and numbers in arrays from 0
 
+_MOST_SHOWN = 120  # characters of a bad value
+MOST_PARTS = 100  # of a dotted key: what the TOML reader does with one grows with the square of them
+_LONG_KEY = re.compile(rf"""(?<![\w.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}""")
 _BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _PLAIN = re.compile(r"[^,\]}#\n]+")  # a number, a date, true or false
@@ -38,7 +41,10 @@ class TomlText:
 
     @classmethod
     def parsed(cls, path: Path, text: str) -> "TomlText":
-        """The values of a text; BadInput, with file and line, when it is no TOML."""
+        """The values of a text; BadInput, with file and line, when it is no TOML, or a key has too many parts."""
+        if long := _LONG_KEY.search(text):
+            line = text.count("\n", 0, long.start()) + 1
+            raise BadInput(f"{path}: line {line}: a key of more than {MOST_PARTS} parts")
         try:
             return cls(path, text, tomllib.loads(text))
         except (ValueError, RecursionError) as error:  # beside TOMLDecodeError: numbers or nests beyond Python's limits
@@ -174,6 +180,8 @@ def explain(error: ValidationError) -> str:
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "extra_forbidden":
         message = "there is no such key"
-    shown = "" if isinstance(first["input"], dict) or not where else f" (got {first['input']!r})"
+    got = repr(first["input"])
+    got = got if len(got) <= _MOST_SHOWN else f"{got[:_MOST_SHOWN]} ..."
+    shown = "" if isinstance(first["input"], dict) or not where else f" (got {got})"
     more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
     return f"{where + ': ' if where else ''}{message}{shown}{more}"

@@ -26,6 +26,7 @@ ROUNDNESS = 0.72  # of the spot's smallest circle that it fills: a disc near 1, 
 PNG = b"\x89PNG\r\n\x1a\n"
 MAX_BYTES = 64_000_000
 MAX_PIXELS = 40_000_000
+MAX_MARKERS = 10_000  # in a picture: a grid of 100 x 100 cells; fitting an ellipse to each of more takes too long
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ MARKERS = {
 def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
     """All markers in a picture (H, W, 3), by kind, then cell, and how many spots of their hues were no round marker.
 
-    Cells may lie outside the grid. Raises BadInput for a picture of another shape or dtype.
+    Cells may lie outside the grid. Raises BadInput for a picture of another shape or dtype, or of too many markers.
     """
     import cv2
 
@@ -72,6 +73,8 @@ def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
             pixel = (float(x), float(y))
             place = view.place(pixel, kind)
             markers.append(Marker(kind, pixel, place, view.cell(place)))
+            if len(markers) > MAX_MARKERS:
+                raise BadInput(f"picture: more than {MAX_MARKERS} round coloured spots: no picture of a grid")
     return tuple(sorted(markers, key=lambda m: (m.kind, m.cell, m.pixel))), ignored
 
 

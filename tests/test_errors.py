@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.errors import MOST_NAMES, BadInput, LabError, WorkFailed, counted, unknown
+from lab.errors import MOST_CHARACTERS, MOST_NAMES, BadInput, LabError, WorkFailed, counted, unknown
 
 
 @pytest.mark.parametrize(("kind", "code"), [(BadInput, 2), (WorkFailed, 1), (LabError, 1)])
@@ -42,3 +42,12 @@ def test_any_value_is_reported_in_one_line_with_all_that_is_known(value: str, kn
     assert f"'{value}' (TASK)" in message
     more = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
     assert message.endswith(f"known: {', '.join(sorted(known)[:MOST_NAMES]) or 'none'}{more}")
+
+
+def test_a_message_is_no_longer_than_a_screen_and_keeps_its_two_ends() -> None:
+    message = str(unknown("task", "x" * 100_000, ["toast"], "TASK"))
+    assert len(message) <= MOST_CHARACTERS
+    assert message.startswith("unknown task 'xxx")
+    assert message.endswith("xxx' (TASK): known: toast")
+    assert " more characters) ... " in message
+    assert str(LabError(message)) == message  # said again it stays as it is

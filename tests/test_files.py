@@ -1,11 +1,12 @@
 """Files written whole or not at all, and where a folder would be made."""
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
 
-from lab.files import nearest, write_whole
+from lab.files import draft, nearest, write_whole
 
 
 def test_a_file_is_written_and_replaced(tmp_path: Path) -> None:
@@ -42,3 +43,48 @@ def test_the_nearest_folder(tmp_path: Path) -> None:
     assert nearest(tmp_path) == nearest(tmp_path / "a" / "b") == tmp_path
     with pytest.raises(OSError, match="too long"):
         nearest(tmp_path / ("x" * 300))
+
+
+def drafting(folder: Path) -> tuple[int, int]:
+    """A process that writes a draft and waits to be killed: its number, and a pipe that ends with it."""
+    ready, tell = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        with draft(folder) as made:
+            (made / "half").write_text("half")
+            os.write(tell, b"x")
+            signal.pause()
+        os._exit(0)
+    os.read(ready, 1)
+    return pid, ready
+
+
+def drafts(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir() if path.name.startswith(".run-")}
+
+
+def test_a_draft_is_gone_in_the_end(tmp_path: Path) -> None:
+    with draft(tmp_path) as made:
+        (made / "file").write_text("x")
+        assert drafts(tmp_path) == {made.name}
+    with pytest.raises(KeyboardInterrupt), draft(tmp_path):
+        raise KeyboardInterrupt
+    assert drafts(tmp_path) == set()
+
+
+def test_a_killed_process_leaves_a_draft_that_the_next_one_clears(tmp_path: Path) -> None:
+    (tmp_path / ".run-mine").mkdir()  # not the name of a draft
+    killed, alive = drafting(tmp_path), drafting(tmp_path)
+    os.kill(killed[0], signal.SIGKILL)
+    os.waitpid(killed[0], 0)
+    assert len(drafts(tmp_path)) == 3
+    with draft(tmp_path) as made:
+        left = drafts(tmp_path) - {made.name, ".run-mine"}
+        assert len(left) == 1  # of the process that is still at it
+        assert (tmp_path / left.pop() / "half").read_text() == "half"
+    os.kill(alive[0], signal.SIGKILL)
+    os.waitpid(alive[0], 0)
+    with draft(tmp_path) as made:
+        assert drafts(tmp_path) == {made.name, ".run-mine"}
+    for _, ready in (killed, alive):
+        os.close(ready)

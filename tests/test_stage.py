@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from lab.gridworld import GridWorld, random_world
 from lab.mdp import FloatArray, TabularMDP, grid
-from lab.run import prepare
+from lab.production.run import prepare
 from lab.sim import assets
 from lab.sim.kinematics import TOOL, ToolPose, inverse
 from lab.sim.scene import GRASP_DEPTH
@@ -45,7 +45,7 @@ def lesson(name: str) -> tuple[Stage, Skill, TabularMDP]:
     prepared = prepare(load("toast"), 2, 0, name)
     made = stage_of(prepared, prepared.problems[name])
     assert isinstance(made, SkillStage)
-    return made, prepared.crew.skills[name], prepared.problems[name].mdp
+    return made, prepared.skillset.skills[name], prepared.problems[name].mdp
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -334,7 +334,7 @@ def test_butter_is_where_the_state_has_it() -> None:
 
 def test_slices_that_may_stand_beside_the_one_are_ghosts_and_real_ones_are_not() -> None:
     prepared = prepare(load("toast"), 2, 0, "grasp at plate")
-    with closing(SkillStage(prepared.task, 2, prepared.layout, prepared.crew.skills["grasp at plate"])) as stage:
+    with closing(SkillStage(prepared.task, 2, prepared.layout, prepared.skillset.skills["grasp at plate"])) as stage:
         first, second = stage.frame(0), stage.frame(1)
         ghosts = {name for name in first.poses if name.startswith("slice ") and not name[6:].isdigit()}
         assert len(ghosts) == 3  # the second toast is where the fourth would be

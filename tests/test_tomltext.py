@@ -6,10 +6,11 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import TypeAdapter, ValidationError
 
 from lab.data import tasks_folder
 from lab.errors import BadInput
-from lab.tomltext import Loc, TomlText, lines_of
+from lab.tomltext import Loc, TomlText, explain, lines_of
 
 TEXT = '''\
 # a comment with a "quote and [a bracket
@@ -151,3 +152,19 @@ def test_any_text_has_lines_or_is_bad_input(text: str) -> None:
 
 def test_a_nest_beyond_all_bounds_has_some_lines() -> None:
     assert lines_of("a = 1\nb = " + "[" * 100_000)[("a",)] == 1
+
+
+@pytest.mark.parametrize("part", ["a", "'a b'", '"a.b"', "a "])
+def test_a_key_of_too_many_parts_is_refused_before_it_is_read(part: str) -> None:
+    long = f"x = 1\n{'.'.join([part] * 20_000)} = 1\n"
+    with pytest.raises(BadInput, match=r"^some\.toml: line 2: a key of more than 100 parts$"):
+        TomlText.parsed(Path("some.toml"), long)
+    assert TomlText.parsed(Path("some.toml"), f"{'.'.join([part] * 100)} = 1\n# {'.' * 200}\nn = [0.1, 0.2]\n").raw
+
+
+def test_a_long_bad_value_is_cut() -> None:
+    with pytest.raises(ValidationError) as caught:
+        TypeAdapter(dict[str, int]).validate_python({"a": "x" * 1000})
+    assert explain(caught.value).startswith("a: Input should be a valid integer")
+    assert explain(caught.value).endswith("xxx ...)")
+    assert len(explain(caught.value)) < 250

@@ -295,3 +295,11 @@ def test_drawing_marks_a_copy() -> None:
     assert tuple(drawn[corner_y, corner_x]) == MARKERS["gripper"].rgb
     inside_x, inside_y = np.rint(grid.view.pixel((4.9 * CELL, 3.9 * CELL, 0.0))).astype(int)
     assert drawn[inside_y, inside_x, 0] > drawn[inside_y, inside_x, 1] + 30  # an obstacle's cell is tinted red
+
+
+def test_a_picture_of_nothing_but_spots_is_refused() -> None:
+    spots = np.zeros((16 * 101, 16 * 100, 3), dtype=np.uint8)
+    for i, j in np.ndindex(101, 100):
+        cv2.circle(spots, (16 * j + 8, 16 * i + 8), 6, MARKERS["gripper"].rgb, -1)
+    with pytest.raises(BadInput, match="more than 10000 round coloured spots"):
+        find_markers(spots, plain_view(spots.shape[:2], (100, 100)))

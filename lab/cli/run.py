@@ -34,9 +34,9 @@ def run(
     from lab import taskfile
     from lab.advice.advisors import PEOPLE
     from lab.advice.counsel import Counsel
-    from lab.report import check_out
-    from lab.run import prepare
-    from lab.run import run as run_task
+    from lab.production.report import check_out
+    from lab.production.run import prepare
+    from lab.production.run import run as run_task
     from lab.sessions import Words, kept_by
     from lab.view.summary import run_summary
 

@@ -91,7 +91,7 @@ def teach(
     """
     from lab.lesson import check
     from lab.lesson import teach as teach_session
-    from lab.report import check_out
+    from lab.production.report import check_out
     from lab.sessions import Words
     from lab.view.summary import lesson_summary
 

@@ -83,7 +83,7 @@ class Schedule:
 
         came_s: when each part came to its first station [s]; None: all at 0.
         """
-        robot = [activity for move in moves for activity in _robot_activities(move)]
+        robot = [activity for move in moves for activity in robot_activities(move)]
         end_s = max((move.drop_s for move in moves), default=0.0)
         parts: list[Activity] = []
         machines: list[Activity] = []
@@ -130,7 +130,8 @@ class LearnedSequence(SequenceResult):
     final_cost: float
 
 
-def _robot_activities(move: Move) -> list[Activity]:
+def robot_activities(move: Move) -> list[Activity]:
+    """What the robot does in one move, without what takes no time."""
     served_s = move.pick_s - move.service_s
     carries: Kind = "carry" if move.carries == "part" else "pallet"
     spans: tuple[tuple[Kind, int | None, str, str, float, float], ...] = (

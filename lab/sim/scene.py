@@ -86,8 +86,13 @@ def _draw_place(
 
 
 def is_applier(station: Station) -> bool:
-    """Whether the station is the butter applier (its process is learned) rather than the toaster."""
-    return station.process == "butter"
+    """Whether the station is the applier, whose process is learned."""
+    return station.process is not None
+
+
+def is_toaster(station: Station) -> bool:
+    """Whether the station is the toaster, which slices reach through the camera's grid: a machine with a time of its own."""
+    return station.kind == "machine" and not is_applier(station)
 
 
 def floor(station: Station) -> float:
@@ -271,7 +276,7 @@ def check_scene(task: Task) -> None:
 
 def _check_toaster(task: Task) -> None:
     """BadInput for a second toaster, which the camera's grid has no room for, or one that a carried slice would hit."""
-    toasters = [s.name for s in task.stations if s.kind == "machine" and not is_applier(s)]
+    toasters = [s.name for s in task.stations if is_toaster(s)]
     if len(toasters) > 1:
         raise BadInput(
             f"machines '{toasters[0]}' and '{toasters[1]}' both have processing_s: the camera's grid leads to one toaster"

@@ -7,6 +7,7 @@ from lab.skills.place import Place
 from lab.skills.skill import Skill
 from lab.skills.transfer import Transfer
 
-SKILLS: dict[str, type[Skill]] = {skill.subtask: skill for skill in (Transfer, Grasp, Insert, Butter, Place)}
+# in the order in which they bring a slice on, and then what machines do
+SKILLS: dict[str, type[Skill]] = {skill.subtask: skill for skill in (Grasp, Transfer, Insert, Place, Butter)}
 
 __all__ = ["SKILLS", "Butter", "Grasp", "Insert", "Place", "Skill", "Transfer"]

@@ -11,6 +11,8 @@ from lab.sim.kinematics import ToolPose
 from lab.sim.world import TIME_STEP, Array
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path
 from lab.skills.surveys import Surveys
+from lab.taskfile import Task
+from lab.view.frames import Body, Shape
 
 if TYPE_CHECKING:
     from lab.policy import Policy
@@ -20,6 +22,7 @@ CELL_M = assets.SLICE[0] / 3
 JOINTS = ("head_x", "head_z")
 REST = (0.0, 0.0)  # where the head waits, low, out of the gripper's way
 HEAD_BEHIND_M = 0.03  # the head's frame behind the nozzle's plane
+BUTTER = (1.0, 0.87, 0.25, 1.0)
 _RAY_M = 0.2
 
 
@@ -27,11 +30,19 @@ class Butter(Skill):
     """Butter the slice that stands in the applier; `covered` are the cells that the nozzle's ray has met, in order."""
 
     subtask: ClassVar[str] = "butter"
+    near: ClassVar[bool] = True
+    moves_arm: ClassVar[bool] = False
+    looks_from: ClassVar[tuple[float, float]] = (-42.0, 28.0)  # the head stands before the slice
 
     def __init__(self, station: str) -> None:
         super().__init__(f"butter at {station}")
         self.station = station
         self.covered: list[tuple[int, int]] = []
+
+    @classmethod
+    def at_machine(cls, task: Task, station: str) -> "Butter | None":
+        """In a machine with this process."""
+        return cls(station) if task.station(station).process == cls.subtask else None
 
     def setup(self, surveys: Surveys) -> Problem:
         """Which cell the head is at and which are covered: the shortest complete coverage."""
@@ -56,6 +67,20 @@ class Butter(Skill):
         bench.scene.world.set_joints(self.station, JOINTS, self.head(state))
         return True
 
+    @classmethod
+    def on_slice(cls, number: int) -> tuple[Body, ...]:
+        """Nine patches of butter on the side of its negative y axis."""
+        return tuple(_patch(number, row, column) for row, column in np.ndindex(*SHAPE))
+
+    def shown(self) -> list[str]:
+        """The patches that were covered in this motion."""
+        return [patch_name(int(self.slice.rpartition(" ")[2]), *cell) for cell in self.covered]
+
+    def shown_in(self, state: int, number: int) -> dict[str, bool]:
+        """Where butter is in `state`."""
+        covered = np.ndenumerate(self.problem.mdp.covered(state))
+        return {patch_name(number, row, column): bool(on) for (row, column), on in covered}
+
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Move the head along the learned cells, stay on each, note where the nozzle's ray meets the slice, and go to rest."""
         mdp = self.problem.mdp
@@ -72,11 +97,6 @@ class Butter(Skill):
         missed = sorted(set(np.ndindex(*SHAPE)) - set(self.covered))
         if missed:
             raise SkillFailed(f"the butter missed {len(missed)} of 9 cells of {self.slice}: {missed}")
-
-    def on(self, name: str) -> "Butter":
-        """The same skill, told which slice stands in the applier."""
-        self.slice = name
-        return self
 
     def _slide(self, bench: Bench, target: tuple[float, float], speed: float) -> Iterator[None]:
         world = bench.scene.world
@@ -102,6 +122,18 @@ class Butter(Skill):
         row = int((assets.SLICE[2] / 2 - local[2]) // CELL_M)
         column = int((local[0] + assets.SLICE[0] / 2) // CELL_M)
         return (row, column) if 0 <= row < SHAPE[0] and 0 <= column < SHAPE[1] else None
+
+
+def patch_name(number: int, row: int, column: int) -> str:
+    """What the butter in a cell of slice `number` is called."""
+    return f"butter {number} {row}{column}"
+
+
+def _patch(number: int, row: int, column: int) -> Body:
+    at = ((column - 1) * CELL_M * 0.9, -assets.SLICE[1] / 2 - 0.0016, (1 - row) * CELL_M * 0.9)
+    return Body(
+        patch_name(number, row, column), (Shape("box", (CELL_M * 0.82, 0.0024, CELL_M * 0.82), None, BUTTER, at),)
+    )
 
 
 def _unrotated(vector: Array, turn: Array) -> Array:

@@ -13,6 +13,7 @@ from lab.sim.scene import spots
 from lab.sim.survey import Survey
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
+from lab.taskfile import Task
 
 if TYPE_CHECKING:
     from lab.policy import Policy
@@ -28,10 +29,18 @@ class Grasp(Skill):
     """Take a slice at one station: the table holds the tool's pose relative to the slice (x, y, z, yaw)."""
 
     subtask: ClassVar[str] = "grasp"
+    near: ClassVar[bool] = True
+    tried: ClassVar[bool] = True
+    looks_from: ClassVar[tuple[float, float]] = (-60.0, 28.0)
 
     def __init__(self, station: str) -> None:
         super().__init__(f"grasp at {station}")
         self.station = station
+
+    @classmethod
+    def at_pick(cls, task: Task, station: str) -> "Grasp":
+        """It takes slices up everywhere."""
+        return cls(station)
 
     def setup(self, surveys: Surveys) -> Problem:
         """The poses around a slice with slices beside it; episodes begin anywhere above it."""
@@ -76,10 +85,9 @@ class Grasp(Skill):
             bench.held = None
             raise SkillFailed(f"{name} is not in the gripper after grasping at '{self.station}'")
 
-    def take(self, name: str) -> "Grasp":
-        """The same skill, told which slice to take."""
-        self.slice = name
-        return self
+    def begins_at(self) -> ToolPose:
+        """At the station's approach."""
+        return self.surveys.approach(self.station)
 
 
 def _top(x: int, y: int, yaw: int) -> tuple[int, int, int, int]:

@@ -13,10 +13,10 @@ from lab.mdp import NoPath, grid
 from lab.overhead import Marker
 from lab.sim import assets
 from lab.sim.kinematics import ToolPose
-from lab.sim.scene import GRASP_DEPTH, Spot, spots
+from lab.sim.scene import GRASP_DEPTH, Spot, is_toaster, spots
 from lab.skills.place import let_go, release_pose
-from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
-from lab.skills.surveys import Surveys, camera_view, overhead_camera
+from lab.skills.skill import Bench, Photo, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
+from lab.skills.surveys import INSERT_START, Surveys, camera_view, overhead_camera
 from lab.taskfile import Obstacle, Task
 from lab.vision import find_markers, locate, see
 
@@ -36,12 +36,17 @@ class Insert(Skill):
     """Carry the slice in the gripper from the grid's start to the toaster's slot and let it go there."""
 
     subtask: ClassVar[str] = "insert"
+    looks_from: ClassVar[tuple[float, float]] = (-84.0, 46.0)
     carries = True
 
     def __init__(self, station: str) -> None:
         super().__init__(f"insert at {station}")
         self.station = station
-        self.deviations_m: list[float] = []
+
+    @classmethod
+    def on_carry(cls, task: Task, origin: str, target: str) -> "Insert | None":
+        """At the end, where the camera's grid leads."""
+        return cls(target) if is_toaster(task.station(target)) else None
 
     def setup(self, surveys: Surveys) -> Problem:
         """Take the overhead picture, find the markers, and block the cells in which the slice would meet a cube."""
@@ -87,6 +92,15 @@ class Insert(Skill):
         x, y = marker.world_m
         places = zip(task.obstacles, self.surveys.layout.obstacles, strict=True)
         return min(places, key=lambda place: hypot(place[1][0] - x, place[1][1] - y))[0].name
+
+    def photo(self) -> Photo:
+        """The overhead picture."""
+        return Photo(self.picture, self.seen)
+
+    def begins_at(self) -> ToolPose:
+        """At the grid's start, where a transfer ends."""
+        high = self.surveys.approach(INSERT_START)
+        return ToolPose(high.x, high.y, self.surveys.task.insert.height_m, 0.0)
 
     def pose(self, state: int) -> ToolPose:
         """Over the middle of the grid's cell."""

@@ -7,10 +7,11 @@ import numpy as np
 
 from lab.mdp import NoPath, grid
 from lab.sim.kinematics import ToolPose
-from lab.sim.scene import Spot, spots
+from lab.sim.scene import Spot, is_toaster, spots
 from lab.skills.grasp import entry_cell, free_above, from_above
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
 from lab.skills.surveys import RELEASE_ABOVE, Surveys, near_pose
+from lab.taskfile import Task
 
 if TYPE_CHECKING:
     from lab.policy import Policy
@@ -26,12 +27,18 @@ class Place(Skill):
     """Set a slice down at one station: the table holds the tool's position relative to the spot (x, y, z)."""
 
     subtask: ClassVar[str] = "place"
+    near: ClassVar[bool] = True
+    looks_from: ClassVar[tuple[float, float]] = (-60.0, 28.0)
     carries = True
 
     def __init__(self, station: str) -> None:
         super().__init__(f"place at {station}")
         self.station = station
-        self.spot: Spot | None = None
+
+    @classmethod
+    def on_carry(cls, task: Task, origin: str, target: str) -> "Place | None":
+        """At the end, where the camera's grid does not lead."""
+        return None if is_toaster(task.station(target)) else cls(target)
 
     def setup(self, surveys: Surveys) -> Problem:
         """The positions above a spot with slices beside it; episodes begin anywhere above it."""
@@ -70,10 +77,9 @@ class Place(Skill):
         if not bench.stands(name, spot.grasp(), NEAR_M):
             raise SkillFailed(f"{name} does not stand on '{self.station}'")
 
-    def on(self, spot: Spot) -> "Place":
-        """The same skill, told on which spot to set the slice down."""
-        self.spot = spot
-        return self
+    def begins_at(self) -> ToolPose:
+        """At the station's approach."""
+        return self.surveys.approach(self.station)
 
 
 def release_pose(bench: Bench, name: str, spot: Spot) -> ToolPose:

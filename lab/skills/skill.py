@@ -1,20 +1,24 @@
-"""What all skills share: one life (setup, start, step, stop, status), the problem they learn, the bench they work at."""
+"""What all skills share: one life, from what a task needs of them to what they show, and the bench they work at."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from math import atan2, hypot
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import Environment
 from lab.mdp import NoPath, TabularMDP, greedy_path
+from lab.overhead import GridView
 from lab.sim import assets
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME as ROBOT
-from lab.sim.scene import GRASP_DEPTH, Scene
+from lab.sim.scene import GRASP_DEPTH, Scene, Spot, spots
+from lab.taskfile import Task
+from lab.view.frames import Body
 
 if TYPE_CHECKING:
     from lab.policy import Policy
@@ -22,6 +26,9 @@ if TYPE_CHECKING:
 
 LOST_M = 0.03  # [m] a slice farther than this from where the fingers hold it is not held
 UPRIGHT = 0.97  # cosine of the largest tilt of a slice that stands
+FINGERS_OFF_M = 0.0005  # [m] of a finger off a slice that is put between them
+TRIED_WITH = "slice 1"
+STAND_STEPS = 15  # physics steps until what was put somewhere at once is at rest
 
 
 class Status(Enum):
@@ -68,6 +75,15 @@ class Bench:
         turn = (0.0, 0.0, float(np.sin(pose.yaw / 2)), float(np.cos(pose.yaw / 2)))
         self.scene.world.put(name, (pose.x, pose.y, up), turn)
 
+    def hold(self, name: str, pose: ToolPose) -> None:
+        """Stand a new slice between the fingers of the tool that is at `pose`, and grip it."""
+        scene = self.scene
+        scene.robot.open_at_once(assets.SLICE[1] / 2 + FINGERS_OFF_M)
+        scene.add_slice(name, Spot(pose.x, pose.y, pose.z + GRASP_DEPTH - assets.SLICE[2], pose.yaw))
+        for _ in scene.robot.grip():
+            scene.world.step()
+        self.held = name
+
     def upright(self, name: str) -> float:
         """Cosine of a slice's tilt: 1 when it stands."""
         x, y, _, _ = self.scene.world.pose(name)[1]
@@ -87,26 +103,81 @@ class Bench:
         return near and self.upright(name) > UPRIGHT
 
 
+@dataclass(frozen=True, eq=False)
+class Photo:
+    """The picture (H, W, 3) that a problem was read from, RGB uint8, and the grid that was seen in it."""
+
+    picture: NDArray[np.uint8]
+    seen: GridView
+
+
 class Skill:
-    """One sub-task at one place: it surveys its problem, and carries out a learned policy one physics step at a time."""
+    """One sub-task at one place, with all of its life; a new one is a class of these in a file, and a row in `SKILLS`.
+
+    What a task needs of it (`at_pick` to `at_machine`), the survey of its problem (`setup`), what it is about (`aim`), its
+    motion (`start`, `step`, `stop`), what it shows (`show` to `photo`), and how it is tried in physics (`begins_at`).
+    """
 
     subtask: ClassVar[str]
-    problem: Problem  # once it is set up
+    moves_arm: ClassVar[bool] = True  # a machine's process does not
+    tried: ClassVar[bool] = False  # whether a lesson ends with a trial in physics
+    looks_from: ClassVar[tuple[float, float]] = (-72.0, 36.0)  # [deg] the camera of a lesson, azimuth and elevation
+    near: ClassVar[bool] = (
+        False  # whether all of it takes place around its station's first spot; looks_from is then its own
+    )
+
+    station = ""  # where it takes place, if it is at one
     carries = False  # whether a slice is in the gripper meanwhile
+    surveys: "Surveys"  # once it is set up
+    problem: Problem
 
     def __init__(self, name: str) -> None:
         self.name = name
+        self.slice = ""
+        self.spot: Spot | None = None
+        self.deviations_m: list[float] = []  # how far off a camera has seen the gripper
         self.status = Status.IDLE
         self.reason = ""
         self._motion: Iterator[None] | None = None
+
+    # ---- what a task needs of it: None where it has no part ------------------------------------------------------
+
+    @classmethod
+    def at_pick(cls, task: Task, station: str) -> "Skill | None":
+        """The skill that takes a slice up from a station."""
+        return None
+
+    @classmethod
+    def on_carry(cls, task: Task, origin: str, target: str) -> "Skill | None":
+        """The skill's part in bringing a slice that is in the gripper from one station to another, and setting it down."""
+        return None
+
+    @classmethod
+    def on_travel(cls, task: Task, origin: str, target: str) -> "Skill | None":
+        """The skill's part in taking the empty gripper from one station to another."""
+        return None
+
+    @classmethod
+    def at_machine(cls, task: Task, station: str) -> "Skill | None":
+        """What a machine does by itself with the slice that stands in it."""
+        return None
+
+    # ---- survey and aim ------------------------------------------------------------------------------------------
 
     def setup(self, surveys: "Surveys") -> Problem:
         """Survey the scene and state the problem to learn. BadInput when it has no solution, naming what is in the way."""
         raise NotImplementedError
 
+    def aim(self, name: str, spot: Spot | None = None) -> Self:
+        """The same skill, told which slice it is about, and on which spot to set it down, by default the station's first."""
+        self.slice, self.spot = name, spot
+        return self
+
     def pose(self, state: int) -> ToolPose:
         """The tool pose that the motion goes through in a state of the problem; a blocked one may be out of reach."""
         raise NotImplementedError
+
+    # ---- what it shows -------------------------------------------------------------------------------------------
 
     def show(self, bench: Bench, state: int) -> bool:
         """Put the bench into a state at once, without physics; False, and nothing moves, when the arm cannot reach it."""
@@ -116,6 +187,44 @@ class Skill:
         if bench.held is not None:
             bench.put_slice(bench.held, pose)
         return True
+
+    @classmethod
+    def on_slice(cls, number: int) -> tuple[Body, ...]:
+        """What this skill may make to be seen on slice `number`."""
+        return ()
+
+    def shown(self) -> list[str]:
+        """The names of what is to be seen on its slice now."""
+        return []
+
+    def shown_in(self, state: int, number: int) -> dict[str, bool]:
+        """What is to be seen on slice `number` in a state of the problem, and what is not, by name."""
+        return {}
+
+    def photo(self) -> Photo | None:
+        """The picture that its problem was read from, once it is set up; None: it was surveyed without one."""
+        return None
+
+    # ---- how it is tried, and its motion ---------------------------------------------------------------------------
+
+    def begins_at(self) -> ToolPose | None:
+        """Where the tool is when the skill begins; None: anywhere."""
+        return None
+
+    def begin(self, bench: Bench) -> None:
+        """Put all at once to where the set-up skill begins, to try it: the arm, and a slice on its spot or in the gripper."""
+        scene, pose = bench.scene, self.begins_at()
+        self.aim(TRIED_WITH)
+        if self.near and not self.carries:
+            scene.add_slice(TRIED_WITH, spots(self.surveys.task.station(self.station))[0])
+        if pose is not None:
+            scene.robot.stand(pose)
+            if self.carries:
+                bench.hold(TRIED_WITH, pose)
+            else:
+                scene.robot.open_at_once()
+        for _ in range(STAND_STEPS):
+            scene.world.step()
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Carry the policy out: each `next` sets what one physics step needs; raises SkillFailed."""

@@ -20,6 +20,7 @@ from lab.sim.scene import (
     Spot,
     check_scene,
     in_camera_grid,
+    is_toaster,
     marker_offset_of_toaster,
     spots,
     used_spots,
@@ -167,7 +168,7 @@ class Surveys:
             for name, spot in self._waiting().items():
                 scene.add_slice(name, spot)
                 scene.solid.append(name)
-            toasters = [s.name for s in self.task.stations if s.kind == "machine" and s.process is None]
+            toasters = [s.name for s in self.task.stations if is_toaster(s)]
             clearance = self.task.insert.cell_m / 2 + _GRID_MARGIN
             surveyor = Surveyor(scene, loaded=True, clearance=clearance, ignore=[*seen, *toasters])
             survey = surveyor.grid(self.task.insert.shape, self.grid_pose)
@@ -189,7 +190,7 @@ class Surveys:
         """Where slices may stand while another is carried through the insert grid, as far as they are near it."""
         waiting = {}
         for station in self.task.stations:
-            if station.kind == "machine" and station.process is None:
+            if is_toaster(station):
                 continue
             for number, spot in enumerate(used_spots(station, self.toasts), start=1):
                 if _far_from_grid(self.task.insert, spot) < _WAITING_WITHIN:
@@ -235,7 +236,7 @@ def camera_view(task: Task, pixels: int | None = None, layout: Layout | None = N
 
 
 def _toaster_offset(task: Task) -> tuple[float, float]:
-    yaw = next((s.pose[2] for s in task.stations if s.kind == "machine" and s.process is None), 0.0)
+    yaw = next((s.pose[2] for s in task.stations if is_toaster(s)), 0.0)
     along, across = marker_offset_of_toaster()
     return (np.sin(yaw) * across - np.cos(yaw) * along, -np.sin(yaw) * along - np.cos(yaw) * across)
 

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, ClassVar
 from lab.errors import BadInput
 from lab.mdp import NoPath, grid
 from lab.sim.kinematics import ToolPose
+from lab.sim.scene import is_toaster
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
 from lab.skills.surveys import INSERT_START, Surveys
+from lab.taskfile import Task
 
 if TYPE_CHECKING:
     from lab.policy import Policy
@@ -25,6 +27,16 @@ class Transfer(Skill):
         super().__init__(f"transfer {origin} to {target}{' with slice' if loaded else ''}")
         self.origin, self.target, self.loaded = origin, target, loaded
         self.carries = loaded
+
+    @classmethod
+    def on_carry(cls, task: Task, origin: str, target: str) -> "Transfer":
+        """First of all, to where the slice is set down, or on through the camera's grid."""
+        return cls(origin, INSERT_START if is_toaster(task.station(target)) else target, loaded=True)
+
+    @classmethod
+    def on_travel(cls, task: Task, origin: str, target: str) -> "Transfer":
+        """All of it."""
+        return cls(origin, target, loaded=False)
 
     def setup(self, surveys: Surveys) -> Problem:
         """The workspace as a 3D grid: cells that are out of reach or too near to something are blocked."""
@@ -48,6 +60,10 @@ class Transfer(Skill):
     def pose(self, state: int) -> ToolPose:
         """In the middle of the workspace's cell."""
         return self.surveys.cell_pose(self.problem.mdp.state_cell(state))
+
+    def begins_at(self) -> ToolPose:
+        """At the origin's approach."""
+        return self.surveys.approach(self.origin)
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Along the learned cells from where the tool is, then to the target's approach."""

@@ -13,7 +13,7 @@ from lab.stage.world import WorldStage
 from lab.view.frames import Body, Camera, Frame
 
 if TYPE_CHECKING:
-    from lab.report import Prepared
+    from lab.production.report import Prepared
 
 
 class Stage(Protocol):
@@ -39,7 +39,7 @@ def stage_of(where: "Prepared | GridWorld | None", problem: Problem) -> Stage | 
         return WorldStage(where, problem.mdp)
     if where is None or problem.name not in where.problems:
         return None
-    return SkillStage(where.task, where.toasts, where.layout, where.crew.skills[problem.name])
+    return SkillStage(where.task, where.toasts, where.layout, where.skillset.skills[problem.name])
 
 
 __all__ = ["SkillStage", "Stage", "WorldStage", "stage_of"]

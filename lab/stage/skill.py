@@ -5,41 +5,40 @@ from math import hypot, radians
 
 import numpy as np
 
-from lab.mdp import TabularMDP
-from lab.recorder import Recorder
 from lab.sim import assets
 from lab.sim.scene import Layout, Scene, spots
 from lab.sim.world import World
-from lab.skills import Butter, Grasp, Insert, Place, Skill, Transfer
-from lab.skills.skill import Bench
+from lab.skills import Skill
+from lab.skills.skill import FINGERS_OFF_M, Bench
 from lab.skills.surveys import neighbours
 from lab.stage.marks import GREEN, STEP_S, Changes, Marks, camera_for, corners, vector
 from lab.taskfile import Task
 from lab.view.frames import Body, Camera, Frame, Rgba, Shape, Vector
 
-SLICE = "slice 1"  # the one that the lesson is about
+NUMBER = 1  # of the slice that the lesson is about
+SLICE = f"slice {NUMBER}"
 GHOST: Rgba = (0.80, 0.68, 0.48, 0.3)
 TRAIL_M, COLLISION_M = 0.004, 0.045  # [m] at least: the gripper must not hide them
 _ROOM = np.array([0.09, 0.09, 0.10])  # [m] of a slice and the gripper around the places of the tool
 
 
 @dataclass
-class Patches:
-    """The butter on the slice in the states of the butter sub-task."""
+class OnSlice:
+    """What a skill has made to be seen on the slice in the states of its problem."""
 
-    mdp: TabularMDP
+    skill: Skill
     world: World
 
     def bodies(self) -> tuple[Body, ...]:
-        """Nine patches, as a run's replay has them."""
-        return tuple(body for body in Recorder(self.world, 1).bodies if body.name.startswith("butter 1 "))
+        """All of it, as a run's replay has it."""
+        return self.skill.on_slice(NUMBER)
 
     def at(self, state: int) -> Changes:
-        """Where butter is in `state`."""
-        covered = {f"butter 1 {row}{column}": bool(on) for (row, column), on in np.ndenumerate(self.mdp.covered(state))}
+        """What there is in `state`, where the slice is."""
+        seen = self.skill.shown_in(state, NUMBER)
         position, (i, j, k, w) = self.world.pose(SLICE)
         pose = (*vector(position), float(i), float(j), float(k), float(w))
-        return dict.fromkeys(covered, pose), covered
+        return dict.fromkeys(seen, pose), seen
 
 
 class SkillStage:
@@ -52,7 +51,7 @@ class SkillStage:
         try:
             self._bench = Bench(Scene(self._world, task, toasts, layout))
             self._ghosts = self._set_up(task)
-            self._extra = Patches(self._mdp, self._world) if isinstance(skill, Butter) else self._marks()
+            self._extra = OnSlice(skill, self._world) if skill.on_slice(NUMBER) else self._marks()
             self._bodies = (*self._world.bodies(), *self._goal(), *self._extra.bodies())
             self._camera = self._look()
         except BaseException:
@@ -67,10 +66,10 @@ class SkillStage:
         bench, skill = self._bench, self._skill
         if skill.carries:
             bench.held = SLICE
-            bench.scene.robot.open_at_once(assets.SLICE[1] / 2 + 0.0005)
-        elif isinstance(skill, Grasp | Butter):
+            bench.scene.robot.open_at_once(assets.SLICE[1] / 2 + FINGERS_OFF_M)
+        elif skill.near:
             bench.put_slice(SLICE, spots(task.station(skill.station))[0].grasp())
-        if not isinstance(skill, Grasp | Place):
+        if not skill.near:
             return {}
         station = task.station(skill.station)
         slices = [bench.slice_pose(f"slice {number}") for number in range(1, bench.scene.toasts + 1)]
@@ -103,7 +102,7 @@ class SkillStage:
 
     def _goal(self) -> tuple[Body, ...]:
         """A ball where the tool is to go through the cell; at a station the slice says so."""
-        if not isinstance(self._skill, Transfer | Insert):
+        if self._skill.near:
             return ()
         at = self._place(int(np.flatnonzero(self._mdp.goal)[0]))
         return (Body("goal", (Shape("sphere", (0.35 * self._size(),), None, GREEN, at),)),)
@@ -116,18 +115,14 @@ class SkillStage:
     def _look(self) -> Camera:
         free = np.flatnonzero(~self._mdp.terminal | self._mdp.goal)
         places = np.array([self._place(int(state)) for state in free])
-        if isinstance(self._skill, Grasp | Place | Butter):
-            yaw = self._skill.surveys.task.station(self._skill.station).pose[2]
-            aside = 30.0
-            if isinstance(self._skill, Butter):
-                aside = 48.0  # the head stands before the slice
-                places = np.vstack([places, self._world.pose(SLICE)[0]])
-            seen = corners(places.min(axis=0) - _ROOM, places.max(axis=0) + _ROOM)
-            return camera_for(seen, yaw - radians(90.0 - aside), radians(28.0))
-        seen = np.vstack([places * [1.0, 1.0, 0.0], places + _ROOM])
-        if isinstance(self._skill, Insert):
-            return camera_for(seen, -radians(84.0), radians(46.0))
-        return camera_for(seen, -radians(72.0), radians(36.0))
+        azimuth, elevation = (radians(angle) for angle in self._skill.looks_from)
+        if not self._skill.near:
+            return camera_for(np.vstack([places * [1.0, 1.0, 0.0], places + _ROOM]), azimuth, elevation)
+        if not self._skill.moves_arm:
+            places = np.vstack([places, self._world.pose(SLICE)[0]])
+        yaw = self._skill.surveys.task.station(self._skill.station).pose[2]
+        seen = corners(places.min(axis=0) - _ROOM, places.max(axis=0) + _ROOM)
+        return camera_for(seen, yaw + azimuth, elevation)
 
     def bodies(self) -> tuple[Body, ...]:
         """The cell as a run shows it, and the marks of the lesson."""

@@ -226,9 +226,9 @@ const seatDraw = (() => {
     for (const [row, kind, part, start, end] of all) {
       const wait = kind === "wait", top = rows.indexOf(row) * height + (wait ? 8 : 3);
       const bar = node("rect", { x: x(start), y: top, width: Math.max(1, x(end) - x(start)), height: wait ? 6 : height - 7, class: `k-${kind}` });
-      bar.append(node("title", {}, `${row}: ${kind}${kind === "empty" ? "" : `, part ${part}`}, ${start} to ${end} s`));
+      bar.append(node("title", {}, `${row}: ${kind === "pallet" ? "carry an empty pallet" : kind}${kind === "empty" ? "" : `, part ${part}`}, ${start} to ${end} s`));
       parts.push(bar);
-      if (x(end) - x(start) > 14 && ["carry", "process"].includes(kind)) {
+      if (x(end) - x(start) > 14 && ["carry", "pallet", "process"].includes(kind)) {
         parts.push(node("text", { x: (x(start) + x(end)) / 2, y: top + 12, "text-anchor": "middle", fill: kind === "carry" ? "#ffffff" : "#222222" }, part));
       }
     }
@@ -236,7 +236,8 @@ const seatDraw = (() => {
     parts.push(node("line", { x1: x(now_s), x2: x(now_s), y1: 0, y2: foot + 4, stroke: "#222222", "stroke-dasharray": "3 3" }));
     parts.push(node("text", { x: Math.min(x(now_s), wide - 40), y: foot + 16, "text-anchor": "middle", fill: "#222222" }, `${Math.round(now_s)} s`));
     svg.replaceChildren(...parts);
-    svg.setAttribute("aria-label", `${seatSide.count(all.filter((bar) => bar[1] === "carry").length, "move")} so far, ${Math.round(now_s)} s`);
+    const moves = all.filter((bar) => ["carry", "pallet"].includes(bar[1])).length;
+    svg.setAttribute("aria-label", `${seatSide.count(moves, "move")} so far, ${Math.round(now_s)} s`);
   }
 
   return { grid, curve, rate, bars, trust, nice };

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lab.sequencing.advised import SequenceRequest
-from lab.sequencing.events import Move
+from lab.sequencing.events import Move, robot_activities
+from lab.sequencing.layout import ROBOT
 from lab.sequencing.positions import part_of
 from lab.sequencing.run import Run
 from lab.view.seat_question import progress_of
 
 Json = dict[str, Any]
-ROBOT = "robot"
 
 
 def order_of(request: SequenceRequest) -> Json:
@@ -97,14 +97,7 @@ def bars_of(moves: Sequence[Move], now_s: float | None = None) -> Json:
 
 
 def _robot_bars(move: Move) -> list[list[Any]]:
-    served_s = move.pick_s - move.service_s
-    spans = (
-        ("empty", move.leave_s, move.reach_s),
-        ("wait", move.reach_s, served_s),
-        ("service", served_s, move.pick_s),
-        ("carry", move.pick_s, move.drop_s),
-    )
-    return [[ROBOT, kind, move.part, _s(start), _s(end)] for kind, start, end in spans if end > start]
+    return [[ROBOT, did.kind, move.part, _s(did.start_s), _s(did.end_s)] for did in robot_activities(move)]
 
 
 def _machine_bars(moves: Sequence[Move], number: int) -> list[list[Any]]:

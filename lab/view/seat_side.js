@@ -70,7 +70,9 @@ const seatSide = (() => {
 
   function showWork({ work }) {
     el("work").hidden = !work || !work.bars.length;
-    if (!el("work").hidden) seatDraw.bars(el("bars"), work);
+    if (el("work").hidden) return;
+    el("work").querySelector("[data-kind=pallet]").hidden = !work.bars.some((bar) => bar[1] === "pallet");
+    seatDraw.bars(el("bars"), work);
   }
 
   function worded(value) {

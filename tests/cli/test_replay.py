@@ -18,7 +18,10 @@ def test_a_session_is_replayed_listed_and_not_gone_on_with_when_it_is_over(lab: 
     assert (taught.code, "receipt" in taught.out) == (0, False)
     ran = lab("replay", "lesson", "--json")
     assert (ran.code, ran.out.count("\n")) == (0, 1)
-    assert ran.err == f"lab: journal 'lesson/events.jsonl' names, outside its folder, what is read now: {folder / 'w.txt'}\n"
+    assert (
+        ran.err
+        == f"lab: journal 'lesson/events.jsonl' names, outside its folder, what is read now: {folder / 'w.txt'}\n"
+    )
     assert ran.json.keys() == {"session", "problem", "words", "seed", "lab", "closed", "cut", "events", "receipt"}
     answers = [event for event in ran.json["events"] if event["kind"] == "answer"]
     assert [(answer["action"], answer["left"]) for answer in answers] == [(3, False), (None, True)]

@@ -8,13 +8,12 @@ import pytest
 
 from lab.mdp import optimal_values, shortest_steps
 from lab.policy import Policy
-from lab.sim import assets
-from lab.sim.kinematics import ToolPose
-from lab.sim.scene import GRASP_DEPTH, Layout, Scene, Spot, spots
+from lab.production.skillset import SkillSet
+from lab.sim.scene import Layout, Scene, spots
 from lab.sim.world import World
-from lab.skills import Butter, Grasp, Insert, Place, Skill, Transfer
+from lab.skills import Skill
 from lab.skills.skill import Bench, Problem, Status
-from lab.skills.surveys import INSERT_START, Surveys
+from lab.skills.surveys import Surveys
 from lab.taskfile import Task, load
 
 SLICE = "slice 1"
@@ -43,15 +42,14 @@ def surveys(task: Task, layout: Layout) -> Surveys:
 
 
 @pytest.fixture(scope="session")
-def make() -> dict[str, Callable[[], Skill]]:
-    """A fresh skill of every kind."""
-    return {
-        "transfer": lambda: Transfer("toaster_buffer", "plate", loaded=False),
-        "grasp": lambda: Grasp("plate").take(SLICE),
-        "insert": lambda: Insert("toaster"),
-        "butter": lambda: Butter("butter_applier").on(SLICE),
-        "place": lambda: Place("toaster_buffer"),
-    }
+def make(task: Task) -> Callable[[str], Skill]:
+    """A fresh skill of a kind: the first that the shipped task needs, told about its first slice."""
+
+    def example(subtask: str) -> Skill:
+        skills = SkillSet.of(task, 2).skills.values()
+        return next(skill for skill in skills if skill.subtask == subtask).aim(SLICE)
+
+    return example
 
 
 @pytest.fixture(scope="session")
@@ -114,36 +112,19 @@ def stage(surveys: Surveys, layout: Layout) -> Iterator[Callable[..., Bench]]:
             task: Task = surveys.task,
             off: tuple[float, float, float] = (0.0, 0.0, 0.0),
         ) -> Bench:
-            scene = Scene(worlds.enter_context(World()), task, 0, layout)
-            bench = Bench(scene)
-            if isinstance(skill, Grasp | Butter):
-                scene.add_slice(SLICE, spots(task.station(skill.station))[0], off)
-                for _ in range(60):
-                    scene.world.step()
-            if isinstance(skill, Transfer):
-                _begin(bench, surveys.approach(skill.origin), holding=skill.loaded)
-            elif isinstance(skill, Insert):
-                high = surveys.approach(INSERT_START)
-                _begin(bench, ToolPose(high.x, high.y, task.insert.height_m, 0.0), holding=True)
-            elif isinstance(skill, Grasp | Place):
-                _begin(bench, surveys.approach(skill.station), holding=isinstance(skill, Place))
+            bench = Bench(Scene(worlds.enter_context(World()), task, 0, layout))
+            vars(skill).setdefault("surveys", surveys)
+            spot = skill.spot
+            skill.begin(bench)
+            skill.spot = spot
+            if any(off):
+                foot = spots(task.station(skill.station))[0].grasp()
+                bench.put_slice(SLICE, foot.local(off[0], off[1], 0.0, off[2]))
+                for _ in range(30):
+                    bench.scene.world.step()
             return bench
 
         yield make_bench
-
-
-def _begin(bench: Bench, pose: ToolPose, *, holding: bool) -> None:
-    """Put the arm at a pose, with a slice in its fingers or without."""
-    robot, world = bench.scene.robot, bench.scene.world
-    assert robot.stand(pose)
-    if not holding:
-        robot.open_at_once()
-        return
-    robot.open_at_once(assets.SLICE[1] / 2 + 0.0005)
-    bench.scene.add_slice(SLICE, Spot(pose.x, pose.y, pose.z + GRASP_DEPTH - assets.SLICE[2], pose.yaw))
-    for _ in robot.grip():
-        world.step()
-    bench.held = SLICE
 
 
 @pytest.fixture(scope="session")

@@ -23,7 +23,7 @@ HEAD = ("head_x", "head_z")
 
 
 def prepared(surveys: Surveys, stage: Stage, optimal: PolicyOf) -> tuple[Butter, Bench, Policy]:
-    butter = Butter("butter_applier").on(SLICE)
+    butter = Butter("butter_applier").aim(SLICE)
     policy = optimal(butter.setup(surveys))
     return butter, stage(butter), policy
 
@@ -68,7 +68,7 @@ def test_without_a_slice_nothing_is_covered(surveys: Surveys, stage: Stage, opti
 
 def test_another_slice_does_not_count(surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run) -> None:
     butter, bench, policy = prepared(surveys, stage, optimal)
-    butter.on("slice 2")
+    butter.aim("slice 2")
     assert run(butter, bench, policy) is Status.FAILURE
     assert "of slice 2" in butter.reason
 

@@ -27,7 +27,7 @@ MAY_STAND = np.array([0.012, 0.005, 0.08])  # [m], [m], [rad]: a little wider th
 def test_a_slice_is_lifted_from_wherever_it_stands(
     seed: int, surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
-    grasp = Grasp("plate").take(SLICE)
+    grasp = Grasp("plate").aim(SLICE)
     policy = optimal(grasp.setup(surveys))
     off = tuple(map(float, np.random.default_rng(seed).uniform(-1, 1, 3) * MAY_STAND))
     bench = stage(grasp, off=off)
@@ -43,7 +43,7 @@ def test_a_slice_is_lifted_from_wherever_it_stands(
 def test_beside_other_slices_none_of_them_is_knocked_over(
     surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run, task: Task
 ) -> None:
-    grasp = Grasp("plate").take(SLICE)
+    grasp = Grasp("plate").aim(SLICE)
     policy = optimal(grasp.setup(surveys))
     bench = stage(grasp, off=(0.008, -0.003, 0.05))
     for number, spot in enumerate(spots(task.station("plate"))[1:6], start=2):
@@ -55,7 +55,7 @@ def test_beside_other_slices_none_of_them_is_knocked_over(
 def test_a_slippery_slice_is_not_lifted_and_that_is_said(
     surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
-    grasp = Grasp("plate").take(SLICE)
+    grasp = Grasp("plate").aim(SLICE)
     policy = optimal(grasp.setup(surveys))
     bench = stage(grasp)
     position, turn = bench.scene.world.pose(SLICE)
@@ -69,7 +69,7 @@ def test_a_slippery_slice_is_not_lifted_and_that_is_said(
 
 
 def test_a_slice_that_is_not_there_is_not_lifted(surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run) -> None:
-    grasp = Grasp("plate").take(SLICE)
+    grasp = Grasp("plate").aim(SLICE)
     policy = optimal(grasp.setup(surveys))
     bench = stage(grasp)
     bench.scene.world.put(SLICE, (0.5, 0.0, 0.06), (0.7071068, 0.0, 0.0, 0.7071068))  # flat on the table

@@ -43,7 +43,7 @@ def test_it_goes_to_the_spot_it_is_told(
     place = Place("finished_plate")
     policy = optimal(place.setup(surveys))
     chosen = spots(task.station("finished_plate"))[5]
-    bench = stage(place.on(chosen))
+    bench = stage(place.aim(SLICE, chosen))
     for number in (2, 3, 4):  # on the spots before it
         bench.scene.add_slice(f"slice {number}", spots(task.station("finished_plate"))[number])
     assert run(place, bench, policy) is Status.SUCCESS, place.reason

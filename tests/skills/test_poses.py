@@ -10,12 +10,12 @@ from lab.policy import Policy
 from lab.sim import assets
 from lab.sim.kinematics import ToolPose, inverse
 from lab.sim.robot import NAME as ROBOT
-from lab.skills import SKILLS, Butter, Skill, Transfer
+from lab.skills import SKILLS, Skill, Transfer
 from lab.skills.butter import SHAPE
 from lab.skills.skill import Bench, Problem, Status
 from lab.skills.surveys import Surveys
 
-Make = dict[str, Callable[[], Skill]]
+Make = Callable[[str], Skill]
 Stage = Callable[..., Bench]
 PolicyOf = Callable[[Problem], Policy]
 SLICE = "slice 1"
@@ -29,7 +29,7 @@ def free_states(problem: Problem) -> list[int]:
 
 def found(skill: Skill, bench: Bench) -> ToolPose:
     """Where the skill's tool is in physics: the arm's, or the applier's head."""
-    if not isinstance(skill, Butter):
+    if skill.moves_arm:
         return bench.scene.robot.tool()
     (x, y, z), _ = bench.scene.world.pose(skill.station, "head")
     return ToolPose(float(x), float(y), float(z))
@@ -41,7 +41,7 @@ def apart(one: ToolPose, other: ToolPose) -> float:
 
 @every_skill
 def test_shown_in_any_free_state_the_tool_is_at_its_pose(name: str, make: Make, surveys: Surveys, stage: Stage) -> None:
-    skill = make[name]()
+    skill = make(name)
     problem = skill.setup(surveys)
     bench = stage(skill)
     for state in free_states(problem):
@@ -58,7 +58,7 @@ def test_shown_in_any_free_state_the_tool_is_at_its_pose(name: str, make: Make, 
 def test_the_motion_goes_through_the_poses_of_the_learned_states(
     name: str, make: Make, surveys: Surveys, stage: Stage, optimal: PolicyOf
 ) -> None:
-    skill = make[name]()
+    skill = make(name)
     problem = skill.setup(surveys)
     bench = stage(skill)
     policy = optimal(problem)
@@ -89,7 +89,7 @@ def test_out_of_reach_nothing_moves(surveys: Surveys, stage: Stage) -> None:
 def test_around_another_slice_the_poses_are_that_much_away(make: Make, surveys: Surveys) -> None:
     """A slice 2 cm to the right of the spot and turned by a quarter: the slice's own x axis is the world's y axis."""
     for name in ("grasp", "place"):
-        skill = make[name]()
+        skill = make(name)
         mdp = skill.setup(surveys).mdp
         goal = skill.pose(int(np.flatnonzero(mdp.goal)[0]))
         there = goal.shifted(dx=0.02, dyaw=np.pi / 2)
@@ -100,7 +100,7 @@ def test_around_another_slice_the_poses_are_that_much_away(make: Make, surveys: 
 
 
 def test_the_head_stands_before_the_cell_that_it_butters(surveys: Surveys, stage: Stage, make: Make) -> None:
-    butter = make["butter"]()
+    butter = make("butter")
     mdp = butter.setup(surveys).mdp
     bench = stage(butter)
     (x, y, z), _ = bench.scene.world.pose(SLICE)

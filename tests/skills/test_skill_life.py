@@ -1,39 +1,93 @@
 """What every skill promises, whichever it is: one life, a problem with a solution, a reason when it fails."""
 
 from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from lab.errors import WorkFailed
-from lab.mdp import NoPath, greedy_path, shortest_steps
+from lab.lesson import teach_one
+from lab.mdp import NoPath, greedy_path, grid, shortest_steps
 from lab.policy import Policy
+from lab.production.durations import measure
+from lab.production.skillset import SkillSet
 from lab.sim.kinematics import ToolPose
+from lab.sim.scene import Layout
 from lab.skills import SKILLS, Skill
 from lab.skills.skill import Bench, Problem, SkillFailed, Status, learned_path, no_way
 from lab.skills.surveys import Surveys
-from lab.taskfile import SUBTASKS
+from lab.stage import SkillStage
+from lab.taskfile import Stage, Subtask, Task
+from lab.teaching import Teacher
+from lab.toolbox import Toolbox
 
-Make = dict[str, Callable[[], Skill]]
+Make = Callable[[str], Skill]
 PolicyOf = Callable[[Problem], Policy]
 Run = Callable[[Skill, Bench, Policy], Status]
-every_skill = pytest.mark.parametrize("name", SKILLS)
+
+
+class Hover(Skill):
+    """A new skill, all of it: before it travels, the empty gripper rises from a station's approach, level by level."""
+
+    subtask: ClassVar[str] = "hover"
+
+    def __init__(self, station: str) -> None:
+        super().__init__(f"hover at {station}")
+        self.station = station
+
+    @classmethod
+    def on_travel(cls, task: Task, origin: str, target: str) -> "Hover":
+        return cls(origin)
+
+    def setup(self, surveys: Surveys) -> Problem:
+        self.surveys = surveys
+        mdp = grid((1, 3), np.zeros((1, 3), bool), (0, 0), (0, 2), action_labels=("stay", "wait", "down", "up"))
+        self.problem = Problem(self.name, self.subtask, mdp)
+        return self.problem
+
+    def pose(self, state: int) -> ToolPose:
+        return self.begins_at().shifted(dz=0.03 * self.problem.mdp.state_cell(state)[1])
+
+    def begins_at(self) -> ToolPose:
+        return self.surveys.approach(self.station)
+
+    def motion(self, bench: Bench, policy: Policy) -> Iterator[None]:
+        path = learned_path(policy, self.problem.mdp, self.problem.mdp.start)
+        yield from bench.scene.robot.follow([self.pose(state) for state in path])
+
+
+every_skill = pytest.mark.parametrize("name", [*SKILLS, Hover.subtask])
+
+
+@pytest.fixture(autouse=True)
+def row() -> Iterator[None]:
+    """The new skill's row in the table: it comes before travelling."""
+    others = dict(SKILLS)
+    SKILLS.clear()
+    SKILLS.update({Hover.subtask: Hover} | others)
+    yield
+    SKILLS.clear()
+    SKILLS.update(others)
 
 
 def poses(bench: Bench) -> dict[str, tuple[float, ...]]:
     return dict(bench.scene.world.frame().poses)
 
 
-def test_every_skill_is_a_sub_task_of_the_task_file_and_has_an_example_here(make: Make) -> None:
-    assert tuple(SKILLS) == SUBTASKS == tuple(make)
-    assert all(SKILLS[name].subtask == name for name in SKILLS)
+@every_skill
+def test_it_stands_in_the_table_under_its_own_name_and_the_shipped_task_needs_it(name: str, make: Make) -> None:
+    assert SKILLS[name].subtask == make(name).subtask == name
+    assert f" {make(name).station}" in f" {make(name).name}"
 
 
 @every_skill
 def test_the_problem_has_a_solution_from_every_start(
     name: str, make: Make, surveys: Surveys, optimal: PolicyOf
 ) -> None:
-    skill = make[name]()
+    skill = make(name)
     problem = skill.setup(surveys)
     assert (problem.name, problem.subtask) == (skill.name, name)
     assert shortest_steps(problem.mdp) > 0
@@ -45,12 +99,12 @@ def test_the_problem_has_a_solution_from_every_start(
 @every_skill
 def test_the_same_scene_gives_the_same_problem(name: str, make: Make, surveys: Surveys) -> None:
     again = Surveys(surveys.task, surveys.layout) if name != "transfer" else surveys
-    assert make[name]().setup(surveys).mdp.signature == make[name]().setup(again).mdp.signature
+    assert make(name).setup(surveys).mdp.signature == make(name).setup(again).mdp.signature
 
 
 @every_skill
 def test_idle_it_moves_nothing(name: str, make: Make, surveys: Surveys, stage: Callable[..., Bench]) -> None:
-    skill = make[name]()
+    skill = make(name)
     assert skill.status is Status.IDLE
     assert skill.step() is Status.IDLE  # even before it knows its problem
     skill.setup(surveys)
@@ -65,7 +119,7 @@ def test_idle_it_moves_nothing(name: str, make: Make, surveys: Surveys, stage: C
 def test_it_runs_succeeds_and_then_stays_done(
     name: str, make: Make, surveys: Surveys, stage: Callable[..., Bench], optimal: PolicyOf, run: Run
 ) -> None:
-    skill = make[name]()
+    skill = make(name)
     policy = optimal(skill.setup(surveys))
     bench = stage(skill)
     skill.start(bench, policy)
@@ -95,7 +149,7 @@ def test_a_policy_that_knows_nothing_fails_with_a_reason_and_touches_nothing(
     optimal: PolicyOf,
     run: Run,
 ) -> None:
-    skill = make[name]()
+    skill = make(name)
     problem = skill.setup(surveys)
     bench = stage(skill)
     before = bench.scene.robot.tool()
@@ -111,7 +165,7 @@ def test_a_policy_that_knows_nothing_fails_with_a_reason_and_touches_nothing(
 def test_what_goes_wrong_in_a_motion_is_the_reason(
     error: type[Exception], make: Make, surveys: Surveys, stage: Callable[..., Bench], optimal: PolicyOf, run: Run
 ) -> None:
-    skill = make["transfer"]()
+    skill = make("transfer")
     policy = optimal(skill.setup(surveys))
 
     def motion(*_: object) -> Iterator[None]:
@@ -126,7 +180,7 @@ def test_what_goes_wrong_in_a_motion_is_the_reason(
 def test_a_learned_path_ends_at_the_goal_or_says_where_it_got_lost(
     make: Make, surveys: Surveys, optimal: PolicyOf, clueless: PolicyOf
 ) -> None:
-    problem = make["insert"]().setup(surveys)
+    problem = make("insert").setup(surveys)
     mdp, goal = problem.mdp, int(np.flatnonzero(problem.mdp.goal)[0])
     path = learned_path(optimal(problem), mdp, mdp.start)
     assert (path[0], path[-1], len(path)) == (mdp.start, goal, shortest_steps(mdp) + 1)
@@ -146,7 +200,7 @@ def test_no_way_names_what_encloses_or_the_border() -> None:
 def test_a_bench_tells_standing_leaning_and_held_slices_apart(
     make: Make, surveys: Surveys, stage: Callable[..., Bench]
 ) -> None:
-    place = make["place"]()
+    place = make("place")
     place.setup(surveys)
     bench = stage(place)
     world, tool = bench.scene.world, bench.scene.robot.tool()
@@ -166,3 +220,23 @@ def test_a_bench_tells_standing_leaning_and_held_slices_apart(
     world.put("slice 1", (0.6, 0.0, 0.06), (np.sin(0.3), 0.0, 0.0, np.cos(0.3)))
     assert bench.upright("slice 1") == pytest.approx(np.cos(0.6))
     assert not bench.stands("slice 1", ToolPose(0.6, 0.0, 0.09), 0.01)
+
+
+def test_a_new_skill_is_a_class_and_a_row_and_all_else_knows_it(
+    task: Task, surveys: Surveys, optimal: PolicyOf, tmp_path: Path
+) -> None:
+    """The task file may have settings for it, lessons teach and show it, and jobs need it, time it and carry it out."""
+    ends = tuple(Stage(station=stage.station) for stage in (task.route[0], task.route[-1]))
+    short = task.model_copy(update={"route": ends, "subtasks": task.subtasks | {"hover": Subtask()}})
+    document = teach_one(short, "hover", Teacher(Toolbox(tmp_path)), episodes=40, out=tmp_path / "out")
+    assert (document["subtask"], document["skill"], document["solved"]) == ("hover", "hover at toaster_buffer", True)
+    skillset = SkillSet.of(short, 1)
+    hovers = [skill for skill in skillset.skills.values() if isinstance(skill, Hover)]
+    assert hovers
+    assert all(way[0] in hovers for way in skillset.travels.values())
+    for name, skill in skillset.skills.items():
+        skillset.policies[name] = optimal(skill.setup(surveys))
+    with closing(SkillStage(task, 1, Layout(surveys.layout.obstacles, ((0.0, 0.0, 0.0),)), hovers[0])) as stage:
+        assert stage.frame(2).poses["robot tool"][2] == pytest.approx(stage.frame(0).poses["robot tool"][2] + 0.06)
+    durations = measure(skillset, surveys)
+    assert set(durations.empty_s) == set(skillset.moves.empty)

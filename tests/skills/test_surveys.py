@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from lab.crew import Crew
 from lab.errors import BadInput
 from lab.mdp import greedy_path, optimal_values
+from lab.production.skillset import SkillSet
 from lab.sim.assets import SLICE as SIZE
 from lab.sim.scene import GRASP_DEPTH, Layout, spots
 from lab.skills import Insert
@@ -15,8 +15,8 @@ from lab.vision import see
 
 
 def signatures(surveys: Surveys) -> dict[str, str]:
-    crew = Crew.of(surveys.task, 1)
-    return {name: skill.setup(surveys).mdp.signature for name, skill in crew.skills.items()}
+    skillset = SkillSet.of(surveys.task, 1)
+    return {name: skill.setup(surveys).mdp.signature for name, skill in skillset.skills.items()}
 
 
 @pytest.fixture(scope="module")

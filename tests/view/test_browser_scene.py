@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lab import taskfile
-from lab.recorder import Recorder
+from lab.production.recorder import Recorder
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Scene, draw_layout
 from lab.sim.world import World

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from copy import deepcopy
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from lab.advice.requests import AdviceRequest
 from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP, grid, optimal_values
 from lab.sequencing.advised import SequenceRequest
-from lab.sequencing.run import follow
+from lab.sequencing.run import Run, follow
 from lab.taskfile import load_cell
 from lab.view.seat import SeatPage
 
@@ -113,6 +114,26 @@ def test_the_order_is_advised(tab: "Page", page: SeatPage, until: Until) -> None
     until(tab, "document.querySelectorAll('#bars rect').length === 3")
     tab.click("#moves >> text=toast 2")
     assert asked.result(20) == 2
+
+
+def test_a_pallets_move_is_no_carry(tab: "Page", page: SeatPage, until: Until) -> None:
+    run = Run(load_cell("fms").cell(("rook",)))
+    page.begin_order("fms", 100, GateSettings(), None)
+    while run.allowed():
+        request = SequenceRequest(deepcopy(run), run.allowed(), run.allowed()[0], 1, None, None, None, Reason())
+        ThreadPoolExecutor(1).submit(page.ask_order, request)
+        carries = run.move(run.allowed()[0]).carries
+        until(tab, "document.querySelector('#moves button:enabled')")
+        tab.keyboard.press("1")
+        until(tab, "!document.querySelector('#moves button:enabled')")
+        if carries == "pallet":
+            break
+        assert tab.is_hidden("[data-kind=pallet]")
+    assert carries == "pallet"
+    ThreadPoolExecutor(1).submit(page.ask_order, replace(request, run=run, allowed=run.allowed() or (1,)))
+    until(tab, "document.querySelectorAll('#bars .k-pallet').length === 1")
+    assert tab.is_visible("[data-kind=pallet]")
+    assert "carry an empty pallet" in (tab.text_content("#bars .k-pallet title") or "")
 
 
 def test_the_receipt_is_shown(tab: "Page", page: SeatPage, until: Until) -> None:

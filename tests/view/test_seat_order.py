@@ -1,6 +1,7 @@
 """The order of the transfers on the teaching page: what may be moved, and how the work so far is made out."""
 
 import numpy as np
+import pytest
 
 from lab.advice.reasons import Reason, TooSlow
 from lab.learning.settings import GateSettings
@@ -77,9 +78,10 @@ def test_a_whole_session_is_followed_move_by_move() -> None:
     assert max(asked) > 5
 
 
-def test_bars_are_those_of_the_schedule() -> None:
+@pytest.mark.parametrize(("name", "order"), [("toast-case-1", 3), ("fms", ("rook", "rook"))])
+def test_bars_are_those_of_the_schedule(name: str, order: int | tuple[str, ...]) -> None:
     """Robot and machines, beside the schedule that the sequencers make: always the last part that may be moved."""
-    cell = load_cell("toast-case-1").cell(3)
+    cell = load_cell(name).cell(order)
     run, decisions = Run(cell), list[int]()
     while allowed := run.allowed():
         decisions.append(allowed[-1])
@@ -89,6 +91,7 @@ def test_bars_are_those_of_the_schedule() -> None:
     shown = bars_of([run.move(decision) for decision in decisions])
     robot = [tuple(bar[1:2] + bar[3:]) for bar in shown["bars"] if bar[0] == "robot"]
     assert robot == [(a.kind, a.start_s, a.end_s) for a in schedule.robot]
+    assert ("pallet" in {bar[1] for bar in shown["bars"]}) == (name == "fms")
     machines = sorted(tuple(bar) for bar in shown["bars"] if bar[0] != "robot")
     assert machines == sorted((a.resource, a.kind, a.part, a.start_s, a.end_s) for a in schedule.machines)
     assert shown["end_s"] == schedule.makespan_s == shown["now_s"]

@@ -5,21 +5,22 @@ import os
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
-from lab.composer import Outcome
-from lab.crew import Crew, Durations
 from lab.errors import BadInput, WorkFailed, counted
-from lab.files import nearest
+from lab.files import draft, nearest
+from lab.mdp import TabularMDP, greedy_path
 from lab.policy import Policy
+from lab.production.composer import Outcome
+from lab.production.durations import Durations
+from lab.production.skillset import SkillSet
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import SequenceResult
 from lab.sequencing.exact import Optimum
 from lab.sequencing.run import simulate
 from lab.sim.scene import Layout
-from lab.skills import Insert
-from lab.skills.skill import Problem
+from lab.skills import Skill
+from lab.skills.skill import Photo, Problem
 from lab.skills.surveys import Surveys
 from lab.taskfile import Task
 from lab.teaching import Lesson
@@ -45,7 +46,7 @@ class Prepared:
     seed: int
     layout: Layout
     surveys: Surveys
-    crew: Crew
+    skillset: SkillSet
     problems: dict[str, Problem]
     wall_s: float = 0.0
 
@@ -150,11 +151,11 @@ def write_files(prepared: Prepared, taught: Taught, report: Report, out: Path) -
     report.files = {name: str(out / FILES[name]) for name in _names(prepared, report)}
     try:
         out.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=".run-", dir=out) as beside:
-            _draw_all(prepared, taught, report, Path(beside))
+        with draft(out) as beside:
+            _draw_all(prepared, taught, report, beside)
             for name, file in FILES.items():
                 if name in report.files:
-                    os.replace(Path(beside) / file, out / file)
+                    os.replace(beside / file, out / file)
                 else:
                     (out / file).unlink(missing_ok=True)
     except OSError as error:
@@ -162,15 +163,16 @@ def write_files(prepared: Prepared, taught: Taught, report: Report, out: Path) -
 
 
 def _names(prepared: Prepared, report: Report) -> list[str]:
-    """The files that this run can have: a Gantt chart needs a move, the camera's pictures need an insert task."""
+    """The files that this run can have: a Gantt chart needs a move, the camera's pictures need a skill that took one."""
     missing = set() if report.outcome.schedule.robot else {"gantt"}
-    if _insert(prepared) is None:
+    if _photographed(prepared) is None:
         missing |= {"value_map", "overhead"}
     return [name for name in FILES if name not in missing]
 
 
-def _insert(prepared: Prepared) -> Insert | None:
-    return next((skill for skill in prepared.crew.skills.values() if isinstance(skill, Insert)), None)
+def _photographed(prepared: Prepared) -> Skill | None:
+    """The first skill whose problem was read from a picture."""
+    return next((skill for skill in prepared.skillset.skills.values() if skill.photo() is not None), None)
 
 
 def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) -> None:
@@ -184,10 +186,11 @@ def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) 
     if "gantt" in report.files:
         gantt(report.outcome.schedule, paths["gantt"], predicted=predicted)
     learning_curves(_curves(prepared, taught.lessons), paths["learning_curves"])
-    insert = _insert(prepared)
-    if insert is not None:
-        draw_value_map(insert, taught.lessons[insert.name].policy, paths["value_map"])
-        write_picture(paths["overhead"], insert.picture)
+    skill = _photographed(prepared)
+    photo = None if skill is None else skill.photo()
+    if skill is not None and photo is not None:
+        draw_value_map(skill.problem.mdp, photo, taught.lessons[skill.name].policy, paths["value_map"])
+        write_picture(paths["overhead"], photo.picture)
     title = f"{prepared.task.title or prepared.task.name}: {counted(prepared.toasts, 'toast')}"
     replay_html(report.recording, paths["replay"], title=title)
     _write_json(paths["sequence"], _sequence_document(taught, report))
@@ -219,23 +222,21 @@ def _sequence_document(taught: Taught, report: Report) -> dict[str, Any]:
     }
 
 
-def draw_value_map(insert: Insert, policy: Policy, path: Path) -> None:
-    """The insert task's values over the camera's picture, with the learned way."""
-    from lab.mdp import greedy_path
+def draw_value_map(mdp: TabularMDP, photo: Photo, policy: Policy, path: Path) -> None:
+    """The values of a problem over the picture that it was read from, with the learned way."""
     from lab.view.plots import cell_corners, value_map
 
-    mdp = insert.problem.mdp
     states, _, _ = greedy_path(policy.q, mdp, mdp.n_states)
     cells = [mdp.state_cell(state) for state in states]
     value_map(
         policy.q.max(axis=1).reshape(mdp.shape),
-        insert.picture,
+        photo.picture,
         path,
-        corners=cell_corners(insert.seen.view),
+        corners=cell_corners(photo.seen.view),
         route=[(cell[0], cell[1]) for cell in cells],
         blocked=(mdp.terminal & ~mdp.goal).reshape(mdp.shape),
-        start=insert.seen.start,
-        goal=insert.seen.goal,
+        start=photo.seen.start,
+        goal=photo.seen.goal,
     )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from lab.data import assets_folder
-from lab.recorder import FRAME_EVERY, Recorder
+from lab.production.recorder import FRAME_EVERY, Recorder
 from lab.sim.assets import SLICE
 from lab.sim.world import TIME_STEP, World
 from lab.view.frames import Body, Frame
@@ -61,9 +61,9 @@ def test_toast_and_butter_are_hidden_until_they_are_there(world: World) -> None:
     assert len(names) == len(recorder.bodies) == 2 + 2 * (1 + 9)
     recorder.take()
     recorder.toast(2)
-    recorder.butter(2, (0, 1))
+    recorder.show("butter 2 01")
     recorder.take()
-    recorder.butter(2, (0, 1))  # told again after each step
+    recorder.show("butter 2 01")  # told again after each step
     recorder.take()
     first, second, third = recorder.recording.frames
     assert dict(first.visible) == dict.fromkeys(names - {"slice 1", "slice 2"}, False)
@@ -75,7 +75,7 @@ def test_toast_and_butter_are_hidden_until_they_are_there(world: World) -> None:
 def test_what_is_on_a_slice_moves_with_it(world: World) -> None:
     recorder = Recorder(world, 2)
     recorder.toast(1)
-    recorder.butter(1, (2, 2))
+    recorder.show("butter 1 22")
     run(world, recorder, FRAME_EVERY)
     (frame,) = recorder.recording.frames
     assert frame.poses["toasted 1"] == frame.poses["butter 1 22"] == frame.poses["slice 1"]

@@ -1,12 +1,12 @@
-"""A task's crew: exactly the skills that its route needs, and the cell that its measured durations make."""
-
-import json
+"""A task's skills: exactly those that its route needs, and the cell that their measured durations make."""
 
 import numpy as np
 import pytest
 
-from lab.crew import Crew, Durations, cell_of, is_toaster, route, stations
 from lab.errors import BadInput
+from lab.production.durations import Durations, cell_of
+from lab.production.skillset import SkillSet, route, stations
+from lab.sim.scene import is_toaster
 from lab.skills import SKILLS, Insert, Place, Transfer
 from lab.skills.surveys import INSERT_START
 from lab.taskfile import Stage, Task, load
@@ -17,16 +17,16 @@ def task() -> Task:
     return load("toast")
 
 
-def durations(crew: Crew) -> Durations:
+def durations(skillset: SkillSet) -> Durations:
     """Empty moves take 2, 3, ... s, loaded ones 20, 21, ... s, butter 30 s."""
-    empty = {pair: 2.0 + n for n, pair in enumerate(crew.moves.empty)}
-    loaded = {pair: 20.0 + n for n, pair in enumerate(crew.moves.loaded)}
+    empty = {pair: 2.0 + n for n, pair in enumerate(skillset.moves.empty)}
+    loaded = {pair: 20.0 + n for n, pair in enumerate(skillset.moves.loaded)}
     return Durations(empty, loaded, {"butter_applier": 30.0}, 99.0)
 
 
 def test_the_crew_for_one_toast_is_what_its_way_needs(task: Task) -> None:
     direct = task.model_copy(update={"route": tuple(Stage(station=s.station) for s in task.route)})
-    assert set(Crew.of(direct, 1).skills) == {
+    assert set(SkillSet.of(direct, 1).skills) == {
         "transfer toaster_buffer to plate",
         "grasp at plate",
         "transfer plate to insert with slice",
@@ -44,10 +44,10 @@ def test_the_crew_for_one_toast_is_what_its_way_needs(task: Task) -> None:
 
 @pytest.mark.parametrize("toasts", [1, 2, 50])
 def test_every_needed_move_has_its_skills(task: Task, toasts: int) -> None:
-    crew = Crew.of(task, toasts)
-    assert {skill.subtask for skill in crew.skills.values()} == set(SKILLS)
-    for origin, target in crew.moves.loaded:
-        grasp, transfer, arrive = crew.leg(origin, target)
+    skillset = SkillSet.of(task, toasts)
+    assert {skill.subtask for skill in skillset.skills.values()} == set(SKILLS)
+    for origin, target in skillset.moves.loaded:
+        grasp, transfer, arrive = skillset.legs[origin, target]
         assert grasp.name == f"grasp at {origin}"
         assert isinstance(transfer, Transfer)
         assert transfer.loaded
@@ -56,19 +56,19 @@ def test_every_needed_move_has_its_skills(task: Task, toasts: int) -> None:
         else:
             assert (transfer.target, type(arrive)) == (target, Place)
         assert arrive.name.endswith(f" at {target}")
-    for origin, target in crew.moves.empty:
-        assert crew.empty(origin, target).name == f"transfer {origin} to {target}"
-    assert crew.policies == {}
+    for origin, target in skillset.moves.empty:
+        assert [skill.name for skill in skillset.travels[origin, target]] == [f"transfer {origin} to {target}"]
+    assert skillset.policies == {}
 
 
 def test_more_toasts_need_more_empty_ways_but_no_other_skills(task: Task) -> None:
-    one, two, many = (set(Crew.of(task, toasts).skills) for toasts in (1, 2, 30))
+    one, two, many = (set(SkillSet.of(task, toasts).skills) for toasts in (1, 2, 30))
     assert one < two == many
     assert all(name.startswith("transfer ") and "slice" not in name for name in two - one)
 
 
 def test_only_the_toaster_is_reached_through_the_camera(task: Task) -> None:
-    assert [s.name for s in task.stations if is_toaster(task, s.name)] == ["toaster"]
+    assert [s.name for s in task.stations if is_toaster(s)] == ["toaster"]
 
 
 def test_the_sequencer_is_told_what_the_task_says(task: Task) -> None:
@@ -83,8 +83,8 @@ def test_the_sequencer_is_told_what_the_task_says(task: Task) -> None:
 
 
 def test_the_cell_holds_the_measured_times_and_nothing_else(task: Task) -> None:
-    crew = Crew.of(task, 2)
-    measured = durations(crew)
+    skillset = SkillSet.of(task, 2)
+    measured = durations(skillset)
     cell = cell_of(task, measured, 2)
     assert cell.order == ("toast", "toast")
     assert cell.robot_start == task.robot.start
@@ -96,17 +96,22 @@ def test_the_cell_holds_the_measured_times_and_nothing_else(task: Task) -> None:
 
 
 def test_a_move_that_was_not_measured_is_missed(task: Task) -> None:
-    crew = Crew.of(task, 2)
-    measured = durations(crew)
+    skillset = SkillSet.of(task, 2)
+    measured = durations(skillset)
     less = Durations(measured.empty_s, {}, measured.process_s)
     with pytest.raises(BadInput, match="loaded_s 'plate' -> 'toaster' is missing"):
         cell_of(task, less, 2)
 
 
-def test_durations_survive_json(task: Task) -> None:
-    measured = durations(Crew.of(task, 3))
-    back = Durations.from_json(json.loads(json.dumps(measured.to_json())))
-    assert back.empty_s == measured.empty_s
-    assert back.loaded_s == measured.loaded_s
-    assert back.process_s == measured.process_s
-    assert back.sim_s == 0.0  # nothing was simulated when they are read back
+def test_an_unknown_sub_task_is_refused(task: Task) -> None:
+    typo = task.model_copy(update={"subtasks": {"insrt": task.subtask("insert")}})
+    with pytest.raises(BadInput, match=r"unknown sub-task 'insrt' .task 'toast': subtasks.: did you mean 'insert'"):
+        SkillSet.of(typo, 1)
+
+
+def test_a_machine_whose_process_nobody_can_do_is_refused(task: Task) -> None:
+    jam = tuple(s.model_copy(update={"process": "jam"}) if s.process else s for s in task.stations)
+    with pytest.raises(
+        BadInput, match=r"unknown process 'jam' .task 'toast': station 'butter_applier'.: known: butter"
+    ):
+        SkillSet.of(task.model_copy(update={"stations": jam}), 1)

@@ -6,16 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lab.composer import MAX_TRIES, Outcome, Production, carry_out
-from lab.crew import Crew, Durations, cell_of
 from lab.errors import WorkFailed
-from lab.line import Line, measure, try_grasp
+from lab.production.composer import MAX_TRIES, Outcome, Production, carry_out
+from lab.production.durations import Durations, cell_of, measure
+from lab.production.floor import Floor, try_out
+from lab.production.skillset import SkillSet
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import Move
 from lab.sequencing.run import simulate
 from lab.sim.scene import Layout, spots
 from lab.sim.world import TIME_STEP, World
-from lab.skills import Butter, Grasp
+from lab.skills import Butter
 from lab.skills.skill import Status
 from lab.skills.surveys import Surveys
 from lab.taskfile import Stage, Task, load
@@ -46,23 +47,23 @@ def surveys(task: Task, layout: Layout) -> Surveys:
 
 
 @pytest.fixture(scope="module")
-def staffed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Task, Surveys, int], Crew]:
-    """A crew that has learned its skills from the expert."""
-    teacher = Teacher(Toolbox(tmp_path_factory.mktemp("crew")))
+def staffed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Task, Surveys, int], SkillSet]:
+    """A task's skills, learned from the expert."""
+    teacher = Teacher(Toolbox(tmp_path_factory.mktemp("skills")))
 
-    def staff(task: Task, surveys: Surveys, toasts: int) -> Crew:
-        crew = Crew.of(task, toasts)
-        for name, skill in crew.skills.items():
+    def staff(task: Task, surveys: Surveys, toasts: int) -> SkillSet:
+        skillset = SkillSet.of(task, toasts)
+        for name, skill in skillset.skills.items():
             problem = skill.setup(surveys)
             settings = task.subtask(problem.subtask)
-            crew.policies[name] = teacher.find_or_teach(problem, settings, task.name, {}).policy
-        return crew
+            skillset.policies[name] = teacher.find_or_teach(problem, settings, task.name, {}).policy
+        return skillset
 
     return staff
 
 
 @pytest.fixture(scope="module")
-def crew(task: Task, surveys: Surveys, staffed: Callable[[Task, Surveys, int], Crew]) -> Crew:
+def skillset(task: Task, surveys: Surveys, staffed: Callable[[Task, Surveys, int], SkillSet]) -> SkillSet:
     return staffed(task, surveys, 1)
 
 
@@ -73,8 +74,8 @@ def told() -> list[tuple[str, float]]:
 
 
 @pytest.fixture(scope="module")
-def durations(crew: Crew, surveys: Surveys, told: list[tuple[str, float]]) -> Durations:
-    return measure(crew, surveys, lambda name, seconds: told.append((name, seconds)))
+def durations(skillset: SkillSet, surveys: Surveys, told: list[tuple[str, float]]) -> Durations:
+    return measure(skillset, surveys, lambda name, seconds: told.append((name, seconds)))
 
 
 @pytest.fixture(scope="module")
@@ -83,15 +84,15 @@ def cell(task: Task, durations: Durations) -> Cell:
 
 
 @pytest.fixture
-def clueless(crew: Crew) -> Iterator[Callable[[str], None]]:
+def clueless(skillset: SkillSet) -> Iterator[Callable[[str], None]]:
     """Lets a skill forget all it knows; it knows it again after the test."""
-    kept = dict(crew.policies)
+    kept = dict(skillset.policies)
 
     def forget(name: str) -> None:
-        crew.policies[name] = replace(kept[name], q=np.zeros_like(kept[name].q))
+        skillset.policies[name] = replace(kept[name], q=np.zeros_like(kept[name].q))
 
     yield forget
-    crew.policies.update(kept)
+    skillset.policies.update(kept)
 
 
 class Watcher:
@@ -108,9 +109,9 @@ class Watcher:
         self.frames.append(frame)
 
 
-def test_every_needed_move_is_measured(crew: Crew, durations: Durations, told: list[tuple[str, float]]) -> None:
-    assert set(durations.empty_s) == set(crew.moves.empty)
-    assert set(durations.loaded_s) == set(crew.moves.loaded)
+def test_every_needed_move_is_measured(skillset: SkillSet, durations: Durations, told: list[tuple[str, float]]) -> None:
+    assert set(durations.empty_s) == set(skillset.moves.empty)
+    assert set(durations.loaded_s) == set(skillset.moves.loaded)
     assert set(durations.process_s) == {"butter_applier"}
     times = [*durations.empty_s.values(), *durations.loaded_s.values(), *durations.process_s.values()]
     assert all(1.0 < seconds < 40.0 for seconds in times)
@@ -123,7 +124,7 @@ def test_every_needed_move_is_measured(crew: Crew, durations: Durations, told: l
 
 
 def test_measuring_again_gives_the_same_to_the_last_bit(
-    task: Task, surveys: Surveys, staffed: Callable[[Task, Surveys, int], Crew]
+    task: Task, surveys: Surveys, staffed: Callable[[Task, Surveys, int], SkillSet]
 ) -> None:
     short = staffed(task.model_copy(update={"route": (task.route[0], task.route[-1])}), surveys, 1)
     one = measure(short, surveys)
@@ -132,23 +133,25 @@ def test_measuring_again_gives_the_same_to_the_last_bit(
 
 
 def test_a_move_that_cannot_be_measured_is_a_failure_that_says_so(
-    crew: Crew, surveys: Surveys, clueless: Callable[[str], None]
+    skillset: SkillSet, surveys: Surveys, clueless: Callable[[str], None]
 ) -> None:
     clueless("grasp at plate")
     with pytest.raises(WorkFailed, match=r"^measuring 'grasp at plate': policy 'grasp at plate \w+' does not reach"):
-        measure(crew, surveys)
+        measure(skillset, surveys)
 
 
-def test_one_toast_is_delivered_in_the_time_predicted(crew: Crew, surveys: Surveys, layout: Layout, cell: Cell) -> None:
+def test_one_toast_is_delivered_in_the_time_predicted(
+    skillset: SkillSet, surveys: Surveys, layout: Layout, cell: Cell
+) -> None:
     moves: list[Move] = []
     watcher = Watcher()
-    outcome, recording = carry_out(crew, surveys, layout, cell, (1, 1, 1), viewer=watcher, on_move=moves.append)
+    outcome, recording = carry_out(skillset, surveys, layout, cell, (1, 1, 1), viewer=watcher, on_move=moves.append)
     assert outcome.failure is None
     assert (outcome.delivered, outcome.dropped, outcome.retries) == ((1,), (), ())
     predicted = simulate(cell, (1, 1, 1))
     assert outcome.schedule.makespan_s == pytest.approx(predicted.makespan_s, rel=0.03)
     assert outcome.schedule.sequence == (1, 1, 1)
-    assert [(m.origin, m.target) for m in moves] == list(crew.moves.loaded)
+    assert [(m.origin, m.target) for m in moves] == list(skillset.moves.loaded)
     assert moves[1].pick_s >= moves[0].drop_s + 4.0  # the toaster's time
     assert 0 < max(outcome.camera_deviations_m) < 0.008
     recording.check()
@@ -157,7 +160,7 @@ def test_one_toast_is_delivered_in_the_time_predicted(crew: Crew, surveys: Surve
     assert shown[0] == "toasted 1"
     assert sorted(shown[1:]) == [f"butter 1 {row}{column}" for row in range(3) for column in range(3)]
     last = recording.frames[-1].poses["slice 1"]
-    spot = spots(crew.task.station("finished_plate"))[0]
+    spot = spots(skillset.task.station("finished_plate"))[0]
     assert (last[0], last[1]) == pytest.approx((spot.x, spot.y), abs=0.005)
     assert outcome.sim_s >= outcome.schedule.makespan_s
 
@@ -182,7 +185,7 @@ def failed(outcome: Outcome, where: str, why: str) -> None:
 def test_a_step_that_goes_on_failing_stops_the_run_with_toast_place_and_reason(
     skill: str,
     where: str,
-    crew: Crew,
+    skillset: SkillSet,
     surveys: Surveys,
     layout: Layout,
     cell: Cell,
@@ -190,9 +193,9 @@ def test_a_step_that_goes_on_failing_stops_the_run_with_toast_place_and_reason(
 ) -> None:
     clueless(skill)
     heard: list[str] = []
-    outcome, _ = carry_out(crew, surveys, layout, cell, (1, 1, 1), on_retry=heard.append)
-    start = crew.skills[skill].reason
-    assert start.startswith(f"policy '{crew.policies[skill].name}' does not reach its goal from ")
+    outcome, _ = carry_out(skillset, surveys, layout, cell, (1, 1, 1), on_retry=heard.append)
+    start = skillset.skills[skill].reason
+    assert start.startswith(f"policy '{skillset.policies[skill].name}' does not reach its goal from ")
     failed(outcome, where, start)
     assert tuple(heard) == outcome.retries
     assert all(text.startswith(f"toast 1 at '{where}', '{skill}', try ") for text in heard)
@@ -200,10 +203,10 @@ def test_a_step_that_goes_on_failing_stops_the_run_with_toast_place_and_reason(
 
 
 def test_slippery_slices_are_not_delivered_and_said_to_be_lost(
-    task: Task, crew: Crew, surveys: Surveys, layout: Layout, cell: Cell
+    task: Task, skillset: SkillSet, surveys: Surveys, layout: Layout, cell: Cell
 ) -> None:
     oily = task.model_copy(update={"slices": task.slices.model_copy(update={"friction": 0.0})})
-    outcome, recording = carry_out(replace(crew, task=oily), surveys, layout, cell, (1, 1, 1))
+    outcome, recording = carry_out(replace(skillset, task=oily), surveys, layout, cell, (1, 1, 1))
     assert outcome.failure is not None
     assert outcome.failure.startswith("toast 1 at 'plate': slice 1 is ")
     assert outcome.retries[0] == (
@@ -215,26 +218,26 @@ def test_slippery_slices_are_not_delivered_and_said_to_be_lost(
 
 
 class Ground:
-    """A line with a production on it, begun at the robot's start."""
+    """A floor with a production on it, begun at the robot's start."""
 
-    def __init__(self, world: World, crew: Crew, surveys: Surveys, layout: Layout, cell: Cell) -> None:
-        self.line = Line(world, crew, layout, cell.parts)
-        self.line.at(cell.robot_start, surveys)
-        self.line.restart_clock()
-        self.work = Production(self.line, cell, surveys)
+    def __init__(self, world: World, skillset: SkillSet, surveys: Surveys, layout: Layout, cell: Cell) -> None:
+        self.floor = Floor(world, skillset, layout, cell.parts)
+        self.floor.stand(surveys.approach(cell.robot_start))
+        self.floor.restart_clock()
+        self.work = Production(self.floor, cell, surveys)
 
     def put(self, name: str, x: float, y: float, z: float) -> None:
-        self.line.world.put(name, (x, y, z))
+        self.floor.world.put(name, (x, y, z))
 
 
 @pytest.fixture
-def ground(crew: Crew, surveys: Surveys, layout: Layout, cell: Cell) -> Iterator[Ground]:
+def ground(skillset: SkillSet, surveys: Surveys, layout: Layout, cell: Cell) -> Iterator[Ground]:
     with World() as world:
-        yield Ground(world, crew, surveys, layout, cell)
+        yield Ground(world, skillset, surveys, layout, cell)
 
 
 def test_a_grasp_that_failed_once_is_tried_again_and_the_run_goes_on(ground: Ground) -> None:
-    place = ground.line.world.pose("slice 1")[0]
+    place = ground.floor.world.pose("slice 1")[0]
     ground.put("slice 1", 0.6, 0.0, -9.0)
 
     def put_back(text: str) -> None:
@@ -248,17 +251,17 @@ def test_a_grasp_that_failed_once_is_tried_again_and_the_run_goes_on(ground: Gro
 
 
 def test_a_slice_set_down_beside_the_slot_is_picked_up_again_and_inserted(ground: Ground, task: Task) -> None:
-    line = ground.line
+    floor = ground.floor
     x, y, _ = task.station("toaster").pose
     spoiled: list[float] = []
 
     def spoil() -> None:
-        insert = line.crew.skills["insert at toaster"]
-        if insert.status is Status.RUNNING and line.bench.held is None and not spoiled:
-            spoiled.append(line.now_s)
-            line.world.put("slice 1", (x, y - 0.11, 0.06))  # beside the toaster
+        insert = floor.skillset.skills["insert at toaster"]
+        if insert.status is Status.RUNNING and floor.bench.held is None and not spoiled:
+            spoiled.append(floor.now_s)
+            floor.world.put("slice 1", (x, y - 0.11, 0.06))  # beside the toaster
 
-    line.on_tick = spoil
+    floor.on_tick = spoil
     failure = ground.work.carry_out((1,))
     assert spoiled
     assert failure is None, ground.work.retries
@@ -269,33 +272,33 @@ def test_a_slice_set_down_beside_the_slot_is_picked_up_again_and_inserted(ground
 def test_a_slice_set_down_beside_its_spot_on_the_last_plate_is_taken_up_again_and_delivered(
     ground: Ground, task: Task
 ) -> None:
-    line = ground.line
+    floor = ground.floor
     x, y, _ = task.station("finished_plate").pose
     spoiled: list[float] = []
 
     def spoil() -> None:
-        place = line.crew.skills["place at finished_plate"]
-        if place.status is Status.RUNNING and line.bench.held is None and not spoiled:
-            spoiled.append(line.now_s)
-            line.world.put("slice 1", (x - 0.03, y + 0.02, 0.073))
+        place = floor.skillset.skills["place at finished_plate"]
+        if place.status is Status.RUNNING and floor.bench.held is None and not spoiled:
+            spoiled.append(floor.now_s)
+            floor.world.put("slice 1", (x - 0.03, y + 0.02, 0.073))
 
-    line.on_tick = spoil
+    floor.on_tick = spoil
     failure = ground.work.carry_out((1, 1, 1))
     assert spoiled
     assert failure is None, ground.work.retries
     assert [note for note in ground.work.retries if "does not stand on 'finished_plate'" in note] == ground.work.retries
     assert len(ground.work.retries) == 1
-    assert line.bench.stands("slice 1", ground.work.spot_of[1].grasp(), 0.012)
+    assert floor.bench.stands("slice 1", ground.work.spot_of[1].grasp(), 0.012)
 
 
 def test_a_machine_that_failed_while_the_robot_was_away_is_noticed_and_tried_again(ground: Ground) -> None:
     """The butter's failure is over long before the robot asks for the slice."""
-    line, work = ground.line, ground.work
-    butter = line.crew.skills["butter at butter_applier"]
+    floor, work = ground.floor, ground.work
+    butter = floor.skillset.skills["butter at butter_applier"]
     assert isinstance(butter, Butter)
-    line.scene.world.put("slice 1", (0.80, -0.52, 0.0805))
-    butter.on("slice 1")
-    line.machines["butter_applier"] = butter
+    floor.scene.world.put("slice 1", (0.80, -0.52, 0.0805))
+    butter.aim("slice 1")
+    floor.machines["butter_applier"] = butter
     butter.status, butter.reason = Status.FAILURE, "the butter missed 9 of 9 cells"
     work._await(1, "butter_applier")
     assert work.retries == ["toast 1 at 'butter_applier', try 1: the butter missed 9 of 9 cells"]
@@ -308,11 +311,11 @@ def test_a_machine_that_goes_on_failing_stops_the_run(
 ) -> None:
     clueless("butter at butter_applier")
     work = ground.work
-    ground.line.bench.held = None
+    ground.floor.bench.held = None
     for decision in (1, 1):  # plate to toaster, toaster to butter_applier
         work.plan.move(decision)
     ground.put("slice 1", 0.80, -0.52, 0.0805)
-    ground.line.at("butter_applier", surveys)
+    ground.floor.stand(surveys.approach("butter_applier"))
     work.place = "butter_applier"
     work._start_machine(1, "butter_applier")
     failure = work.carry_out((1,))
@@ -338,14 +341,14 @@ def test_a_toast_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None
 def test_the_robot_waits_until_the_machine_is_done(ground: Ground) -> None:
     ground.work.ready_s["toaster"] = 0.5
     ground.work._await(1, "toaster")
-    assert ground.line.now_s == pytest.approx(0.5, abs=TIME_STEP)
+    assert ground.floor.now_s == pytest.approx(0.5, abs=TIME_STEP)
     ground.work._await(1, "toaster")
-    assert ground.line.now_s == pytest.approx(0.5, abs=TIME_STEP)
+    assert ground.floor.now_s == pytest.approx(0.5, abs=TIME_STEP)
 
 
-def test_a_grasp_can_be_tried_alone(crew: Crew, surveys: Surveys, clueless: Callable[[str], None]) -> None:
-    grasp = crew.skills["grasp at plate"]
-    assert isinstance(grasp, Grasp)
-    assert try_grasp(crew, surveys, grasp) is None
+def test_a_grasp_can_be_tried_alone(skillset: SkillSet, surveys: Surveys, clueless: Callable[[str], None]) -> None:
+    grasp = skillset.skills["grasp at plate"]
+    assert grasp.tried
+    assert try_out(skillset, surveys, grasp) is None
     clueless("grasp at plate")
-    assert "does not reach its goal" in (try_grasp(crew, surveys, grasp) or "")
+    assert "does not reach its goal" in (try_out(skillset, surveys, grasp) or "")

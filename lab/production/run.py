@@ -1,31 +1,28 @@
 """The main job: find or learn the skills, measure their durations, sequence, carry out in physics."""
 
-import hashlib
 import time
 from dataclasses import replace
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
 
-from lab.composer import carry_out
-from lab.crew import Crew, Durations, cell_of
-from lab.line import measure, try_grasp
+from lab.errors import LabError
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
 from lab.policy import Policy
-from lab.recorder import Viewer, show_scene
-from lab.report import Prepared, Report, Taught, write_files
+from lab.production.composer import carry_out
+from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
+from lab.production.floor import try_out
+from lab.production.recorder import Viewer, show_scene
+from lab.production.report import Prepared, Report, Taught, write_files
+from lab.production.skillset import SkillSet
 from lab.sequencing.exact import optimum
 from lab.sequencing.search import Reference
-from lab.sim.scene import Layout, check_apart, draw_layout
-from lab.skills import Grasp
+from lab.sim.scene import check_apart, draw_layout
 from lab.skills.skill import Problem
 from lab.skills.surveys import Surveys
 from lab.taskfile import Task, check_toasts
 from lab.teaching import Teacher, Trial
-
-_LAB = Path(__file__).resolve().parent  # whose code the kept durations depend on
 
 
 def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prepared:
@@ -36,29 +33,29 @@ def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prep
     began = time.perf_counter()
     check_toasts(toasts, task)
     check_apart(task, toasts)
+    skillset = SkillSet.of(task, toasts)
     layout = draw_layout(task, toasts, np.random.default_rng([seed, 1]))
     surveys = Surveys(task, layout)
-    crew = Crew.of(task, toasts)
-    problems = {name: skill.setup(surveys) for name, skill in crew.skills.items() if only in (None, name)}
-    return Prepared(task, toasts, seed, layout, surveys, crew, problems, time.perf_counter() - began)
+    problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items() if only in (None, name)}
+    return Prepared(task, toasts, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
 
 
 def trial_of(prepared: Prepared) -> Trial:
-    """What tries a learned skill in physics before it is kept: a grasp must lift its slice; other skills are not tried."""
+    """What tries a learned skill in physics before it is kept: a grasp must lift its slice; most skills are not tried."""
 
     def trial(problem: Problem, policy: Policy) -> str | None:
-        skill = prepared.crew.skills[problem.name]
-        if not isinstance(skill, Grasp):
+        skill = prepared.skillset.skills[problem.name]
+        if not skill.tried:
             return None
-        prepared.crew.policies[skill.name] = policy
-        return try_grasp(prepared.crew, prepared.surveys, skill)
+        prepared.skillset.policies[skill.name] = policy
+        return try_out(prepared.skillset, prepared.surveys, skill)
 
     return trial
 
 
 def teach_all(prepared: Prepared, teacher: Teacher, listener: Listener) -> Taught:
     """Find or learn every skill, then find or measure the durations of every move."""
-    task, crew = prepared.task, prepared.crew
+    task, skillset = prepared.task, prepared.skillset
     teacher = replace(teacher, trial=trial_of(prepared))
     known, damaged = teacher.toolbox.index()
     for what in damaged:
@@ -68,7 +65,7 @@ def teach_all(prepared: Prepared, teacher: Teacher, listener: Listener) -> Taugh
     for name, problem in prepared.problems.items():
         lesson = teacher.find_or_teach(problem, task.subtask(problem.subtask), task.name, known)
         known[problem.subtask, problem.mdp.signature] = lesson.policy
-        crew.policies[name] = lesson.policy
+        skillset.policies[name] = lesson.policy
         lessons[name] = lesson
         listener.lesson(name, lesson)
     durations = _durations(prepared, teacher, listener)
@@ -77,52 +74,26 @@ def teach_all(prepared: Prepared, teacher: Teacher, listener: Listener) -> Taugh
 
 def _durations(prepared: Prepared, teacher: Teacher, listener: Listener) -> Durations:
     """The durations measured earlier for exactly these policies in exactly this scene, or measured now and kept."""
-    crew = prepared.crew
-    key = _fingerprint(prepared.task, prepared.layout, crew)
-    kept = _kept_durations(teacher, key, crew)
+    skillset, key, kept = prepared.skillset, "", None
+    try:
+        key = durations_key(prepared.task, prepared.layout, skillset.moves, skillset.policies)
+        kept = kept_durations(teacher.toolbox, key, prepared.task, skillset.moves)
+    except LabError as error:  # then they are measured: nothing is lost but time
+        listener.skipped(f"durations measured earlier: {error}")
     if kept is not None:
         return kept
     processes = sum(station.process is not None for station in prepared.task.stations)
-    listener.phase("measure", len(crew.moves.loaded) + len(crew.moves.empty) + processes)
-    durations = measure(crew, prepared.surveys, listener.measured)
-    teacher.toolbox.save_record("durations", key, durations.to_json())
+    listener.phase("measure", len(skillset.moves.loaded) + len(skillset.moves.empty) + processes)
+    durations = measure(skillset, prepared.surveys, listener.measured)
+    if key:
+        teacher.toolbox.save_record(RECORDS, key, durations.to_json())
     return durations
-
-
-def _kept_durations(teacher: Teacher, key: str, crew: Crew) -> Durations | None:
-    """The record of that key; None when there is none, or it is not whole."""
-    record = teacher.toolbox.load_record("durations", key)
-    try:
-        kept = None if record is None else Durations.from_json(record)
-    except (AttributeError, KeyError, TypeError, ValueError):
-        return None
-    if (
-        kept is None
-        or not set(crew.moves.empty) <= kept.empty_s.keys()
-        or not set(crew.moves.loaded) <= kept.loaded_s.keys()
-        or not {station.name for station in crew.task.stations if station.process} <= kept.process_s.keys()
-    ):
-        return None
-    times = (*kept.empty_s.values(), *kept.loaded_s.values(), *kept.process_s.values())
-    return kept if all(isfinite(seconds) and seconds >= 0.0 for seconds in times) else None
-
-
-def _fingerprint(task: Task, layout: Layout, crew: Crew) -> str:
-    """A hash of all that a move's duration depends on: the code, the scene, where things stand, the tables followed."""
-    physical = task.model_dump_json(exclude={"name", "title", "sequencing", "subtasks"})
-    digest = hashlib.sha256(f"{physical}{layout.obstacles}{crew.moves}".encode())
-    for code in sorted([*_LAB.glob("sim/*.py"), *_LAB.glob("skills/*.py"), _LAB / "line.py"]):
-        digest.update(code.read_bytes())
-    for name in sorted(crew.policies):
-        policy: Policy = crew.policies[name]
-        digest.update(f"{name}{policy.signature}".encode() + policy.q.tobytes())
-    return digest.hexdigest()[:24]
 
 
 def run(
     prepared: Prepared, teacher: Teacher, out: Path, *, listener: Listener | None = None, viewer: Viewer | None = None
 ) -> Report:
-    """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.report.check_out`)."""
+    """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.production.report.check_out`)."""
     began = time.perf_counter() - prepared.wall_s
     listener = listener or Listener()
     if viewer is not None:
@@ -135,7 +106,7 @@ def run(
     listener.sequenced(found, Reference(proven.bound_s, proven.proven, "A*"))
     listener.phase("carry out", len(found.sequence))
     outcome, recording = carry_out(
-        prepared.crew,
+        prepared.skillset,
         prepared.surveys,
         prepared.layout,
         taught.cell,

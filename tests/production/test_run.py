@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-import lab.report
-import lab.run
-from lab.composer import Outcome
-from lab.crew import Crew, Durations
+import lab.production.report
+import lab.production.run
 from lab.errors import BadInput, WorkFailed
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
-from lab.report import FILES, Prepared, Report, Taught, check_out, write_files
-from lab.run import prepare, teach_all
+from lab.production.composer import Outcome
+from lab.production.durations import Durations
+from lab.production.report import FILES, Prepared, Report, Taught, check_out, write_files
+from lab.production.run import prepare, teach_all
+from lab.production.skillset import SkillSet
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.events import Schedule
 from lab.sequencing.exact import optimum
@@ -185,24 +186,24 @@ def toolbox(cold: Ran, tmp_path: Path) -> Toolbox:
 
 
 @pytest.fixture
-def measured(monkeypatch: pytest.MonkeyPatch) -> list[Crew]:
-    """The crews whose moves were timed; each move takes 5 s."""
-    crews: list[Crew] = []
+def measured(monkeypatch: pytest.MonkeyPatch) -> list[SkillSet]:
+    """The skill sets whose moves were timed; each move takes 5 s."""
+    timed: list[SkillSet] = []
 
-    def measure(crew: Crew, *_: object) -> Durations:
-        crews.append(crew)
-        every = dict.fromkeys((*crew.moves.empty, *crew.moves.loaded), 5.0)
-        return Durations(every, every, {"butter_applier": 5.0}, 1.0)
+    def measure(skillset: SkillSet, *_: object) -> Durations:
+        timed.append(skillset)
+        empty, loaded = (dict.fromkeys(pairs, 5.0) for pairs in (skillset.moves.empty, skillset.moves.loaded))
+        return Durations(empty, loaded, {"butter_applier": 5.0}, 1.0)
 
-    monkeypatch.setattr(lab.run, "measure", measure)
-    return crews
+    monkeypatch.setattr(lab.production.run, "measure", measure)
+    return timed
 
 
 def sources(taught: Taught) -> dict[str, str]:
     return {name: lesson.source for name, lesson in taught.lessons.items()}
 
 
-def test_the_same_scene_needs_nothing(prepared: Prepared, toolbox: Toolbox, measured: list[Crew]) -> None:
+def test_the_same_scene_needs_nothing(prepared: Prepared, toolbox: Toolbox, measured: list[SkillSet]) -> None:
     heard = Heard()
     taught = teach_all(prepared, Teacher(toolbox), heard)
     assert set(sources(taught).values()) == {"reused"}
@@ -231,7 +232,7 @@ def same(one: Prepared, other: Prepared, name: str) -> bool:
     ("cubes", "by", "must"), [("tower left", (0.0, 0.1), "transfer"), ("cubes A", (0.0, -0.05), "insert")]
 )
 def test_a_moved_obstacle_is_learned_around_and_nothing_else(
-    prepared: Prepared, toolbox: Toolbox, measured: list[Crew], cubes: str, by: tuple[float, float], must: str
+    prepared: Prepared, toolbox: Toolbox, measured: list[SkillSet], cubes: str, by: tuple[float, float], must: str
 ) -> None:
     changed = prepare(move(prepared.task, cubes, by), 1, 0)
     affected = {name for name in prepared.problems if not same(prepared, changed, name)}
@@ -245,7 +246,7 @@ def test_a_moved_obstacle_is_learned_around_and_nothing_else(
 
 
 def test_damaged_policies_are_named_and_learned_again(
-    prepared: Prepared, toolbox: Toolbox, measured: list[Crew]
+    prepared: Prepared, toolbox: Toolbox, measured: list[SkillSet]
 ) -> None:
     files = {path.stem.partition("-at-")[0]: path for path in toolbox.folder.glob("*-at-*.safetensors")}
     files["insert"].write_bytes(files["insert"].read_bytes()[:-8])
@@ -269,16 +270,21 @@ def test_damaged_policies_are_named_and_learned_again(
         lambda record: record | {"loaded_s": dict.fromkeys(record["loaded_s"], -1.0)},
         lambda record: record | {"process_s": {"butter_applier": "soon"}},
         lambda record: record | {"empty_s": [1, 2]},
+        lambda record: record | {"empty_s": record["empty_s"] | {"plate > elsewhere": 5.0}},
+        lambda record: record | {"process_s": record["process_s"] | {"elsewhere": 5.0}},
     ],
 )
 def test_damaged_durations_are_measured_again(
-    prepared: Prepared, toolbox: Toolbox, measured: list[Crew], damage: Callable[[dict[str, Any]], dict[str, Any]]
+    prepared: Prepared, toolbox: Toolbox, measured: list[SkillSet], damage: Callable[[dict[str, Any]], dict[str, Any]]
 ) -> None:
     (path,) = (toolbox.folder / "records" / "durations").glob("*.json")
     whole = json.loads(path.read_text(encoding="utf-8"))
     path.write_text(json.dumps(whole | {"record": damage(whole["record"])}), encoding="utf-8")
-    taught = teach_all(prepared, Teacher(toolbox), Listener())
+    heard = Heard()
+    taught = teach_all(prepared, Teacher(toolbox), heard)
     assert len(measured) == 1
+    assert [what for what in heard.damaged if what.startswith("durations measured earlier: record '")] == heard.damaged
+    assert len(heard.damaged) == 1
     assert set(taught.durations.loaded_s.values()) == {5.0}
     teach_all(prepared, Teacher(toolbox), Listener())
     assert len(measured) == 1
@@ -319,7 +325,7 @@ def draw(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) -> 
         if stop is not None:
             raise stop
 
-    monkeypatch.setattr(lab.report, "_draw_all", quick)
+    monkeypatch.setattr(lab.production.report, "_draw_all", quick)
 
 
 def test_a_failed_run_says_so_and_leaves_no_old_chart(
@@ -332,6 +338,8 @@ def test_a_failed_run_says_so_and_leaves_no_old_chart(
     assert document["failure"].startswith("toast 1 at 'plate': ")
     (tmp_path / "gantt.png").write_text("old")
     (tmp_path / "mine.txt").write_text("mine")
+    (tmp_path / ".run-k3pt_0ab").mkdir()  # a run that was killed while it drew has left this
+    (tmp_path / ".run-k3pt_0ab" / "gantt.png").write_text("half")
     draw(monkeypatch)
     write_files(prepared, taught, failed, tmp_path)
     assert sorted(failed.files) == sorted(set(FILES) - {"gantt"})
@@ -367,7 +375,7 @@ def test_output_folders(tmp_path: Path) -> None:
 
 def test_lessons_are_drawn_once_for_each_table(prepared: Prepared, toolbox: Toolbox) -> None:
     taught = teach_all(prepared, Teacher(toolbox), Listener())
-    drawn = lab.report._curves(prepared, taught.lessons)
+    drawn = lab.production.report._curves(prepared, taught.lessons)
     assert len(drawn) == len({lesson.policy.name for lesson in taught.lessons.values()})
     assert "grasp at plate, starts vary" in drawn
     assert "insert at toaster" in drawn

@@ -1,0 +1,84 @@
+"""A scene with the robot and the machines at work in it: who is where, at one clock."""
+
+from collections.abc import Callable
+
+from lab.production.recorder import Recorder, Viewer
+from lab.production.skillset import SkillSet
+from lab.sim.kinematics import ToolPose
+from lab.sim.scene import Layout, Scene
+from lab.sim.world import TIME_STEP, World
+from lab.skills import Skill
+from lab.skills.skill import STAND_STEPS, Bench, Status
+from lab.skills.surveys import Surveys
+
+_SETTLE_STEPS = 60
+
+
+class Floor:
+    """A scene in which skills are carried out: one clock, the robot's skill and the machines' processes side by side."""
+
+    def __init__(
+        self,
+        world: World,
+        skillset: SkillSet,
+        layout: Layout,
+        toasts: int,
+        *,
+        film: bool = False,
+        viewer: Viewer | None = None,
+    ) -> None:
+        """Build the scene and let it settle; `film` keeps frames, `viewer` sees them live."""
+        self.world, self.skillset = world, skillset
+        self.scene = Scene(world, skillset.task, toasts, layout)
+        self.bench = Bench(self.scene)
+        self.machines: dict[str, Skill] = {}
+        self.on_tick: Callable[[], None] | None = None
+        for _ in range(_SETTLE_STEPS):
+            world.step()
+        self.recorder = Recorder(world, toasts, viewer) if film or viewer else None
+        self._zero = world.steps
+
+    @property
+    def now_s(self) -> float:
+        """Seconds since the floor was ready."""
+        return (self.world.steps - self._zero) * TIME_STEP
+
+    def restart_clock(self) -> None:
+        """Let the floor's time begin now."""
+        self._zero = self.world.steps
+
+    def tick(self) -> None:
+        """One physics step, with every running machine."""
+        for machine in self.machines.values():
+            machine.step()
+        self.world.step()
+        if self.on_tick is not None:
+            self.on_tick()
+        if self.recorder is not None:
+            self.recorder.step()
+
+    def start(self, skill: Skill) -> None:
+        """Begin to carry a skill out with its policy."""
+        skill.start(self.bench, self.skillset.policies[skill.name])
+
+    def run(self, skill: Skill) -> Status:
+        """Carry one skill out to its end."""
+        self.start(skill)
+        while skill.step() is Status.RUNNING:
+            self.tick()
+        return skill.status
+
+    def stand(self, pose: ToolPose) -> None:
+        """Put the open gripper at once to a pose, to begin there."""
+        self.scene.robot.stand(pose)
+        self.scene.robot.open_at_once()
+        for _ in range(STAND_STEPS):
+            self.tick()
+
+
+def try_out(skillset: SkillSet, surveys: Surveys, skill: Skill) -> str | None:
+    """Carry a skill out once in physics, with its policy; None when it did what it is for, else why it did not."""
+    with World() as world:
+        floor = Floor(world, skillset, surveys.layout, 0)
+        skill.begin(floor.bench)
+        return None if floor.run(skill) is Status.SUCCESS else skill.reason

@@ -1,0 +1,78 @@
+"""The source of a module and of all that it imports, found as the interpreter finds them: in a folder, a wheel or a zip."""
+
+import ast
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec, resolve_name
+
+from lab.errors import WorkFailed
+
+
+@dataclass(frozen=True)
+class Sources:
+    """The text of each module, by name, and the libraries that these modules import, by the name they import them under."""
+
+    texts: dict[str, str]
+    libraries: frozenset[str]
+
+
+def sources(roots: Sequence[str], without: Sequence[str] = ()) -> Sources:
+    """All modules of the roots' own packages that `roots` import, also inside functions, and the packages they lie in.
+
+    `without`: packages and modules that are left out, with what only they import. WorkFailed for a module whose source
+    cannot be found, such as one that is there compiled only.
+    """
+    own = {root.partition(".")[0] for root in roots}
+    pending, texts, libraries = list(roots), dict[str, str](), set[str]()
+    while pending:
+        module = pending.pop()
+        if module in texts or any(module == out or module.startswith(f"{out}.") for out in without):
+            continue
+        texts[module] = source(module)
+        pending += [module.rpartition(".")[0]] if "." in module else []
+        for target in _imports(module, texts[module]):
+            if target.partition(".")[0] in own:
+                pending.append(_module(target))
+            else:
+                libraries.add(target.partition(".")[0])
+    return Sources(dict(sorted(texts.items())), frozenset(libraries - sys.stdlib_module_names))
+
+
+def source(module: str) -> str:
+    """The text of one module; WorkFailed when it cannot be found."""
+    spec = find_spec(module)
+    text = getattr(spec.loader, "get_source", lambda name: None)(module) if spec is not None else None
+    if text is None:
+        raise WorkFailed(f"the source of the module '{module}' cannot be found")
+    return str(text)
+
+
+def _imports(module: str, text: str) -> Iterator[str]:
+    """Absolute dotted names; of `from a import b` it is 'a.b', whether b is a module or not."""
+    tree = ast.parse(text)
+    unseen = {id(only) for node in ast.walk(tree) if _is_type_checking(node) for only in ast.walk(node)}
+    for node in (node for node in ast.walk(tree) if id(node) not in unseen):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = f"{'.' * node.level}{node.module or ''}"
+            base = resolve_name(base, _package(module)) if node.level else base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def _package(module: str) -> str:
+    spec = find_spec(module)
+    return "" if spec is None else spec.parent or ""
+
+
+def _is_type_checking(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
+
+
+def _module(name: str) -> str:
+    """The module that a dotted name of ours is, or lies in."""
+    try:
+        return name if find_spec(name) is not None else name.rpartition(".")[0]
+    except ModuleNotFoundError:  # what is above it is no package
+        return name.rpartition(".")[0]

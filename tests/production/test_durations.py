@@ -1,0 +1,193 @@
+"""Durations: what is kept is read back whole or refused in one line, and its key changes with all that decides them."""
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lab.data
+from lab.errors import BadInput, WorkFailed
+from lab.policy import Policy
+from lab.production.durations import Durations, durations_key
+from lab.sequencing.positions import Moves
+from lab.sim.scene import Layout
+from lab.taskfile import Task, load
+
+MOVES = Moves((("b", "a"),), (("a", "b"), ("b", "c")))
+MEASURED = Durations({("b", "a"): 2.0}, {("a", "b"): 20.5, ("b", "c"): 21.0}, {"b": 30.0}, 99.0)
+
+
+def test_durations_survive_json() -> None:
+    back = Durations.from_json(json.loads(json.dumps(MEASURED.to_json())), MOVES, ["b"])
+    assert back == replace(MEASURED, sim_s=0.0)  # nothing is simulated when they are read back
+
+
+@pytest.mark.parametrize(
+    ("table", "times", "says"),
+    [
+        ("empty_s", [1, 2], "empty_s: it is no table of times"),
+        ("empty_s", {}, "empty_s: the time of 'b > a' is missing"),
+        ("empty_s", {"b > a": 1.0, "zzz": 1.0}, "unknown move or station 'zzz' (empty_s): known: b > a"),
+        ("loaded_s", {"a > b": 1.0}, "loaded_s: the time of 'b > c' is missing"),
+        ("loaded_s", {"a > b": 1.0, "b > c": -1.0}, "loaded_s 'b > c': -1.0: wanted 0 to 86400 s"),
+        ("process_s", {"b": "soon"}, "process_s 'b': 'soon': wanted 0 to 86400 s"),
+        ("process_s", {"b": True}, "process_s 'b': True: wanted 0 to 86400 s"),
+        ("process_s", {"b": float("inf")}, "process_s 'b': inf: wanted 0 to 86400 s"),
+        ("process_s", {"b": 1e300}, "process_s 'b': 1e+300: wanted 0 to 86400 s"),
+        ("process_s", {"b": 1.0, "d": 1.0}, "unknown move or station 'd' (process_s): known: b"),
+    ],
+)  # fmt: skip
+def test_a_damaged_record_is_refused_in_one_line(table: str, times: Any, says: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        Durations.from_json(MEASURED.to_json() | {table: times}, MOVES, ["b"])
+    assert str(caught.value) == says
+
+
+# ---- the key ---------------------------------------------------------------------------------------------------------
+
+LAYOUT = Layout(((0.5, 0.1), (0.6, 0.2)), ((0.0, 0.0, 0.0),))
+
+
+def policy(value: float = 1.0, signature: str = "a" * 16) -> Policy:
+    """A policy of two states and two actions."""
+    known: dict[str, Any] = dict.fromkeys(("subtask", "task", "advisor"), "x") | {
+        "name": "grasp",
+        "signature": signature,
+    }
+    known |= dict.fromkeys(("start", "helped_steps", "requests", "seed"), 0) | {"optimal_steps": 1, "final_steps": 1}
+    known |= {"solved": True, "created": "2026-01-01T00:00:00+00:00", "versions": {}, "learner": {}, "gate": {}}
+    known |= {"action_labels": ("a", "b"), "shape": (2,), "curve": [], "guided": []}
+    return Policy(q=np.full((2, 2), value), visits=np.zeros((2, 2), np.int64), **known)
+
+
+@pytest.fixture(scope="module")
+def task() -> Task:
+    return load("toast")
+
+
+@pytest.fixture
+def own_assets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A checkout whose assets are copies, so that they can be changed."""
+    shutil.copytree(lab.data.assets_folder(), tmp_path / "assets", ignore=shutil.ignore_patterns("pictures"))
+    (tmp_path / "pyproject.toml").touch()
+    monkeypatch.setattr(lab.data, "PACKAGE", tmp_path / "lab")
+    return tmp_path / "assets"
+
+
+@pytest.fixture
+def motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package that moves an arm, with a library of a version of its own."""
+    package = tmp_path / f"motion_{tmp_path.name}"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "arm.py").write_text(f"from {package.name} import physics\n")
+    (package / "physics.py").write_text("import springs\nSTEP = 0.01\n")
+    metadata = tmp_path / "springs-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: springs\nVersion: 1.0\n")
+    (metadata / "top_level.txt").write_text("springs\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return package
+
+
+Change = Callable[[dict[str, Any]], None]
+
+
+def edit(name: str, change: Callable[[Any], Any]) -> Change:
+    """Another value of one argument of the key."""
+
+    def apply(given: dict[str, Any]) -> None:
+        given[name] = change(given[name])
+
+    return apply
+
+
+def write(old: str, new: str, *where: str) -> Change:
+    """Another text in a file beside the package `motion`."""
+
+    def apply(given: dict[str, Any]) -> None:
+        path = next(given["folder"].glob("/".join(where)))
+        assert old in path.read_text()
+        path.write_text(path.read_text().replace(old, new))
+
+    return apply
+
+
+def slower(task: Task) -> Task:
+    return task.model_copy(update={"robot": task.robot.model_copy(update={"speed_m_s": 0.4})})
+
+
+def shifted(task: Task) -> Task:
+    first, *rest = task.stations
+    x, y, yaw = first.pose
+    return task.model_copy(update={"stations": (first.model_copy(update={"pose": (x + 0.001, y, yaw)}), *rest)})
+
+
+CHANGES: dict[str, Change] = {
+    "a robot's speed": edit("task", slower),
+    "a station's place": edit("task", shifted),
+    "an obstacle's place": edit("layout", lambda layout: replace(layout, obstacles=((0.5, 0.1), (0.6, 0.201)))),
+    "a move": edit("moves", lambda moves: replace(moves, empty=())),
+    "a policy's table": edit("policies", lambda policies: {"grasp": policy(1.5)}),
+    "a policy's problem": edit("policies", lambda policies: {"grasp": policy(signature="b" * 16)}),
+    "whose policy it is": edit("policies", lambda policies: {"place": policy()}),
+    "a URDF": write('name="robot"', 'name="arm"', "assets", "robot.urdf"),
+    "a mesh": write("v ", "v  ", "assets", "robot_tool_0.obj"),
+    "a module that measures": write("physics", "physics  # changed", "motion_*", "arm.py"),
+    "a module that it imports": write("0.01", "0.02", "motion_*", "physics.py"),
+    "a library's version": write("Version: 1.0", "Version: 1.1", "springs-*", "METADATA"),
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_the_key_changes_with_whatever_decides(task: Task, own_assets: Path, motion: Path, what: str) -> None:
+    given: dict[str, Any] = {"task": task, "layout": LAYOUT, "moves": MOVES, "policies": {"grasp": policy()}}
+    given["modules"] = [f"{motion.name}.arm"]
+    before = durations_key(**given)
+    assert durations_key(**given) == before
+    changed = given | {"folder": own_assets.parent}
+    CHANGES[what](changed)
+    del changed["folder"]
+    assert durations_key(**changed) != before
+
+
+def test_what_decides_nothing_leaves_the_key(task: Task) -> None:
+    other = task.model_copy(update={"title": "another", "subtasks": {}})
+    moved = replace(LAYOUT, slices=((0.1, 0.0, 0.0),))  # a move is measured with a slice on its spot
+    key = durations_key(task, LAYOUT, MOVES, {"grasp": policy()})
+    assert durations_key(other, moved, MOVES, {"grasp": policy()}) == key
+
+
+def test_a_key_that_cannot_be_made_is_an_error(task: Task, motion: Path) -> None:
+    shutil.rmtree(next(motion.parent.glob("springs-*")))
+    with pytest.raises(WorkFailed, match="the version of the library 'springs' cannot be found"):
+        durations_key(task, LAYOUT, MOVES, {}, modules=[f"{motion.name}.arm"])
+    (motion / "physics.py").unlink()
+    with pytest.raises(WorkFailed, match="cannot be found"):
+        durations_key(task, LAYOUT, MOVES, {}, modules=[f"{motion.name}.arm", f"{motion.name}.physics"])
+
+
+def test_all_that_moves_the_arm_is_in_the_key() -> None:
+    from lab.production.durations import DECIDED_BY_RESULT, MEASURED_BY
+    from lab.sources import sources
+
+    package = Path(lab.__file__).parent
+    rooms = [*package.glob("sim/*.py"), *package.glob("skills/*.py")]
+    found = sources(MEASURED_BY, DECIDED_BY_RESULT)
+    here = {
+        ".".join(path.relative_to(package.parent).with_suffix("").parts) for path in rooms if path.stem != "__init__"
+    }
+    assert here <= found.texts.keys()
+    assert {
+        "lab.mdp",
+        "lab.vision",
+        "lab.overhead",
+        "lab.production.skillset",
+        "lab.production.floor",
+    } <= found.texts.keys()
+    assert {"pybullet", "numpy", "cv2"} <= found.libraries
