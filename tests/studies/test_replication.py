@@ -99,7 +99,7 @@ def side_by_side(rows: Iterable[Row], names: tuple[str, ...]) -> list[Row]:
 def chance(one: Row, theirs: int) -> float:
     """The standard error of the difference between a figure and the printed one, which so many sessions gave."""
     low, high = one["ci95"]
-    return (high - low) / 2 / 1.96 * sqrt(1 + SESSIONS / theirs)
+    return float(high - low) / 2 / 1.96 * sqrt(1 + SESSIONS / theirs)
 
 
 def beyond(rows: Iterable[Row], theirs: int) -> int:
