@@ -69,9 +69,9 @@ def held(folder: Path, maze: Path) -> tuple[Any, ...]:
 
 
 def gone_on(folder: Path, maze: Path) -> tuple[Any, ...]:
-    """The session gone on with until it is over."""
+    """The session gone on with until it is over, without pictures."""
     kept = KeptSession(folder / "lesson", "--resume")
-    return result(folder, teach(kept.words, teacher(folder), folder / "lesson", kept))
+    return result(folder, teach(kept.words, teacher(folder), None, kept))
 
 
 def test_killed_at_any_moment_and_gone_on_with_it_is_the_same_session(tmp_path: Path, maze: Path, root: Path) -> None:

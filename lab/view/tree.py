@@ -116,10 +116,10 @@ def _drawing(
     branches: Sequence[Branch], title: str, near: bool
 ) -> tuple[Callable[["Figure"], None], tuple[float, float]]:
     """What draws the tree on a figure, and the figure's width and height [inch]."""
-    columns, rows = _layout(branches)
+    columns, rows = layout(branches)
     if near:
         branches = _near(branches)
-        columns, rows = _layout(branches)
+        columns, rows = layout(branches)
     if len(branches) > MAX_NODES:
         raise BadInput(f"search tree of {len(branches)} nodes: allowed are {MAX_NODES}, or only those near the optimum")
     leaves = int(max(rows)) + 1
@@ -193,7 +193,7 @@ def _near(branches: Sequence[Branch]) -> list[Branch]:
     return found
 
 
-def _layout(branches: Sequence[Branch]) -> tuple[list[int], list[float]]:
+def layout(branches: Sequence[Branch]) -> tuple[list[int], list[float]]:
     """Column (number of moves) and row of each node: leaves one below the other, others amid their children."""
     children: list[list[int]] = [[] for _ in branches]
     columns: list[int] = []

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-import lab.production.report
 import lab.production.run
 from lab.errors import BadInput, WorkFailed
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
+from lab.policy import Policy
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
 from lab.production.report import FILES, Prepared, Report, Taught, check_out, write_files
@@ -318,19 +318,24 @@ def report(prepared: Prepared, toolbox: Toolbox) -> tuple[Taught, Report]:
     return taught, made
 
 
-def draw(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) -> None:
-    def quick(prepared: Prepared, taught: Taught, report: Report, folder: Path) -> None:
-        for name in report.files:
-            (folder / FILES[name]).write_text("new")
+def drawn(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) -> list[str]:
+    """The names of the learning curves, which are not drawn."""
+    names: list[str] = []
+
+    def quick(policies: dict[str, Policy], path: Path) -> None:
+        names.extend(policies)
+        path.write_text("new")
         if stop is not None:
             raise stop
 
-    monkeypatch.setattr(lab.production.report, "_draw_all", quick)
+    monkeypatch.setattr("lab.view.plots.learning_curves", quick)
+    return names
 
 
 def test_a_failed_run_says_so_and_leaves_no_old_chart(
     prepared: Prepared, report: tuple[Taught, Report], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Its lessons are drawn once for each table."""
     taught, failed = report
     document = failed.to_json()
     assert (document["success"], document["delivered"], document["dropped"]) == (False, 0, 1)
@@ -340,10 +345,12 @@ def test_a_failed_run_says_so_and_leaves_no_old_chart(
     (tmp_path / "mine.txt").write_text("mine")
     (tmp_path / ".run-k3pt_0ab").mkdir()  # a run that was killed while it drew has left this
     (tmp_path / ".run-k3pt_0ab" / "gantt.png").write_text("half")
-    draw(monkeypatch)
+    curves = drawn(monkeypatch)
     write_files(prepared, taught, failed, tmp_path)
     assert sorted(failed.files) == sorted(set(FILES) - {"gantt"})
     assert sorted(os.listdir(tmp_path)) == sorted(["mine.txt", "toolbox", *map(FILES.__getitem__, failed.files)])
+    assert len(curves) == len({lesson.policy.name for lesson in taught.lessons.values()})
+    assert {"grasp at plate, starts vary", "insert at toaster"} < set(curves)
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt(), OSError(28, "No space left on device")])
@@ -358,7 +365,7 @@ def test_nothing_is_half_written(
     out = tmp_path / "out"
     out.mkdir()
     (out / "run.json").write_text("old")
-    draw(monkeypatch, stop)
+    drawn(monkeypatch, stop)
     with pytest.raises((KeyboardInterrupt, WorkFailed)):
         write_files(prepared, taught, failed, out)
     assert {path.name: path.read_text() for path in out.iterdir()} == {"run.json": "old"}
@@ -371,14 +378,6 @@ def test_output_folders(tmp_path: Path) -> None:
     for wrong in ("file", "file/below", "x" * 300):
         with pytest.raises(BadInput, match=r"output folder '.*' .--out.: "):
             check_out(tmp_path / wrong)
-
-
-def test_lessons_are_drawn_once_for_each_table(prepared: Prepared, toolbox: Toolbox) -> None:
-    taught = teach_all(prepared, Teacher(toolbox), Listener())
-    drawn = lab.production.report._curves(prepared, taught.lessons)
-    assert len(drawn) == len({lesson.policy.name for lesson in taught.lessons.values()})
-    assert "grasp at plate, starts vary" in drawn
-    assert "insert at toaster" in drawn
 
 
 def short_task(root: Path) -> str:
