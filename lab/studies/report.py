@@ -92,7 +92,7 @@ def write_report(
 def write_rows(path: Path, rows: Sequence[Row]) -> None:
     """Write rows as CSV: all settings, then COLUMNS with the lab's version; beside `path` first, then renamed.
 
-    Numbers and true/false as in JSON, None as nothing, text as it is or as JSON where it could be taken for another value.
+    Numbers and true/false as in JSON, None as nothing, text as it is.
     Raises BadInput for a value that is none of these, WorkFailed when the file cannot be written.
     """
     settings = dict.fromkeys(key for row in rows for key in row if key not in RESULTS)
@@ -109,46 +109,14 @@ def write_rows(path: Path, rows: Sequence[Row]) -> None:
     _write_whole(path, text.getvalue())
 
 
-def read_rows(path: Path) -> list[dict[str, Any]]:
-    """The rows of a file that `write_rows` wrote, each with `lab_version`; settings that are None are left out.
-
-    Raises BadInput when it cannot be read or is no such file.
-    """
-    try:
-        lines = list(csv.reader(StringIO(path.read_text(encoding="utf-8"))))
-    except (OSError, ValueError, csv.Error) as error:
-        raise BadInput(f"study rows '{path}': {getattr(error, 'strerror', None) or error}") from None
-    head = lines[0] if lines else []
-    if tuple(head[-len(COLUMNS) :]) != COLUMNS:
-        raise BadInput(f"study rows '{path}': the last columns must be {', '.join(COLUMNS)}")
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        if len(line) != len(head):
-            raise BadInput(f"study rows '{path}', line {number}: {len(line)} values, {len(head)} columns")
-        found = dict(zip(head, map(_value, line), strict=True))
-        ends = [found.pop("ci95_low"), found.pop("ci95_high")]
-        settings = {name: value for name, value in found.items() if name not in RESULTS and value is not None}
-        found["ci95"] = None if None in ends else ends
-        rows.append(settings | {name: found[name] for name in RESULTS})
-    return rows
-
-
 def _cell(name: str, value: Any) -> str:
-    """A value as the text of a CSV cell, which `_value` turns back."""
+    """A value as the text of a CSV cell."""
     plain = value.item() if hasattr(value, "item") else value  # numpy's numbers
-    if plain is None or (isinstance(plain, str) and plain.isprintable() and _value(plain) == plain):
+    if plain is None or isinstance(plain, str):
         return plain or ""
-    if not isinstance(plain, str | int | float) or (isinstance(plain, float) and not isfinite(plain)):
+    if not isinstance(plain, int | float) or not isfinite(plain):
         raise BadInput(f"study rows: {name} = {value!r}; allowed: text, finite numbers, true, false, null")
-    return json.dumps(plain, ensure_ascii=False)
-
-
-def _value(text: str) -> Any:
-    try:
-        value = json.loads(text) if text else None
-    except (ValueError, RecursionError):
-        return text
-    return value if value is None or isinstance(value, str | int | float) else text
+    return json.dumps(plain)
 
 
 def _write_whole(path: Path, text: str) -> None:

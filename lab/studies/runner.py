@@ -5,6 +5,9 @@ once, a line a setting, and not done again.
 """
 
 import json
+import os
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
 
 FORMAT = 1  # of what is stored; another one is computed anew
 STORE = "sessions.jsonl"
+PARENT_LOOK_S = 0.2  # how often a worker looks whether its parent is still there
 Progress = Callable[[int, int], None]  # settings done, of how many
 Count = NDArray[np.int64]
 Item = TypeVar("Item")
@@ -155,8 +159,14 @@ class Job:
         else:
             from joblib import Parallel, delayed
 
-            results = Parallel(self.workers, return_as="generator", batch_size=4)(delayed(work)(item) for item in items)
-            yield from zip(items, results, strict=True)
+            pool = Parallel(
+                self.workers,
+                return_as="generator",
+                batch_size=4,
+                initializer=_end_with_parent,
+                initargs=(os.getpid(),),
+            )
+            yield from zip(items, pool(delayed(work)(item) for item in items), strict=True)
 
     def _stored(self) -> Iterator[tuple[str, Outcome]]:
         path = None if self.folder is None else self.folder / STORE
@@ -182,6 +192,17 @@ class Job:
                 file.write(("\n" if cut else "") + json.dumps(line) + "\n")
         except OSError as error:
             raise WorkFailed(f"output folder '{self.folder}' (--out) cannot be written: {error.strerror}") from error
+
+
+def _end_with_parent(parent: int) -> None:
+    """Ends this process soon after its parent's end, which may be a kill -9 that leaves no time to say so."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_LOOK_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _on_cluster(work: Callable[[Item], Result], items: list[Item], address: str) -> Iterator[tuple[Item, Result]]:

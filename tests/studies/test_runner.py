@@ -1,8 +1,13 @@
 """The sessions of a study: named by their setting, the same wherever they run, kept, and not run again."""
 
 import json
+import os
+import signal
+import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
@@ -20,6 +25,7 @@ from lab.mdp import optimal_values
 from lab.studies import runner
 from lab.studies.runner import STORE, Job, Outcome, Setting, seeds_of, sessions_of
 
+ROOT = str(Path(__file__).parents[2])
 # 3 x 3 x 2 cells, one of them an obstacle, which is also all that an advisor with a limited view sees of it. From one
 # corner to the opposite one on the same floor: 4 moves, 5 steps with the start.
 SMALL = """
@@ -338,6 +344,47 @@ def test_without_dask(few: list[Setting], monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(BadInput, match=r"Dask is not installed: pip install 'teaching-lab\[dask\]'"):
         Job(10, dask="127.0.0.1:9").run(few)
+
+
+ENDLESS = """
+import time
+from lab.studies.runner import Job
+
+if __name__ == "__main__":
+    seconds = [0.0, 0.1, 0.2, 0.3, *range(3600, 3608)]  # shared out four at a time
+    Job(workers=2, progress=lambda done, total: print(done, flush=True)).each(time.sleep, seconds)
+"""
+
+
+def running() -> dict[int, int]:
+    """Every process that is not over, and its parent."""
+    found = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # it has just ended
+            state, parent = stat.read_text().rpartition(") ")[2].split()[:2]
+            if state != "Z":
+                found[int(stat.parent.name)] = int(parent)
+    return found
+
+
+def test_workers_end_with_a_study_that_is_killed(tmp_path: Path) -> None:
+    (tmp_path / "endless.py").write_text(ENDLESS, encoding="utf-8")
+    command = [sys.executable, str(tmp_path / "endless.py")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": ROOT}) as study:
+        assert study.stdout is not None
+        assert [study.stdout.readline() for _ in range(5)] == [f"{done}\n" for done in range(5)]
+        workers = {pid for pid, parent in running().items() if parent == study.pid}
+        study.kill()
+    assert len(workers) >= 2
+    try:
+        deadline = time.monotonic() + 60
+        while left := workers & running().keys():
+            assert time.monotonic() < deadline, f"{len(left)} workers go on"
+            time.sleep(0.05)
+    finally:
+        for pid in workers:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
 
 
 # ---- what is kept -------------------------------------------------------------------------------------------------
