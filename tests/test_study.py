@@ -10,8 +10,9 @@ from xml.etree import ElementTree
 import pytest
 
 from lab.errors import BadInput
-from lab.studies import STUDIES, chapter9, runner
+from lab.studies import STUDIES, runner
 from lab.studies.runner import STORE, Outcome, Setting, sessions_of
+from lab.studies.thesis import chapter_9_cells
 from lab.study import run_study
 from lab.taskfile import load_world
 
@@ -26,7 +27,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("LAB_TOOLBOX", str(tmp_path / "toolbox"))
     monkeypatch.setenv("COLUMNS", "200")
-    monkeypatch.setattr(chapter9, "BETAS", (0.7, 1.3))
+    monkeypatch.setattr(chapter_9_cells, "BETAS", (0.7, 1.3))
     return tmp_path
 
 
@@ -219,7 +220,7 @@ def test_bad_words(lab: Lab, folder: Path, words: str, line: str) -> None:
 
 
 def test_a_reconstruction_is_written(lab: Lab, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is found is up to lab.studies.reconstruct; here it finds world I."""
+    """What is found is up to lab.studies.thesis.world_2; here it finds world I."""
     asked: list[int] = []
 
     def found(seed: int, progress: Any) -> Any:
@@ -227,7 +228,7 @@ def test_a_reconstruction_is_written(lab: Lab, folder: Path, monkeypatch: pytest
         progress(1, 1)
         return load_world("world-1")
 
-    monkeypatch.setattr("lab.studies.reconstruct.reconstruct", found)
+    monkeypatch.setattr("lab.studies.thesis.world_2.reconstruct", found)
     ran = lab("task", "reconstruct", "--seed", "6", "--out", "w.toml", "--json")
     assert (ran.code, ran.err, asked) == (0, "", [6])
     assert (ran.json["file"], ran.json["seed"], ran.json["name"]) == ("w.toml", 6, "world-1")

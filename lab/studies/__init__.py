@@ -24,9 +24,9 @@ def _chapter(number: int, name: str) -> Run:
     """A study of chapter 7 or 9, by the name of its function."""
 
     def run(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-        from lab.studies import chapter7_parts, chapter9_parts
+        from lab.studies.thesis import chapter_7, chapter_9
 
-        findings: Findings = getattr({7: chapter7_parts, 9: chapter9_parts}[number], name)(job, reading)
+        findings: Findings = getattr({7: chapter_7, 9: chapter_9}[number], name)(job, reading)
         return findings
 
     return run
@@ -34,7 +34,7 @@ def _chapter(number: int, name: str) -> Run:
 
 def _table(name: str) -> Run:
     def run(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-        from lab.studies.chapter9_parts import best_scores
+        from lab.studies.thesis.chapter_9 import best_scores
 
         return best_scores(job, reading, name)
 
@@ -42,43 +42,43 @@ def _table(name: str) -> Run:
 
 
 def _appendix_iii(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.appendix3 import appendix_iii
+    from lab.studies.thesis.appendix_3 import appendix_iii
 
     return appendix_iii(job, reading)
 
 
 def _srl_time(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.comparison import srl_time_study
+    from lab.studies.ours.srl_time_compared import srl_time_study
 
     return srl_time_study(job, reading)
 
 
 def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.comparison_speed import sequencing_speed
+    from lab.studies.ours.sequencing_speed import sequencing_speed
 
     return sequencing_speed(job, reading)
 
 
 def _flat(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.flat import flat
+    from lab.studies.ours.two_levels.flat_or_two_levels import flat
 
     return flat(job, reading)
 
 
 def _advice_budget(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.budget import advice_budget
+    from lab.studies.ours.advice_budget import advice_budget
 
     return advice_budget(job, reading)
 
 
 def _advisors(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.advisors import advisors
+    from lab.studies.ours.several_advisors import advisors
 
     return advisors(job, reading)
 
 
 def _speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.speed import speed
+    from lab.studies.ours.learning_speed import speed
 
     return speed(job)
 

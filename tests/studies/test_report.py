@@ -191,7 +191,7 @@ def test_it_says_which_version_measured(tmp_path: Path) -> None:
 
 def test_it_shows_in_a_narrow_browser(tmp_path: Path, browser_page: "Page") -> None:
     """320 pixels wide, without scripts: the page itself never scrolls sideways, its tables do; the figure is drawn."""
-    from lab.studies.figures import bars
+    from lab.studies.charts import bars
 
     page(tmp_path, ROWS, {"bars": bars(["a", "b"], ["x"], [[1, 2]], None, "y")})
     browser_page.goto((tmp_path / "report.html").as_uri())
