@@ -9,12 +9,12 @@ import numpy as np
 
 from lab.advice.advisors import SKILLS
 from lab.advice.gates import GATES
-from lab.studies.findings import Findings
+from lab.studies.findings import Findings, Row, mean_row, row, share_row, those
 from lab.studies.ours.advice_budget_figures import of_ccrl, of_gates
-from lab.studies.runner import Job, Outcome, Setting
-from lab.studies.statistics import interval, proportion_interval
+from lab.studies.runner import Job
+from lab.studies.statistics import share
 from lab.studies.thesis.chapter_9 import ADVISOR, EXACT, RECONSTRUCTED
-from lab.studies.thesis.chapter_9_cells import Row, row
+from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, measured
 
 WORLDS = ("world-1", "world-2")
 WRONG, NOBODY = "wrong", "nobody"
@@ -49,7 +49,7 @@ WORST = (
 def advice_budget(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Every gate, advisor and world, with and without memory; advisors know the exact values unless read otherwise."""
     cells = {cell: replace(setting, **reading) for cell, setting in settings().items()}
-    found = job.run(list(cells.values()))
+    found = measured(job, list(cells.values()))
     outcomes = {cell: found[setting] for cell, setting in cells.items()}
     table = next(iter(cells.values())).advisor_table
     rows = [one for cell, outcome in outcomes.items() for one in rows_of(cell, outcome, table)]
@@ -92,12 +92,10 @@ def rows_of(cell: Cell, outcome: Outcome, table: str) -> list[Row]:
     named: Row = {"world": place, "view": "full", "gate": gate, "memory": memory, "advisor": name}
     if name != NOBODY:
         named |= {"tau": SKILLS.get(name, SKILLS["expert"]), "advisor_table": table}
-    share, low, high = _share(outcome)
-    helped, asked = interval(outcome.helped_steps), interval(outcome.requests)
     rows = [
-        row(named, "SP_percent", share, (low, high), None),
-        row(named, "HS_steps", helped[0], helped[1:], None),
-        row(named, "AR_requests", asked[0], asked[1:], None),
+        share_row(named, "SP_percent", outcome.success),
+        mean_row(named, "HS_steps", outcome.helped_steps),
+        mean_row(named, "AR_requests", outcome.requests),
     ]
     if (place, gate, memory) == ("world-1", "ccrl", True) and name in TARGETS:
         for one, target in zip(rows, TARGETS[name], strict=False):
@@ -105,18 +103,14 @@ def rows_of(cell: Cell, outcome: Outcome, table: str) -> list[Row]:
     return rows
 
 
-def _share(outcome: Outcome) -> tuple[float, float, float]:
-    return proportion_interval(int(outcome.success.sum()), len(outcome.success))
-
-
 def difference(one: Outcome, other: Outcome) -> tuple[float, float, float]:
     """How much more often one setting's sessions succeed than another's, low and high end, in points.
 
     Source: R. G. Newcombe, Statistics in Medicine 17 (1998), 873-890, method 10.
     """
-    (share, low, high), (than, than_low, than_high) = _share(one), _share(other)
-    gap = share - than
-    return gap, gap - hypot(share - low, than_high - than), gap + hypot(high - share, than - than_low)
+    (percent, low, high), (than, than_low, than_high) = share(one.success), share(other.success)
+    gap = percent - than
+    return gap, gap - hypot(percent - low, than_high - than), gap + hypot(high - percent, than - than_low)
 
 
 def worst(outcomes: Mapping[Cell, Outcome], place: str, gates: Sequence[str] = CCRL) -> list[Row]:
@@ -128,7 +122,7 @@ def worst(outcomes: Mapping[Cell, Outcome], place: str, gates: Sequence[str] = C
         gap, low, high = difference(of[gate, name], outcomes[place, "never", NOBODY, memory])
         named = {"world": place, "view": "full", "gate": gate, "memory": True, "advisor": name}
         named |= {"over": "any gate" if len(gates) > 1 else gate, "against": AGAINST[memory]}
-        rows.append(row(named, "worst_below_alone_points", gap, (low, high), None))
+        rows.append(row(named, "worst_below_alone_points", gap, (low, high)))
     return rows
 
 
@@ -164,10 +158,9 @@ def _both(success: float, helped: float) -> str:
 
 
 def _worst_in_short(below: Sequence[Row]) -> Row:
-    of_ccrl = [one for one in below if (one["over"], one["against"]) == ("ccrl", "alone")]
-    lowest = min(of_ccrl, key=lambda one: float(one["value"]))
+    lowest = min(those(below, over="ccrl", against="alone"), key=lambda one: float(one["value"]))
     says: Row = {"worst_below_alone": round(float(lowest["value"]), 1)}
-    says["worst_below_alone target"] = f"at least {MOST_BELOW:g} points: {_verdict(lowest)}"
+    says["worst_below_alone target"] = f"at least {MOST_BELOW:g} points: {verdict(lowest)}"
     for one in below:
         low, high = one["ci95"]
         which = one["advisor"] if one["over"] == one["gate"] else f"{one['gate']}, {one['advisor']}"
@@ -177,7 +170,7 @@ def _worst_in_short(below: Sequence[Row]) -> Row:
     return says
 
 
-def _verdict(lowest: Row) -> str:
+def verdict(lowest: Row) -> str:
     """Whether the worst advisor keeps to the target, as far as the interval says."""
     low, high = lowest["ci95"]
     if low >= MOST_BELOW:

@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-from lab.studies.thesis.chapter_9_cells import Row
+from lab.studies.charts import legend_below
+from lab.studies.findings import Row, those
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, YELLOW, picture_bytes, tip
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ YLABEL = "sessions that end optimal [%]"
 Point = tuple[str, str, bool, float, float]  # gate, advisor, memory, helped steps, success [%]
 
 
-def of_gates(rows: Sequence[Row], form: str = "svg") -> bytes:
+def of_gates(rows: Sequence[Row]) -> bytes:
     """Every gate and advisor: hollow without memory, filled with it; lines across: nobody to ask."""
 
     def draw(axes: "Axes", place: str, points: Sequence[Point]) -> None:
@@ -40,10 +41,10 @@ def of_gates(rows: Sequence[Row], form: str = "svg") -> bytes:
             kept = "memory" if memory else "no memory"
             tip(drawn, f"{gate}, {name}, {kept}: {success:.1f} %, {helped:.1f} helped steps")
 
-    return _panels(rows, draw, _gate_keys(), form)
+    return _panels(rows, draw, _gate_keys())
 
 
-def of_ccrl(rows: Sequence[Row], targets: Mapping[str, tuple[float, float]], form: str = "svg") -> bytes:
+def of_ccrl(rows: Sequence[Row], targets: Mapping[str, tuple[float, float]]) -> bytes:
     """CCRL alone: an arrow for each advisor from without memory to with it; stars: the project's targets in world I."""
 
     def draw(axes: "Axes", place: str, points: Sequence[Point]) -> None:
@@ -65,12 +66,12 @@ def of_ccrl(rows: Sequence[Row], targets: Mapping[str, tuple[float, float]], for
                 axes.annotate(name, targets[name][::-1], color=INK, **offset)
 
     shown = [one for one in rows if one["gate"] in ("ccrl", "never")]
-    return _panels(shown, draw, _ccrl_keys(), form)
+    return _panels(shown, draw, _ccrl_keys())
 
 
-def _panels(rows: Sequence[Row], draw: Any, keys: Sequence[Any], form: str) -> bytes:
+def _panels(rows: Sequence[Row], draw: Any, keys: Sequence[Any]) -> bytes:
     """A panel for each world, with a line across for nobody, without and with memory."""
-    by_world = {place: _points([one for one in rows if one["world"] == place]) for place in ("world-1", "world-2")}
+    by_world = {place: _points(those(rows, world=place)) for place in ("world-1", "world-2")}
 
     def whole(figure: "Figure") -> None:
         panels = figure.subplots(1, len(by_world), sharey=True)
@@ -86,9 +87,9 @@ def _panels(rows: Sequence[Row], draw: Any, keys: Sequence[Any], form: str) -> b
             axes.set_xlim(0, 1.3 * max(5.0, *(point[3] for point in points)))
             _name_ticks(axes)
         panels[0].set_ylabel(YLABEL)
-        figure.legend(handles=keys, loc="outside lower center", ncols=6, columnspacing=1.4)
+        legend_below(figure, {key.get_label(): key for key in keys})
 
-    return picture_bytes(whole, len(by_world) * PANEL_INCH[0], PANEL_INCH[1], form)
+    return picture_bytes(whole, len(by_world) * PANEL_INCH[0], PANEL_INCH[1], "svg")
 
 
 def _name_ticks(axes: "Axes") -> None:

@@ -1,19 +1,20 @@
 """How fast sessions are: the compiled kernel, alone and with gates, beside rivals, all in one run on one core."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
-from statistics import median
+from typing import Any
 
 import numpy as np
 
 from lab.advice.advisors import Advice, skill
 from lab.learning.batch import run_sessions
 from lab.learning.settings import GateSettings
-from lab.studies.findings import Findings
-from lab.studies.ours.learning_speed_rivals import RIVALS, Missing
-from lab.studies.runner import Job, learned_table, world
-from lab.studies.thesis.chapter_9_cells import Row, agreement, row
+from lab.studies.findings import Findings, Row, agreement, median_row
+from lab.studies.ours.learning_speed_rivals import RIVALS
+from lab.studies.ours.learning_speed_session import Missing
+from lab.studies.runner import Job
+from lab.studies.thesis.chapter_9_sessions import learned_table, world
 
 SESSIONS = 500
 ABOUT = (
@@ -26,8 +27,8 @@ REPEATS = 5
 GATES = (GateSettings("ccrl", omega=1), GateSettings("ia"), GateSettings("combined", omega=1))
 
 
-def speed(job: Job) -> Findings:
-    """Million environment steps a second in world I: the median of five runs, lowest and highest beside it."""
+def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """Million environment steps a second in world I, median of five runs; the reading changes nothing here."""
     place = world("world-1")
     mdp, learner = place.mdp(), place.learner
     advice = Advice.of(skill(learned_table(place), 0.1))
@@ -62,6 +63,4 @@ def speed(job: Job) -> Findings:
 def _row(name: str, run: Callable[[], tuple[int, float]]) -> Row:
     run()  # compiles
     rates = [moves / seconds / 1e6 for moves, seconds in (run() for _ in range(REPEATS))]
-    return row(
-        {"name": name, "world": "world-1"}, "speed_million steps per s", median(rates), (min(rates), max(rates)), None
-    )
+    return median_row({"name": name, "world": "world-1"}, "speed_million steps per s", rates)

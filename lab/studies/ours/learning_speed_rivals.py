@@ -6,14 +6,8 @@ V(s)), and a terminal state gets its own value when it is entered. Each runs on 
 """
 
 import ctypes
-import os
 import subprocess
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
 from itertools import pairwise
-from multiprocessing import get_context
 from pathlib import Path
 from shutil import which
 from tempfile import TemporaryDirectory
@@ -22,93 +16,31 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lab.errors import BadInput, LabError
-from lab.learning.selection import temperature
 from lab.learning.settings import LearnerSettings
-from lab.mdp import BoolArray, FloatArray, IntArray, TabularMDP, shortest_steps
+from lab.mdp import TabularMDP
+from lab.studies.ours.learning_speed_jax import jax_lock_step
+from lab.studies.ours.learning_speed_session import (
+    MOVES,
+    Measured,
+    Missing,
+    Rival,
+    Session,
+    session_of,
+    shared_out,
+)
 
 if TYPE_CHECKING:
     from gymnasium import Env
 
-MOVES = 6
-MOST_STATES = 2**16
 NUMPY_LANES = 2000  # sessions side by side: more of them share the price of a call
 NUMPY_BLOCK = 64  # moves after which sessions that are over leave
-JAX_LANES = 500  # the tables of more do not stay in the cache
-JAX_FEWEST_LANES = 64  # fewer are not worth a program of their own
 C_SOURCE = Path(__file__).with_name("learning_speed_rival.c")
 C_FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")
 
 
-class Missing(LabError):
-    """The rival cannot run on this computer; the message says why."""
-
-
-@dataclass(frozen=True)
-class Measured:
-    """All moves of the sessions, the seconds that learning them took, and the sessions that ended on a shortest way."""
-
-    moves: int
-    seconds: float
-    success_percent: float
-    compile_seconds: float = 0.0
-
-
-Rival = Callable[[TabularMDP, LearnerSettings, int, int], Measured]  # (problem, settings, sessions, seed)
-
-
-@dataclass(frozen=True, eq=False)
-class _Job:
-    """Problem and settings as plain arrays and numbers; sharpness (episodes,): gamma / tau."""
-
-    successor: IntArray
-    terminal: BoolArray
-    goal: BoolArray
-    arrival: FloatArray
-    start: int
-    optimal: int
-    loss: float
-    alpha: float
-    discount: float
-    max_moves: int
-    sharpness: FloatArray
-
-    @property
-    def states(self) -> int:
-        return len(self.successor)
-
-    @property
-    def episodes(self) -> int:
-        return len(self.sharpness)
-
-
-def _job(mdp: TabularMDP, settings: LearnerSettings, sessions: int) -> _Job:
-    if mdp.n_actions != MOVES or mdp.n_states > MOST_STATES or mdp.starts:
-        raise BadInput(
-            f"a problem of {mdp.n_states} states, {mdp.n_actions} actions and {len(mdp.starts) or 1} starts: rivals learn "
-            f"one with {MOVES} actions, one start and at most {MOST_STATES} states"
-        )
-    if sessions < 1:
-        raise BadInput(f"sessions = {sessions}: allowed are whole numbers from 1")
-    taus = [temperature(n, settings.beta, settings.exploration) for n in range(1, settings.episodes + 1)]
-    return _Job(
-        mdp.successor,
-        mdp.terminal,
-        mdp.goal,
-        mdp.arrival,
-        mdp.start,
-        shortest_steps(mdp),
-        mdp.step_reward,
-        settings.alpha,
-        settings.discount,
-        settings.max_steps - settings.count_start,
-        settings.discount / np.array(taus),
-    )
-
-
 def gymnasium_loop(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
     """The loop of the tutorials: a Gymnasium environment without wrappers, a numpy table, one session after another."""
-    job, rng = _job(mdp, settings, sessions), np.random.default_rng(seed)
+    job, rng = session_of(mdp, settings, sessions), np.random.default_rng(seed)
     env = _gymnasium_world(job)
     began = perf_counter()
     ended = [_tutorial_session(env, job, rng) for _ in range(sessions)]
@@ -116,7 +48,7 @@ def gymnasium_loop(mdp: TabularMDP, settings: LearnerSettings, sessions: int, se
     return Measured(sum(moves for moves, _ in ended), seconds, 100.0 * sum(won for _, won in ended) / sessions)
 
 
-def _gymnasium_world(job: _Job) -> "Env[int, int]":
+def _gymnasium_world(job: Session) -> "Env[int, int]":
     from gymnasium import Env
     from gymnasium.spaces import Discrete
 
@@ -147,7 +79,7 @@ def _gymnasium_world(job: _Job) -> "Env[int, int]":
     return World()
 
 
-def _tutorial_session(env: "Env[int, int]", job: _Job, rng: np.random.Generator) -> tuple[int, bool]:
+def _tutorial_session(env: "Env[int, int]", job: Session, rng: np.random.Generator) -> tuple[int, bool]:
     values = np.zeros(job.states)
     moves = 0
     for sharpness in job.sharpness.tolist():
@@ -168,18 +100,14 @@ def _tutorial_session(env: "Env[int, int]", job: _Job, rng: np.random.Generator)
 
 def numpy_lock_step(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
     """All sessions side by side in numpy arrays, one move of each at a time; a session is reset as its episode ends."""
-    job, rng = _job(mdp, settings, sessions), np.random.default_rng(seed)
+    job, rng = session_of(mdp, settings, sessions), np.random.default_rng(seed)
     began = perf_counter()
-    batches = [_numpy_batch(job, lanes, rng) for lanes in _batches(sessions, NUMPY_LANES)]
+    batches = [_numpy_batch(job, lanes, rng) for lanes in shared_out(sessions, NUMPY_LANES)]
     seconds = perf_counter() - began
     return Measured(sum(moves for moves, _ in batches), seconds, 100.0 * sum(won for _, won in batches) / sessions)
 
 
-def _batches(sessions: int, most: int) -> list[int]:
-    return [min(most, sessions - first) for first in range(0, sessions, most)]
-
-
-def _numpy_batch(job: _Job, n: int, rng: np.random.Generator) -> tuple[int, int]:
+def _numpy_batch(job: Session, n: int, rng: np.random.Generator) -> tuple[int, int]:
     """The moves and the won sessions of n lanes. A session that is over walks on unseen until the end of the block."""
     neighbours = np.ascontiguousarray(job.successor.T, np.intp)  # (6, S)
     sharpness_in = np.pad(job.sharpness, (0, NUMPY_BLOCK), "edge")
@@ -243,103 +171,9 @@ def _numpy_batch(job: _Job, n: int, rng: np.random.Generator) -> tuple[int, int]
     return moves, won
 
 
-def jax_lock_step(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
-    """All sessions side by side in one compiled jax program, in a process of its own, so that it has one thread."""
-    job = _job(mdp, settings, sessions)
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        try:
-            return pool.submit(_measure_jax, job, sessions, seed).result()
-        except BrokenProcessPool:
-            raise Missing("jax: its process ended early") from None
-
-
-def _measure_jax(job: _Job, sessions: int, seed: int) -> Measured:
-    os.environ |= {"NPROC": "1", "JAX_PLATFORMS": "cpu", "JAX_ENABLE_X64": "1"}  # one thread; read as jax starts
-    try:
-        import jax  # type: ignore[import-not-found, unused-ignore]
-    except ImportError as error:
-        raise Missing(f"jax cannot be imported: {error}") from None
-    rng = np.random.default_rng(seed)
-    streams = [rng.integers(0, 2**64, lanes, np.uint64) for lanes in _batches(sessions, JAX_LANES)]
-    began = perf_counter()
-    sizes = {len(stream): stream for stream in streams}
-    programs = {lanes: jax.jit(_jax_program(job, lanes)).lower(stream).compile() for lanes, stream in sizes.items()}
-    compiled = perf_counter()
-    ended = [[int(number) for number in programs[len(stream)](stream)] for stream in streams]
-    seconds = perf_counter() - compiled
-    won = sum(won for _, won in ended)
-    return Measured(sum(moves for moves, _ in ended), seconds, 100.0 * won / sessions, compiled - began)
-
-
-def _jax_program(job: _Job, lanes: int) -> Callable[[Any], tuple[Any, Any]]:
-    """(streams of random numbers) -> (moves, won sessions); half of the lanes are dropped when half are over."""
-    import jax.numpy as jnp  # type: ignore[import-not-found, unused-ignore]
-    from jax import lax  # type: ignore[import-not-found, unused-ignore]
-
-    step = _jax_step(job)
-
-    def program(stream: Any) -> tuple[Any, Any]:
-        zeros, n, moves, won = jnp.zeros(lanes, jnp.int32), lanes, 0, 0
-        table, base = jnp.zeros(lanes * job.states), jnp.arange(lanes, dtype=jnp.int32) * job.states
-        lane: tuple[Any, ...] = (base, zeros + job.start, zeros, zeros, zeros, zeros > 0, stream)
-        while n:
-            rest = n // 2 if n >= JAX_FEWEST_LANES else 0
-            table, lane = lax.while_loop(lambda c: (c[1][2] < job.episodes).sum() > rest, step, (table, lane))  # noqa: B023
-            order = jnp.argsort(lane[2] >= job.episodes)
-            moves, won = moves + lane[4][order[rest:]].sum(), won + lane[5][order[rest:]].sum()
-            lane, n = tuple(x[order[:rest]] for x in lane), rest
-        return moves, won
-
-    return program
-
-
-def _jax_step(job: _Job) -> Callable[[Any], Any]:
-    """One move of each lane; where an episode is over, its end instead: then one scatter does for both."""
-    import jax.numpy as jnp  # type: ignore[import-not-found, unused-ignore]
-
-    known: dict[str, Any] = {"mode": "promise_in_bounds"}
-    neighbours, terminal, goal = jnp.asarray(job.successor), jnp.asarray(job.terminal), jnp.asarray(job.goal)
-    arrival, sharpness = jnp.asarray(job.arrival), jnp.asarray(np.append(job.sharpness, job.sharpness[-1]))
-
-    def step(carry: Any) -> Any:
-        table, (base, state, episode, made, moves, won, stream) = carry
-        near = neighbours.at[state].get(**known).T
-        value = table.at[base + near].get(**known)
-        weight = jnp.exp((value - value.max(0)) * sharpness.at[episode].get(**known))
-        sums = [weight[0]]
-        for action in range(1, MOVES):
-            sums.append(sums[-1] + weight[action])
-        stream = stream + jnp.uint64(0x9E3779B97F4A7C15)
-        mark = (_mixed(stream) >> 11).astype(jnp.float64) * 2.0**-53 * sums[-1]
-        entered, onward = near[-1], value[-1]
-        for action in reversed(range(MOVES - 1)):
-            entered = jnp.where(mark < sums[action], near[action], entered)
-            onward = jnp.where(mark < sums[action], value[action], onward)
-        here, ends = base + state, terminal.at[state].get(**known)
-        old = table.at[here].get(**known)
-        new = old + job.alpha * (job.loss + job.discount * onward - old)
-        over, going = ends | (made == job.max_moves), episode < job.episodes
-        new = jnp.where(ends, arrival.at[state].get(**known), jnp.where(over, old, new))
-        table = table.at[here].set(new, unique_indices=True, **known)
-        hit = goal.at[state].get(**known) & (made == job.optimal)
-        won = jnp.where(over & (episode == job.episodes - 1), hit, won)
-        moves, episode = moves + (going & ~over), episode + (going & over)
-        state, made = jnp.where(over, job.start, entered), jnp.where(over, 0, made + 1)
-        return table, (base, state, episode, made, moves, won, stream)
-
-    return step
-
-
-def _mixed(z: Any) -> Any:
-    """The scrambling of splitmix64; z uint64."""
-    z = (z ^ (z >> 30)) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> 27)) * np.uint64(0x94D049BB133111EB)
-    return z ^ (z >> 31)
-
-
 def c_scalar(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
     """One session after another in C (rival.c), compiled for this very processor."""
-    job, rng = _job(mdp, settings, sessions), np.random.default_rng(seed)
+    job, rng = session_of(mdp, settings, sessions), np.random.default_rng(seed)
     began = perf_counter()
     learn = _compiled_c()
     compiled = perf_counter()

@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable, Mapping
 from functools import partial
 from math import inf, isfinite
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -17,10 +16,9 @@ from lab.sequencing.exact import optimum
 from lab.sequencing.search import Search, SrlSettings
 from lab.sequencing.sessions import learn_readably
 from lab.sequencing.srl import Srl
-from lab.studies.findings import Findings
+from lab.studies.findings import Findings, Row, agreement, median_row, row, those
 from lab.studies.runner import Job
 from lab.studies.thesis.chapter_7_cells import robot_cell
-from lab.studies.thesis.chapter_9_cells import Row, agreement, row
 
 CASES = ("I", "II", "III")
 EPISODES, TOASTS = 400, 4  # of the sessions whose rate is measured
@@ -53,13 +51,13 @@ def sequencing_speed(job: Job, reading: Mapping[str, Any]) -> Findings:
     learned, missed, solved = [], list[str](), []
     for case in CASES:
         near_s = _seconds_to_near(case, job)
-        learned += _near_rows(case, near_s)
+        learned += near_rows(case, near_s)
         tell()
-        solved += _solved(case, missed, job.seed)
+        solved += solved_rows(case, missed, job.seed)
         tell()
     rows = [*rates, *proofs, *learned, *solved]
     notes = (ABOUT.format(job.sessions), ABOUT_MANY.format(CP_SAT_LIMIT_S), *missed)
-    return Findings(rows, _ratios(rates, learned, solved) | agreement(rows), {}, notes)
+    return Findings(rows, ratios(rates, learned, solved) | agreement(rows), {}, notes)
 
 
 class _Count:
@@ -99,7 +97,7 @@ def _rates(job: Job, tell: Callable[[], None]) -> list[Row]:
         run()  # compiles
         rates = [done / seconds / 1e3 for done, seconds in (run() for _ in range(REPEATS))]
         own = named if name.startswith("srl") else {key: named[key] for key in ("case", "toasts")}
-        rows.append(row({"name": name, **own}, RATE, median(rates), (min(rates), max(rates)), None))
+        rows.append(median_row({"name": name, **own}, RATE, rates))
         tell()
     return rows
 
@@ -113,8 +111,7 @@ def _proof(case: str, toasts: int, tell: Callable[[], None]) -> Row:
         seconds.append(time.perf_counter() - began)
     tell()
     name = "exact" if proven else "exact, not proven"
-    named = {"name": name, "case": case, "toasts": toasts}
-    return row(named, SECONDS, median(seconds), (min(seconds), max(seconds)), None)
+    return median_row({"name": name, "case": case, "toasts": toasts}, SECONDS, seconds)
 
 
 def _seconds_to_near(case: str, job: Job) -> list[float]:
@@ -134,17 +131,15 @@ def _seconds_to_near(case: str, job: Job) -> list[float]:
     return found
 
 
-def _near_rows(case: str, seconds: list[float]) -> list[Row]:
+def near_rows(case: str, seconds: list[float]) -> list[Row]:
     """The share of sessions that came near, and where all did, their seconds."""
     named: Row = {"name": "srl-time, near the optimum", "case": case, "toasts": MANY}
     share = 100.0 * sum(map(isfinite, seconds)) / len(seconds)
-    rows = [row(named, "near_percent", share, None, None)]
-    if share == 100.0:
-        rows.append(row(named, SECONDS, median(seconds), (min(seconds), max(seconds)), None))
-    return rows
+    rows = [row(named, "near_percent", share)]
+    return [*rows, median_row(named, SECONDS, seconds)] if share == 100.0 else rows
 
 
-def _solved(case: str, missed: list[str], seed: int) -> list[Row]:
+def solved_rows(case: str, missed: list[str], seed: int) -> list[Row]:
     """CP-SAT's gap after its limit; where it found nothing at all, a word of that is added to `missed`."""
     cell = robot_cell(case, MANY)
     best, found = optimum(cell), cp_sat(cell, time_limit_s=CP_SAT_LIMIT_S, seed=seed)
@@ -153,23 +148,19 @@ def _solved(case: str, missed: list[str], seed: int) -> list[Row]:
         return []
     named: Row = {"name": "cp-sat", "case": case, "toasts": MANY, "limit_s": CP_SAT_LIMIT_S}
     gap = max(0.0, 100.0 * best.gap(found.cost))
-    return [row(named, "gap_percent", gap, None, None), row(named, SECONDS, found.wall_s, None, None)]
+    return [row(named, "gap_percent", gap), row(named, SECONDS, found.wall_s)]
 
 
-def _ratios(rates: list[Row], learned: list[Row], solved: list[Row]) -> Row:
+def ratios(rates: list[Row], learned: list[Row], solved: list[Row]) -> Row:
     """How many times as fast; CP-SAT's seconds are at least those of its limit where its sequence was not near yet."""
     fast, random, slow = (one["value"] for one in rates)
     says: Row = {
         "compiled to readable SRL": round(fast / slow, 1),
         "random search to SRL, both compiled": round(random / fast, 2),
     }
-    for one in learned:
-        if one["measure"] == SECONDS:
-            other = {own["measure"]: own["value"] for own in solved if own["case"] == one["case"]}
-            near = other.get("gap_percent", inf) <= 100.0 * NEAR
-            if near or not other:
-                ratio: float | None = None
-            else:
-                ratio = round(other[SECONDS] / one["value"])
-            says[f"CP-SAT's seconds to srl-time's, case {one['case']}, at least"] = ratio
+    for one in those(learned, measure=SECONDS):
+        other = {own["measure"]: own["value"] for own in those(solved, case=one["case"])}
+        far = other.get("gap_percent", 0.0) > 100.0 * NEAR
+        ratio = round(other[SECONDS] / one["value"]) if far else None
+        says[f"CP-SAT's seconds to srl-time's, case {one['case']}, at least"] = ratio
     return says

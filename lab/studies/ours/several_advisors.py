@@ -14,13 +14,11 @@ from lab.advice.panel import DECISIONS, panel_of
 from lab.advice.requests import Advisor
 from lab.learning.selection import uniforms
 from lab.learning.session import run_session
-from lab.mdp import FloatArray, TabularMDP, optimal_values
 from lab.studies.charts import bars
-from lab.studies.findings import Findings
-from lab.studies.runner import LEARNED_SEED, Job, gate_of, learned_values, seeds_of, world
-from lab.studies.runner import Setting as Chapter9
-from lab.studies.statistics import interval, proportion_interval
-from lab.studies.thesis.chapter_9_cells import Row, row
+from lab.studies.findings import Findings, Row, share_row, those, varying_row
+from lab.studies.runner import Job, seeds_of
+from lab.studies.thesis import chapter_9_sessions as chapter_9
+from lab.studies.thesis.chapter_9_sessions import gate_of, learner_of, problem, succeeded, table_of, world
 
 WORLD = "world-1"
 PANELS: tuple[tuple[str, ...], ...] = (
@@ -57,7 +55,7 @@ class Setting:
 
     members: tuple[str, ...]
     way: str | None
-    lesson: Chapter9
+    lesson: chapter_9.Setting
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +72,7 @@ class Tried:
 
 def advisors(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Every panel by every way of deciding; the reading changes the lesson, as in chapter 9."""
-    lesson = replace(Chapter9(WORLD, gate="ccrl"), **reading)
+    lesson = replace(chapter_9.Setting(WORLD, gate="ccrl"), **reading)
     alone = {name: Setting((name,), None, lesson) for panel in PANELS for name in panel}
     nobody = Setting((), None, lesson)
     together = {(panel, way): Setting(panel, way, lesson) for panel in PANELS for way in (*DECISIONS, IN_TURN)}
@@ -131,10 +129,12 @@ def tried(setting: Setting, *, sessions: int, seed: int) -> Tried:
 
 def one_session(setting: Setting, seed: int) -> tuple[bool, int, int, list[Event]]:
     """One session: whether its last episode took the shortest way, helped steps, requests, and what the panel told."""
-    place, mdp, told = world(setting.lesson.world), _problem(setting.lesson.world), list[Event]()
+    lesson, mdp, told = setting.lesson, problem(setting.lesson.world), list[Event]()
     rng = np.random.default_rng(seed)
     streams = rng.spawn(len(setting.members) + 2)
-    members = [_advisor(name, setting.lesson, rng) for name, rng in zip(setting.members, streams, strict=False)]
+    members = [
+        TableAdvisor(_advice(name, lesson), uniforms(rng)) for name, rng in zip(setting.members, streams, strict=False)
+    ]
     advisor: Advisor | None = members[0] if members else None
     if setting.way is not None:
         in_turn = setting.way == IN_TURN
@@ -147,34 +147,16 @@ def one_session(setting: Setting, seed: int) -> tuple[bool, int, int, list[Event
             draw=uniforms(streams[-2]),
             tell=told.append,
         )
-    changes = {
-        name: getattr(setting.lesson, name) for name in ("beta", "learner") if getattr(setting.lesson, name) is not None
-    }
-    learner = replace(place.learner, **changes)
-    result = run_session(mdp, learner, gate_of(setting.lesson, place.gate), advisor, streams[-1])
-    shown = result.steps[-1] if setting.lesson.success == "last" else result.steps.min()
-    return bool(shown == result.optimal_steps), result.helped_steps, result.requests, told
-
-
-@lru_cache(maxsize=8)
-def _problem(name: str) -> TabularMDP:
-    return world(name).mdp()
+    gate = gate_of(lesson, world(lesson.world).gate)
+    result = run_session(mdp, learner_of(lesson), gate, advisor, streams[-1])
+    (success,) = succeeded(lesson, np.array([result.steps]))
+    return bool(success), result.helped_steps, result.requests, told
 
 
 @lru_cache(maxsize=64)
-def _advice(name: str, lesson: Chapter9) -> Advice:
-    values = _known(lesson)
-    return Advice.of(skill(-values, SKILLS["expert"]) if name == "wrong" else skill(values, SKILLS[name]))
-
-
-def _known(lesson: Chapter9) -> FloatArray:
-    if lesson.advisor_table == "exact":
-        return optimal_values(_problem(lesson.world), world(lesson.world).learner.discount)
-    return learned_values(lesson.world, LEARNED_SEED if lesson.table_seed is None else lesson.table_seed)
-
-
-def _advisor(name: str, lesson: Chapter9, rng: np.random.Generator) -> TableAdvisor:
-    return TableAdvisor(_advice(name, lesson), uniforms(rng))
+def _advice(name: str, lesson: chapter_9.Setting) -> Advice:
+    wrong, values = name == "wrong", table_of(lesson)
+    return Advice.of(skill(-values if wrong else values, SKILLS["expert" if wrong else name]))
 
 
 def rows_of(panel: Sequence[str], way: str, who: str, found: Tried) -> list[Row]:
@@ -182,20 +164,17 @@ def rows_of(panel: Sequence[str], way: str, who: str, found: Tried) -> list[Row]
     sessions = len(found.success)
     named: Row = {"table": "World I", "panel": ", ".join(panel) or None, "way": way, "asked": who or None}
     named = {name: value for name, value in named.items() if value is not None} | {"sessions": sessions}
-    share, low, high = proportion_interval(int(found.success.sum()), sessions)
-    rows = [row(named, "SP_percent", share, (low, high), None), _mean(named, "HS_steps", found.helped_steps)]
+    rows = [share_row(named, "SP_percent", found.success), varying_row(named, "HS_steps", found.helped_steps)]
     if way not in (*DECISIONS, IN_TURN):
         return rows
-    times = sum(found.dropped.values(), np.zeros(sessions, np.int64))
+    never = np.zeros(sessions, np.int64)
     rows += [
-        _mean(named, "dropped", times),
-        _mean(named, "readmitted", found.readmitted),
-        _mean(named, "disagreed_steps", found.disagreed),
+        varying_row(named, "dropped", sum(found.dropped.values(), never)),
+        varying_row(named, "readmitted", found.readmitted),
+        varying_row(named, "disagreed_steps", found.disagreed),
     ]
     for name in names_in(panel):
-        often = int((found.dropped[name] > 0).sum()) if name in found.dropped else 0
-        share, low, high = proportion_interval(often, sessions)
-        rows.append(row(named | {"advisor": name}, "ever_dropped_percent", share, (low, high), None))
+        rows.append(share_row(named | {"advisor": name}, "ever_dropped_percent", found.dropped.get(name, never) > 0))
     return rows
 
 
@@ -206,20 +185,12 @@ def names_in(panel: Sequence[str]) -> list[str]:
     ]
 
 
-def _mean(named: Row, measure: str, values: NDArray[np.int64]) -> Row:
-    if np.ptp(values) == 0:  # nothing varies: no interval
-        return row(named, measure, float(values[0]), None, None)
-    mean, low, high = interval(values)
-    return row(named, measure, mean, (low, high), None)
+def _row(rows: Sequence[Row], panel: Sequence[str], way: str, measure: str) -> Row:
+    return those(rows, panel=", ".join(panel) or None, way=way, measure=measure, advisor=None)[0]
 
 
 def _value(rows: Sequence[Row], panel: Sequence[str], way: str, measure: str) -> float:
-    name = ", ".join(panel) or None
-    return next(
-        float(one["value"])
-        for one in rows
-        if (one.get("panel"), one["way"], one["measure"]) == (name, way, measure) and "advisor" not in one
-    )
+    return float(_row(rows, panel, way, measure)["value"])
 
 
 def in_short(rows: Sequence[Row]) -> Row:
@@ -240,8 +211,5 @@ def in_short(rows: Sequence[Row]) -> Row:
 
 def _picture(rows: Sequence[Row], measure: str, ylabel: str) -> bytes:
     """Bars by panel, a bar for each way."""
-    of = {(one.get("panel"), one["way"]): one for one in rows if one["measure"] == measure}
-    lines = [[of[", ".join(panel), way] for panel in PANELS] for way in WAYS]
-    values = [[one["value"] for one in line] for line in lines]
-    ends = [[one["ci95"] or [one["value"]] * 2 for one in line] for line in lines]
-    return bars([",\n".join(panel) for panel in PANELS], WAYS, values, ends, ylabel)
+    lines = {way: [_row(rows, panel, way, measure) for panel in PANELS] for way in WAYS}
+    return bars([",\n".join(panel) for panel in PANELS], lines, ylabel)

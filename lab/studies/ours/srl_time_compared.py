@@ -6,15 +6,11 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lab.sequencing.search import SAME
-from lab.studies.findings import Findings
+from lab.studies.findings import Findings, Row, agreement, row, share_row, those, varying_row
 from lab.studies.ours.srl_time_figures import by_episodes, by_wall_time, of_orders
 from lab.studies.ours.srl_time_sessions import CAPS, COMPILED, LEARNING, READABLE, Setting, Tried, Work, single, tried
 from lab.studies.runner import Job
-from lab.studies.statistics import interval, proportion_interval
-from lab.studies.thesis.chapter_9_cells import Row, agreement, row
 
 CASES = ("I", "II", "III")
 FEW = {3: (5, 15, 30, 60, 200), 4: (15, 50, 100, 400)}  # session lengths by number of toasts
@@ -95,15 +91,13 @@ def _factors(work: Work, method: str) -> tuple[str | None, ...]:
 
 def rows_of(setting: Setting, found: Tried) -> list[Row]:
     """Success, gap and seconds of a setting."""
-    named, sessions = _described(setting, len(found.gap)), len(found.gap)
-    rows = []
+    named, rows = _described(setting, len(found.gap)), []
     for measure, gaps in (("SP_percent", found.gap), ("final_SP_percent", found.final_gap)):
         if np.isfinite(gaps).all():
-            share, low, high = proportion_interval(int((gaps <= EXACT_TO).sum()), sessions)
-            chance = setting.method in LEARNING
-            rows.append(row(named, measure, share, (low, high) if chance else None, None))
-    rows.append(_mean(named, "gap_percent", 100.0 * np.maximum(found.gap, 0.0)))
-    return [*rows, _mean(named, "wall_s", found.wall_s)]
+            percent = share_row(named, measure, gaps <= EXACT_TO)
+            rows.append(percent if setting.method in LEARNING else row(named, measure, percent["value"]))
+    rows.append(varying_row(named, "gap_percent", 100.0 * np.maximum(found.gap, 0.0)))
+    return [*rows, varying_row(named, "wall_s", found.wall_s)]
 
 
 def _described(setting: Setting, sessions: int) -> Row:
@@ -123,28 +117,18 @@ def _described(setting: Setting, sessions: int) -> Row:
     return {name: value for name, value in named.items() if value is not None}
 
 
-def _mean(named: Row, measure: str, values: NDArray[np.float64]) -> Row:
-    if np.ptp(values) <= SAME:  # nothing varies: no interval
-        return row(named, measure, float(values.mean()), None, None)
-    mean, low, high = interval(values)
-    return row(named, measure, mean, (low, high), None)
-
-
 def in_short(rows: Sequence[Row]) -> Row:
     """The worst cells of srl-time, and the mean gaps of all methods in the longest sessions, by kind of work."""
-    of = [one for one in rows if one["method"] == "srl-time"]
-    says: Row = {
-        f"srl-time, {table}: least SP in {longest} episodes [%]": round(
-            min(_values(of, table, "SP_percent", longest)), 1
-        )
-        for table, longest in _longest(of)
-    }
+    says: Row = {}
+    for table, longest in _longest(those(rows, method="srl-time")):
+        of = those(rows, method="srl-time", table=table, measure="SP_percent", episodes=longest)
+        says[f"srl-time, {table}: least SP in {longest} episodes [%]"] = round(min(one["value"] for one in of), 1)
     for table, longest in _longest(rows):
         for method in LEARNING:
-            gaps = _values([one for one in rows if one["method"] == method], table, "gap_percent", longest)
-            if gaps:
-                says[f"{method}, {table}: mean gap in {longest} episodes [%]"] = round(float(np.mean(gaps)), 2)
-    proofs = [one["value"] for one in rows if (one["method"], one["measure"]) == ("exact", "wall_s")]
+            if of := those(rows, method=method, table=table, measure="gap_percent", episodes=longest):
+                mean = float(np.mean([one["value"] for one in of]))
+                says[f"{method}, {table}: mean gap in {longest} episodes [%]"] = round(mean, 2)
+    proofs = [one["value"] for one in those(rows, method="exact", measure="wall_s")]
     return says | {"exact: longest proof [s]": round(max(proofs), 2)}
 
 
@@ -154,8 +138,3 @@ def _longest(rows: Iterable[Row]) -> list[tuple[str, int]]:
         if "episodes" in one:
             found[one["table"]] = max(found.get(one["table"], 0), one["episodes"])
     return list(found.items())
-
-
-def _values(rows: Iterable[Row], table: str, measure: str, episodes: int) -> list[float]:
-    wanted = (table, measure, episodes)
-    return [one["value"] for one in rows if (one["table"], one["measure"], one.get("episodes")) == wanted]

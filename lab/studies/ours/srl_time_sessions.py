@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -139,8 +139,7 @@ def _settings(setting: Setting) -> SrlSettings:
     work = setting.work
     factor: Literal["A", "B"] = "A" if setting.reward_factor == "A" else "B"
     if work.order is not None:
-        given = settings(len(work.order))
-        return SrlSettings(beta=given.beta, factor=factor, values=given.values, state=given.state)
+        return replace(settings(len(work.order)), factor=factor)
     return SrlSettings(beta=BETAS.get(work.toasts or 0, 0.5), factor=factor)
 
 

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from lab.sequencing.chance import LAWS
 from lab.studies.charts import bars
-from lab.studies.findings import Findings
+from lab.studies.findings import Findings, Row, agreement, mean_row, row, those
 from lab.studies.runner import Job
-from lab.studies.statistics import interval
 from lab.studies.thesis.appendix_3_fifo import STARTS
 from lab.studies.thesis.appendix_3_makespans import (
     ASKED,
@@ -27,7 +26,6 @@ from lab.studies.thesis.appendix_3_makespans import (
     Mix,
     made,
 )
-from lab.studies.thesis.chapter_9_cells import Row, agreement, row
 
 Floats = NDArray[np.float64]
 
@@ -120,9 +118,9 @@ def _rows(group: Group, of: Sequence[Made]) -> list[Row]:
 
 def _measured(named: Row, law: str, method: str, of: Sequence[Made]) -> list[Row]:
     """The mean makespan, and with constant arrivals the gap to the optimum."""
-    rows = [_mean(named, "makespan_s", [one.makespans_s[method, law].mean() for one in of])]
+    rows = [mean_row(named, "makespan_s", [one.makespans_s[method, law].mean() for one in of])]
     if law == "constant":
-        rows.append(_mean(named, "gap_percent", [100.0 * one.gaps[method] for one in of]))
+        rows.append(mean_row(named, "gap_percent", [100.0 * one.gaps[method] for one in of]))
     return rows
 
 
@@ -131,21 +129,16 @@ def _improvements(named: Row, group: Group, of: Sequence[Made]) -> list[Row]:
     method, start, law = named["method"], named["fifo"], group[1]
     pairs = [(one.makespans_s[FIFO[start], law], one.makespans_s[method, law]) for one in of]
     fifo_s, own_s = np.array([(other[: len(own)].mean(), own.mean()) for other, own in pairs]).T
-    p = float(f"{_p(fifo_s - own_s):.2g}")
+    p = float(f"{paired_p(fifo_s - own_s):.2g}")
     printed = method == "srl" and start == "listing"
     shown = [PRINTED_IP.get(group), PRINTED_DIFFERENCE.get(group)] if printed else [None, None]
     return [
-        _mean({**named, "p": p}, "IP_percent", 100.0 * (fifo_s - own_s) / fifo_s, shown[0]),
-        _mean({**named, "p": p}, "difference_s", fifo_s - own_s, shown[1]),
+        mean_row({**named, "p": p}, "IP_percent", 100.0 * (fifo_s - own_s) / fifo_s, shown[0]),
+        mean_row({**named, "p": p}, "difference_s", fifo_s - own_s, shown[1]),
     ]
 
 
-def _mean(named: Row, measure: str, values: Sequence[float] | Floats, thesis: float | None = None) -> Row:
-    found = interval(values)
-    return row(named, measure, found[0], found[1:], thesis)
-
-
-def _p(differences: Floats) -> float:
+def paired_p(differences: Floats) -> float:
     """The p value of the paired t-test (Appendix II) of differences (n,)."""
     from scipy.stats import t
 
@@ -157,18 +150,13 @@ def _p(differences: Floats) -> float:
 
 def _example_rows(orders: Mapping[int, Sequence[str]], found: Mapping[Mix, Made]) -> list[Row]:
     """Every order of 3 parts by itself, constant arrivals of the shorter mean (fig. III.4)."""
+    methods: list[tuple[str, Row]] = [(method, {"method": "fifo", "fifo": start}) for start, method in FIFO.items()]
+    methods += [(method, {"method": method}) for method in ("srl", "srl-time", "exact")]
     rows = []
     for order in orders.get(3, ()):
         of = found[Mix(order, MEANS_S[0])].makespans_s
         named: Row = {"table": "Figure III.4", "order": order, "arrivals": "constant", "interval_s": MEANS_S[0]}
-        rows += [
-            row({**named, "method": "fifo", "fifo": start}, "makespan_s", float(of[method, "constant"][0]), None, None)
-            for start, method in FIFO.items()
-        ]
-        rows += [
-            row({**named, "method": method}, "makespan_s", float(of[method, "constant"][0]), None, None)
-            for method in ("srl", "srl-time", "exact")
-        ]
+        rows += [row(named | own, "makespan_s", float(of[name, "constant"][0])) for name, own in methods]
     return rows
 
 
@@ -176,13 +164,9 @@ def _in_short(rows: Sequence[Row]) -> Row:
     """The range of IP over the cells, for SRL with both FIFO, and for other methods with the FIFO as listed."""
     says: Row = {}
     for method, start in (("srl", "listing"), ("srl", "idle-start"), *((m, "listing") for m in BESIDE)):
-        of = [one["value"] for one in rows if _is(one, method=method, fifo=start, measure="IP_percent")]
+        of = [one["value"] for one in those(rows, method=method, fifo=start, measure="IP_percent")]
         says[f"IP of {method} over {FIFO_NAMES[start]} [%]"] = f"{min(of):.1f} to {max(of):.1f}"
     return says
-
-
-def _is(one: Row, **wanted: Any) -> bool:
-    return all(one.get(name) == value for name, value in wanted.items())
 
 
 def _pictures(rows: Sequence[Row]) -> dict[str, bytes]:
@@ -204,63 +188,54 @@ def _pictures(rows: Sequence[Row]) -> dict[str, bytes]:
     return pictures
 
 
-Line = tuple[str, list[Row]]  # a series of bars: its name, and a row for each group
+def _series(*methods: str) -> list[tuple[str, Row]]:
+    """FIFO and some methods: the name of a series and what its rows have."""
+    fifos: list[tuple[str, Row]] = [(name, {"method": "fifo", "fifo": start}) for start, name in FIFO_NAMES.items()]
+    return fifos + [(METHODS[method], {"method": method}) for method in methods]
 
 
-def _bars(groups: Sequence[str], lines: Sequence[Line], ylabel: str, xlabel: str = "") -> bytes:
-    def of(name: str) -> list[list[Any]]:
-        return [[one[name] if one[name] is not None else np.nan for one in line] for _, line in lines]
-
-    ends = [[one["ci95"] or (np.nan, np.nan) for one in line] for _, line in lines]
-    names = [name for name, _ in lines]
-    return bars(groups, names, of("value"), ends, ylabel, xlabel=xlabel, printed=of("thesis"))
-
-
-def _found(rows: Sequence[Row], **wanted: Any) -> Row:
-    return next(one for one in rows if _is(one, **wanted))
+def _by_parts(rows: Sequence[Row], series: Sequence[tuple[str, Row]], ylabel: str, **wanted: Any) -> bytes:
+    """Bars by the number of parts."""
+    lines = {name: [those(rows, parts=parts, **(wanted | own))[0] for parts in SIZES] for name, own in series}
+    return bars([f"{parts} parts" for parts in SIZES], lines, ylabel)
 
 
 def _examples(rows: Sequence[Row]) -> bytes:
-    shown = [one for one in rows if _is(one, table="Figure III.4")]
-    series = [(name, {"method": "fifo", "fifo": start}) for start, name in FIFO_NAMES.items()]
-    series += [(METHODS[method], {"method": method}) for method in ("srl", "srl-time", "exact")]
-    lines = [(name, [_found(shown, order=order, **wanted) for order in EXAMPLES]) for name, wanted in series]
-    return _bars(EXAMPLES, lines, "makespan [s]", "order of arrival: R a rook, S a sign")
+    shown = those(rows, table="Figure III.4")
+    series = _series("srl", "srl-time", "exact")
+    lines = {name: [those(shown, order=order, **own)[0] for order in EXAMPLES] for name, own in series}
+    return bars(EXAMPLES, lines, "makespan [s]", xlabel="order of arrival: R a rook, S a sign")
 
 
 def _differences(rows: Sequence[Row]) -> bytes:
     groups = [*product(LAWS, MEANS_S)]
-    lines = []
+    lines = {}
     for start, name in FIFO_NAMES.items():
-        wanted = {"parts": 5, "method": "srl", "fifo": start, "measure": "difference_s"}
-        lines.append((f"over {name}", [_found(rows, arrivals=law, interval_s=mean, **wanted) for law, mean in groups]))
-    return _bars([f"{law}\n{mean:g} s" for law, mean in groups], lines, "makespan difference [s]")
+        of = those(rows, parts=5, method="srl", fifo=start, measure="difference_s")
+        lines[f"over {name}"] = [those(of, arrivals=law, interval_s=mean)[0] for law, mean in groups]
+    return bars([f"{law}\n{mean:g} s" for law, mean in groups], lines, "makespan difference [s]")
 
 
 def _by_size(rows: Sequence[Row], law: str, measure: str) -> bytes:
-    lines = []
-    for start, mean in product(STARTS, MEANS_S):
-        wanted = {"arrivals": law, "interval_s": mean, "method": "srl", "fifo": start, "measure": measure}
-        name = f"over {FIFO_NAMES[start]}, mean {mean:g} s"
-        lines.append((name, [_found(rows, parts=parts, **wanted) for parts in SIZES]))
+    series = [
+        (f"over {FIFO_NAMES[start]}, mean {mean:g} s", {"interval_s": mean, "fifo": start})
+        for start, mean in product(STARTS, MEANS_S)
+    ]
     ylabel = "makespan difference [s]" if measure == "difference_s" else "improvement IP [%]"
-    return _bars([f"{parts} parts" for parts in SIZES], lines, ylabel)
+    return _by_parts(rows, series, ylabel, arrivals=law, method="srl", measure=measure)
 
 
 def _gaps(rows: Sequence[Row]) -> bytes:
+    series = _series("srl", "srl pairs", "random", "srl-time")
     wanted = {"arrivals": "constant", "interval_s": MEANS_S[-1], "measure": "gap_percent"}
-    series = [(name, {"method": "fifo", "fifo": start}) for start, name in FIFO_NAMES.items()]
-    series += [(METHODS[method], {"method": method}) for method in ("srl", "srl pairs", "random", "srl-time")]
-    lines = [(name, [_found(rows, parts=parts, **wanted, **own) for parts in SIZES]) for name, own in series]
-    return _bars([f"{parts} parts" for parts in SIZES], lines, "above the proven optimum [%]")
+    return _by_parts(rows, series, "above the proven optimum [%]", **wanted)
 
 
 def _by_method(rows: Sequence[Row]) -> bytes:
-    wanted = {"arrivals": "exponential", "interval_s": MEANS_S[-1], "measure": "IP_percent", "fifo": "listing"}
-    methods = ("srl", "srl-time", "exact", "reacting", "rollout")
     names = {"srl": "SRL, fixed list", "srl-time": "srl-time, fixed list", "exact": "optimum, fixed list"}
-    lines = [
-        (names.get(method, METHODS[method]), [_found(rows, parts=parts, method=method, **wanted) for parts in SIZES])
-        for method in methods
+    series = [
+        (names.get(method, METHODS[method]), {"method": method})
+        for method in ("srl", "srl-time", "exact", "reacting", "rollout")
     ]
-    return _bars([f"{parts} parts" for parts in SIZES], lines, "improvement IP [%]")
+    wanted = {"arrivals": "exponential", "interval_s": MEANS_S[-1], "measure": "IP_percent", "fifo": "listing"}
+    return _by_parts(rows, series, "improvement IP [%]", **wanted)

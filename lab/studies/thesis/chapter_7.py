@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lab.studies.findings import Findings
+from lab.studies.findings import Findings, Row, agreement, row
 from lab.studies.runner import Job
 from lab.studies.statistics import Comparison
 from lab.studies.thesis import appendix_4
@@ -23,7 +23,6 @@ from lab.studies.thesis.chapter_7_cells import (
     printed,
     short_name,
 )
-from lab.studies.thesis.chapter_9_cells import Row, agreement, row
 
 Changes = Mapping[str, Any]  # to all settings: {"reading": "figure 5.1"}
 TABLES = {"I": "Table 7.4", "II": "Table 7.5", "III": "Table 7.6"}
@@ -67,19 +66,14 @@ DECAY = (
 )
 
 
-def table_7_4(job: Job, changes: Changes) -> Findings:
-    """Table 7.4: case I."""
-    return _best_results(job, changes, "I")
-
-
-def table_7_5(job: Job, changes: Changes) -> Findings:
-    """Table 7.5: case II."""
-    return _best_results(job, changes, "II")
-
-
-def table_7_6(job: Job, changes: Changes) -> Findings:
-    """Table 7.6: case III."""
-    return _best_results(job, changes, "III")
+def best_results(job: Job, changes: Changes, case: str) -> Findings:
+    """One of the tables 7.4-7.6: three methods by session length in a case."""
+    cells = _of_case(_changed(printed(SESSION_LENGTHS), changes), case)
+    table = TABLES[case]
+    rows, found = _compared(Measured(job, [cell.setting for cell in cells]), cells, table)
+    pictures = figures.lengths(rows, figures.of_case(case, table))
+    notes = (SYMBOLS, READ_AS, SHADED, HOW_MANY, _assumptions([*found.values()]), *examples(found))
+    return Findings(rows, summary(rows, job.sessions), pictures, notes)
 
 
 def table_iv_1(job: Job, changes: Changes) -> Findings:
@@ -97,14 +91,14 @@ def table_iv_2(job: Job, changes: Changes) -> Findings:
     return Findings(rows, summary(rows, job.sessions), pictures, (SYMBOLS, READ_AS, FACTORS, SHADED, HOW_MANY))
 
 
-def whole(job: Job, changes: Changes) -> Findings:
+def chapter_7(job: Job, changes: Changes) -> Findings:
     """All tables and figures 7.3 to 7.12 and IV.1 to IV.3; each cell is measured once."""
     cells = _changed(printed(SESSION_LENGTHS), changes)
     measured = Measured(job, [*(cell.setting for cell in cells), *_decay_settings(changes)])
     rows = _decay_rows(measured, changes)
     pictures = figures.alone(job.seed) | {"Figure 7.5: SP and CE by beta": figures.by_beta(rows)}
     for case, table in TABLES.items():
-        rows += _compared(measured, _of_table(cells, case), table)[0]
+        rows += _compared(measured, _of_case(cells, case), table)[0]
     factors = _compared(measured, [cell for cell in cells if cell.setting.method == "srl"], FACTOR_TABLE)[0]
     pictures |= figures.lengths([*rows, *factors], figures.COMPARED) | appendix_4.pictures()
     rows += [one for one in factors if one.get("reward_factor") != "B"]  # type B stands in the other tables
@@ -125,23 +119,13 @@ def readings(job: Job, changes: Changes) -> Findings:
     for same, group in groups.items():
         off, chance = deviation(group, job.sessions)
         named = {key: value for key, value in describe(same).items() if key not in ("episodes", "beta")}
-        rows += [row(named, "off_points", off, None, None), row(named, "chance_points", chance, None, None)]
+        rows += [row(named, "off_points", off), row(named, "chance_points", chance)]
     notes = (DISTANCES, SYMBOLS, READ_AS)
     found = {"readings": len(READINGS), "cells": 0, "within": 0}
     return Findings(rows, found, figures.readings(rows), notes)
 
 
-def _best_results(job: Job, changes: Changes, case: str) -> Findings:
-    """One of the tables 7.4-7.6: three methods by session length."""
-    cells = _of_table(_changed(printed(SESSION_LENGTHS), changes), case)
-    table = TABLES[case]
-    rows, found = _compared(Measured(job, [cell.setting for cell in cells]), cells, table)
-    pictures = figures.lengths(rows, figures.of_case(case, table))
-    notes = (SYMBOLS, READ_AS, SHADED, HOW_MANY, _assumptions([*found.values()]), *_examples(found))
-    return Findings(rows, summary(rows, job.sessions), pictures, notes)
-
-
-def _of_table(cells: Sequence[Cell], case: str) -> list[Cell]:
+def _of_case(cells: Sequence[Cell], case: str) -> list[Cell]:
     return [cell for cell in cells if cell.setting.case == case and cell.setting.reward_factor != "A"]
 
 
@@ -190,10 +174,8 @@ def _length(setting: Setting) -> Setting:
 def _tests(table: str, same: Setting, found: Comparison) -> list[Row]:
     """The p values behind the ranks at one session length (Appendix II)."""
     named = {"table": table} | {name: value for name, value in describe(same).items() if name != "method"}
-    rows = [row(named, "ANOVA_p", found.p, None, None)]
-    for (one, other), p in found.tukey.items():
-        rows.append(row({**named, "method": f"{one} - {other}"}, "Tukey_p", p, None, None))
-    return rows
+    pairs = [({**named, "method": f"{one} - {other}"}, p) for (one, other), p in found.tukey.items()]
+    return [row(named, "ANOVA_p", found.p), *(row(pair, "Tukey_p", p) for pair, p in pairs)]
 
 
 def _assumptions(found: Sequence[Comparison]) -> str:
@@ -207,7 +189,7 @@ def _assumptions(found: Sequence[Comparison]) -> str:
     )
 
 
-def _examples(found: Mapping[Setting, Comparison]) -> list[str]:
+def examples(found: Mapping[Setting, Comparison]) -> list[str]:
     """Our test beside the one that Appendix II shows, where it is among these."""
     return [
         f"Appendix II's example (case I, 3 toasts, 30 episodes): {EXAMPLE} printed; here F = {test.f:.1f}, "

@@ -1,34 +1,35 @@
 """Chapter 7 again: the printed figures of tables 7.4-7.6, IV.1 and IV.2, and the sessions that measure them."""
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
-from pathlib import Path
 from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import unknown
+from lab.sequencing.batch import run_sessions
 from lab.sequencing.cell import Cell as RobotCell
+from lab.sequencing.chance import NO_CHANCE, Chance
+from lab.sequencing.search import SAME, Search, SrlSettings
+from lab.studies.findings import Row, mean_row, share_row
 from lab.studies.runner import Job, seeds_of
-from lab.studies.statistics import Comparison, compare, interval, proportion_interval
+from lab.studies.statistics import Comparison, compare
+from lab.studies.thesis import chapter_7_listing as listing
+from lab.studies.thesis import printed_lines
 from lab.studies.thesis.chapter_7_listing import LISTING, Reading
-from lab.studies.thesis.chapter_9_cells import Row, row
 
 Floats = NDArray[np.float64]
 Environment = Literal["deterministic", "stochastic"]
 Factor = Literal["A", "B"]
 
-PRINTED = Path(__file__).parent / "printed"
 SESSION_LENGTHS, DECAY_FACTORS = "tables-7.4-7.6-iv.2.csv", "table-iv.1.csv"
 TASKS = {"I": "toast-case-1", "II": "toast-case-2", "III": "toast-case-3"}
 BETAS = {3: 1.0, 4: 0.5}  # section 7.6, by number of toasts
 SPREAD = 0.1  # section 7.6: the standard deviation of processing times as a share of their mean
 REPLICATIONS = 10  # section 7.6
 DECAY_EPISODES = 200  # section 7.6, the test of beta
-SAME_S = 1e-6
 LISTED = "listing"
 AS_PRINTED = "figure 5.1"
 READINGS: Mapping[str, Reading | None] = {  # None: the lab's own SRL, which is fig. 5.1
@@ -89,9 +90,8 @@ class Cell:
 @cache
 def printed(file: str) -> tuple[Cell, ...]:
     """The figures of a printed table, in its order."""
-    with (PRINTED / file).open(encoding="utf-8") as table:
-        read = _decay_cells if file == DECAY_FACTORS else _length_cells
-        return tuple(cell for line in csv.DictReader(table) for cell in read(line))
+    read = _decay_cells if file == DECAY_FACTORS else _length_cells
+    return tuple(cell for line in printed_lines(file) for cell in read(line))
 
 
 def _length_cells(line: dict[str, str]) -> list[Cell]:
@@ -117,9 +117,8 @@ def _decay_cells(line: dict[str, str]) -> list[Cell]:
 @cache
 def optimum_s(case: str, toasts: int) -> float:
     """The shortest makespan as printed [s]."""
-    with (PRINTED / "optimal-makespans.csv").open(encoding="utf-8") as table:
-        found = {(line["case"], int(line["toasts"])): float(line["optimum_seconds"]) for line in csv.DictReader(table)}
-    return found[case, toasts]
+    lines = printed_lines("optimal-makespans.csv")
+    return next(float(one["optimum_seconds"]) for one in lines if (one["case"], one["toasts"]) == (case, str(toasts)))
 
 
 @lru_cache(maxsize=16)
@@ -138,35 +137,26 @@ def epsilons(setting: Setting) -> Floats:
 
 def sessions_of(setting: Setting, sessions: int, seed: int) -> Outcome:
     """So many sessions of one setting."""
-    from lab.studies.thesis.chapter_7_listing import run_sessions, toasts_of
-
-    reading = READINGS[setting.reading]
-    seeds = seeds_of(setting, sessions, seed)
+    reading, seeds = READINGS[setting.reading], seeds_of(setting, sessions, seed)
+    cell, drawn = robot_cell(setting.case, setting.toasts), setting.environment == "stochastic"
     if reading is None:
-        return _sessions_as_printed(setting, sessions, int(seeds[0]))
-    toasts = toasts_of(robot_cell(setting.case, setting.toasts), _spread(setting), reading)
-    found = run_sessions(
-        toasts, setting.method, epsilons(setting), seeds, factor=setting.reward_factor, reading=reading
-    )
+        search = Search(
+            setting.episodes,
+            chance=Chance("normal", spread=SPREAD) if drawn else NO_CHANCE,
+            settings=SrlSettings(beta=setting.beta or 0.0, factor=setting.reward_factor or "B"),
+        )
+        printed = run_sessions(cell, setting.method, search, sessions, int(seeds[0]))
+        return Outcome(printed.best_cost, printed.final_cost, printed.convergence)
+    found = listing.run_sessions(listed(setting, SPREAD if drawn else 0.0), epsilons(setting), seeds)
     return Outcome(found.best_s, found.last_s, found.converged)
 
 
-def _spread(setting: Setting) -> float:
-    return SPREAD if setting.environment == "stochastic" else 0.0
-
-
-def _sessions_as_printed(setting: Setting, sessions: int, seed: int) -> Outcome:
-    from lab.sequencing.batch import run_sessions
-    from lab.sequencing.chance import NO_CHANCE, Chance
-    from lab.sequencing.search import Search, SrlSettings
-
-    search = Search(
-        setting.episodes,
-        chance=Chance("normal", spread=SPREAD) if setting.environment == "stochastic" else NO_CHANCE,
-        settings=SrlSettings(beta=setting.beta or 0.0, factor=setting.reward_factor or "B"),
+def listed(setting: Setting, spread: float = 0.0) -> listing.Listed:
+    """What the listing is told of a setting."""
+    toasts = robot_cell(setting.case, setting.toasts)
+    return listing.Listed.of(
+        toasts, setting.method, setting.reward_factor, READINGS[setting.reading] or LISTING, spread
     )
-    found = run_sessions(robot_cell(setting.case, setting.toasts), setting.method, search, sessions, seed)
-    return Outcome(found.best_cost, found.final_cost, found.convergence)
 
 
 class Measured:
@@ -177,25 +167,17 @@ class Measured:
         work = partial(sessions_of, sessions=job.sessions, seed=job.seed)
         self.outcomes = job.each(work, list(dict.fromkeys(settings)))
 
-    def value(self, setting: Setting, measure: str) -> tuple[float, tuple[float, float]]:
-        """The measured value and the ends of its interval. Source: section 7.6 (SP, CE, BR)."""
-        outcome = self.outcomes[setting]
-        if measure == "BR_s":
-            found = interval(outcome.best_s)
-        elif measure == "CE_episode":
-            found = interval(outcome.converged)
-        else:
-            succeeds = self.succeeds(setting, outcome.last_s if measure == "final_percent" else outcome.best_s)
-            found = proportion_interval(int(succeeds.sum()), len(succeeds))
-        return found[0], found[1:]
-
     def succeeds(self, setting: Setting, times_s: Floats) -> NDArray[np.bool_]:
         """Which times are the optimum's."""
-        return np.asarray(times_s <= optimum_s(setting.case, setting.toasts) + SAME_S)
+        return np.asarray(times_s <= optimum_s(setting.case, setting.toasts) + SAME)
 
     def row(self, table: str, setting: Setting, measure: str, thesis: float | None, **more: Any) -> Row:
-        """One row of a study; `more` stands after the settings."""
-        return row({"table": table, **describe(setting), **more}, measure, *self.value(setting, measure), thesis)
+        """One row of a study; `more` stands after the settings. Source: section 7.6 (SP, CE, BR)."""
+        named, outcome = {"table": table, **describe(setting), **more}, self.outcomes[setting]
+        if measure in ("BR_s", "CE_episode"):
+            return mean_row(named, measure, outcome.best_s if measure == "BR_s" else outcome.converged, thesis)
+        times_s = outcome.last_s if measure == "final_percent" else outcome.best_s
+        return share_row(named, measure, self.succeeds(setting, times_s), thesis)
 
     def replicated(self, setting: Setting) -> Floats:
         """SP [%] of each of ten replications, or BR [s] where times are left to chance."""

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from lab.sequencing.cell import Cell as RobotCell
 from lab.sequencing.run import simulate
-from lab.studies.charts import MARKERS, PRINTED, bars
+from lab.studies.charts import PRINTED, bars, curve, legend_below
+from lab.studies.findings import Row, those
 from lab.studies.runner import seeds_of
-from lab.studies.thesis.chapter_7_cells import READINGS, Setting, epsilons, optimum_s, robot_cell
-from lab.studies.thesis.chapter_9_cells import Row
+from lab.studies.thesis.chapter_7_cells import READINGS, Setting, epsilons, listed, optimum_s, robot_cell
+from lab.studies.thesis.chapter_7_listing import run_sessions
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, picture_bytes
 from lab.view.sequencing_plots import success_picture
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SESSION = Setting("II", 3, "srl", 200, reward_factor="A", beta=1.5)  # of figs. 7.3 and 7.4
@@ -72,9 +72,8 @@ def _by_length(rows: Sequence[Row], shown: Compared) -> bytes:
     for name in shown.names:
         of = {
             one["episodes"]: one
-            for one in rows
+            for one in those(rows, case=shown.case, toasts=shown.toasts, environment=shown.environment)
             if one["thesis"] is not None
-            and (one["case"], one["toasts"], one["environment"]) == shown[:3]
             and _method(one) == name
             and one["measure"] in ("SP_percent", "BR_s")
             and one["table"] != "Table IV.1"
@@ -92,7 +91,7 @@ def _by_length(rows: Sequence[Row], shown: Compared) -> bytes:
 
 def by_beta(rows: Sequence[Row]) -> bytes:
     """SP and CE by beta with type A, a line for each case. Source: thesis fig. 7.5."""
-    shown = [one for one in rows if one["table"] == "Table IV.1" and one["reward_factor"] == "A"]
+    shown = those(rows, table="Table IV.1", reward_factor="A")
 
     def draw(figure: "Figure") -> None:
         from matplotlib.ticker import MaxNLocator
@@ -102,28 +101,20 @@ def by_beta(rows: Sequence[Row]) -> bytes:
             (left, "SP_percent", "sessions that find the optimum [%]"),
             (right, "CE_episode", "mean episode of convergence"),
         ):
-            for colour, marker, case in zip(COLOURS, MARKERS, ("I", "II", "III"), strict=False):
-                of = [one for one in shown if (one["measure"], one["case"]) == (measure, case)]
-                _draw_case(axes, of, colour, marker, f"case {case}")
+            for colour, marker, case in zip(COLOURS, "os^", ("I", "II", "III"), strict=False):
+                of = those(shown, measure=measure, case=case)
+                curve(axes, of, "beta", (colour, marker, f"case {case}"))
+                look = PRINTED | {"marker": marker, "linestyle": ":", "linewidth": 0.9, "markeredgecolor": colour}
+                axes.plot([one["beta"] for one in of], [one["thesis"] for one in of], color=colour, **look)
             axes.set(xlabel="β (episode n explores with probability $n^{-β}$)", ylabel=label, xticks=BETAS)
             axes.grid()
         left.yaxis.set_major_locator(MaxNLocator(integer=True))
         left.set_ylim(None, 101)
         right.set_ylim(0, None)
-        handles = left.get_legend_handles_labels()[0]
-        handles += left.plot([], [], linestyle="none", label="printed", **(PRINTED | {"marker": "o"}))
-        figure.legend(handles=handles, loc="outside lower center", ncols=4)
+        left.plot([], [], label="printed", **(PRINTED | {"marker": "o"}))
+        legend_below(figure)
 
     return picture_bytes(draw, 8.0, 3.6, "svg")
-
-
-def _draw_case(axes: "Axes", rows: Sequence[Row], colour: str, marker: str, name: str) -> None:
-    beta, value = [one["beta"] for one in rows], [one["value"] for one in rows]
-    low, high = np.array([one["ci95"] for one in rows]).T
-    axes.fill_between(beta, low, high, color=colour, alpha=0.15, linewidth=0)
-    axes.plot(beta, value, color=colour, marker=marker, markersize=5, label=name, zorder=3)
-    look: dict[str, Any] = {"markerfacecolor": "white", "markersize": 6, "linestyle": ":", "linewidth": 0.9}
-    axes.plot(beta, [one["thesis"] for one in rows], color=colour, marker=marker, zorder=2.5, **look)
 
 
 def alone(seed: int) -> dict[str, bytes]:
@@ -131,7 +122,7 @@ def alone(seed: int) -> dict[str, bytes]:
     times_s, sequence = session(seed)
     cell = robot_cell(SESSION.case, SESSION.toasts)
     return {
-        "Figure 7.3: a session that settles on the optimum": _convergence(times_s),
+        "Figure 7.3: a session that settles on the optimum": convergence(times_s),
         "Figure 7.4: where the toasts are, in the sequence found": _places(cell, sequence),
         "Figure 7.6: how fast exploration ends": _exploration(),
     }
@@ -139,16 +130,12 @@ def alone(seed: int) -> dict[str, bytes]:
 
 def session(seed: int) -> tuple[NDArray[np.float64], list[int]]:
     """The times (E,) of the first session that settles on the optimum [s], and the toasts that its best episode moves."""
-    from lab.studies.thesis.chapter_7_listing import run_sessions, toasts_of
-
-    toasts = toasts_of(robot_cell(SESSION.case, SESSION.toasts))
-    seeds = seeds_of(SESSION, TRIED, seed)
-    found = run_sessions(toasts, "srl", epsilons(SESSION), seeds, factor="A", keep_times=True)
+    found = run_sessions(listed(SESSION), epsilons(SESSION), seeds_of(SESSION, TRIED, seed), keep_times=True)
     n = int(np.argmin(found.last_s))
     return found.times_s[n], [toast for toast in found.sequences[n].tolist() if toast]
 
 
-def _convergence(times_s: NDArray[np.float64]) -> bytes:
+def convergence(times_s: NDArray[np.float64]) -> bytes:
     best_s = optimum_s(SESSION.case, SESSION.toasts)
     changes = np.flatnonzero(times_s[1:] != times_s[:-1])
     settles = int(changes[-1]) + 2 if len(changes) else 1
@@ -165,7 +152,7 @@ def _convergence(times_s: NDArray[np.float64]) -> bytes:
         axes.set(xlabel="episode", ylabel="makespan [s]", xlim=(0, 1.01 * len(times_s)))
         axes.set_title(f"SRL type A, β = {SESSION.beta:g}, case {SESSION.case}, {SESSION.toasts} toasts")
         axes.grid()
-        figure.legend(loc="outside lower center", ncols=2)
+        legend_below(figure)
 
     return picture_bytes(draw, *SIZE_INCH, "svg")
 
@@ -188,7 +175,7 @@ def _places(cell: RobotCell, sequence: Sequence[int]) -> bytes:
         moved = [", ".join(map(str, toasts)) for toasts in (sequence, SEQUENCE_PRINTED)]
         axes.set_title(f"toasts moved: {moved[0]}; {schedule.makespan_s:g} s (printed: {moved[1]})")
         axes.grid()
-        figure.legend(loc="outside lower center", ncols=3)
+        legend_below(figure)
 
     return picture_bytes(draw, *SIZE_INCH, "svg")
 
@@ -203,23 +190,23 @@ def _exploration() -> bytes:
             axes.plot(range(1, setting.episodes + 1), epsilons(setting), color=colour, label=f"β = {beta:g}")
         axes.set(xlabel="episode", ylabel="probability of a random choice", xlim=(0, 60), ylim=(0, 1.02))
         axes.grid()
-        figure.legend(loc="outside lower center", ncols=4)
+        legend_below(figure)
 
     return picture_bytes(draw, 6.0, 3.4, "svg")
 
 
 def readings(rows: Sequence[Row]) -> dict[str, bytes]:
     """How far each reading is from the printed SP: bars by method, a picture for each number of toasts."""
-    off = {
-        (one["reading"], one["toasts"], _method(one)): one["value"] for one in rows if one["measure"] == "off_points"
+    off = {(one["reading"], one["toasts"], _method(one)): one for one in those(rows, measure="off_points")}
+    groups = [fill(name, 14) for name in READINGS]
+    return {
+        f"Distance from the printed SP by reading, {toasts} toasts, case I": bars(
+            groups,
+            {shown: [off[reading, toasts, name] for reading in READINGS] for name, shown in NAMES.items()},
+            "mean distance from print [points]",
+        )
+        for toasts in (3, 4)
     }
-    pictures = {}
-    for toasts in (3, 4):
-        table = [[off[reading, toasts, name] for reading in READINGS] for name in NAMES]
-        groups, series = [fill(name, 14) for name in READINGS], list(NAMES.values())
-        caption = f"Distance from the printed SP by reading, {toasts} toasts, case I"
-        pictures[caption] = bars(groups, series, table, None, "mean distance from print [points]")
-    return pictures
 
 
 def _method(one: Row) -> str:

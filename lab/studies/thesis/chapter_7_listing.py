@@ -3,13 +3,11 @@
 They differ from fig. 5.1, and that makes the printed figures. Values are kept per next state, and a next state is what
 is chosen, but only its toast counts: it may be a state to which that toast cannot go now (a phantom). A toast in a
 buffer may be chosen while the machine ahead is busy, and stays (a null move). `Reading` changes these one by one.
-What is compiled stands in `listing_kernels`.
+What is compiled stands in `chapter_7_listing_kernels`.
 """
 
 from dataclasses import dataclass
 from itertools import product
-from math import log
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +21,11 @@ from lab.studies.thesis.chapter_7_listing_kernels import (
     DONE,
     METHODS,
     PLATE,
+    RANDOM,
     STATIONS,
     TOASTER,
     TOASTER_BUFFER,
     Floats,
-    Ints,
     Rules,
     Toasts,
     Work,
@@ -63,29 +61,38 @@ class Reading:
 LISTING = Reading()
 
 
-class Sessions(NamedTuple):
-    """What N sessions of E episodes came to.
+@dataclass(frozen=True, eq=False)
+class Listed:
+    """What a session does: the toast cell and its method as the listing reads them."""
 
-    best_s and last_s (N,): the best time and that of the last episode [s]; converged (N,): the first episode from which
-    on the time stays the same; sequences (N, 5 K): the toasts moved in the best episode, from 1, then zeros; times_s
-    (N, E), of no sessions unless asked for.
-    """
+    toasts: Toasts
+    rules: Rules
+    count: int  # of toasts
 
-    best_s: Floats
-    last_s: Floats
-    converged: Ints
-    sequences: Ints
-    times_s: Floats
+    @classmethod
+    def of(
+        cls, cell: Cell, method: str, factor: str | None = None, reading: Reading = LISTING, spread: float = 0.0
+    ) -> "Listed":
+        """A method in the toast cell of ch. 7, whose parts are toasts, 2 to MOST_TOASTS; factor: "A" or "B", of SRL.
 
-
-def toasts_of(cell: Cell, spread: float = 0.0, reading: Reading = LISTING) -> Toasts:
-    """The toast cell of ch. 7 with its parts as toasts, 2 to MOST_TOASTS. BadInput for other cells."""
-    if tuple(station.kind for station in cell.stations) != KINDS:
-        raise BadInput(f"cell with the stations {', '.join(cell.names)}: only a toast cell's six can be read as listed")
-    if not 2 <= cell.parts <= MOST_TOASTS:
-        raise BadInput(f"{cell.parts} toasts as listed: allowed are 2 to {MOST_TOASTS}")
-    processing_s = np.array([station.processing_s for station in cell.stations])
-    return Toasts(np.nan_to_num(cell.loaded_s), processing_s, spread, banned_states(cell.parts, reading))
+        spread: the standard deviation of processing times as a share of their mean. Raises BadInput for other cells,
+        and for an unknown method or factor.
+        """
+        if tuple(station.kind for station in cell.stations) != KINDS:
+            raise BadInput(
+                f"cell with the stations {', '.join(cell.names)}: only a toast cell's six can be read as listed"
+            )
+        if not 2 <= cell.parts <= MOST_TOASTS:
+            raise BadInput(f"{cell.parts} toasts as listed: allowed are 2 to {MOST_TOASTS}")
+        if method not in METHODS:
+            raise unknown("method", method, METHODS, "listing")
+        if method == "srl" and factor not in ("A", "B"):
+            raise unknown("reward factor", factor, ("A", "B"), "listing")
+        processing_s = np.array([station.processing_s for station in cell.stations])
+        toasts = Toasts(np.nan_to_num(cell.loaded_s), processing_s, spread, banned_states(cell.parts, reading))
+        a, b = FACTOR_A if cell.parts <= 3 else FACTOR_A_MORE
+        changed = {name: getattr(reading, name) for name in Rules._fields if hasattr(reading, name)}
+        return cls(toasts, Rules(METHODS.index(method), factor == "A", a, b, **changed), cell.parts)
 
 
 def banned_states(toasts: int, reading: Reading = LISTING) -> NDArray[np.bool_]:
@@ -106,43 +113,30 @@ def banned_states(toasts: int, reading: Reading = LISTING) -> NDArray[np.bool_]:
 
 
 def run_sessions(
-    toasts: Toasts,
-    method: str,
-    epsilons: Floats,
-    seeds: NDArray[np.uint64],
-    *,
-    factor: str | None = None,
-    reading: Reading = LISTING,
-    keep_times: bool = False,
-) -> Sessions:
+    listed: Listed, epsilons: Floats, seeds: NDArray[np.uint64], *, keep_times: bool = False
+) -> kernels.Found:
     """A session for each seed (N,), with the exploration epsilons (E,); random search explores anyway.
 
-    factor: "A" or "B", of SRL. Raises BadInput for an unknown method or factor, and without episodes.
+    Raises BadInput without episodes.
     """
-    if method not in METHODS:
-        raise unknown("method", method, METHODS, "listing")
-    if method == "srl" and factor not in ("A", "B"):
-        raise unknown("reward factor", factor, ("A", "B"), "listing")
     if not len(epsilons):
         raise BadInput("episodes = 0: allowed are whole numbers from 1")
-    count, sessions, episodes = round(log(len(toasts.banned), STATIONS)), len(seeds), len(epsilons)
-    tried = np.ones(episodes) if method == "random" else np.asarray(epsilons, np.float64)
-    rules = _rules(count, method, factor, reading)
-    times_s, ends = np.zeros((sessions if keep_times else 1, episodes)), np.zeros((sessions, 2))
-    converged, sequences = np.ones(sessions, np.int64), np.zeros((sessions, LONGEST * count), np.int64)
-    kernels.run_sessions(
-        toasts, rules, _work(count), tried, np.asarray(seeds, np.uint64), times_s, ends, converged, sequences
+    sessions, episodes = len(seeds), len(epsilons)
+    tried = np.ones(episodes) if listed.rules.method == RANDOM else np.asarray(epsilons, np.float64)
+    found = kernels.Found(
+        times_s=np.zeros((sessions if keep_times else 1, episodes)),
+        best_s=np.zeros(sessions),
+        last_s=np.zeros(sessions),
+        converged=np.ones(sessions, np.int64),
+        sequences=np.zeros((sessions, LONGEST * listed.count), np.int64),
     )
-    return Sessions(ends[:, 0], ends[:, 1], converged, sequences, times_s if keep_times else times_s[:0])
+    work = work_of(listed.count)
+    kernels.run_sessions(listed.toasts, listed.rules, work, tried, np.asarray(seeds, np.uint64), found)
+    return found if keep_times else found._replace(times_s=found.times_s[:0])
 
 
-def _rules(toasts: int, method: str, factor: str | None, reading: Reading) -> Rules:
-    a, b = FACTOR_A if toasts <= 3 else FACTOR_A_MORE
-    changed = {name: getattr(reading, name) for name in Rules._fields if hasattr(reading, name)}
-    return Rules(METHODS.index(method), factor == "A", a, b, **changed)
-
-
-def _work(toasts: int) -> Work:
+def work_of(toasts: int) -> Work:
+    """What a session with so many toasts works on, as it begins."""
     states = STATIONS**toasts
     return Work(
         values=np.ones(states),

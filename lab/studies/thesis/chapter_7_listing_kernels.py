@@ -1,4 +1,4 @@
-"""Sessions of `lab.studies.thesis.chapter_7_listing`, compiled with numba, whose cache knows changes of this file only.
+"""Sessions of `chapter_7_listing`, compiled with numba, whose cache knows changes of this file only.
 
 Stations and toasts are numbered from 0 here.
 """
@@ -16,7 +16,7 @@ Ints = NDArray[np.int64]
 PLATE, TOASTER_BUFFER, TOASTER, BUTTER_BUFFER, APPLIER, DONE = range(6)
 STATIONS = 6
 METHODS = ("srl", "mc", "random")
-SRL, MONTE_CARLO = METHODS.index("srl"), METHODS.index("mc")
+SRL, MONTE_CARLO, RANDOM = range(3)  # in METHODS
 ALPHA, DISCOUNT, GOAL_REWARD = 0.05, 0.9, 1.5
 LATEST_S = 20_000.0  # the listing gives an episode up then
 MOST_MOVES = 10_000_000  # null moves take no time, so time alone would not end every episode; never met
@@ -73,6 +73,21 @@ class Work(NamedTuple):
     moved: Ints
 
 
+class Found(NamedTuple):
+    """What N sessions of E episodes came to.
+
+    times_s (N, E), of one session alone unless all are kept [s]; best_s and last_s (N,): the best time and that of the
+    last episode [s]; converged (N,): the first episode from which on the time stays the same; sequences (N, 5 K): the
+    toasts moved in the best episode, from 1, then zeros.
+    """
+
+    times_s: Floats
+    best_s: Floats
+    last_s: Floats
+    converged: Ints
+    sequences: Ints
+
+
 def _compiled(function: Function) -> Function:
     """Nothing here makes arrays or keeps them, so references need no counting, which would take most of the time."""
     jit: Any = njit  # its types do not know _nrt
@@ -91,7 +106,7 @@ def _uniform(work: Any) -> float:
 
 
 @_compiled
-def _processing_s(toasts: Any, work: Any, machine: int) -> float:
+def processing_s(toasts: Any, work: Any, machine: int) -> float:
     """Not cut off at 0 s, as in the listing. Source: Box and Muller 1958."""
     mean_s = toasts.processing_s[machine]
     if toasts.spread == 0.0:
@@ -110,7 +125,7 @@ def _target(work: Any, origin: int) -> int:
 
 
 @_compiled
-def _reset(work: Any) -> None:
+def reset(work: Any) -> None:
     for toast in range(len(work.place)):
         work.place[toast], work.ready_s[toast] = PLATE, 0.0
     for n in range(work.whole[SEEN]):
@@ -120,7 +135,7 @@ def _reset(work: Any) -> None:
 
 
 @_compiled
-def _carry(toasts: Any, rules: Any, work: Any, toast: int) -> None:
+def carry(toasts: Any, rules: Any, work: Any, toast: int) -> None:
     """The robot goes to a toast, waits until it is processed, and takes it on, or leaves it where it is: a null move."""
     origin = work.place[toast]
     target = _target(work, origin)
@@ -129,7 +144,7 @@ def _carry(toasts: Any, rules: Any, work: Any, toast: int) -> None:
     work.place[toast] = work.whole[ROBOT] = target
     if target in (TOASTER, APPLIER):
         work.busy[target] = True
-        work.ready_s[toast] = work.clock[0] + _processing_s(toasts, work, target)
+        work.ready_s[toast] = work.clock[0] + processing_s(toasts, work, target)
     if target == DONE:
         work.busy[APPLIER] = False
     elif (rules.frees_by_place and target >= BUTTER_BUFFER) or origin == TOASTER:
@@ -150,7 +165,7 @@ def _visit(work: Any) -> None:
 
 
 @_compiled
-def _list_options(toasts: Any, rules: Any, work: Any) -> int:
+def list_options(toasts: Any, rules: Any, work: Any) -> int:
     """How many next states may be chosen: by toast, the nearer station first."""
     count, state, weight = 0, work.whole[STATE], 1
     for toast in range(len(work.place)):
@@ -195,11 +210,11 @@ def _choose(rules: Any, work: Any, count: int, epsilon: float) -> int:
 @_compiled
 def _episode(toasts: Any, rules: Any, work: Any, epsilon: float) -> float:
     """One episode with the step update of SRL; its time [s], LATEST_S when it does not end."""
-    _reset(work)
+    reset(work)
     goal, toast = len(toasts.banned) - 1, 0  # the first move is always that of the first toast
     for _ in range(MOST_MOVES):
         before = work.whole[STATE]
-        _carry(toasts, rules, work, toast)
+        carry(toasts, rules, work, toast)
         state = work.whole[STATE]
         _visit(work)
         if rules.method == SRL:
@@ -208,7 +223,7 @@ def _episode(toasts: Any, rules: Any, work: Any, epsilon: float) -> float:
             if rules.method == SRL:
                 work.values[goal] = GOAL_REWARD + DISCOUNT * work.values[goal]
             return float(work.clock[0])
-        count = _list_options(toasts, rules, work)
+        count = list_options(toasts, rules, work)
         if count == 0 or work.clock[0] >= LATEST_S:
             break
         toast = _choose(rules, work, count, epsilon)
@@ -216,7 +231,7 @@ def _episode(toasts: Any, rules: Any, work: Any, epsilon: float) -> float:
 
 
 @_compiled
-def _learn(rules: Any, work: Any, time_s: float, best_s: float) -> None:
+def learn(rules: Any, work: Any, time_s: float, best_s: float) -> None:
     """What the time of an episode does to the values of the states visited, the start left out, once for each visit."""
     gain = 1.0 / time_s
     factor = 1.0 / (time_s - best_s + rules.a) + rules.b if rules.type_a else gain
@@ -235,29 +250,19 @@ def _learn(rules: Any, work: Any, time_s: float, best_s: float) -> None:
 
 
 @_compiled
-def run_sessions(
-    toasts: Any,
-    rules: Any,
-    work: Any,
-    epsilons: Any,
-    seeds: Any,
-    times_s: Any,
-    ends: Any,
-    converged: Any,
-    sequences: Any,
-) -> None:
-    """All sessions; times_s (N or 1, E), ends (N, 2): best and last time, converged (N,) and sequences (N, 5 K) are theirs."""
+def run_sessions(toasts: Any, rules: Any, work: Any, epsilons: Any, seeds: Any, found: Any) -> None:
+    """A session for each seed (N,), with exploration epsilons (E,); what they come to is written to `found`."""
     for n in range(len(seeds)):
-        row, best_s = n % len(times_s), inf
+        row, best_s = n % len(found.times_s), inf
         work.values[:], work.counts[:], work.stream[0] = 1.0, 0, seeds[n]
         for episode in range(len(epsilons)):
             time_s = _episode(toasts, rules, work, epsilons[episode])
             if time_s < best_s:
                 best_s = time_s
                 for m in range(len(work.moved)):
-                    sequences[n, m] = work.moved[m]
-            if episode > 0 and time_s != times_s[row, episode - 1]:
-                converged[n] = episode + 1
-            times_s[row, episode] = time_s
-            _learn(rules, work, time_s, best_s)
-        ends[n, 0], ends[n, 1] = best_s, times_s[row, len(epsilons) - 1]
+                    found.sequences[n, m] = work.moved[m]
+            if episode > 0 and time_s != found.times_s[row, episode - 1]:
+                found.converged[n] = episode + 1
+            found.times_s[row, episode] = time_s
+            learn(rules, work, time_s, best_s)
+        found.best_s[n], found.last_s[n] = best_s, found.times_s[row, len(epsilons) - 1]

@@ -16,9 +16,9 @@ from lab.errors import WorkFailed
 from lab.gridworld import GridWorld, View
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import BoolArray, FloatArray, NoPath, TabularMDP, grid, shortest_steps
-from lab.studies.runner import gate_of, learned_table
 from lab.studies.statistics import PERCENT_POINTS, RELATIVE
-from lab.studies.thesis.chapter_9_cells import Cell, printed
+from lab.studies.thesis.chapter_9_cells import BEST_BETA, Cell, printed
+from lab.studies.thesis.chapter_9_sessions import gate_of, learned_table
 
 COMMENT = """\
 World II of the thesis (ch. 9, fig. 9.2 b), RECONSTRUCTED: the thesis prints only a picture of it. Like the printed one
@@ -29,7 +29,8 @@ Made by: lab task reconstruct --seed {seed} --out {file}
 Cells are [x, y, z], counted from 0.
 """
 SIDE, OBSTACLES, MOVES = 10, 100, 15
-BETA, PERCENT, POINTS = 0.7, 37.0, 2.0  # the best decay, its success, and how near is near enough
+BETA, PERCENT = BEST_BETA["world-2"]
+POINTS = 2.0  # how near its success is near enough
 OTHER_BETAS = (0.5, 0.6, 0.8, 0.9, 1.1, 1.3)
 QUICK, SURE = 60, 500  # sessions for a first look, and for the decision
 LAYOUTS, VIEWS = 16, 100  # how many of each are drawn and compared
@@ -44,22 +45,22 @@ Progress = Callable[[int, int], None]
 def reconstruct(seed: int, progress: Progress = lambda done, total: None) -> GridWorld:
     """A world like world II, the same for the same seed; takes minutes. WorkFailed when none is found."""
     rng = np.random.default_rng(seed)
-    full, limited = ([c for c in printed("appendix-v.csv") if _compared(c, view)] for view in ("full", "limited"))
+    full, limited = ([c for c in printed("appendix-v.csv") if is_compared(c, view)] for view in ("full", "limited"))
     found: list[tuple[float, GridWorld, FloatArray]] = []
     for world in _alike(rng, seed):
         table = learned_table(world)
-        found.append((_distance(world, table, full), world, table))
+        found.append((distance(world, table, full), world, table))
         progress(len(found), LAYOUTS + VIEWS)
         if len(found) == LAYOUTS:
             break
     if not found:
         raise WorkFailed(f"seed {seed}: no layout like world II among {MAX_TRIES}: try another seed")
     _, world, table = min(found, key=lambda entry: entry[0])
-    view = _best_view(world, rng, lambda view: _distance(_with(world, view), table, limited), progress)
+    view = best_view(world, rng, lambda view: distance(_with(world, view), table, limited), progress)
     return _with(world, view)
 
 
-def _best_view(
+def best_view(
     world: GridWorld, rng: np.random.Generator, distance: Callable[[Ints], float], progress: Progress
 ) -> Ints:
     """The best of some views drawn at random, its faces then moved by a cell as long as that helps; (2, 3), corners."""
@@ -85,7 +86,7 @@ def _with(world: GridWorld, view: Ints) -> GridWorld:
     return world.model_copy(update={"view": View(lower=_tuple(view[0]), upper=_tuple(view[1]))})
 
 
-def _compared(cell: Cell, view: str) -> bool:
+def is_compared(cell: Cell, view: str) -> bool:
     """The printed lines that layouts and views are compared by: experts and novices of world II."""
     setting = cell.setting
     return (setting.world, setting.view) == ("world-2", view) and setting.tau in (0.01, 1.0)
@@ -94,7 +95,7 @@ def _compared(cell: Cell, view: str) -> bool:
 def _alike(rng: np.random.Generator, seed: int) -> Iterator[GridWorld]:
     """Worlds whose learner does alone what the thesis says."""
     for _ in range(MAX_TRIES):
-        wall = _layout(rng)
+        wall = layout(rng)
         free = np.argwhere(~wall)
         start, goal = free[rng.choice(len(free), 2, replace=False)]
         if np.abs(start - goal).sum() > MOVES:
@@ -103,7 +104,7 @@ def _alike(rng: np.random.Generator, seed: int) -> Iterator[GridWorld]:
             mdp = grid(wall.shape, wall, _tuple(start), _tuple(goal))
         except NoPath:
             continue
-        if shortest_steps(mdp) == MOVES and _learns_alike(mdp):
+        if shortest_steps(mdp) == MOVES and learns_alike(mdp):
             yield GridWorld(
                 name="world-2",
                 title=f"Like world II of the thesis: a reconstruction, seed {seed}",
@@ -116,7 +117,7 @@ def _alike(rng: np.random.Generator, seed: int) -> Iterator[GridWorld]:
             )
 
 
-def _layout(rng: np.random.Generator) -> BoolArray:
+def layout(rng: np.random.Generator) -> BoolArray:
     """100 obstacle cells in blocks, walls and bars; bool (10, 10, 10)."""
     wall = np.zeros((SIDE, SIDE, SIDE), bool)
     while wall.sum() < OBSTACLES:
@@ -137,15 +138,15 @@ def _layout(rng: np.random.Generator) -> BoolArray:
     return wall
 
 
-def _learns_alike(mdp: TabularMDP) -> bool:
+def learns_alike(mdp: TabularMDP) -> bool:
     """Whether learning alone succeeds in 37 % with beta .7, and in no more with any other."""
-    if abs(_alone(mdp, BETA, QUICK) - PERCENT) > 3 * POINTS:
+    if abs(success_alone(mdp, BETA, QUICK) - PERCENT) > 3 * POINTS:
         return False
-    at_best = _alone(mdp, BETA, SURE)
-    return abs(at_best - PERCENT) <= POINTS and all(_alone(mdp, beta, SURE) <= at_best for beta in OTHER_BETAS)
+    at_best = success_alone(mdp, BETA, SURE)
+    return abs(at_best - PERCENT) <= POINTS and all(success_alone(mdp, beta, SURE) <= at_best for beta in OTHER_BETAS)
 
 
-def _alone(mdp: TabularMDP, beta: float, sessions: int) -> float:
+def success_alone(mdp: TabularMDP, beta: float, sessions: int) -> float:
     from lab.learning.batch import run_sessions
 
     seeds = np.arange(sessions, dtype=np.uint64)
@@ -153,7 +154,7 @@ def _alone(mdp: TabularMDP, beta: float, sessions: int) -> float:
     return 100.0 * float((batch.steps[:, -1] == MOVES + 1).mean())
 
 
-def _distance(world: GridWorld, table: FloatArray, cells: Sequence[Cell]) -> float:
+def distance(world: GridWorld, table: FloatArray, cells: Sequence[Cell]) -> float:
     """How far success and helped steps are from the printed ones; 1: on average just what counts as agreeing."""
     from lab.advice.advisors import Advice, skill
     from lab.learning.batch import run_sessions

@@ -21,7 +21,8 @@ from lab.studies.ours.advice_budget import (
     settings,
     worst,
 )
-from lab.studies.runner import Job, Outcome, Setting, gate_of, seeds_of, sessions_of, world
+from lab.studies.runner import Job, seeds_of
+from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, gate_of, sessions_of, world
 
 CELLS = len(WORLDS) * 2 * (1 + len(ASKING) * len(ADVISORS))
 TARGETS_IN_ROWS = {name: list(pair) for name, pair in TARGETS.items()}
@@ -152,7 +153,7 @@ def test_targets_are_met_or_missed(outcomes: Mapping[Cell, Outcome]) -> None:
 )
 def test_a_verdict_needs_its_interval(ends: tuple[float, float], says: str) -> None:
     row: dict[str, Any] = {"ci95": list(ends)}
-    assert advice_budget._verdict(row) == says
+    assert advice_budget.verdict(row) == says
 
 
 def test_settings_without_memory_have_the_chances_that_they_had_before_there_was_memory() -> None:

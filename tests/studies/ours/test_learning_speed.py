@@ -8,8 +8,10 @@ from lab.learning.settings import LearnerSettings
 from lab.mdp import TabularMDP
 from lab.studies.ours import learning_speed as module
 from lab.studies.ours.learning_speed import FEW, REPEATS, SESSIONS, speed
-from lab.studies.ours.learning_speed_rivals import RIVALS, Measured, Missing
-from lab.studies.runner import Job, world
+from lab.studies.ours.learning_speed_rivals import RIVALS
+from lab.studies.ours.learning_speed_session import Measured, Missing
+from lab.studies.runner import Job
+from lab.studies.thesis.chapter_9_sessions import world
 
 Asked = list[tuple[Any, ...]]
 
@@ -33,7 +35,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
 def test_the_kernel_beside_rivals(asked: Asked) -> None:
     """The first run compiles and does not count; the other five took 2 to 6 seconds: 3 to 1 million a second, median 1.5."""
     told: list[tuple[int, int]] = []
-    found = speed(Job(sessions=10, seed=7, progress=lambda *both: told.append(both)))
+    found = speed(Job(sessions=10, seed=7, progress=lambda *both: told.append(both)), {})
     assert [one["name"] for one in found.rows] == ["kernel", "kernel gated", "quick"]
     kernel, gated, quick = found.rows
     assert (quick["value"], quick["ci95"]) == (1.5, [1.0, 3.0])
@@ -53,7 +55,7 @@ def test_the_kernel_beside_rivals(asked: Asked) -> None:
 def test_slow_rivals_learn_few_sessions(asked: Asked, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "FEW", {"quick": 3})
     monkeypatch.setattr(module, "REPEATS", 1)
-    speed(Job(sessions=10))
+    speed(Job(sessions=10), {})
     assert {call[2] for call in asked} == {3}
     assert {*FEW} <= {*RIVALS}
     assert max(FEW.values()) < SESSIONS
@@ -62,7 +64,7 @@ def test_slow_rivals_learn_few_sessions(asked: Asked, monkeypatch: pytest.Monkey
 def test_without_any_rival(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "RIVALS", {})
     monkeypatch.setattr(module, "REPEATS", 1)
-    found = speed(Job(sessions=10))
+    found = speed(Job(sessions=10), {})
     assert [one["name"] for one in found.rows] == ["kernel", "kernel gated"]
     assert found.summary == {"cells": 0, "within": 0, "kernel to the fastest rival": None}
     assert "not measured" not in "".join(found.notes)

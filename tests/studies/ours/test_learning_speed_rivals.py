@@ -9,7 +9,8 @@ from lab.errors import BadInput
 from lab.gridworld import GridWorld
 from lab.learning.settings import LearnerSettings
 from lab.mdp import TabularMDP, coverage, grid
-from lab.studies.ours.learning_speed_rivals import RIVALS, Measured, Missing
+from lab.studies.ours.learning_speed_rivals import RIVALS
+from lab.studies.ours.learning_speed_session import Measured, Missing
 from lab.taskfile import load_world
 
 SESSIONS = 60

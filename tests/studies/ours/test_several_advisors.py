@@ -23,7 +23,7 @@ from lab.studies.ours.several_advisors import (
     tried,
 )
 from lab.studies.runner import Job
-from lab.studies.runner import Setting as Chapter9
+from lab.studies.thesis.chapter_9_sessions import Setting as Chapter9
 
 EXACT = Chapter9("world-1", gate="ccrl", advisor_table="exact")
 PAIR = ("expert", "wrong")

@@ -201,11 +201,11 @@ def test_speeds_are_measured_in_one_run() -> None:
 def test_what_was_not_reached_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed_study, "CP_SAT_LIMIT_S", 1e-6)
     missed: list[str] = []
-    assert speed_study._solved("I", missed, 0) == []
+    assert speed_study.solved_rows("I", missed, 0) == []
     assert missed == ["CP-SAT found no sequence for 8 toasts in case I within 1e-06 s."]
-    rows = speed_study._near_rows("I", [0.5, inf])
+    rows = speed_study.near_rows("I", [0.5, inf])
     assert [(one["measure"], one["value"]) for one in rows] == [("near_percent", 50.0)]
-    rows = speed_study._near_rows("I", [0.5, 0.7, 0.1])
+    rows = speed_study.near_rows("I", [0.5, 0.7, 0.1])
     assert [(one["measure"], one["value"], one["ci95"]) for one in rows] == [
         ("near_percent", 100.0, None),
         (SECONDS, 0.5, [0.1, 0.7]),
@@ -221,7 +221,7 @@ def test_ratios_are_of_what_was_measured() -> None:
         for case, gap in (("I", 12.0), ("II", 0.5))
         for measure, value in (("gap_percent", gap), (SECONDS, 10.0))
     ]
-    assert speed_study._ratios(rates, learned, solved) == {
+    assert speed_study.ratios(rates, learned, solved) == {
         "compiled to readable SRL": 40.0,
         "random search to SRL, both compiled": 1.5,
         "CP-SAT's seconds to srl-time's, case I, at least": 20,

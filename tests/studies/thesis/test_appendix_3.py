@@ -18,7 +18,7 @@ from lab.studies.findings import Findings
 from lab.studies.report import write_rows
 from lab.studies.runner import Job
 from lab.studies.thesis import appendix_3, appendix_3_makespans
-from lab.studies.thesis.appendix_3 import METHODS, _p, appendix_iii, orders_of
+from lab.studies.thesis.appendix_3 import METHODS, appendix_iii, orders_of, paired_p
 from lab.studies.thesis.appendix_3_fifo import STARTS, queued_fifo
 from lab.studies.thesis.appendix_3_makespans import FIFO, Mix, fms, made, times_seeds
 
@@ -124,9 +124,9 @@ def test_orders() -> None:
 def test_p_is_that_of_the_paired_test() -> None:
     rng = np.random.default_rng(0)
     one, other = rng.normal(3, 1, 9), rng.normal(2, 1, 9)
-    assert _p(one - other) == pytest.approx(ttest_rel(one, other).pvalue)
-    assert _p(np.zeros(4)) == 1.0
-    assert _p(np.full(4, 2.5)) == 0.0
+    assert paired_p(one - other) == pytest.approx(ttest_rel(one, other).pvalue)
+    assert paired_p(np.zeros(4)) == 1.0
+    assert paired_p(np.full(4, 2.5)) == 0.0
 
 
 @pytest.fixture(scope="module")

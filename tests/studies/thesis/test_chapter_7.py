@@ -10,22 +10,19 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from lab.studies.findings import Findings
+from lab.studies.findings import Findings, agreement, row, those
 from lab.studies.report import write_report, write_rows
 from lab.studies.runner import Job
 from lab.studies.statistics import compare
 from lab.studies.thesis import chapter_7
 from lab.studies.thesis import chapter_7_figures as figures
 from lab.studies.thesis.chapter_7 import (
+    best_results,
     deviation,
     readings,
     summary,
-    table_7_4,
-    table_7_5,
-    table_7_6,
     table_iv_1,
     table_iv_2,
-    whole,
 )
 from lab.studies.thesis.chapter_7_cells import (
     DECAY_FACTORS,
@@ -37,7 +34,6 @@ from lab.studies.thesis.chapter_7_cells import (
     printed,
     short_name,
 )
-from lab.studies.thesis.chapter_9_cells import agreement, row
 
 JOB = Job(sessions=10)
 LENGTHS, CELLS = 4, 4 * 4 * 3 * 2  # of sessions in some_printed, and its cells: methods, cases and environments
@@ -63,7 +59,7 @@ def check(found: Findings, folder: Path) -> None:
     json.dumps([found.rows, found.summary], allow_nan=False)
     write_rows(folder / "rows.csv", found.rows)
     assert len((folder / "rows.csv").read_text(encoding="utf-8").splitlines()) == len(found.rows) + 1
-    write_report(folder / "report.html", "title", "name", found.rows, found.summary, found.figures, found.notes)
+    write_report(folder / "report.html", "title", "name", found)
     for picture in found.figures.values():
         assert ElementTree.fromstring(picture).tag.endswith("svg")
     assert all(found.notes)
@@ -76,12 +72,9 @@ def printed_rows(found: Findings) -> list[dict[str, Any]]:
 # ---- the tables ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("study", "case", "table"),
-    [(table_7_4, "I", "Table 7.4"), (table_7_5, "II", "Table 7.5"), (table_7_6, "III", "Table 7.6")],
-)
-def test_a_table_of_three_methods(tmp_path: Path, study: Any, case: str, table: str) -> None:
-    found = study(JOB, {})
+@pytest.mark.parametrize(("case", "table"), [("I", "Table 7.4"), ("II", "Table 7.5"), ("III", "Table 7.6")])
+def test_a_table_of_three_methods(tmp_path: Path, case: str, table: str) -> None:
+    found = best_results(JOB, {}, case)
     check(found, tmp_path)
     cells = printed_rows(found)
     assert len(cells) == 3 * LENGTHS * 2 == found.summary["cells"]
@@ -105,7 +98,7 @@ def test_the_example_of_appendix_ii() -> None:
     assert 30 < found.f < 300  # 93.8 printed
     assert found.ranks["srl B"] == "1" < found.ranks["mc"] == max(found.ranks.values())
     same = Setting("I", 3, "", 30)
-    (note,) = chapter_7._examples({same: found, Setting("I", 3, "", 35): found, Setting("I", 4, "", 30): found})
+    (note,) = chapter_7.examples({same: found, Setting("I", 3, "", 35): found, Setting("I", 4, "", 30): found})
     assert f"here F = {found.f:.1f}, srl B {found.means['srl B']:.1f} %, mc" in note
 
 
@@ -116,7 +109,7 @@ def _texts(picture: bytes) -> Iterator[str]:
 def test_ranks_and_shades_are_those_of_the_tests() -> None:
     """Shaded is what is significantly better than another method, and than which none is."""
     job = Job(sessions=60)
-    found = table_7_4(job, {})
+    found = best_results(job, {}, "I")
     cells = [c for c in some_printed(SESSION_LENGTHS) if c.setting.case == "I"]
     settings = [c.setting for c in cells if c.setting.reward_factor != "A"]
     measured = Measured(job, settings)
@@ -125,7 +118,7 @@ def test_ranks_and_shades_are_those_of_the_tests() -> None:
         group = [s for s in settings if (s.environment, s.toasts, s.episodes) == (environment, toasts, episodes)]
         values = {short_name(setting): measured.replicated(setting) for setting in group}
         expected = compare(values, lowest_is_best=environment == "stochastic")
-        rows = [one for one in found.rows if _is(one, environment=environment, toasts=toasts, episodes=episodes)]
+        rows = those(found.rows, environment=environment, toasts=toasts, episodes=episodes)
         ranked = {
             " ".join(filter(None, (one["method"], one.get("reward_factor")))): one for one in rows if "rank" in one
         }
@@ -139,10 +132,6 @@ def test_ranks_and_shades_are_those_of_the_tests() -> None:
         p = {one["method"]: one["value"] for one in rows if one["measure"] == "Tukey_p"}
         assert p == {f"{one} - {other}": value for (one, other), value in expected.tukey.items()}
     assert shaded == {True, False}
-
-
-def _is(one: dict[str, Any], **wanted: Any) -> bool:
-    return all(one.get(name) == value for name, value in wanted.items())
 
 
 def test_beta(tmp_path: Path) -> None:
@@ -159,7 +148,7 @@ def test_beta(tmp_path: Path) -> None:
     assert {one["measure"] for one in found.rows} == {"SP_percent", "CE_episode", "final_percent"}
     assert len(found.rows) == 3 * len(cells)
     for case in ("I", "II", "III"):
-        ends = {one["beta"]: one["value"] for one in cells if _is(one, case=case, measure="CE_episode")}
+        ends = {one["beta"]: one["value"] for one in those(cells, case=case, measure="CE_episode")}
         assert ends[1.0] > ends[1.7] + 30
     both = [one for one in found.rows if one["reward_factor"] == "B" and one["measure"] == "SP_percent"]
     assert min(one["value"] for one in both) > 90
@@ -187,7 +176,7 @@ def test_another_reading_changes_all_settings() -> None:
 
 def test_the_whole_chapter(tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
-    found = whole(Job(sessions=10, progress=lambda *both: told.append(both)), {})
+    found = chapter_7.chapter_7(Job(sessions=10, progress=lambda *both: told.append(both)), {})
     check(found, tmp_path)
     assert told[-1] == (CELLS + 24, CELLS + 24)  # each setting once; 24: table IV.1 with both reward factors
     numbers = {number for caption in found.figures for number in re.findall(r"\b7\.\d+", caption)}
@@ -198,7 +187,7 @@ def test_the_whole_chapter(tmp_path: Path) -> None:
     pairs = {(name, one["measure"]) for name, one in zip(named, cells, strict=True)}
     assert len(pairs) == len(cells)
     values = {(_key(one), one["measure"]): one["value"] for one in cells}
-    for one in printed_rows(table_7_6(JOB, {})):
+    for one in printed_rows(best_results(JOB, {}, "III")):
         assert values[_key(one), one["measure"]] == one["value"]
 
 

@@ -158,9 +158,9 @@ def test_values_and_intervals(measured: Measured) -> None:
         "BR_s": interval(best_s),
         "CE_episode": interval(np.arange(1, 21)),
     }
-    for measure, (value, low, high) in expected.items():
-        assert measured.value(SRL_B, measure) == (value, (low, high))
-    assert [measured.value(SRL_B, measure)[0] for measure in expected] == [75, 20, 514.75, 10.5]
+    rows = {measure: measured.row("Table 7.4", SRL_B, measure, None) for measure in expected}
+    assert {measure: (one["value"], *one["ci95"]) for measure, one in rows.items()} == expected
+    assert [one["value"] for one in rows.values()] == [75, 20, 514.75, 10.5]
 
 
 def test_ten_replications(measured: Measured) -> None:
@@ -224,6 +224,6 @@ def test_the_reading_comes_out() -> None:
     assert len(wanted) == 8
     found = Measured(Job(400), [cell.setting for cell in wanted])
     for cell in wanted:
-        value, (low, high) = found.value(cell.setting, cell.measure)
-        error = (high - low) / 2 / 1.96
-        assert abs(value - cell.value) < 4 * error * (1 + 400 / 1000) ** 0.5 + 0.5, cell
+        one = found.row("Table 7.5", cell.setting, cell.measure, cell.value)
+        error = (one["ci95"][1] - one["ci95"][0]) / 2 / 1.96
+        assert abs(one["value"] - cell.value) < 4 * error * (1 + 400 / 1000) ** 0.5 + 0.5, cell

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from lab.sequencing.run import simulate
+from lab.studies.findings import Row
 from lab.studies.runner import Job
 from lab.studies.thesis import chapter_7_figures as figures
 from lab.studies.thesis.chapter_7_cells import Measured, printed, robot_cell
-from lab.studies.thesis.chapter_9_cells import Row
 
 
 def words(picture: bytes) -> str:
@@ -39,18 +39,18 @@ def test_the_session_shown_settles_on_the_optimum(seed: int) -> None:
 def test_pictures_of_one_session() -> None:
     pictures = figures.alone(0)
     assert pictures == figures.alone(0)
-    convergence, places, exploration = map(words, pictures.values())
-    assert "optimum: 700 s" in convergence
-    assert "printed: from 67 on" in convergence
+    settles, places, exploration = map(words, pictures.values())
+    assert "optimum: 700 s" in settles
+    assert "printed: from 67 on" in settles
     assert all(f"toast {number}" in places for number in (1, 2, 3))
     assert "5  butter applier" in places
     assert "β = 1.7" in exploration
 
 
 def test_settles_where_the_time_stops_changing() -> None:
-    picture = figures._convergence(np.array([900.0, 700, 800, 700, 700, 700]))
+    picture = figures.convergence(np.array([900.0, 700, 800, 700, 700, 700]))
     assert "stays the same from episode 4 on" in words(picture)
-    assert "stays the same from episode 1 on" in words(figures._convergence(np.array([700.0, 700])))
+    assert "stays the same from episode 1 on" in words(figures.convergence(np.array([700.0, 700])))
 
 
 def test_what_a_picture_by_length_shows(rows: list[Row]) -> None:

@@ -8,17 +8,15 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
-from lab.mdp import optimal_values
-from lab.studies.findings import Findings
+from lab.studies.findings import Findings, agreement, those
 from lab.studies.report import write_report, write_rows
-from lab.studies.runner import STORE, Job, world
+from lab.studies.runner import STORE, Job
 from lab.studies.statistics import proportion_interval
 from lab.studies.thesis import chapter_9, chapter_9_cells
-from lab.studies.thesis.chapter_9 import NEVER_REJECTS, READINGS, all_cells, best_scores, decay_factors, readings, whole
-from lab.studies.thesis.chapter_9_cells import TABLES, agreement, appendix, table
+from lab.studies.thesis.chapter_9 import READINGS, appendix_v, best_scores, figure_9_4, readings
+from lab.studies.thesis.chapter_9_cells import TABLES, appendix, table
 
 JOB = Job(sessions=10)
 
@@ -31,15 +29,15 @@ def one_world(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def texts(picture: bytes) -> list[str]:
-    """What stands in an SVG picture: matplotlib writes each text as a comment beside its outlines."""
-    return [part.partition("-->")[0].strip() for part in picture.decode().split("<!--")[1:]]
+    """What stands in an SVG picture."""
+    return [text.strip() for text in ElementTree.fromstring(picture).itertext() if text.strip()]
 
 
 def check(found: Findings, folder: Path) -> None:
     """Whether a report takes it: pictures that can be read, rows that come back as they were."""
     for picture in found.figures.values():
         assert ElementTree.fromstring(picture).tag == "{http://www.w3.org/2000/svg}svg"
-    write_report(folder / "report.html", "Title", "name", found.rows, found.summary, found.figures, found.notes)
+    write_report(folder / "report.html", "Title", "name", found)
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert page.count("<figure>") == len(found.figures)
     assert f"{len(found.rows)} cells" in page
@@ -59,7 +57,7 @@ def test_a_table_is_drawn_with_its_ranks(tmp_path: Path) -> None:
     words = texts(picture)
     assert {"CCRL", "IA", "combined", "expert (0.01)", "novice (1)", "all", "printed", "score"} <= {*words}
     ranks = [
-        one["rank"] for gate in ("ccrl", "ia", "combined") for one in found.rows if _is(one, measure="score", gate=gate)
+        one["rank"] for gate in ("ccrl", "ia", "combined") for one in those(found.rows, measure="score", gate=gate)
     ]
     labels = [word for word in words if word in ("1", "2", "3", "1-2", "2-3", "1-3")]
     assert labels[-15:] == ranks
@@ -67,13 +65,9 @@ def test_a_table_is_drawn_with_its_ranks(tmp_path: Path) -> None:
     assert "reconstruction" not in "".join(found.notes)  # world I is none
 
 
-def _is(one: dict[str, Any], **wanted: Any) -> bool:
-    return all(one.get(name) == value for name, value in wanted.items())
-
-
 def test_learning_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chapter_9_cells, "BETAS", (0.7, 1.3))
-    found = decay_factors(JOB, {})
+    found = figure_9_4(JOB, {})
     assert (found.summary["cells"], len(found.rows)) == (2, 4)
     assert {"world-1", "world-2", "printed"} <= {*texts(*found.figures.values())}
     assert "reconstruction" in "".join(found.notes)
@@ -88,7 +82,7 @@ def test_the_appendix_is_all_worlds_and_views(monkeypatch: pytest.MonkeyPatch) -
         return [{"measure": "score", "within": True}]
 
     monkeypatch.setattr(chapter_9, "appendix", made_up)
-    found = all_cells(JOB, {"advisor_table": "exact"})
+    found = appendix_v(JOB, {"advisor_table": "exact"})
     assert asked == [*TABLES.values(), {"advisor_table": "exact"}]
     assert (found.summary["cells"], found.summary["within"]) == (1, 1)
     assert "reconstruction" in "".join(found.notes)
@@ -106,7 +100,7 @@ def test_readings_are_compared_by_their_agreement(tmp_path: Path, monkeypatch: p
     expected = {}
     for view, count in (("full", 73), ("limited", 123)):
         for measure in ("SP_percent", "HS_steps", "score"):
-            inside = [one["within"] for one in cells if _is(one, view=view, measure=measure)]
+            inside = [one["within"] for one in those(cells, view=view, measure=measure)]
             assert len(inside) == count
             expected[view, measure.split("_")[0]] = proportion_interval(sum(inside), count)
     shares = {(one["view"], one["measure"].split("_")[0]): (one["value"], *one["ci95"]) for one in found.rows}
@@ -128,7 +122,7 @@ FIGURES = {"9.1", *(f"9.{n}" for n in range(3, 14))}  # 9.2 shows the worlds
 
 
 def test_the_whole_chapter(tmp_path: Path, one_world: None) -> None:
-    found = whole(replace(JOB, folder=tmp_path), {})
+    found = chapter_9.chapter_9(replace(JOB, folder=tmp_path), {})
     named = {number for caption in found.figures for number in re.findall(r"\b9\.\d+", caption) if "igure" in caption}
     assert named == FIGURES
     assert "table-9.2: scores and ranks" in found.figures
@@ -139,57 +133,3 @@ def test_the_whole_chapter(tmp_path: Path, one_world: None) -> None:
     assert re.fullmatch(r"\d+ of 15 as printed", found.summary["table-9.2 ranks"])
     keys = [json.loads(line)["key"] for line in (tmp_path / STORE).read_text(encoding="utf-8").splitlines()]
     assert len(keys) == len({*keys}) > 80  # cells that several need are run once
-
-
-def test_cells_of_the_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each figure varies one or two settings, and where the appendix has the cell, it is the same one."""
-    monkeypatch.setattr(chapter_9, "bars", lambda *_, **__: b"")  # drawn in the test above
-    rows, pictures = chapter_9._figures(JOB, {})
-    assert len(pictures) == 3 + 2 * len(chapter_9._series())
-    walks, cells = rows[:16], rows[16:]
-    assert [one["tau"] for one in walks if one["measure"] == "SP_percent"] == [0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1]
-    assert [one["thesis"] for one in walks if one["thesis"]] == [100.0, 13.0, 178.0]
-    assert {one["advisor"] for one in walks} == {"alone"}
-
-    def settings(place: str, view: str, gate: str, **more: Any) -> list[dict[str, Any]]:
-        return [one for one in cells if _is(one, world=place, view=view, gate=gate, measure="HS_steps", **more)]
-
-    for omega in (NEVER_REJECTS, 7):  # fig. 9.7
-        by_lambda = settings("world-2", "limited", "ccrl", omega=omega)
-        assert [one["lambda_threshold"] for one in by_lambda] == [0.01, 0.05, 0.1, 0.3, 0.5, 0.9]
-        assert {one["tau"] for one in by_lambda} == {0.01}
-    for omega in (NEVER_REJECTS, 1, 3, 5, 7):  # figs. 9.8 to 9.10; omega 1 is in both
-        by_skill = [one["tau"] for one in settings("world-1", "limited", "ccrl", omega=omega)]
-        assert sorted(by_skill) == sorted([0.01, 0.1, 0.3, 1.0] * (2 if omega == 1 else 1))
-    by_psi = settings("world-2", "limited", "ia")  # figs. 9.11 and 9.12
-    assert sorted((one["psi"], one["tau"]) for one in by_psi) == [
-        *((0.1, 0.01), (0.3, 0.01), (0.7, 0.01), (1.0, 0.01), (1.0, 0.01)),
-        *((1.0, 0.1), (1.0, 0.3), (1.0, 1.0), (1.3, 0.01)),
-    ]
-    both = settings("world-2", "limited", "combined")
-    assert [(one["lambda_threshold"], one["omega"], one["psi"], one["tau"]) for one in both] == [
-        (0.05, 5, 1.0, tau) for tau in (0.01, 0.1, 0.3, 1.0)
-    ]
-
-    printed = {_named(one): one["value"] for one in appendix(JOB, [TABLES["table-9.5"]], {}) if one["tau"] != "all"}
-    again = [one for one in cells if _named(one) in printed]
-    assert len(again) > 20
-    assert all(one["value"] == printed[_named(one)] for one in again)
-
-
-def _named(one: dict[str, Any]) -> str:
-    results = ("value", "ci95", "thesis", "within", "table")
-    return json.dumps({name: value for name, value in one.items() if name not in results}, sort_keys=True)
-
-
-def test_an_advisor_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Who knows the exact values and is an expert takes the shortest way, in 13 steps; a novice seldom arrives."""
-    monkeypatch.setattr(chapter_9, "learned_table", lambda place: optimal_values(place.mdp(), 0.99))
-    rows: list[dict[str, Any]] = []
-    ElementTree.fromstring(chapter_9._advisors(rows, {}))
-    shares, means = ([one["value"] for one in rows if one["measure"] == m] for m in ("SP_percent", "mean_steps"))
-    assert shares[0] > 99 > 1 > shares[-1]
-    assert means[0] == pytest.approx(13, abs=0.1)
-    assert means[-1] > 150
-    assert np.all(np.diff(shares) <= 0)
-    assert world("world-1").learner.max_steps == 200

@@ -1,15 +1,15 @@
 """Chapter 9's printed tables as they were read, and measured again: whose means and scores a reader can redo."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from lab.studies.runner import Job, Outcome, Setting
-from lab.studies.statistics import compare, interval, proportion_interval, score, within
+from lab.studies.runner import Job
+from lab.studies.statistics import compare, interval, proportion_interval, score
 from lab.studies.thesis import chapter_9_cells
 from lab.studies.thesis.chapter_9_cells import (
     BETAS,
@@ -18,14 +18,13 @@ from lab.studies.thesis.chapter_9_cells import (
     TAUS,
     Cell,
     Grid,
-    agreement,
     appendix,
     by_beta,
     describe,
     printed,
-    row,
     table,
 )
+from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, measured
 
 APPENDIX, BEST = FILES
 JOB = Job(sessions=10)
@@ -107,12 +106,6 @@ def test_printed_figures(file: str, number: int, expected: Cell) -> None:
     assert printed(file)[number - 1] == expected
 
 
-def test_parameters_name_a_combination() -> None:
-    cell = printed(BEST)[11]
-    assert cell.parameters == ("full", "combined", 0.05, 1, 0.3)
-    assert replace(cell, setting=replace(cell.setting, tau=0.1), average=True).parameters == cell.parameters
-
-
 # ---- a world and view measured ------------------------------------------------------------------------------------
 
 
@@ -177,9 +170,9 @@ class MadeUp(Job):
     """Sessions of which the expert's all succeed with 100 helped steps, the moderate one's never with 300, the others'
     in the first half of ten, with 200."""
 
-    def run(self, settings: Sequence[Setting]) -> dict[Setting, Outcome]:
+    def computed(self, work: Any, items: list[Any]) -> Iterator[tuple[Any, Any]]:
         first = {0.01: 10, 0.1: 0}
-        return {s: made(first.get(s.tau or 0, 5), {0.01: 100, 0.1: 300}.get(s.tau or 0, 200)) for s in settings}
+        return ((s, made(first.get(s.tau or 0, 5), {0.01: 100, 0.1: 300}.get(s.tau or 0, 200))) for s in items)
 
 
 def made(successes: int, helped: int) -> Outcome:
@@ -270,7 +263,7 @@ def test_the_printed_success_stands_at_the_best_beta(monkeypatch: pytest.MonkeyP
         *(("world-1", 0.5, None), ("world-1", 0.7, None), ("world-1", 1.3, 63.0)),
         *(("world-2", 0.5, None), ("world-2", 0.7, 37.0), ("world-2", 1.3, None)),
     ]
-    outcomes = JOB.run([Setting(one["world"], beta=one["beta"]) for one in rows])
+    outcomes = measured(JOB, [Setting(one["world"], beta=one["beta"]) for one in rows])
     for one, outcome in zip(rows, outcomes.values(), strict=True):
         assert (one["value"], *one["ci95"]) == proportion_interval(int(outcome.success.sum()), 10)
         assert one.keys() >= {"world", "view", "gate", "beta"} | RESULTS
@@ -293,50 +286,3 @@ def test_the_printed_success_stands_at_the_best_beta(monkeypatch: pytest.MonkeyP
 )
 def test_a_setting_is_described_by_what_applies(setting: Setting, said: dict[str, Any]) -> None:
     assert describe(setting) == {"world": setting.world, "view": setting.view} | said
-
-
-def test_a_row_says_whether_it_agrees() -> None:
-    """68 is 5 points from 63, 69 is 6; the interval may hold it all the same."""
-    assert row({"tau": 1}, "SP_percent", 68, (66, 70), 63) == {
-        "tau": 1,
-        "measure": "SP_percent",
-        "value": 68.0,
-        "ci95": [66.0, 70.0],
-        "thesis": 63,
-        "within": True,
-    }
-    assert [row({}, "SP_percent", 69, ci, 63)["within"] for ci in ((66, 72), (62, 76), None)] == [False, True, False]
-    nothing = row({}, "ANOVA_p", np.float64(0.5), None, None)
-    assert (nothing["value"], type(nothing["value"]), nothing["ci95"], nothing["within"]) == (0.5, float, None, None)
-    assert within(69, (62, 76), 63, "SP_percent")
-
-
-def made_up(measure: str, inside: bool | None, **more: Any) -> dict[str, Any]:
-    return {"measure": measure, "within": inside, **more}
-
-
-def test_agreement_counts() -> None:
-    rows = [
-        made_up("SP_percent", True),
-        made_up("SP_percent", False),
-        made_up("SP_percent", None),
-        made_up("HS_steps", True, rank="1", thesis_rank="1"),  # a rank counts once, with the score
-        made_up("score", True, rank="1", thesis_rank="1"),
-        made_up("score", False, rank="2", thesis_rank="1-2"),
-        made_up("score", True, rank="1", thesis_rank=None),
-        made_up("score", False, rank="1-2", thesis_rank="1-2"),
-        made_up("AR_requests", None),
-    ]
-    assert agreement(rows) == {
-        "cells": 7,
-        "within": 4,
-        "SP_percent cells": 2,
-        "SP_percent within": 1,
-        "HS_steps cells": 1,
-        "HS_steps within": 1,
-        "score cells": 4,
-        "score within": 2,
-        "ranks": 3,
-        "ranks as printed": 2,
-    }
-    assert agreement([]) == {"cells": 0, "within": 0}

@@ -15,9 +15,9 @@ from lab.learning import batch as compiled
 from lab.learning.batch import Batch
 from lab.learning.settings import GateSettings
 from lab.mdp import grid, shortest_steps
-from lab.studies.runner import Setting, sessions_of
 from lab.studies.thesis import world_2 as module
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, Cell, printed
+from lab.studies.thesis.chapter_9_sessions import Setting, sessions_of
 from lab.studies.thesis.world_2 import COMMENT, reconstruct
 from lab.taskfile import load_world
 
@@ -61,7 +61,9 @@ def test_learning_alone_does_best_where_the_thesis_says() -> None:
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search of a second: any layout with the right way, learned in a few sessions, compared by two printed cells."""
-    cells = {cell.setting.view: cell for cell in printed("appendix-v.csv") if module._compared(cell, cell.setting.view)}
+    cells = {
+        cell.setting.view: cell for cell in printed("appendix-v.csv") if module.is_compared(cell, cell.setting.view)
+    }
     monkeypatch.setattr(module, "printed", lambda file: tuple(cells.values()))
     names: dict[str, Any] = {"LAYOUTS": 2, "VIEWS": 4, "QUICK": 3, "SURE": 3, "COMPARED": 3, "POINTS": 100.0}
     for name, value in names.items():
@@ -95,7 +97,7 @@ def test_no_tries(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_layouts_have_a_hundred_obstacles() -> None:
     rng = np.random.default_rng(0)
-    layouts = [module._layout(rng) for _ in range(20)]
+    layouts = [module.layout(rng) for _ in range(20)]
     assert {(wall.shape, int(wall.sum())) for wall in layouts} == {((10, 10, 10), 100)}
     assert len({wall.tobytes() for wall in layouts}) == 20
 
@@ -113,8 +115,8 @@ def test_layouts_have_a_hundred_obstacles() -> None:
 )
 def test_which_layouts_are_alike(monkeypatch: pytest.MonkeyPatch, success: dict[float, float], alike: bool) -> None:
     """By their success, 30 % where nothing else is said."""
-    monkeypatch.setattr(module, "_alone", lambda mdp, beta, sessions: success.get(beta, 30.0))
-    assert module._learns_alike(grid((1, 2, 1), np.zeros((1, 2, 1), bool), (0, 0, 0), (0, 1, 0))) is alike
+    monkeypatch.setattr(module, "success_alone", lambda mdp, beta, sessions: success.get(beta, 30.0))
+    assert module.learns_alike(grid((1, 2, 1), np.zeros((1, 2, 1), bool), (0, 0, 0), (0, 1, 0))) is alike
 
 
 def test_the_nearest_layout_is_taken_and_the_nearest_view(small: None, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -132,7 +134,7 @@ def test_the_nearest_layout_is_taken_and_the_nearest_view(small: None, monkeypat
         return float(np.abs(np.array([world.view.lower, world.view.upper]) - best).sum())
 
     monkeypatch.setattr(module, "LAYOUTS", 3)
-    monkeypatch.setattr(module, "_distance", distance)
+    monkeypatch.setattr(module, "distance", distance)
     world = reconstruct(0)
     assert len({one.obstacles for one in seen}) == 3
     assert world.obstacles == seen[1].obstacles
@@ -152,7 +154,7 @@ def test_the_best_of_the_drawn_views_is_taken(monkeypatch: pytest.MonkeyPatch) -
     rng: Any = SimpleNamespace(integers=lambda low, high, shape: np.array(drawn.pop(0)))
     monkeypatch.setattr(module, "VIEWS", 4)
     told: list[tuple[int, int]] = []
-    best = module._best_view(
+    best = module.best_view(
         load_world("world-2"), rng, lambda view: far.get(tuple(view.ravel().tolist()), 9.0), lambda *n: told.append(n)
     )
     assert best.tolist() == [[2, 2, 2], [4, 5, 6]]
@@ -179,4 +181,4 @@ def test_how_far_a_world_is(monkeypatch: pytest.MonkeyPatch, percent: int, helpe
 
     monkeypatch.setattr(compiled, "run_sessions", made_up)
     cell = Cell(Setting("world-2", "limited", "ia", 0.01, psi=0.3), False, sp=40.0, hs=100.0, score=0.5)
-    assert module._distance(world, np.zeros((1000, 6)), [cell] * 3) == pytest.approx(expected)
+    assert module.distance(world, np.zeros((1000, 6)), [cell] * 3) == pytest.approx(expected)

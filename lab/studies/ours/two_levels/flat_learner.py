@@ -1,6 +1,6 @@
 """Q-learning of the whole task as one flat problem, compiled with numba, with the makespan known after so many steps."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -12,8 +12,7 @@ from lab.studies.ours.two_levels.kitchen import FlatWorld
 Count = NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-class FlatSettings:
+class FlatSettings(NamedTuple):
     """How the flat problem is learned: Q-learning with alpha 1, exact where nothing is left to chance; values begin at 0.
 
     cost: of each step. goal: reward at the end. In episode n a random action has the probability epsilon * n ** -beta,
@@ -30,6 +29,12 @@ class FlatSettings:
     longest: int = 20_000
 
 
+class _Problem(NamedTuple):
+    successor: IntArray  # (S, A)
+    terminal: BoolArray  # (S,)
+    start: int
+
+
 def learn_flat(
     world: FlatWorld, settings: FlatSettings, budgets: tuple[int, ...], cap: int, rng: np.random.Generator
 ) -> Count:
@@ -38,50 +43,35 @@ def learn_flat(
     It is that of the greedy policy or of the best episode until then, whichever is shorter: nothing is left to chance,
     so that an episode can be repeated. Budgets ascend.
     """
-    s = settings
-    mdp, exploring = world.mdp, (float(s.epsilon), float(s.beta), float(s.least))
-    rewards = (float(s.cost), float(s.goal), float(s.discount))
-    makespans = np.full(len(budgets), -1, np.int64)
-    room = (np.zeros(mdp.successor.shape), np.zeros((s.longest, 2), np.int32))
-    stops = np.array(budgets, np.int64)
-    _session(mdp.successor, mdp.terminal, mdp.start, rewards, exploring, stops, cap, *room, makespans, rng)
-    return makespans
+    problem = _Problem(world.mdp.successor, world.mdp.terminal, world.mdp.start)
+    return np.asarray(_session(problem, settings, np.array(budgets, np.int64), cap, rng))
 
 
 @njit(cache=True, nogil=True)
-def _session(
-    successor: IntArray,
-    terminal: BoolArray,
-    start: int,
-    rewards: tuple[float, float, float],
-    exploring: tuple[float, float, float],
-    budgets: Count,
-    cap: int,
-    q: FloatArray,
-    episode: IntArray,
-    makespans: Count,
-    rng: np.random.Generator,
-) -> None:
-    """One session. q (S, A) begins at 0; episode (longest, 2): states and actions of the one under way."""
-    state, length, number, used, best = start, 0, 1, 0, cap + 1
+def _session(problem: _Problem, settings: FlatSettings, budgets: Count, cap: int, rng: np.random.Generator) -> Count:
+    q = np.zeros(problem.successor.shape)
+    makespans = np.full(len(budgets), -1)
+    episode = np.zeros((settings.longest, 2), np.int32)  # states and actions of the one under way
+    state, length, number, used, best = problem.start, 0, 1, 0, cap + 1
     for stop in range(len(budgets)):
         while used < budgets[stop]:
-            epsilon = max(exploring[2], exploring[0] * number ** -exploring[1])
+            epsilon = max(settings.least, settings.epsilon * number**-settings.beta)
             action = _choose(q, state, epsilon, rng)
             episode[length, 0], episode[length, 1] = state, action
-            _learn(successor, terminal, rewards, q, state, action)
-            state = successor[state, action]
+            _learn(problem, settings, q, state, action)
+            state = problem.successor[state, action]
             length += 1
             used += 1
-            if terminal[state]:
+            if problem.terminal[state]:
                 best = min(best, length)
-            if terminal[state] or length == len(episode):
+            if problem.terminal[state] or length == len(episode):
                 for step in range(length - 1, -1, -1):
-                    _learn(successor, terminal, rewards, q, episode[step, 0], episode[step, 1])
-                state, length, number = start, 0, number + 1
-        found = min(best, _greedy_steps(successor, terminal, start, q, cap))
+                    _learn(problem, settings, q, episode[step, 0], episode[step, 1])
+                state, length, number = problem.start, 0, number + 1
+        found = min(best, _greedy_steps(problem, q, cap))
         if found <= cap:
             makespans[stop] = found
+    return makespans
 
 
 @njit(cache=True, nogil=True)
@@ -104,32 +94,24 @@ def _choose(q: FloatArray, state: int, epsilon: float, rng: np.random.Generator)
 
 
 @njit(cache=True, nogil=True)
-def _learn(
-    successor: IntArray,
-    terminal: BoolArray,
-    rewards: tuple[float, float, float],
-    q: FloatArray,
-    state: int,
-    action: int,
-) -> None:
+def _learn(problem: _Problem, settings: FlatSettings, q: FloatArray, state: int, action: int) -> None:
     """Q(s,a) = r + gamma max Q(s',.): the rule of `lab.learning.updates.QLearning` with alpha 1."""
-    cost, goal, discount = rewards
-    entered = successor[state, action]
-    value = goal
-    if not terminal[entered]:
+    entered = problem.successor[state, action]
+    value = settings.goal
+    if not problem.terminal[entered]:
         top = q[entered, 0]
         for other in range(1, q.shape[1]):
             top = max(top, q[entered, other])
-        value = discount * top
-    q[state, action] = value - cost
+        value = settings.discount * top
+    q[state, action] = value - settings.cost
 
 
 @njit(cache=True, nogil=True)
-def _greedy_steps(successor: IntArray, terminal: BoolArray, start: int, q: FloatArray, cap: int) -> int:
+def _greedy_steps(problem: _Problem, q: FloatArray, cap: int) -> int:
     """Steps of the greedy policy to the end (ties: the lowest index); cap + 1 when it takes more."""
-    state = start
+    state = problem.start
     for steps in range(cap + 1):
-        if terminal[state]:
+        if problem.terminal[state]:
             return steps
-        state = successor[state, int(q[state].argmax())]
+        state = problem.successor[state, int(q[state].argmax())]
     return cap + 1

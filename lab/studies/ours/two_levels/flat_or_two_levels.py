@@ -8,13 +8,12 @@ from numpy.typing import NDArray
 
 from lab.mdp import shortest_steps
 from lab.sequencing.exact import optimum
-from lab.studies.findings import Findings
+from lab.studies.charts import Look, curve, legend_below
+from lab.studies.findings import Findings, Row, agreement, mean_row, row, share_row, those
 from lab.studies.ours.two_levels.flat_learner import FlatSettings, learn_flat
 from lab.studies.ours.two_levels.kitchen import FlatWorld, Kitchen, Way, flat_world
 from lab.studies.ours.two_levels.two_level_learner import Outcome, Skill, TwoLevels, practised
 from lab.studies.runner import Job
-from lab.studies.statistics import interval, proportion_interval
-from lab.studies.thesis.chapter_9_cells import Row, agreement, row
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, SKY, picture_bytes
 
 if TYPE_CHECKING:
@@ -39,7 +38,7 @@ FLAT = {
 PRACTICE, FLAT_LEARNING, SEQUENCING = 1, 2, 3  # in seeds: nothing shares its chance with anything else
 ALL_STEPS, LOW_STEPS = "all steps", "low level's steps"
 Method = tuple[str, str]  # method and setting of a row
-METHODS: dict[Method, tuple[str, str, str]] = {  # colour, marker, name in the picture
+METHODS: dict[Method, Look] = {
     **{
         ("flat", name): (colour, marker, f"flat, {name}")
         for name, colour, marker in zip(FLAT, (RED, ORANGE, GREY), "^vX", strict=True)
@@ -112,7 +111,7 @@ def _exact(world: FlatWorld, toasts: int) -> list[Row]:
         ("flat", "problem_states"): world.mdp.n_states,
         ("two levels", "problem_subtasks"): len(ways),
     }
-    return [row(_named(("exact", s), toasts, None), measure, v, None, None) for (s, measure), v in figures.items()]
+    return [row(_named(("exact", s), toasts, None), measure, v) for (s, measure), v in figures.items()]
 
 
 def _flat_rows(
@@ -123,7 +122,7 @@ def _flat_rows(
         chances = [np.random.default_rng([seed, session, FLAT_LEARNING, toasts, number]) for session in range(sessions)]
         learned = np.array([learn_flat(world, settings, budgets, CAP, chance) for chance in chances])
         for budget, makespans in zip(budgets, learned.T, strict=True):
-            rows += _rows(_named(("flat", name), toasts, budget), makespans, best)
+            rows += rows_of(_named(("flat", name), toasts, budget), makespans, best)
     return rows
 
 
@@ -141,8 +140,8 @@ def _two_level_rows(
         for budget in budgets:
             found: list[Outcome] = [learner.outcome(budget, CAP, name == ALL_STEPS) for learner in learners]
             named = _named(("two-level", name), toasts, budget)
-            rows += _rows(named, np.array([-1 if one.makespan is None else one.makespan for one in found]), best)
-            rows.append(row(named, "used_steps", float(np.mean([one.used for one in found])), None, None))
+            rows += rows_of(named, np.array([-1 if one.makespan is None else one.makespan for one in found]), best)
+            rows.append(row(named, "used_steps", float(np.mean([one.used for one in found]))))
     return rows
 
 
@@ -151,16 +150,14 @@ def _named(method: Method, toasts: int, budget: int | None) -> Row:
     return {"table": table, "method": method[0], "setting": method[1], "toasts": toasts, "budget": budget}
 
 
-def _rows(named: Row, makespans: NDArray[np.int64], best: int) -> list[Row]:
+def rows_of(named: Row, makespans: NDArray[np.int64], best: int) -> list[Row]:
     """Makespan and its distance from the optimum over the sessions that finished, if any, and the share of these."""
     there = makespans[makespans >= 0]
     rows = []
     for measure, values in (("makespan_steps", there), ("gap_percent", 100.0 * (there / best - 1.0))):
         if len(values):
-            mean, low, high = interval(values) if len(values) > 1 else (float(values[0]), 0.0, 0.0)
-            rows.append(row(named, measure, mean, (low, high) if len(values) > 1 else None, None))
-    share, low, high = proportion_interval(len(there), len(makespans))
-    return [*rows, row(named, "finished_percent", share, (low, high), None)]
+            rows.append(mean_row(named, measure, values) if len(values) > 1 else row(named, measure, values[0]))
+    return [*rows, share_row(named, "finished_percent", makespans >= 0)]
 
 
 def _in_short(rows: Sequence[Row], toasts: int, exact: Sequence[Row]) -> Row:
@@ -169,14 +166,11 @@ def _in_short(rows: Sequence[Row], toasts: int, exact: Sequence[Row]) -> Row:
     says = ("optimum, flat", "optimum, two levels", "states of the flat problem", "sub-tasks")
     found: Row = {f"{table}: {what}": int(one["value"]) for what, one in zip(says, exact, strict=True)}
     for method, setting in METHODS:
-        of = [one for one in rows if (one["method"], one["setting"]) == (method, setting)]
-        sure = {one["budget"] for one in of if one["measure"] == "finished_percent" and one["value"] == 100.0}
-        near = [
-            one["budget"]
-            for one in of
-            if one["measure"] == "gap_percent" and one["value"] <= NEAR_PERCENT and one["budget"] in sure
-        ]
-        found[f"{table}: steps to within {NEAR_PERCENT:g} %, {method}, {setting}"] = min(near, default=None)
+        of = those(rows, method=method, setting=setting)
+        sure = {one["budget"] for one in those(of, measure="finished_percent", value=100.0)}
+        near = [one["budget"] for one in those(of, measure="gap_percent") if one["value"] <= NEAR_PERCENT]
+        steps = min((budget for budget in near if budget in sure), default=None)
+        found[f"{table}: steps to within {NEAR_PERCENT:g} %, {method}, {setting}"] = steps
     return found
 
 
@@ -186,34 +180,26 @@ def _picture(rows: Sequence[Row]) -> bytes:
     def draw(figure: "Figure") -> None:
         plots = figure.subplots(1, len(TOASTS), squeeze=False)[0]
         for axes, toasts in zip(plots, TOASTS, strict=True):
-            _draw(axes, [one for one in rows if one["toasts"] == toasts])
+            _draw(axes, those(rows, toasts=toasts))
         plots[0].set_ylabel("makespan [steps]")
-        handles, _ = plots[-1].get_legend_handles_labels()
-        figure.legend(handles=handles, loc="outside lower center", ncols=3)
+        legend_below(figure)
 
     return picture_bytes(draw, 3.4 * len(TOASTS), 3.9, "svg")
 
 
 def _draw(axes: "Axes", rows: Sequence[Row]) -> None:
     finished = {
-        (one["method"], one["setting"], one["budget"]): one["value"]
-        for one in rows
-        if one["measure"] == "finished_percent"
+        (one["method"], one["setting"], one["budget"]): one["value"] == 100.0
+        for one in those(rows, measure="finished_percent")
     }
     for (method, setting), (colour, marker, name) in METHODS.items():
-        line = [
-            one
-            for one in rows
-            if (one["method"], one["setting"], one["measure"]) == (method, setting, "makespan_steps")
-        ]
-        budgets, values = [one["budget"] for one in line], [one["value"] for one in line]
-        low, high = ([(one["ci95"] or [one["value"]] * 2)[end] for one in line] for end in (0, 1))
-        axes.fill_between(budgets, low, high, color=colour, alpha=0.2, linewidth=0)
-        axes.plot(budgets, values, color=colour, marker=marker, markersize=4.5, label=name)
+        line = those(rows, method=method, setting=setting, measure="makespan_steps")
+        curve(axes, line, "budget", (colour, marker, name))
         for one in line:
-            if finished[method, setting, one["budget"]] < 100.0:
-                axes.plot(one["budget"], one["value"], marker, color=colour, markerfacecolor="white", markersize=4.5)
-    best = next(one["value"] for one in rows if one["method"] == "exact")
+            if not finished[method, setting, one["budget"]]:
+                look: dict[str, Any] = {"color": colour, "markerfacecolor": "white", "markersize": 4.5, "zorder": 3}
+                axes.plot(one["budget"], one["value"], marker, **look)
+    best = those(rows, method="exact")[0]["value"]
     axes.axhline(best, color=INK, linestyle="--", linewidth=1.0, label="exact optimum")
     axes.set(xscale="log", xlabel="steps of learning", title=f"{rows[0]['table']}, optimum {best:.0f}")
     asked = [budget for _, _, budget in finished]

@@ -310,11 +310,11 @@ def test_the_studys_summary_and_picture(study: Study) -> None:
 
 def test_one_session_that_finished_has_no_interval() -> None:
     named = {"toasts": 1}
-    rows = {one["measure"]: one for one in module._rows(named, np.array([-1, 20, -1]), 16)}
+    rows = {one["measure"]: one for one in module.rows_of(named, np.array([-1, 20, -1]), 16)}
     assert (rows["makespan_steps"]["value"], rows["makespan_steps"]["ci95"]) == (20.0, None)
     assert rows["gap_percent"]["value"] == 25.0
     assert rows["finished_percent"]["value"] == pytest.approx(100 / 3)
-    none = [one["measure"] for one in module._rows(named, np.array([-1, -1]), 16)]
+    none = [one["measure"] for one in module.rows_of(named, np.array([-1, -1]), 16)]
     assert none == ["finished_percent"]
 
 

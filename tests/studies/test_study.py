@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import pytest
 
 from lab.errors import BadInput
-from lab.studies import STUDIES, runner
-from lab.studies.runner import STORE, Outcome, Setting, sessions_of
-from lab.studies.thesis import chapter_9_cells
-from lab.study import run_study
+from lab.studies import STUDIES, run_study
+from lab.studies.runner import STORE, Job
+from lab.studies.thesis import chapter_9_cells, chapter_9_sessions
+from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, sessions_of
 from lab.taskfile import load_world
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
@@ -35,9 +35,10 @@ def tree(folder: Path) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
 
 
-def study(name: str = "figure-9.4", out: str = "out", **more: Any) -> dict[str, Any]:
-    settings: dict[str, Any] = {"sessions": 10, "seed": 0, "workers": 1, "dask": None, "advisor_table": None}
-    return run_study(name, out=Path(out), progress=lambda done, total: None, **(settings | more))
+def study(
+    name: str = "figure-9.4", out: str = "out", seed: int = 0, advisor_table: str | None = None
+) -> dict[str, Any]:
+    return run_study(name, Job(10, seed), Path(out), advisor_table)
 
 
 # ---- what a study writes ------------------------------------------------------------------------------------------
@@ -91,7 +92,7 @@ def test_what_is_refused_writes_nothing(
     folder: Path, monkeypatch: pytest.MonkeyPatch, changes: dict[str, Any], says: str
 ) -> None:
     (folder / "taken").write_text("mine", encoding="utf-8")
-    monkeypatch.setattr(runner, "sessions_of", lambda *_, **__: pytest.fail("nothing is to be learned"))
+    monkeypatch.setattr(chapter_9_sessions, "sessions_of", lambda *_, **__: pytest.fail("nothing is to be learned"))
     with pytest.raises(BadInput, match=says):
         study(**changes)
     assert tree(folder) == ["taken"]
@@ -111,7 +112,7 @@ def stop_after(count: int, monkeypatch: pytest.MonkeyPatch) -> list[Setting]:
         done.append(setting)
         return sessions_of(setting, sessions, seed)
 
-    monkeypatch.setattr(runner, "sessions_of", stopped)
+    monkeypatch.setattr(chapter_9_sessions, "sessions_of", stopped)
     return done
 
 
