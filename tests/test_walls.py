@@ -40,7 +40,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.sequence_drawn",),
     ("lab.sessions", "lab.gymworld"),
     ("lab.classroom",),
-    ("lab.lesson", "lab.study", "lab.look", "lab.sequence"),
+    ("lab.lesson", "lab.look", "lab.sequence"),
     ("lab.task",),
     ("lab.cli",),
 )
@@ -56,6 +56,7 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "starlette": {"lab.view.server", "lab.view.server_page"},
     "uvicorn": {"lab.view.server"},
     "websockets": set(),  # uvicorn's
+    "jinja2": {"lab.studies.report"},
     "joblib": {"lab.studies.runner"},  # to work in several processes; its files are pickles, and nobody reads those
 } | {library: set() for library in ("random", "pickle", "dill", "cloudpickle", "shelve", "marshal")}
 NEVER = {  # room -> rooms that it never imports, whatever the layers say
@@ -67,7 +68,7 @@ NEVER = {  # room -> rooms that it never imports, whatever the layers say
 }
 HEAVY = (
     *("numpy", "pydantic", "scipy", "trimesh", "matplotlib", "numba", "meshcat", "cv2", "pybullet", "safetensors"),
-    *("ortools", "pymoo", "starlette", "uvicorn", "gymnasium"),
+    *("ortools", "pymoo", "starlette", "uvicorn", "gymnasium", "jinja2"),
 )
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 

@@ -35,19 +35,12 @@ def study_run(
     as_json: Json = False,
 ) -> None:
     """Run a study and write its report; sessions of chapter 9 that a folder already holds are not run again."""
-    from lab.study import run_study
+    from lab.studies import run_study
+    from lab.studies.runner import Job
     from lab.view.progress import counting
     from lab.view.summary import study_summary
 
     with counting(console(), f"cells of {name}") as progress:
-        document = run_study(
-            name,
-            sessions=sessions,
-            seed=seed,
-            workers=workers,
-            dask=dask,
-            advisor_table=advisor_table,
-            out=out or Path(f"{name}-study"),
-            progress=progress,
-        )
+        job = Job(sessions, seed, workers, dask, progress=progress)
+        document = run_study(name, job, out or Path(f"{name}-study"), advisor_table)
     show(document, as_json, study_summary)
