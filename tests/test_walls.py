@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors",),
-    ("lab.data", "lab.files", "lab.tomltext"),
+    ("lab.data", "lab.files", "lab.tomltext", "lab.compiled"),
     ("lab.overhead", "lab.view.frames", "lab.mdp", "lab.sequencing", "lab.learning.settings"),
     ("lab.vision",),
     ("lab.learning.selection",),
@@ -52,6 +52,7 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "meshcat": {"lab.view.meshcat"},
     "cv2": {"lab.vision", "lab.sim.camera"},
     "PIL": {"lab.vision", "lab.sim.camera"},
+    "numba": {"lab.compiled", "lab.learning.kernels"},  # what is kept of it is kept in one place
     "ortools": {"lab.sequencing.cpsat", "lab.sequencing.cpsat_model"},
     "pymoo": {"lab.sequencing.genetic"},
     "starlette": {"lab.view.server", "lab.view.server_page"},

@@ -3,7 +3,7 @@
 Many sessions walk side by side: one alone waits for its memory and its exponentials, 24 keep the processor busy.
 Each has uniform numbers of its own (`selection.splitmix`), so its result depends on its seed and on nothing else, and
 equals that of `session.run_session` with the same numbers. Rules come from `selection`, `updates`, `advice.gates` and
-`advice.memory`; numba's cache knows changes of this file only, so whoever changes a rule there deletes `__pycache__` here.
+`advice.memory`.
 """
 
 from dataclasses import fields
@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from lab.advice import gates, memory
+from lab.compiled import compiled
 from lab.learning import selection, updates
 from lab.mdp import FloatArray
 
@@ -264,7 +265,7 @@ def _choose(
         chosen[j] = action
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def run(
     problem: Any,
     rules: Any,

@@ -1,15 +1,13 @@
-"""Sessions that learn in the simulation of `kernels`, compiled with numba; held equal to `sessions`.
-
-numba's cache knows changes of this file only: who changes `kernels` or `updates` deletes `__pycache__`.
-"""
+"""Sessions that learn in the simulation of `kernels`, compiled with numba; held equal to `sessions`."""
 
 from typing import Any
 
 import numpy as np
 
+from lab.compiled import inner, lean
 from lab.sequencing import updates
 from lab.sequencing.arrays import LEARNER_CODES
-from lab.sequencing.kernels import compiled, cost, inner, list_allowed, mixed, move, reset, uniform
+from lab.sequencing.kernels import cost, list_allowed, mixed, move, reset, uniform
 
 RANDOM, SRL, MONTE_CARLO = (LEARNER_CODES[name] for name in ("random", "srl", "mc"))
 _explore, _best_of, _log_sum = inner(updates.explore), inner(updates.best_of), inner(updates.log_sum)
@@ -56,7 +54,7 @@ def _add(memory: Any, key: int, value: float, visits: int) -> Any:
     return row
 
 
-@compiled
+@lean
 def copy_rows(memory: Any, larger: Any) -> None:
     """All rows of a table into an empty one with more room."""
     for row in range(1, memory.used[0] + 1):
@@ -178,7 +176,7 @@ def _advance(
                 work.best[m] = work.sequence[m] if m < moves else 0
 
 
-@compiled
+@lean
 def advance(
     cell: Any,
     calm: Any,

@@ -1,15 +1,11 @@
-"""The simulation of a cell, compiled with numba; held equal to `run`, `chance` and `objectives`. `episodes` learns in it.
+"""The simulation of a cell, compiled with numba; held equal to `run`, `chance` and `objectives`. `episodes` learns in it."""
 
-numba's cache knows changes of one file only: who changes this one deletes `__pycache__`, where `episodes` has a copy.
-"""
-
-from collections.abc import Callable
 from math import cos, log, pi, sqrt
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from numba import njit
 
+from lab.compiled import inner, lean
 from lab.sequencing.arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES
 
 CLOCK, PICK = ARRIVAL_CODES["clock"], ARRIVAL_CODES["pick"]
@@ -17,19 +13,6 @@ CONSTANT, NORMAL = LAW_CODES["constant"], LAW_CODES["normal"]
 MAKESPAN, TARDINESS, ROBOT_IDLE, MACHINE_IDLE = (
     OBJECTIVE_CODES[name] for name in ("makespan", "mean-tardiness", "robot-idle", "machine-idle")
 )
-Function = TypeVar("Function", bound=Callable[..., Any])
-
-
-def compiled(function: Function, **options: bool) -> Function:
-    """Nothing here makes arrays or keeps them, so references need no counting, which would take most of the time."""
-    jit: Any = njit  # its types do not know all options
-    jitted: Function = jit(cache=True, nogil=True, error_model="numpy", _nrt=False, **options)(function)
-    return jitted
-
-
-def inner(function: Function) -> Function:
-    """For what only compiled functions call: what Python would need to call it takes a third of the time to compile."""
-    return compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 @inner
@@ -40,7 +23,7 @@ def mixed(z: Any) -> Any:
     return z ^ (z >> np.uint64(31))
 
 
-@compiled
+@lean
 def uniform(seed: Any, number: int) -> float:
     """`chance.uniform`."""
     z = seed + (np.uint64(number) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
@@ -65,7 +48,7 @@ def _interval(cell: Any, seed: Any, part: int) -> float:
     return _drawn(cell.arrivals_law, cell.spread, cell.interval_s[part], seed, number)
 
 
-@compiled
+@lean
 def reset(cell: Any, run: Any, seed: Any) -> None:
     """`Run.__init__`, with the times of an episode's seed (uint64)."""
     parts, came_s = len(run.locations), 0.0
@@ -80,7 +63,7 @@ def reset(cell: Any, run: Any, seed: Any) -> None:
     run.whole[0], run.whole[1], run.whole[2] = cell.robot_start, 0, parts
 
 
-@compiled
+@lean
 def list_allowed(cell: Any, run: Any) -> int:
     """`Run.allowed`: how many decisions may be taken now; they stand in run.allowed, what they mean in run.options."""
     parts, count = len(run.locations), 0
@@ -109,7 +92,7 @@ def _sort(run: Any, count: int) -> None:
         run.allowed[i], run.options[i] = decision, o
 
 
-@compiled
+@lean
 def move(cell: Any, run: Any, i: int, seed: Any) -> None:
     """`Run.move`: carries out the i-th of the allowed decisions, with the times of an episode's seed."""
     parts, o = len(run.locations), run.options[i]
@@ -141,7 +124,7 @@ def move(cell: Any, run: Any, i: int, seed: Any) -> None:
         run.whole[2] -= 1
 
 
-@compiled
+@lean
 def cost(cell: Any, run: Any) -> float:
     """`objectives.cost`."""
     if run.whole[2] > 0:
@@ -159,7 +142,7 @@ def cost(cell: Any, run: Any) -> float:
     return total / len(run.locations) if cell.objective == TARDINESS else total
 
 
-@compiled
+@lean
 def follow(cell: Any, run: Any, sequence: Any, seed: Any) -> float:
     """The cost of a sequence of decisions with the times of an episode's seed; NaN when one of them may not be taken.
 
@@ -176,7 +159,7 @@ def follow(cell: Any, run: Any, sequence: Any, seed: Any) -> float:
     return cost(cell, run)
 
 
-@compiled
+@lean
 def follow_all(cell: Any, run: Any, sequences: Any, lengths: Any, seeds: Any, costs: Any) -> None:
     """`follow` of each row of sequences (N, L), as many decisions as lengths (N,) says, with M seeds; costs (N, M)."""
     for n in range(len(sequences)):

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from lab.compiled import compiled
 from lab.mdp import BoolArray, FloatArray, IntArray
 from lab.studies.flat_world import FlatWorld
 
@@ -48,7 +48,7 @@ def learn_flat(
     return makespans
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _session(
     successor: IntArray,
     terminal: BoolArray,
@@ -84,7 +84,7 @@ def _session(
             makespans[stop] = found
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _choose(q: FloatArray, state: int, epsilon: float, rng: np.random.Generator) -> int:
     """The best action, equally good ones drawn between, or with probability epsilon any one."""
     actions = q.shape[1]
@@ -103,7 +103,7 @@ def _choose(q: FloatArray, state: int, epsilon: float, rng: np.random.Generator)
     return best
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _learn(
     successor: IntArray,
     terminal: BoolArray,
@@ -124,7 +124,7 @@ def _learn(
     q[state, action] = value - cost
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _greedy_steps(successor: IntArray, terminal: BoolArray, start: int, q: FloatArray, cap: int) -> int:
     """Steps of the greedy policy to the end (ties: the lowest index); cap + 1 when it takes more."""
     state = start
