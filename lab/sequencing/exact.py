@@ -2,7 +2,6 @@
 
 import heapq
 from dataclasses import dataclass
-from math import inf
 from operator import le
 
 from lab.errors import BadInput
@@ -10,6 +9,7 @@ from lab.sequencing.bound import TICKS_PER_S
 from lab.sequencing.cell import Cell
 from lab.sequencing.positions import part_of
 from lab.sequencing.run import Run, simulate
+from lab.sequencing.search import gap
 from lab.sequencing.states import Moves, State, sequence_of, times_of
 
 MAX_EXPANDED = 300_000
@@ -35,11 +35,8 @@ class Optimum:
         return self.cost if self.proven else None
 
     def gap(self, cost: float) -> float:
-        """How much longer a makespan is than the proven optimum, or than the bound when there is none; a fraction."""
-        if self.bound_s == 0:
-            return inf if cost > 0 else 0.0
-        gap = cost / self.bound_s - 1.0
-        return 0.0 if abs(gap) < 1e-9 else gap
+        """How much longer a makespan is than the proven optimum, or than the bound when there is none (see `search.gap`)."""
+        return gap(cost, self.bound_s)
 
 
 class _Search:

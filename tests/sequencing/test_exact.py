@@ -18,7 +18,7 @@ from lab.sequencing.objectives import cost
 from lab.sequencing.positions import part_of
 from lab.sequencing.proven import exact
 from lab.sequencing.run import Run, simulate
-from lab.sequencing.search import Search
+from lab.sequencing.search import Reference, Search
 from lab.sequencing.states import Moves, sequence_of
 from lab.sequencing.tree import branch_and_bound
 
@@ -193,6 +193,13 @@ def test_gap() -> None:
     assert best.gap(120.0) == pytest.approx(0.2)
     assert Optimum(0.0, (1,), True, 0.0, 1).gap(0.0) == 0.0
     assert Optimum(0.0, (1,), True, 0.0, 1).gap(1.0) == np.inf
+
+
+@given(bound_s=st.floats(1.0, 1e6), off=st.floats(-1e-7, 1e-7))
+def test_a_gap_of_nothing_but_rounding_is_0(bound_s: float, off: float) -> None:
+    """-5e-12 is none, however the sums of the two were rounded."""
+    cost = bound_s * (1.0 + off)
+    assert Optimum(bound_s, (1,), True, bound_s, 1).gap(cost) == Reference(bound_s, True, "A*").gap(cost) == 0.0
 
 
 @given(data=st.data())
