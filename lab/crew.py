@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lab.policy import Policy
-from lab.sequencing.cell import Cell, needed_moves
-from lab.sequencing.layout import Product, Route, Stage, Station
-from lab.sequencing.positions import Moves
+from lab.sequencing.cell.cell import Cell, needed_moves
+from lab.sequencing.cell.routes import Moves
+from lab.sequencing.cell.stations import Product, Route, Stage, Station
 from lab.skills import Butter, Grasp, Insert, Place, Skill, Transfer
 from lab.skills.surveys import INSERT_START
 from lab.taskfile import Task

@@ -13,10 +13,10 @@ from lab.crew import Crew, Durations
 from lab.errors import BadInput, WorkFailed
 from lab.files import nearest
 from lab.policy import Policy
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import SequenceResult
-from lab.sequencing.exact import Optimum
-from lab.sequencing.run import simulate
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.schedule import SequenceResult
+from lab.sequencing.methods.exact import Optimum
+from lab.sequencing.simulate.run import simulate
 from lab.sim.scene import Layout
 from lab.skills import Insert
 from lab.skills.skill import Problem

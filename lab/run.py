@@ -15,7 +15,7 @@ from lab.planner import find_sequence, search_for
 from lab.policy import Policy
 from lab.recorder import Viewer, show_scene
 from lab.report import Prepared, Report, Taught, write_files
-from lab.sequencing.exact import optimum
+from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Reference
 from lab.sim.scene import Layout, check_apart, draw_layout
 from lab.skills.surveys import Surveys

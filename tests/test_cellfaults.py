@@ -15,7 +15,7 @@ from lab.cellfaults import MAX_STAGES, SHOWN, loc_of
 from lab.cellfile import CellFile
 from lab.data import tasks_folder
 from lab.errors import BadInput
-from lab.sequencing.cell import Cell
+from lab.sequencing.cell.cell import Cell
 from lab.tomltext import TomlText
 
 FMS = (tasks_folder() / "fms.toml").read_text(encoding="utf-8")

@@ -21,8 +21,8 @@ from lab.learning.updates import UPDATES
 from lab.mdp import grid
 from lab.policy import Policy
 from lab.sequencing import SEQUENCERS
-from lab.sequencing.advised import FITTING
-from lab.sequencing.objectives import OBJECTIVES
+from lab.sequencing.cell.objectives import OBJECTIVES
+from lab.sequencing.methods.srl_advised import FITTING
 from lab.taskfile import load, load_world, shipped
 from lab.toolbox import Toolbox
 

@@ -10,9 +10,9 @@ from lab.composer import MAX_TRIES, Outcome, Production, carry_out
 from lab.crew import Crew, Durations, cell_of
 from lab.errors import WorkFailed
 from lab.line import Line, measure, try_grasp
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import Move
-from lab.sequencing.run import simulate
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.simulate.run import simulate
 from lab.sim.scene import Layout, spots
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Butter, Grasp

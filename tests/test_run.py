@@ -22,8 +22,8 @@ from lab.planner import find_sequence, search_for
 from lab.report import FILES, Prepared, Report, Taught, check_out, write_files
 from lab.run import prepare, teach_all
 from lab.sequencing import SEQUENCERS
-from lab.sequencing.events import Schedule
-from lab.sequencing.exact import optimum
+from lab.sequencing.cell.schedule import Schedule
+from lab.sequencing.methods.exact import optimum
 from lab.taskfile import Task, load
 from lab.teaching import Teacher
 from lab.toolbox import Toolbox

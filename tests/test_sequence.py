@@ -22,14 +22,14 @@ from lab.sequence import (
     sequence_named,
 )
 from lab.sequencing import DRAWN, SEQUENCERS
-from lab.sequencing.cell import Cell
-from lab.sequencing.chance import NO_CHANCE, Chance
-from lab.sequencing.events import SequenceResult
-from lab.sequencing.execute import replicate
-from lab.sequencing.layout import Stage, Station
-from lab.sequencing.objectives import OBJECTIVES
-from lab.sequencing.run import simulate
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance
+from lab.sequencing.cell.objectives import OBJECTIVES
+from lab.sequencing.cell.schedule import SequenceResult
+from lab.sequencing.cell.stations import Stage, Station
 from lab.sequencing.search import Reference, Search, SrlSettings
+from lab.sequencing.simulate.execution import replicate
+from lab.sequencing.simulate.run import simulate
 from lab.taskfile import load, load_cell
 from lab.teaching import Teacher
 from lab.toolbox import Toolbox

@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.sequencing.cell import Cell
-from lab.sequencing.chance import NO_CHANCE, Chance
-from lab.sequencing.events import EpisodeSequenced
-from lab.sequencing.objectives import MAKESPAN, check_objective
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance
+from lab.sequencing.cell.objectives import MAKESPAN, check_objective
+from lab.sequencing.cell.schedule import EpisodeSequenced
 
 FACTORS = ("A", "B")
 VALUES = ("pairs", "states")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.sequencing.chance import LAWS
+from lab.sequencing.cell.chance import LAWS
 from lab.studies.appendix3_fifo import STARTS
 from lab.studies.appendix3_parts import (
     ASKED,

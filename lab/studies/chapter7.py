@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import unknown
-from lab.sequencing.cell import Cell as RobotCell
+from lab.sequencing.cell.cell import Cell as RobotCell
 from lab.studies.chapter9 import Row, row
 from lab.studies.listing import LISTING, Reading
 from lab.studies.runner import Job, seeds_of
@@ -156,8 +156,8 @@ def _spread(setting: Setting) -> float:
 
 
 def _sessions_as_printed(setting: Setting, sessions: int, seed: int) -> Outcome:
-    from lab.sequencing.batch import run_sessions
-    from lab.sequencing.chance import NO_CHANCE, Chance
+    from lab.sequencing.cell.chance import NO_CHANCE, Chance
+    from lab.sequencing.methods.many_sessions import run_sessions
     from lab.sequencing.search import Search, SrlSettings
 
     search = Search(

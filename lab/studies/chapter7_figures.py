@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.sequencing.cell import Cell as RobotCell
-from lab.sequencing.run import simulate
+from lab.sequencing.cell.cell import Cell as RobotCell
+from lab.sequencing.simulate.run import simulate
 from lab.studies.chapter7 import READINGS, Setting, epsilons, optimum_s, robot_cell
 from lab.studies.chapter9 import Row
 from lab.studies.figures import MARKERS, PRINTED, bars

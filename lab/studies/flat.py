@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.mdp import shortest_steps
-from lab.sequencing.exact import optimum
+from lab.sequencing.methods.exact import optimum
 from lab.studies.chapter9 import Row, agreement, row
 from lab.studies.findings import Findings
 from lab.studies.flat_learner import FlatSettings, learn_flat

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, unknown
-from lab.sequencing.cell import Cell
+from lab.sequencing.cell.cell import Cell
 from lab.studies import listing_kernels as kernels
 from lab.studies.listing_kernels import (
     APPLIER,

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from lab.advice.events import AdviceRejected, AdviceRequested, Event
 from lab.listener import Listener
-from lab.sequencing.events import Move, SequenceResult
+from lab.sequencing.cell.schedule import Move, SequenceResult
 from lab.sequencing.search import Reference
 from lab.teaching import Lesson
 

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import ttest_rel
 
-from lab.sequencing.batch import evaluate
-from lab.sequencing.chance import Chance, Episode
-from lab.sequencing.execute import carry_out, replicate
+from lab.sequencing.cell.chance import Chance, Episode
+from lab.sequencing.methods.many_sessions import evaluate
+from lab.sequencing.simulate.execution import carry_out, replicate
 from lab.studies import appendix3, appendix3_parts
 from lab.studies.appendix3 import METHODS, _p, appendix_iii, orders_of
 from lab.studies.appendix3_fifo import STARTS, queued_fifo

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.sequencing.exact import optimum
+from lab.sequencing.methods.exact import optimum
 from lab.studies.chapter7 import (
     AS_PRINTED,
     DECAY_FACTORS,

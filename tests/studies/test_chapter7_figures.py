@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from lab.sequencing.run import simulate
+from lab.sequencing.simulate.run import simulate
 from lab.studies import chapter7_figures as figures
 from lab.studies.chapter7 import Measured, printed, robot_cell
 from lab.studies.chapter9 import Row

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from lab.sequencing.exact import optimum
+from lab.sequencing.methods.exact import optimum
 from lab.studies import comparison, comparison_parts, comparison_speed
 from lab.studies.chapter7 import robot_cell
 from lab.studies.comparison import rows_of, settings_of, srl_time_study, works_of

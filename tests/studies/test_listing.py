@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.sequencing.cell import Cell
-from lab.sequencing.chance import uniform
-from lab.sequencing.run import simulate
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import uniform
+from lab.sequencing.simulate.run import simulate
 from lab.studies import listing_kernels as kernels
 from lab.studies.listing import LISTING, Reading, _rules, _work, banned_states, run_sessions, toasts_of
 from lab.studies.listing_kernels import LATEST_S, STATE, Toasts

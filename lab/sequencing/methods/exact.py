@@ -1,0 +1,132 @@
+"""The proven optimum of a cell: best-first search over its decision states, with alike parts merged."""
+
+import heapq
+from dataclasses import dataclass
+from operator import le
+
+from lab.errors import BadInput
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import part_of
+from lab.sequencing.methods.robot_bound import TICKS_PER_S
+from lab.sequencing.search import gap
+from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.states import Moves, State, sequence_of, times_of
+
+MAX_EXPANDED = 300_000
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The best sequence known, and what is proven: no sequence is shorter than `bound_s`.
+
+    cost: its makespan [s]. `proven`: the sequence is optimal (to a nanosecond a move) and `bound_s` is its makespan.
+    `expanded`: states opened.
+    """
+
+    cost: float
+    sequence: tuple[int, ...]
+    proven: bool
+    bound_s: float
+    expanded: int
+
+    @property
+    def optimal_s(self) -> float | None:
+        """The makespan when it is proven to be optimal, else None [s]."""
+        return self.cost if self.proven else None
+
+    def gap(self, cost: float) -> float:
+        """How much longer a makespan is than the proven optimum, or than the bound when there is none (see `search.gap`)."""
+        return gap(cost, self.bound_s)
+
+
+class _Search:
+    """The states that are queued and those that were reached; `expanded`: how many were opened."""
+
+    def __init__(self, cell: Cell) -> None:
+        self.cell, self.moves = cell, Moves(cell)
+        self.expanded = self.bound = self._serial = 0
+        self._fronts: dict[tuple[int, int], list[tuple[int, ...]]] = {}
+        self._heap: list[tuple[int, int, State]] = []
+        self._greedy = False
+        self._reach(self.moves.start())
+
+    def run(self, most: int) -> State | None:
+        """The first complete state; None: when `most` states were opened in all there was none."""
+        while self._heap:
+            bound, serial, state = heapq.heappop(self._heap)
+            if times_of(state) not in self._fronts[state.counts, state.robot]:
+                continue  # overtaken since it was queued
+            self.bound = max(self.bound, bound)
+            if self.moves.done(state):
+                return state
+            if self.expanded >= most:
+                heapq.heappush(self._heap, (bound, serial, state))
+                return None
+            self.expanded += 1
+            for successor in self.moves.successors(state):
+                self._reach(successor)
+        return None
+
+    def hasten(self) -> None:
+        """From now on open what has the least left to do first: any end will do."""
+        self._greedy = True
+        self._heap = [(self.moves.left(state), serial, state) for _, serial, state in self._heap]
+        heapq.heapify(self._heap)
+
+    def _reach(self, state: State) -> None:
+        """Queue a state unless one that is alike otherwise is no later anywhere; those that it beats are forgotten."""
+        times = times_of(state)
+        front = self._fronts.setdefault((state.counts, state.robot), [])
+        if any(all(map(le, other, times)) for other in front):
+            return
+        front[:] = [other for other in front if not all(map(le, times, other))]
+        front.append(times)
+        # Of equally promising states the newest comes first, hence the falling serial number.
+        self._serial -= 1
+        left = self.moves.left(state)
+        heapq.heappush(self._heap, (left if self._greedy else state.now + left, self._serial, state))
+
+
+def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
+    """The shortest makespan of the cell and a sequence that reaches it, alike parts numbered first in, first out.
+
+    States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
+    optimal; a deadlock leads nowhere. After `max_expanded` states it gives up and opens as many again, nearest to the end
+    first, for the sequence it returns: `proven` False, and the bound reached so far. Raises BadInput when nothing brings
+    all parts to their ends.
+    Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
+    states that are otherwise alike is the thesis's branch and bound, App. IV.
+    """
+    search = _Search(cell)
+    state = search.run(max_expanded)
+    if state is not None:
+        sequence = sequence_of(cell, state)
+        cost = simulate(cell, sequence).makespan_s
+        return Optimum(cost, sequence, True, cost, search.expanded)
+    bound_s, expanded = search.bound / TICKS_PER_S, search.expanded
+    search.hasten()
+    state = search.run(2 * max_expanded)
+    sequence = first_come(cell) if state is None else sequence_of(cell, state)
+    return Optimum(simulate(cell, sequence).makespan_s, sequence, False, bound_s, expanded)
+
+
+def first_come(cell: Cell) -> tuple[int, ...]:
+    """A sequence that comes to its end: what is ready first goes first; when that ends in a deadlock, part after part.
+
+    One part alone never meets a full station where routes are sound. Raises BadInput, naming the deadlock, where it does.
+    """
+    run, sequence = Run(cell), list[int]()
+    while allowed := run.allowed():
+        sequence.append(min(allowed, key=lambda decision: run.ready_s[part_of(decision, cell.parts) - 1]))
+        run.move(sequence[-1])
+    if run.done:
+        return tuple(sequence)
+    stuck, run, sequence = run, Run(cell), []
+    for part in range(1, cell.parts + 1):
+        while run.finished_s[part - 1] is None:
+            decision = next((one for one in run.allowed() if part_of(one, cell.parts) == part), None)
+            if decision is None:
+                raise BadInput(f"no sequence found that finishes all {cell.parts} parts: {stuck.deadlock()}")
+            sequence.append(decision)
+            run.move(decision)
+    return tuple(sequence)
