@@ -4,7 +4,6 @@ import heapq
 from dataclasses import dataclass
 from operator import le
 
-from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.methods.robot_bound import TICKS_PER_S
@@ -92,8 +91,7 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
 
     States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
     optimal; a deadlock leads nowhere. After `max_expanded` states it gives up and opens as many again, nearest to the end
-    first, for the sequence it returns: `proven` False, and the bound reached so far. Raises BadInput when nothing brings
-    all parts to their ends.
+    first, for the sequence it returns: `proven` False, and the bound reached so far.
     Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
     states that are otherwise alike is the thesis's branch and bound, App. IV.
     """
@@ -113,7 +111,7 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
 def first_come(cell: Cell) -> tuple[int, ...]:
     """A sequence that comes to its end: what is ready first goes first; when that ends in a deadlock, part after part.
 
-    One part alone never meets a full station where routes are sound. Raises BadInput, naming the deadlock, where it does.
+    One part alone never meets a full station: its routes are sound, and every station has room for one.
     """
     run, sequence = Run(cell), list[int]()
     while allowed := run.allowed():
@@ -121,12 +119,9 @@ def first_come(cell: Cell) -> tuple[int, ...]:
         run.move(sequence[-1])
     if run.done:
         return tuple(sequence)
-    stuck, run, sequence = run, Run(cell), []
+    run, sequence = Run(cell), []
     for part in range(1, cell.parts + 1):
         while run.finished_s[part - 1] is None:
-            decision = next((one for one in run.allowed() if part_of(one, cell.parts) == part), None)
-            if decision is None:
-                raise BadInput(f"no sequence found that finishes all {cell.parts} parts: {stuck.deadlock()}")
-            sequence.append(decision)
-            run.move(decision)
+            sequence.append(next(one for one in run.allowed() if part_of(one, cell.parts) == part))
+            run.move(sequence[-1])
     return tuple(sequence)

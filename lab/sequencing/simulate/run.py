@@ -119,13 +119,6 @@ class Run:
             return f"{name} at '{where}' has no choice {choice_of(decision, cell.parts) + 1}"
         return f"{name} at '{where}' cannot move on: {' and '.join(repr(name) for name in dict.fromkeys(full))} full"
 
-    def deadlock(self) -> str | None:
-        """Which parts wait for one another, in words, when nothing can move any more; else None."""
-        if self.done or self.allowed():
-            return None
-        waiting = [part for part in range(1, self.cell.parts + 1) if self.finished_s[part - 1] is None]
-        return "deadlock: " + "; ".join(self.refusal(part) for part in waiting if self._in_turn(part))
-
     def _first_ready_s(self) -> list[float]:
         arrivals = self.cell.arrivals
         if arrivals is None:

@@ -214,18 +214,6 @@ def test_first_come_gets_around_deadlocks() -> None:
     assert first_come(cell) == (1, 1, 1, 2, 2, 2)
 
 
-def test_rules_that_no_part_can_follow_are_refused() -> None:
-    """Positions laid by hand, so that a part in the lathe needs room in the lathe."""
-    cell = crossing_cell("PN")
-    places, lathe = list(cell.positions), cell.index("lathe")
-    stuck = next(n for n, place in enumerate(places) if (place.product, place.station) == (0, lathe))
-    (way,) = places[stuck].options
-    places[stuck] = replace(places[stuck], options=(replace(way, needs=(lathe,)),))
-    cell.__dict__["positions"] = tuple(places)
-    with pytest.raises(BadInput, match=r"no sequence found .* deadlock: pin 1 at 'lathe' cannot move on: 'lathe' full"):
-        optimum(cell)
-
-
 @pytest.mark.parametrize("objective", ["makespan", "mean-tardiness", "tardy-parts", "robot-idle", "machine-idle"])
 def test_the_sequencer_is_exact_for_every_objective(toast_cell: CellMaker, objective: str, ends: Ends) -> None:
     cell = replace(toast_cell("II", 2), due_s=(350.0, 450.0))

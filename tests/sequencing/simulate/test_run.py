@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Chance, Episode
+from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.cell.stations import Arrivals, Product, Route, Stage, Station
 from lab.sequencing.simulate.run import Run, simulate
@@ -196,19 +197,22 @@ def test_opposite_routes_can_block_one_another() -> None:
     moved(run, 1, 2)
     assert run.allowed() == ()
     assert not run.done
-    assert run.deadlock() == (
-        "deadlock: type 1 1 at 'm' cannot move on: 'n' full; type 2 2 at 'n' cannot move on: 'm' full"
-    )
+    assert run.refusal(1) == "type 1 1 at 'm' cannot move on: 'n' full"
+    assert run.refusal(2) == "type 2 2 at 'n' cannot move on: 'm' full"
     with pytest.raises(BadInput, match=r"position 3 of the sequence: .*'n' full; allowed here: none, it is a deadlock"):
         simulate(cell, (1, 2, 1))
     assert simulate(cell, (1, 1, 1, 2, 2, 2)).makespan_s == 2 * (2 + 10 + 2 + 10 + 2) + 1
 
 
-def test_what_is_done_or_can_go_on_is_no_deadlock(oven_cell: CellMaker) -> None:
-    run = Run(oven_cell(1))
-    assert run.deadlock() is None
-    moved(run, 1, 1)
-    assert run.deadlock() is None
+@given(data=st.data())
+def test_one_part_after_the_other_always_gets_through(
+    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject
+) -> None:
+    """So every cell can be finished, whatever deadlocks there are on the way."""
+    run = Run(data.draw(cells(max_parts=5, max_machines=3, many=True)))
+    for part in range(1, run.cell.parts + 1):
+        while run.finished_s[part - 1] is None:
+            run.move(next(decision for decision in run.allowed() if part_of(decision, run.cell.parts) == part))
     assert run.done
 
 
