@@ -53,7 +53,7 @@ def _genetic(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "Seq
 
 
 def _exact(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    from lab.sequencing.methods.proven import exact
+    from lab.sequencing.methods.exact import exact
 
     return exact(cell, search, rng)
 

@@ -4,11 +4,14 @@ What a route says in words (a buffer when the machine is busy, a pallet that has
 options to leave them. The simulations, the bound and the searches know these only.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from graphlib import TopologicalSorter
+from typing import Literal, TypeVar
 
 from lab.sequencing.cell.stations import Product, Route, Stage, Station
+
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,13 @@ class Option:
     service_s: float = 0.0
     waits: bool = True
     carries: Literal["part", "pallet"] = "part"
+
+    def possible(self, full: Sequence[bool]) -> bool:
+        """Whether there is room for it, and no more than it may find; `full`: whether each station is."""
+        for station in self.needs:  # a loop: this is asked often
+            if full[station]:
+                return False
+        return self.if_full is None or full[self.if_full]
 
 
 @dataclass(frozen=True)
@@ -77,6 +87,15 @@ def positions_of(
     for number, product in enumerate(products):
         layout.add(number, product)
     return tuple(layout.positions)
+
+
+def from_the_ends(positions: Sequence[Position], value: Callable[[int, list[Value]], Value]) -> list[Value]:
+    """The value of each position, found after those that its options lead to: value(position, theirs, in their order)."""
+    ahead = {number: [option.to for option in place.options] for number, place in enumerate(positions)}
+    found = dict[int, Value]()
+    for number in TopologicalSorter(ahead).static_order():
+        found[number] = value(number, [found[to] for to in ahead[number]])
+    return [found[number] for number in range(len(positions))]
 
 
 def moves_between(stations: Sequence[Station], positions: Sequence[Position], robot_start: str, parts: int) -> Moves:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.methods.robot_bound import TICKS_PER_S
-from lab.sequencing.simulate.merged import Flow, Layout, State
+from lab.sequencing.cell.ways import TICKS_PER_S
+from lab.sequencing.simulate.merged import Key, MergedCell, State
 
 MAX_NODES = 20_000
 
@@ -56,39 +56,39 @@ class _Tree:
         self.ends: list[str] = []
         self.heap: list[tuple[int, int]] = []
         self.best: tuple[int, ...] = ()
-        self._flows: dict[int, Flow] = {}
-        self._reached: dict[State, tuple[int, int]] = {}  # when, and by which node
+        self._cell = MergedCell(cell)
+        self._states: dict[int, State] = {}
+        self._reached: dict[Key, tuple[int, int]] = {}  # when, and by which node
         self._most, self._finished_at = most, -1
-        self._add(Flow(Layout.of(cell)), ())
+        self._add(self._cell.start(named=True), ())
 
     def open(self, number: int, now: int) -> None:
         """Branch a node, unless something that was reached meanwhile makes that needless."""
-        flow = self._flows.pop(number)
-        if self._reached[flow.state()][1] != number:
+        state = self._states.pop(number)
+        if self._reached[self._cell.key(state)][1] != number:
             self.ends[number] = "dominated"
         elif self._finished_at >= 0 and now >= self._finished_at:
             self.ends[number] = "bound"
         else:
-            branches = [(flow.branch(), action) for action in flow.actions()]
+            branches = list(self._cell.successors(state))
             self.ends[number] = "" if branches else "deadlock"
-            for branch, action in branches:
-                decision = branch.take(action)
-                self._add(branch, (*self.decisions[number], decision))
+            for branch in branches:
+                self._add(branch, (*self.decisions[number], self._cell.decision(branch)))
 
-    def _add(self, flow: Flow, decisions: tuple[int, ...]) -> None:
+    def _add(self, state: State, decisions: tuple[int, ...]) -> None:
         number = len(self.decisions)
         if number == self._most:
             raise BadInput(f"search tree: it has more than {self._most} nodes; take fewer parts")
         self.decisions.append(decisions)
-        self.times_s.append(flow.now / TICKS_PER_S)
+        self.times_s.append(state.now / TICKS_PER_S)
         self.ends.append("dominated")
-        if flow.done:
+        if self._cell.done(state):
             self.ends[number] = "finished"
-            if self._finished_at < 0 or flow.now < self._finished_at:
-                self._finished_at, self.best = flow.now, decisions
+            if self._finished_at < 0 or state.now < self._finished_at:
+                self._finished_at, self.best = state.now, decisions
             return
-        state = flow.state()
-        if state not in self._reached or flow.now < self._reached[state][0]:
-            self._reached[state] = flow.now, number
-            self._flows[number] = flow
-            heapq.heappush(self.heap, (flow.now, number))
+        key = self._cell.key(state)
+        if key not in self._reached or state.now < self._reached[key][0]:
+            self._reached[key] = state.now, number
+            self._states[number] = state
+            heapq.heappush(self.heap, (state.now, number))

@@ -11,8 +11,8 @@ from ortools.sat.python import cp_model
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, machine_places
 from lab.sequencing.cell.routes import entry
+from lab.sequencing.cell.ways import Way, distances, follows, ways_of
 from lab.sequencing.methods.cp_sat_times import Timed, Times, longest, timed
-from lab.sequencing.methods.robot_bound import Way, distances, follows, ways_of
 
 
 class Task(NamedTuple):

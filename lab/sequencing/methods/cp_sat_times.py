@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.routes import part_of
-from lab.sequencing.methods.robot_bound import Way, backwards
+from lab.sequencing.cell.routes import from_the_ends, part_of
+from lab.sequencing.cell.ways import Way
 from lab.sequencing.simulate.run import Run
 
 UNITS_PER_S = (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
@@ -102,10 +102,12 @@ def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]
 def longest(cell: Cell, times: Times, ways: Sequence[Way]) -> int:
     """No sequence takes longer than this many units, if the robot never waits without need."""
     travel = max((times.travel(a, b) for a, b in np.argwhere(~np.isnan(cell.empty_s)).tolist()), default=0)
-    most = [0] * len(cell.positions)
-    for place in backwards(cell.positions):
-        own = [travel + times.work(way) + most[way.option.to] for way in ways if way.place == place]
-        most[place] = times.processing(place) + max(own, default=0)
+
+    def longest_from(place: int, ahead: list[int]) -> int:
+        own = [travel + times.work(way) for way in ways if way.place == place]
+        return times.processing(place) + max((here + then for here, then in zip(own, ahead, strict=True)), default=0)
+
+    most = from_the_ends(cell.positions, longest_from)
     arrive = sum(times.whole(seconds) for seconds in cell.arrivals.interval_s) if cell.arrivals else 0
     return arrive + sum(most[start] for start in cell.starts)
 

@@ -2,14 +2,21 @@
 
 import heapq
 from dataclasses import dataclass
+from itertools import chain
+from math import inf
 from operator import le
 
+import numpy as np
+
 from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.routes import part_of
-from lab.sequencing.methods.robot_bound import TICKS_PER_S
-from lab.sequencing.search import gap
+from lab.sequencing.cell.schedule import SequenceResult
+from lab.sequencing.cell.ways import TICKS_PER_S
+from lab.sequencing.methods.lower_bound import LowerBound
+from lab.sequencing.search import Log, Search, gap
+from lab.sequencing.simulate.merged import MergedCell, State
 from lab.sequencing.simulate.run import Run, simulate
-from lab.sequencing.simulate.states import Moves, State, sequence_of, times_of
 
 MAX_EXPANDED = 300_000
 
@@ -42,39 +49,46 @@ class _Search:
     """The states that are queued and those that were reached; `expanded`: how many were opened."""
 
     def __init__(self, cell: Cell) -> None:
-        self.cell, self.moves = cell, Moves(cell)
+        self.merged = MergedCell(cell)
+        self._least = LowerBound(self.merged)
+        self._waits = (
+            len(self.merged.slots) + self.merged.one_by_one
+        )  # what the clock brings is no wait: it comes anyway
         self.expanded = self.bound = self._serial = 0
         self._fronts: dict[tuple[int, int], list[tuple[int, ...]]] = {}
         self._heap: list[tuple[int, int, State]] = []
         self._greedy = False
-        self._reach(self.moves.start())
+        self._reach(self.merged.start())
 
     def run(self, most: int) -> State | None:
         """The first complete state; None: when `most` states were opened in all there was none."""
         while self._heap:
             bound, serial, state = heapq.heappop(self._heap)
-            if times_of(state) not in self._fronts[state.counts, state.robot]:
+            if self._times(state) not in self._fronts[state.counts, state.robot]:
                 continue  # overtaken since it was queued
             self.bound = max(self.bound, bound)
-            if self.moves.done(state):
+            if self.merged.done(state):
                 return state
             if self.expanded >= most:
                 heapq.heappush(self._heap, (bound, serial, state))
                 return None
             self.expanded += 1
-            for successor in self.moves.successors(state):
+            for successor in self.merged.successors(state):
                 self._reach(successor)
         return None
 
     def hasten(self) -> None:
         """From now on open what has the least left to do first: any end will do."""
         self._greedy = True
-        self._heap = [(self.moves.left(state), serial, state) for _, serial, state in self._heap]
+        self._heap = [(self._least.left(state), serial, state) for _, serial, state in self._heap]
         heapq.heapify(self._heap)
 
     def _reach(self, state: State) -> None:
         """Queue a state unless one that is alike otherwise is no later anywhere; those that it beats are forgotten."""
-        times = times_of(state)
+        if self.merged.one_by_one:
+            # Since when a part waits to be picked does not matter either.
+            state = state._replace(waits=(*state.waits[:-1], tuple([max(at, state.now) for at in state.waits[-1][:1]])))
+        times = self._times(state)
         front = self._fronts.setdefault((state.counts, state.robot), [])
         if any(all(map(le, other, times)) for other in front):
             return
@@ -82,8 +96,12 @@ class _Search:
         front.append(times)
         # Of equally promising states the newest comes first, hence the falling serial number.
         self._serial -= 1
-        left = self.moves.left(state)
+        left = self._least.left(state)
         heapq.heappush(self._heap, (left if self._greedy else state.now + left, self._serial, state))
+
+    def _times(self, state: State) -> tuple[int, ...]:
+        """Now and all that is waited for: of states with equal counts and robot, one that is nowhere later is no worse."""
+        return (state.now, *chain.from_iterable(state.waits[: self._waits]))
 
 
 def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
@@ -98,14 +116,35 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     search = _Search(cell)
     state = search.run(max_expanded)
     if state is not None:
-        sequence = sequence_of(cell, state)
+        sequence = search.merged.decisions(state)
         cost = simulate(cell, sequence).makespan_s
         return Optimum(cost, sequence, True, cost, search.expanded)
     bound_s, expanded = search.bound / TICKS_PER_S, search.expanded
     search.hasten()
     state = search.run(2 * max_expanded)
-    sequence = first_come(cell) if state is None else sequence_of(cell, state)
+    sequence = first_come(cell) if state is None else search.merged.decisions(state)
     return Optimum(simulate(cell, sequence).makespan_s, sequence, False, bound_s, expanded)
+
+
+def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
+    """The proven best sequence by the mean times; it draws nothing from `rng`.
+
+    The makespan is minimised by `optimum`; when that gives up, and for other objectives, by CP-SAT within its time limit,
+    which may not prove its sequence. Raises BadInput as these do.
+    """
+    search.check(cell)
+    found = optimum(cell) if search.objective == MAKESPAN else None
+    sequence, cost = (found.sequence, found.cost) if found else ((), inf)
+    if found is None or not found.proven:
+        from lab.sequencing.methods.cp_sat import cp_sat, fits  # only where it is needed: OR-Tools takes its time
+
+        if found is None or fits(cell):
+            other = cp_sat(cell, search.objective, hint=sequence or None)
+            sequence, cost = min((cost, sequence), (other.cost, other.sequence))[::-1]
+    log = Log(search)
+    log.note(sequence, cost, complete=bool(sequence))
+    log.check(cell)
+    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
 
 
 def first_come(cell: Cell) -> tuple[int, ...]:

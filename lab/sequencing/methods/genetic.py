@@ -11,6 +11,7 @@ from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.methods.fifo import drawn_times
 from lab.sequencing.search import Log, Search, kernel_seed
+from lab.sequencing.simulate.arrays import most_moves
 from lab.sequencing.simulate.run import Run
 
 # Shares of a generation, and the chance of a gene to come from the elite parent: within what Gonçalves and Resende 2011
@@ -40,7 +41,7 @@ def genetic(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceRes
 
 def genes(cell: Cell) -> int:
     """How many keys a chromosome has: one for each decision of the longest sequence."""
-    return sum(_longest_ways(cell)[start] for start in cell.starts)
+    return most_moves(cell)
 
 
 def decode(run: Run, keys: NDArray[np.float64]) -> tuple[int, ...]:
@@ -65,18 +66,6 @@ def _episode(cell: Cell, search: Search, rng: np.random.Generator, keys: NDArray
     run = Run(cell, drawn_times(cell, search, rng))
     log.note(decode(run, keys), cost(run, search.objective), run.done)
     return log.costs[-1]
-
-
-def _longest_ways(cell: Cell) -> tuple[int, ...]:
-    """The most moves that a part may take from each position to its end."""
-    most: dict[int, int] = {}
-
-    def moves(index: int) -> int:
-        if index not in most:
-            most[index] = max((1 + moves(option.to) for option in cell.positions[index].options), default=0)
-        return most[index]
-
-    return tuple(moves(index) for index in range(len(cell.positions)))
 
 
 def _algorithm(genes: int, episodes: int, seed: int) -> Any:

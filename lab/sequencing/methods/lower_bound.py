@@ -1,22 +1,17 @@
 """The highest of the lower bounds of what a cell still needs: robot, machines, parts alone, and parts that still arrive."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import accumulate
 from typing import NamedTuple
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.methods.robot_bound import (
-    TICKS_PER_S,
-    RobotWork,
-    Way,
-    backwards,
-    distances,
-    least_rest,
-    ticks,
-    ways_of,
-)
+from lab.sequencing.cell.routes import from_the_ends
+from lab.sequencing.cell.ways import TICKS_PER_S, Way, distances, ticks, ways_of
+from lab.sequencing.methods.robot_bound import RobotWork, least_rest
+from lab.sequencing.simulate.merged import MergedCell, State
 
 NEVER = -(1 << 61)
+Spans = tuple[tuple[int, int], ...]
 
 
 class Term(NamedTuple):
@@ -27,7 +22,7 @@ class Term(NamedTuple):
 
     slot: int
     which: int  # 0 the first that is waited for, -1 the last
-    ways: tuple[tuple[int, int], ...]
+    ways: Spans
     plus: int
 
 
@@ -41,7 +36,7 @@ class Least(NamedTuple):
     latest: int
 
     def left(self, now: int, robot: int, waits: Sequence[Sequence[int]]) -> int:
-        """Ticks still needed at least; waits: by slot, until when (see `states.State`)."""
+        """Ticks still needed at least; waits: by slot, until when (see `merged.State`)."""
         most = max(self.fixed, self.rest + self.here[robot], self.latest - now)
         for slot, which, ways, plus in self.terms:
             wait = waits[slot][which] - now
@@ -49,14 +44,13 @@ class Least(NamedTuple):
         return most
 
 
-class LeastLeft:
-    """The highest of all bounds: the robot's work, each part alone, each machine with room for one, and what arrives.
+class LowerBound:
+    """The highest of all bounds: the robot's work, each part alone, each machine with room for one, and what arrives."""
 
-    slots: by position, where its waiting times are; `arriving`: the slot of the next arrival (None: not waited for so).
-    """
-
-    def __init__(self, cell: Cell, slots: Mapping[int, int], arriving: int | None) -> None:
-        self._cell, self._slots, self._arriving = cell, slots, arriving
+    def __init__(self, merged: MergedCell) -> None:
+        self._cell, self._merged, self._slots = merged.cell, merged, merged.slots
+        self._known: dict[int, Least] = {}
+        cell = merged.cell
         self._robot = RobotWork(cell)
         self._to_end = _Spans(cell, None)
         used = sorted({station for place in cell.positions for station in place.holds})
@@ -64,7 +58,14 @@ class LeastLeft:
         self._machines = [_MachineWork(cell, station, self._to_end) for station in single]
         self._after_arrival = _after_arrival(cell, self._to_end)
 
-    def of(self, counts: Sequence[int]) -> Least:
+    def left(self, state: State) -> int:
+        """Ticks still needed at least."""
+        known = self._known.get(state.counts)
+        if known is None:
+            known = self._known[state.counts] = self._of(self._merged.counted(state.counts))
+        return known.left(state.now, state.robot, state.waits)
+
+    def _of(self, counts: Sequence[int]) -> Least:
         """The bounds for counts of parts by position."""
         cell = self._cell
         there = [place for place, count in enumerate(counts) if count]
@@ -87,35 +88,36 @@ class LeastLeft:
         waiting, latest = sum(counts[place] for place in set(cell.starts)), 0
         if waiting and cell.arrivals is not None:
             after = self._after_arrival[cell.parts - waiting]
-            if self._arriving is None:
-                latest = after
+            if self._merged.one_by_one:
+                terms.append(Term(len(self._slots), 0, ((0, after),), 0))
             else:
-                terms.append(Term(self._arriving, 0, ((0, after),), 0))
+                latest = after
         return Least(rest, self._robot.here, fixed, tuple(terms), latest)
 
 
 class _Spans:
     """The least time of one part alone from each position on, until it leaves a station (None: until its end).
 
-    ways: (stay, after) as in `Term`, of a part that is still processed. least: of one that is ready.
+    ways: (stay, after) as in `Term`, of a part that is still processed. least: of one that is ready. entered: from the
+    drop on, processing and all.
     """
 
     def __init__(self, cell: Cell, station: int | None) -> None:
-        self.ways: list[tuple[tuple[int, int], ...]] = [((0, 0),)] * len(cell.positions)
-        self.entered = [0] * len(cell.positions)  # the least from the drop on, processing and all
-        self._cell, self._station, self._ways = cell, station, ways_of(cell)
+        self._cell, self._station, self._distance = cell, station, distances(cell)
         self._own: list[list[Way]] = [[] for _ in cell.positions]
-        for way in self._ways:
+        for way in ways_of(cell):
             self._own[way.place].append(way)
-        self._distance = distances(cell)
-        for place in backwards(cell.positions):
-            found = [span for way in self._own[place] for span in self._through(way)]
-            self.ways[place] = tuple(dict.fromkeys(found)) or ((0, 0),)
-            self.entered[place] = self._after_drop(place, 0)
+        self.ways = from_the_ends(cell.positions, self._spans)
+        self.entered = [self._after_drop(place, 0, ways) for place, ways in enumerate(self.ways)]
         self.least = [min(stay for stay, _ in ways) for ways in self.ways]
 
-    def _through(self, way: Way) -> Iterator[tuple[int, int]]:
-        """The spans that begin with a way."""
+    def _spans(self, place: int, ahead: list[Spans]) -> Spans:
+        """All spans from a position on, by those of the positions ahead."""
+        own = zip(self._own[place], ahead, strict=True)
+        return tuple(dict.fromkeys(span for way, then in own for span in self._through(way, then))) or ((0, 0),)
+
+    def _through(self, way: Way, then: Spans) -> Iterator[tuple[int, int]]:
+        """The spans that begin with a way; then: those from where it leads."""
         option, work = way.option, way.work
         here, there = self._cell.positions[way.place], self._cell.positions[option.to]
         if self._station in here.holds and self._station not in there.holds:
@@ -123,15 +125,15 @@ class _Spans:
             return
         approach = self._distance[option.target][there.station] if there.options else 0
         if there.processing_s is None and not option.waits:
-            for stay, after in self.ways[option.to]:
+            for stay, after in then:
                 yield work + approach + stay, after
         else:
-            all_of_it = work + self._after_drop(option.to, approach)
+            all_of_it = work + self._after_drop(option.to, approach, then)
             yield all_of_it, all_of_it if option.waits else NEVER
 
-    def _after_drop(self, place: int, approach: int) -> int:
+    def _after_drop(self, place: int, approach: int, ways: Spans) -> int:
         process = round((self._cell.positions[place].processing_s or 0.0) * TICKS_PER_S)
-        return min(max(approach + stay, process + after) for stay, after in self.ways[place])
+        return min(max(approach + stay, process + after) for stay, after in ways)
 
 
 class _MachineWork:

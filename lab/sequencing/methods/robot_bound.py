@@ -4,9 +4,6 @@ It is one sum over the parts, so a state costs little: the prices of the moves a
 """
 
 from collections.abc import Iterator, Sequence
-from graphlib import TopologicalSorter
-from math import isnan
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,40 +11,16 @@ from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.routes import Option, Position
+from lab.sequencing.cell.routes import from_the_ends
+from lab.sequencing.cell.ways import TICKS_PER_S, Way, empty_ticks, follows, ways_of
 
-# Times are compared as whole nanoseconds: equal states then compare equal, whatever the order of additions was.
-TICKS_PER_S = 1e9
-FAR = 1 << 61  # two of it still fit an int64
 SMALL = 1e-3  # a gain beside that of the start
 
 
-def ticks(row: Sequence[float]) -> list[int]:
-    """Seconds to ticks; -1 for NaN, a move that is never made."""
-    return [-1 if isnan(seconds) else round(seconds * TICKS_PER_S) for seconds in row]
-
-
-class Way(NamedTuple):
-    """An option and the position (index) that it leaves; `work`: the robot's service and carrying [ticks]."""
-
-    place: int
-    option: Option
-    work: int
-
-
-def ways_of(cell: Cell) -> list[Way]:
-    """Every option of every position, in their order."""
-    loaded = [ticks(row) for row in cell.loaded_s.tolist()]
-    return [
-        Way(place, option, round(option.service_s * TICKS_PER_S) + loaded[option.origin][option.target])
-        for place, at in enumerate(cell.positions)
-        for option in at.options
-    ]
-
-
 class RobotWork:
-    """What the robot still has to do at least, from the parts that stand in each position; in ticks.
+    """What the robot still has to do at least, if it never waited, in ticks: rest[p] for each part in position p, + here.
 
+    here: by the robot's station. Never below 0.
     Every pick has a price, every drop a credit, such that no way from a drop to a pick takes less than price - credit:
     added up, the credits of all drops but the last and the prices of all picks bound the empty travel. The best
     credits for the cell's start come from a linear program; the prices then follow exactly, in whole ticks.
@@ -73,45 +46,26 @@ class RobotWork:
         self.rest = least_rest(cell, ways, carried)
         self.here = [last - credit if station in used else 0 for station, credit in enumerate(credits)]
 
-    def left(self, counts: Sequence[int], robot: int) -> int:
-        """Ticks that the robot still needs at least, if it never waited; counts of parts by position, robot's station."""
-        return max(0, self.here[robot] + sum(count * rest for count, rest in zip(counts, self.rest, strict=True)))
-
-    def least_s(self, counts: Sequence[int], robot: int) -> float:
-        """The same in seconds."""
-        return self.left(counts, robot) / TICKS_PER_S
-
 
 def least_rest(cell: Cell, ways: Sequence[Way], carried: dict[int, int]) -> list[int]:
     """The least sum of `carried` from each position to an end; ways that it does not name are never taken.
 
     Where no end can be reached it is 0: such a state has no time still to come.
     """
-    rest: list[int | None] = [None] * len(cell.positions)
     own: list[list[int]] = [[] for _ in cell.positions]
     for number, way in enumerate(ways):
         own[way.place].append(number)
-    for place in backwards(cell.positions):
-        if not own[place]:
-            rest[place] = 0
-        known = ((carried[number], rest[ways[number].option.to]) for number in own[place] if number in carried)
-        sums = [here + after for here, after in known if after is not None]
-        rest[place] = min(sums, default=rest[place])
-    return [value or 0 for value in rest]
 
+    def least(place: int, ahead: list[int | None]) -> int | None:
+        known = [(carried[n], after) for n, after in zip(own[place], ahead, strict=True) if n in carried]
+        return min([here + after for here, after in known if after is not None], default=None) if own[place] else 0
 
-def backwards(positions: Sequence[Position]) -> list[int]:
-    """The positions, each after all that its options lead to."""
-    ahead = {number: [option.to for option in place.options] for number, place in enumerate(positions)}
-    return list(TopologicalSorter(ahead).static_order())
+    return [value or 0 for value in from_the_ends(cell.positions, least)]
 
 
 def _gaps(cell: Cell, ways: Sequence[Way]) -> dict[tuple[int, int], int]:
     """Least ticks from a drop at a station to where the pick of a way (by number) can begin; none: it never follows."""
-    empty = [ticks(row) for row in cell.empty_s.tolist()]
-    for place in range(len(empty)):
-        empty[place][place] = 0
-    begin = cell.index(cell.robot_start)
+    empty, begin = empty_ticks(cell), cell.index(cell.robot_start)
     gaps: dict[tuple[int, int], int] = {}
     for number, way in enumerate(ways):
         follow = [(begin, 0)] if way.place in cell.starts else []
@@ -120,19 +74,6 @@ def _gaps(cell: Cell, ways: Sequence[Way]) -> dict[tuple[int, int], int]:
             gap = max(wait, empty[station][way.option.origin])
             gaps[station, number] = min(gap, gaps.get((station, number), gap))
     return gaps
-
-
-def follows(cell: Cell, done: Way, way: Way, same: bool) -> bool:
-    """Whether `way` may be the next move after `done`: of the same part, or of another one."""
-    if done.option.if_full is not None and done.option.if_full in way.option.needs:
-        return False  # it is full still
-    if same:
-        return done.option.to == way.place
-    left, there = cell.positions[done.place], cell.positions[done.option.to]
-    full = {station for station in there.holds if cell.capacities[station] == 1}
-    gone = {station for station in left.holds if cell.capacities[station] == 1 and station not in there.holds}
-    standing = set(cell.positions[way.place].holds)
-    return not (full & (standing | set(way.option.needs)) or gone & standing or way.option.if_full in gone)
 
 
 def _waits(cell: Cell, done: Way, way: Way) -> Iterator[int]:
@@ -175,17 +116,3 @@ def _credits(cell: Cell, ways: Sequence[Way], gaps: dict[tuple[int, int], int]) 
     if found.x is None:
         return [0] * size
     return [round(float(credit) * TICKS_PER_S) for credit in found.x[:size]]
-
-
-def distances(cell: Cell, per_s: float = TICKS_PER_S) -> list[list[int]]:
-    """The least time in which the robot gets from a station (row) to another, empty or loaded, by any way.
-
-    In units, of which a second has `per_s`; FAR where it never gets.
-    """
-    seconds = np.fmin(cell.empty_s, cell.loaded_s)
-    table = np.where(np.isnan(seconds), FAR, np.rint(seconds * per_s)).astype(np.int64)
-    np.fill_diagonal(table, 0)
-    for via in range(len(table)):
-        table = np.minimum(table, np.minimum(table[:, via : via + 1] + table[via], FAR))
-    found: list[list[int]] = table.tolist()
-    return found

@@ -12,7 +12,7 @@ from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.objectives import cost
-from lab.sequencing.cell.routes import Option, part_of
+from lab.sequencing.cell.routes import Option, from_the_ends, part_of
 from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.search import Log, Search
 from lab.sequencing.simulate.run import Run
@@ -128,58 +128,46 @@ def work_left_s(cell: Cell) -> tuple[float, ...]:
 
     (positions,) in the order of `cell.positions`.
     """
-    left_s: dict[int, float] = {}
 
-    def left(index: int) -> float:
-        if index not in left_s:
-            ways = [
-                option.service_s
-                + float(cell.loaded_s[option.origin, option.target])
-                + (cell.positions[option.to].processing_s or 0.0)
-                + left(option.to)
-                for option in cell.positions[index].options
-            ]
-            left_s[index] = min(ways, default=0.0)
-        return left_s[index]
+    def left_s(place: int, ahead: list[float]) -> float:
+        ways = [
+            option.service_s
+            + float(cell.loaded_s[option.origin, option.target])
+            + (cell.positions[option.to].processing_s or 0.0)
+            + then
+            for option, then in zip(cell.positions[place].options, ahead, strict=True)
+        ]
+        return min(ways, default=0.0)
 
-    return tuple(left(index) for index in range(len(cell.positions)))
+    return tuple(from_the_ends(cell.positions, left_s))
 
 
 @lru_cache(maxsize=16)
 def _loads_s(cell: Cell) -> tuple[dict[int, float], ...]:
     """For each position, station index -> processing still to come there [s], averaged over the ways on."""
-    found: dict[int, dict[int, float]] = {}
 
-    def loads(index: int) -> dict[int, float]:
-        if index not in found:
-            options = cell.positions[index].options
-            total: dict[int, float] = {}
-            for option in options:
-                there = cell.positions[option.to]
-                ahead = dict(loads(option.to))
-                if there.processing_s and (machine := _machine(cell, option.to)) is not None:
-                    ahead[machine] = ahead.get(machine, 0.0) + there.processing_s
-                for station, seconds in ahead.items():
-                    total[station] = total.get(station, 0.0) + seconds / len(options)
-            found[index] = total
-        return found[index]
+    def loads_s(place: int, ahead: list[dict[int, float]]) -> dict[int, float]:
+        total: dict[int, float] = {}
+        for option, then in zip(cell.positions[place].options, ahead, strict=True):
+            there, own = cell.positions[option.to], dict(then)
+            if there.processing_s and (machine := _machine(cell, option.to)) is not None:
+                own[machine] = own.get(machine, 0.0) + there.processing_s
+            for station, seconds in own.items():
+                total[station] = total.get(station, 0.0) + seconds / len(ahead)
+        return total
 
-    return tuple(loads(index) for index in range(len(cell.positions)))
+    return tuple(from_the_ends(cell.positions, loads_s))
 
 
 @lru_cache(maxsize=16)
 def _feeds(cell: Cell) -> tuple[frozenset[int], ...]:
     """For each position, the machines that a part there is at, or else comes to first."""
-    found: dict[int, frozenset[int]] = {}
 
-    def feeds(index: int) -> frozenset[int]:
-        if index not in found:
-            machine = _machine(cell, index)
-            ways = [feeds(option.to) for option in cell.positions[index].options] if machine is None else []
-            found[index] = frozenset().union(*ways) if machine is None else frozenset({machine})
-        return found[index]
+    def feeds(place: int, ahead: list[frozenset[int]]) -> frozenset[int]:
+        machine = _machine(cell, place)
+        return frozenset().union(*ahead) if machine is None else frozenset({machine})
 
-    return tuple(feeds(index) for index in range(len(cell.positions)))
+    return tuple(from_the_ends(cell.positions, feeds))
 
 
 def _machine(cell: Cell, position: int) -> int | None:

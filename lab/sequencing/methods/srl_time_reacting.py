@@ -7,7 +7,6 @@ from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.routes import choice_of, part_of
 from lab.sequencing.methods.srl_time import Learner
 from lab.sequencing.simulate.execution import Choose, Observed, Policy
-from lab.sequencing.simulate.merged import Flow
 
 PRACTICE = 20  # simulated episodes before each decision
 
@@ -25,7 +24,7 @@ def reacting(cell: Cell, objective: str = MAKESPAN, seed: int = 0, practice: int
         """The decision that serves the position of least cost to come; of alike parts the one that is ready first."""
         if len(allowed) == 1:
             return allowed[0]
-        here = Flow.from_run(learner.layout, seen, distinct=learner.distinct)
+        here = learner.merged.of_run(seen)
         for _ in range(practice):
             learner.episode(here)
         place, choice, wanted = learner.greedy(here)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from lab.sequencing.cell.cell import ARRIVALS_AFTER, Cell
 from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, machine_places, stuck_cost
+from lab.sequencing.cell.routes import from_the_ends
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -207,14 +208,8 @@ def most_choices(cell: Cell) -> int:
 
 def most_moves(cell: Cell) -> int:
     """How many moves the longest sequence has."""
-    longest: dict[int, int] = {}
-
-    def ahead(place: int) -> int:
-        if place not in longest:
-            longest[place] = max((1 + ahead(option.to) for option in cell.positions[place].options), default=0)
-        return longest[place]
-
-    return sum(ahead(start) for start in cell.starts)
+    longest = from_the_ends(cell.positions, lambda _, ahead: max((1 + moves for moves in ahead), default=0))
+    return sum(longest[start] for start in cell.starts)
 
 
 def _padded(stations: Sequence[Sequence[int]], spare: int) -> Ints:

@@ -1,198 +1,211 @@
-"""A run in which alike parts are one: what stands at each position, not who. The simulation that `srl_time` learns in."""
+"""A cell in which alike parts are one: what stands at each position, not who. What searches and learners walk through."""
 
-from bisect import insort
-from collections.abc import Iterator
-from copy import copy
-from dataclasses import dataclass, field
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import accumulate
+from typing import NamedTuple
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.objectives import machine_places
-from lab.sequencing.cell.routes import Option, entry
-from lab.sequencing.methods.lower_bound import Least, LeastLeft
-from lab.sequencing.methods.robot_bound import TICKS_PER_S, ticks
+from lab.sequencing.cell.routes import entry
+from lab.sequencing.cell.ways import TICKS_PER_S, Way, empty_ticks, ticks, ways_of
 from lab.sequencing.simulate.run import Run
 
-State = tuple[object, ...]
-Action = tuple[int, int, int]  # position, choice, and the part where parts are told apart (else 0)
+_BITS = 8  # a count in the code of all counts; MAX_PARTS fits
+_LOW = (1 << _BITS) - 1
+Choices = Mapping[tuple[int, int], Way]  # by position and choice, in their order
+Key = tuple[int, int, tuple[int, ...]]
+Who = tuple[tuple[int, ...], ...]
 
 
-@dataclass(frozen=True)
-class Layout:
-    """What all runs of a cell share, in plain lists of ticks (nanoseconds)."""
+class State(NamedTuple):
+    """Between two moves, in ticks: how many parts stand in each position, the robot's station, what is waited for.
 
-    cell: Cell
-    empty: list[list[int]]
-    loaded: list[list[int]]
-    process: list[int]  # by position
-    intervals: list[int]  # before each part, where parts arrive
-    machines: int
-    starts: frozenset[int]
-    worked: tuple[int, ...]  # positions in which something is processed, or goes on being processed
-    timed: tuple[int, ...]  # these, and the starts where parts arrive
-    bounds: LeastLeft
-    known: dict[tuple[int, ...], Least] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, cell: Cell) -> "Layout":
-        """The layout of a cell."""
-        empty, loaded = ([ticks(row) for row in table.tolist()] for table in (cell.empty_s, cell.loaded_s))
-        for place in range(len(empty)):
-            empty[place][place] = 0
-        starts = frozenset(cell.starts)
-        process = [place.processing_s for place in cell.positions]
-        worked = tuple(place for place, seconds in enumerate(process) if seconds is None or seconds > 0)
-        timed = (*worked, *sorted(starts)) if cell.arrivals else worked
-        one_by_one = cell.arrivals is not None and cell.arrivals.after == "pick"
-        slots = {place: slot for slot, place in enumerate(worked)}
-        bounds = LeastLeft(cell, slots, len(worked) if one_by_one else None)
-        spans = [round((seconds or 0.0) * TICKS_PER_S) for seconds in process]
-        intervals = ticks(cell.arrivals.interval_s) if cell.arrivals else []
-        return cls(cell, empty, loaded, spans, intervals, machine_places(cell), starts, worked, timed, bounds)
-
-    def least(self, counts: list[int]) -> Least:
-        """The bounds for counts of parts by position, found once."""
-        key = tuple(counts)
-        if key not in self.known:
-            self.known[key] = self.bounds.of(key)
-        return self.known[key]
-
-
-class Flow:
-    """One pass through a cell, move by move. With `distinct` alike parts are told apart, as due times need it.
-
-    queues: the (ready tick, part) pairs at each position, the one that may be picked first ahead. now, waited,
-    processed: ticks. last_finished: the part that the last move brought to its end, else 0.
+    Of the parts of one product in one position the first that is ready goes first. waits: by slot (see `MergedCell`),
+    when each part there is finished, ascending, never before `now`; where parts arrive, the last slot has when each
+    comes that has not been fetched. who: by position, the parts on their way, each in the order of its waits; None:
+    nobody asks. `way` and `part` (0: nobody asks) led here from `parent`.
     """
 
-    def __init__(self, layout: Layout, *, distinct: bool = False) -> None:
-        cell = layout.cell
-        self.layout, self.distinct = layout, distinct
-        self.queues: list[list[tuple[int, int]]] = [[] for _ in cell.positions]
-        self.counts = [0] * len(cell.positions)
-        self.occupied = [0] * len(cell.stations)
-        self.robot = cell.index(cell.robot_start)
-        self.now = self.waited = self.processed = self.fetched = self.finished = self.last_finished = 0
-        came = self._first_arrivals()
-        for part, place in enumerate(cell.starts, 1):
-            self.queues[place].append((came[part - 1], part))
-            self.counts[place] += 1
+    now: int
+    counts: int
+    robot: int
+    waits: tuple[tuple[int, ...], ...]
+    who: Who | None = None
+    way: Way | None = None
+    part: int = 0
+    parent: "State | None" = None
 
-    @classmethod
-    def from_run(cls, layout: Layout, run: Run, *, distinct: bool = False) -> "Flow":
-        """A pass that goes on, by the cell's own times, from where a run is."""
-        flow = cls(layout, distinct=distinct)
-        flow.queues = [[] for _ in layout.cell.positions]
-        for part, (place, ready_s) in enumerate(zip(run.locations, run.ready_s, strict=True), 1):
-            if layout.cell.positions[place].options:
-                insort(flow.queues[place], (round(ready_s * TICKS_PER_S), part))
-        for place in layout.starts if layout.cell.arrivals else ():
-            flow.queues[place].sort(key=lambda entry: entry[1])
-        flow.counts = [run.locations.count(place) for place in range(len(layout.cell.positions))]
-        flow.occupied, flow.robot, flow.fetched = run.occupied.copy(), run.robot, run.fetched
-        flow.now, flow.waited = round(run.now_s * TICKS_PER_S), round(run.waited_s * TICKS_PER_S)
-        flow.processed = round(run.processed_s * TICKS_PER_S)
-        flow.finished = sum(end_s is not None for end_s in run.finished_s)
-        return flow
 
-    @property
-    def done(self) -> bool:
-        """Whether every part is finished."""
-        return self.finished == self.layout.cell.parts
+class MergedCell:
+    """The cell in ticks, and the states that follow one another.
 
-    def actions(self) -> Iterator[Action]:
-        """What may be done now: from which position, by which of its ways, and with which part where that matters."""
-        cell = self.layout.cell
-        for place, queue in enumerate(self.queues):
-            if not queue or (place in self.layout.starts and not self._in_turn(queue)):
-                continue
-            for option in cell.positions[place].options:
-                if self._enabled(option):
-                    if not self.distinct:
-                        yield place, option.choice, 0
-                        continue
-                    for _, part in queue[:1] if cell.arrivals and place in self.layout.starts else queue:
-                        yield place, option.choice, part
+    slots: by position where something is waited for, where the states have it in `waits`. process: what begins in each
+    position [ticks]; None: nothing does. starts, ends: where parts begin and finish. one_by_one: each sets out when the
+    one before is picked.
+    """
 
-    def take(self, action: Action) -> int:
-        """Carry an allowed action out; the decision that it is (an entry of a sequence)."""
-        place, choice, wanted = action
-        layout, queue = self.layout, self.queues[place]
-        positions = layout.cell.positions
-        option = next(o for o in positions[place].options if o.choice == choice and self._enabled(o))
-        here, there = positions[place], positions[option.to]
-        ready, part = queue.pop(0) if not wanted else queue.pop([p for _, p in queue].index(wanted))
-        reach = self.now + layout.empty[self.robot][option.origin]
-        begin = max(reach, ready) if option.waits else reach
-        pick = begin + round(option.service_s * TICKS_PER_S)
-        drop = pick + layout.loaded[option.origin][option.target]
-        if not here.holds:
-            self._fetch(pick)
-        for station in here.holds:
-            self.occupied[station] -= 1
-        for station in there.holds:
-            self.occupied[station] += 1
-        if there.processing_s is not None:
-            process = layout.process[option.to]
-            ready = drop + process
-            self.processed += process
-        self.counts[place] -= 1
-        self.counts[option.to] += 1
-        self.robot, self.now, self.waited = option.target, drop, self.waited + begin - reach
-        self.last_finished = 0
-        if there.options:
-            insort(self.queues[option.to], (ready, part))
-        else:
-            self.finished += 1
-            self.last_finished = part
-        return entry(part, option.choice, layout.cell.parts)
+    def __init__(self, cell: Cell) -> None:
+        self.cell, self._empty = cell, empty_ticks(cell)
+        self._loaded = [ticks(row) for row in cell.loaded_s.tolist()]
+        process = [place.processing_s for place in cell.positions]
+        self.process = [None if seconds is None else round(seconds * TICKS_PER_S) for seconds in process]
+        timed = [place for place, seconds in enumerate(process) if seconds is None or seconds > 0]
+        self.slots = {place: slot for slot, place in enumerate(timed)}
+        self._intervals = ticks(cell.arrivals.interval_s) if cell.arrivals is not None else []
+        self.one_by_one = cell.arrivals is not None and cell.arrivals.after == "pick"
+        self.starts = frozenset(cell.starts)
+        self.ends = [place for place, at in enumerate(cell.positions) if not at.options]
+        self._ways: list[list[Way]] = [[] for _ in cell.positions]
+        for way in ways_of(cell):
+            self._ways[way.place].append(way)
+        self._known: dict[int, Choices] = {}
 
-    def state(self) -> State:
-        """All that the future depends on, but not who is who: counts, robot, and how long there is still to wait."""
-        now = self.now
-        waits = tuple((place, at - now) for place in self.layout.timed for at, _ in self.queues[place] if at > now)
-        if self.distinct:
-            return (self.robot, now, waits, *(tuple(part for _, part in queue) for queue in self.queues))
-        return (tuple(self.counts), self.robot, waits)
+    def start(self, *, named: bool = False) -> State:
+        """Where all begins; `named`: parts are told from one another."""
+        cell, waits = self.cell, list[tuple[int, ...]]([()] * len(self.slots))
+        if self._intervals:
+            first = (self._intervals[0], *[0] * (cell.parts - 1))
+            waits.append(first if self.one_by_one else tuple(accumulate(self._intervals)))
+        who = [tuple(n for n, start in enumerate(cell.starts, 1) if start == at) for at in range(len(cell.positions))]
+        robot = cell.index(cell.robot_start)
+        return State(0, self._code_of(cell.starts), robot, tuple(waits), tuple(who) if named else None)
 
-    def branch(self) -> "Flow":
-        """Another pass that goes on from where this one is."""
-        other = copy(self)
-        other.queues = [queue.copy() for queue in self.queues]
-        other.counts, other.occupied = self.counts.copy(), self.occupied.copy()
-        return other
+    def of_run(self, run: Run) -> State:
+        """Where a run is, to go on from by the cell's own times; parts are told from one another."""
+        now, ready = round(run.now_s * TICKS_PER_S), [round(ready_s * TICKS_PER_S) for ready_s in run.ready_s]
+        who: list[list[int]] = [[] for _ in self._ways]
+        for part, place in enumerate(run.locations, 1):
+            if self._ways[place]:
+                who[place].append(part)
+        for place, parts in enumerate(who):
+            if not (self._intervals and place in self.starts):  # these come in their order
+                parts.sort(key=lambda part: ready[part - 1])
+        waits = [tuple([max(ready[part - 1], now) for part in who[place]]) for place in self.slots]
+        if self._intervals:
+            waits.append(tuple(ready[part - 1] for part in sorted(n for place in self.starts for n in who[place])))
+        return State(now, self._code_of(run.locations), run.robot, tuple(waits), tuple(map(tuple, who)))
 
-    def least_left(self) -> int:
-        """Ticks that are still needed at least (see `lab.sequencing.methods.robot_bound`)."""
-        now, layout = self.now, self.layout
-        waits = [[max(at, now) for at, _ in self.queues[place]] for place in layout.worked]
-        if layout.cell.arrivals is not None and self.fetched < layout.cell.parts:
-            waits.append([self.queues[layout.cell.starts[self.fetched]][0][0]])
-        return layout.least(self.counts).left(now, self.robot, waits)
+    def code(self, counts: Sequence[int]) -> int:
+        """The parts in each position as one number."""
+        return sum(count << _BITS * place for place, count in enumerate(counts))
 
-    def _first_arrivals(self) -> list[int]:
-        cell = self.layout.cell
-        came = [0] * cell.parts
-        if cell.arrivals is None:
-            return came
-        for part in range(1, cell.parts + 1) if cell.arrivals.after == "clock" else (1,):
-            came[part - 1] = (came[part - 2] if part > 1 else 0) + self.layout.intervals[part - 1]
-        return came
+    def counted(self, counts: int) -> list[int]:
+        """The parts in each position, of such a number."""
+        return [counts >> _BITS * place & _LOW for place in range(len(self._ways))]
 
-    def _fetch(self, pick: int) -> None:
-        """The next part sets out, where parts are brought one at a time."""
-        self.fetched += 1
-        cell = self.layout.cell
-        if cell.arrivals is None or cell.arrivals.after == "clock" or self.fetched == cell.parts:
-            return
-        part = self.fetched + 1
-        queue = self.queues[cell.starts[part - 1]]
-        queue[0] = (pick + self.layout.intervals[part - 1], part)
+    def finished(self, state: State) -> int:
+        """How many parts are at an end of their routes."""
+        return sum([state.counts >> _BITS * place & _LOW for place in self.ends])
 
-    def _in_turn(self, queue: list[tuple[int, int]]) -> bool:
-        return self.layout.cell.arrivals is None or queue[0][1] == self.fetched + 1
+    def done(self, state: State) -> bool:
+        """Whether all parts are finished."""
+        return self.finished(state) == self.cell.parts
 
-    def _enabled(self, option: Option) -> bool:
-        room, occupied = self.layout.cell.capacities, self.occupied
-        if option.if_full is not None and occupied[option.if_full] < room[option.if_full]:
-            return False
-        return all(occupied[station] < room[station] for station in option.needs)
+    def fetched(self, state: State) -> int:
+        """How many parts have left their first station."""
+        return self.cell.parts - sum([state.counts >> _BITS * place & _LOW for place in self.starts])
+
+    def key(self, state: State) -> Key:
+        """All that the future depends on when parts are alike: counts, robot, how long there is still to wait."""
+        now = state.now
+        return state.counts, state.robot, tuple([max(at - now, 0) for row in state.waits for at in row])
+
+    def choices(self, state: State) -> Choices:
+        """The ways that may be taken now: one an option of a position, since its parts are alike."""
+        known = self._known.get(state.counts)
+        if known is None:
+            known = self._known[state.counts] = self._allowed(self.counted(state.counts))
+        return known
+
+    def successors(self, state: State) -> Iterator[State]:
+        """The states after each of them."""
+        for way in self.choices(state).values():
+            yield self.after(state, way)
+
+    def after(self, state: State, way: Way, part: int = 0) -> State:
+        """The state after a way that may be taken, by the first part that is ready or, where they are named, by `part`."""
+        place, option, work = way
+        waits, who, first = list(state.waits), state.who, 0
+        if who is not None:
+            first = who[place].index(part) if part else 0
+            part = who[place][first]
+        ready, slot, starts = 0, self.slots.get(place), bool(self._intervals) and place in self.starts
+        if slot is not None:
+            there = waits[slot]
+            ready, waits[slot] = there[first], there[:first] + there[first + 1 :]
+        elif starts:
+            ready = waits[-1][0]
+        now = state.now + self._empty[state.robot][option.origin]
+        now = (max(now, ready) if option.waits else now) + work
+        slot, behind = self.slots.get(option.to), None
+        if slot is not None:
+            process, there = self.process[option.to], waits[slot]
+            at = ready if process is None else now + process
+            behind = bisect_right(there, at)
+            waits[slot] = (*there[:behind], at, *there[behind:])
+        coming = waits.pop() if self._intervals else None
+        # A part that finished earlier is ready now: forgetting since when lets more states be equal.
+        rows = [tuple([max(tick, now) for tick in row]) if row else () for row in waits]
+        if coming is not None:
+            pick = now - self._loaded[option.origin][option.target]
+            rows.append(self._left_to_come(coming, self.fetched(state), pick) if starts else coming)
+        named = None if who is None else self._moved(who, way, first, behind)
+        counts = state.counts + (1 << _BITS * option.to) - (1 << _BITS * place)
+        return State(now, counts, option.target, tuple(rows), named, way, part, state)
+
+    def waited(self, state: State, ahead: State) -> int:
+        """How long the robot waited in the move from a state to the one ahead of it."""
+        assert ahead.way is not None
+        return ahead.now - state.now - ahead.way.work - self._empty[state.robot][ahead.way.option.origin]
+
+    def decision(self, state: State) -> int:
+        """The entry of a sequence that led to a state, where parts are named."""
+        assert state.way is not None
+        return entry(state.part, state.way.option.choice, self.cell.parts)
+
+    def decisions(self, state: State) -> tuple[int, ...]:
+        """All entries from the start to a state in which parts need not be named."""
+        ways, named = list[Way](), self.start(named=True)
+        while state.way is not None and state.parent is not None:
+            ways.append(state.way)
+            state = state.parent
+        found = []
+        for way in reversed(ways):
+            named = self.after(named, way)
+            found.append(self.decision(named))
+        return tuple(found)
+
+    def _code_of(self, locations: Sequence[int]) -> int:
+        return self.code([locations.count(place) for place in range(len(self._ways))])
+
+    def _allowed(self, counted: list[int]) -> Choices:
+        cell, occupied = self.cell, [0] * len(self.cell.stations)
+        for count, place in zip(counted, cell.positions, strict=True):
+            for station in place.holds:
+                occupied[station] += count
+        full = [taken >= most for taken, most in zip(occupied, cell.capacities, strict=True)]
+        waiting = sum(counted[place] for place in self.starts)
+        in_turn = cell.starts[cell.parts - waiting] if waiting and self._intervals else None
+        return {
+            (place, way.option.choice): way
+            for place, count in enumerate(counted)
+            if count and (in_turn in (None, place) or place not in self.starts)
+            for way in self._ways[place]
+            if way.option.possible(full)
+        }
+
+    def _left_to_come(self, coming: tuple[int, ...], fetched: int, pick: int) -> tuple[int, ...]:
+        """When parts come once the first of them is picked: then the next one sets out, where they are brought so."""
+        coming, following = coming[1:], fetched + 1
+        if not self.one_by_one or following == self.cell.parts:
+            return coming
+        return (pick + self._intervals[following], *coming[1:])
+
+    def _moved(self, who: Who, way: Way, first: int, behind: int | None) -> Who:
+        """Who is where after a move: the `first` of those in its position goes behind so many others, None: all."""
+        rows, (place, option, _) = list(who), way
+        part, rows[place] = who[place][first], who[place][:first] + who[place][first + 1 :]
+        if self._ways[option.to]:
+            there = rows[option.to]
+            rows[option.to] = (*there[:behind], part, *(() if behind is None else there[behind:]))
+        return tuple(rows)

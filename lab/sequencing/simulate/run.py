@@ -39,13 +39,13 @@ class Run:
 
     def allowed(self) -> tuple[int, ...]:
         """The decisions that may be taken now, ascending; none when all is done, or when nothing can move any more."""
-        parts = self.cell.parts
+        parts, full = self.cell.parts, self._full()
         found = [
             entry(part, option.choice, parts)
             for part in range(1, parts + 1)
             if self._in_turn(part)
             for option in self.cell.positions[self.locations[part - 1]].options
-            if self._enabled(option)
+            if option.possible(full)
         ]
         return tuple(sorted(found))
 
@@ -54,8 +54,9 @@ class Run:
         part = part_of(decision, self.cell.parts)
         if decision < 1 or not self._in_turn(part):
             return None
+        choice, full = choice_of(decision, self.cell.parts), self._full()
         for option in self.cell.positions[self.locations[part - 1]].options:
-            if option.choice == choice_of(decision, self.cell.parts) and self._enabled(option):
+            if option.choice == choice and option.possible(full):
                 return option
         return None
 
@@ -114,10 +115,11 @@ class Run:
             return f"{name} is already at '{where}'"
         if not self._in_turn(part):
             return f"{name} has not come yet: {cell.part_name(self.fetched + 1)} is before it"
-        full = [cell.names[s] for option in place.options for s in option.needs if not self._room(s)]
-        if not full:
+        full = self._full()
+        taken = dict.fromkeys(repr(cell.names[s]) for option in place.options for s in option.needs if full[s])
+        if not taken:
             return f"{name} at '{where}' has no choice {choice_of(decision, cell.parts) + 1}"
-        return f"{name} at '{where}' cannot move on: {' and '.join(repr(name) for name in dict.fromkeys(full))} full"
+        return f"{name} at '{where}' cannot move on: {' and '.join(taken)} full"
 
     def _first_ready_s(self) -> list[float]:
         arrivals = self.cell.arrivals
@@ -143,13 +145,9 @@ class Run:
         waits = self.locations[part - 1] == self.cell.starts[part - 1]
         return self.cell.arrivals is None or not waits or part == self.fetched + 1
 
-    def _enabled(self, option: Option) -> bool:
-        if option.if_full is not None and self._room(option.if_full):
-            return False
-        return all(self._room(station) for station in option.needs)
-
-    def _room(self, station: int) -> bool:
-        return self.occupied[station] < self.cell.capacities[station]
+    def _full(self) -> list[bool]:
+        """Whether each station is."""
+        return [taken >= most for taken, most in zip(self.occupied, self.cell.capacities, strict=True)]
 
     def _most_choices(self) -> int:
         return max(option.choice for place in self.cell.positions for option in place.options)

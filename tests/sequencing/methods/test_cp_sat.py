@@ -12,10 +12,10 @@ from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, WITH_DUE_TIMES, cost
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
+from lab.sequencing.cell.ways import ways_of
 from lab.sequencing.methods.cp_sat import cp_sat, cp_sat_sequencer, fits
 from lab.sequencing.methods.cp_sat_times import Times, longest, timed
 from lab.sequencing.methods.exact import first_come, optimum
-from lab.sequencing.methods.robot_bound import ways_of
 from lab.sequencing.search import Search
 from lab.sequencing.simulate.run import Run, follow, simulate
 

@@ -14,13 +14,12 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
+from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.branch_and_bound import branch_and_bound
-from lab.sequencing.methods.exact import Optimum, first_come, optimum
-from lab.sequencing.methods.proven import exact
-from lab.sequencing.methods.robot_bound import TICKS_PER_S
+from lab.sequencing.methods.exact import Optimum, exact, first_come, optimum
 from lab.sequencing.search import Reference, Search
+from lab.sequencing.simulate.merged import MergedCell
 from lab.sequencing.simulate.run import Run, simulate
-from lab.sequencing.simulate.states import Moves, sequence_of
 
 Ends = Callable[[Run], Iterator[Run]]
 CellMaker = Callable[..., Cell]
@@ -94,11 +93,11 @@ def test_states_keep_the_time_of_the_simulation(
 ) -> None:
     """A walk to the end by any moves, and its decisions simulated."""
     cell = data.draw(cells(max_parts=4, many=True))
-    moves = Moves(cell)
-    state = moves.start()
-    while not moves.done(state):
-        state = data.draw(st.sampled_from(list(moves.successors(state))))
-    assert state.now / TICKS_PER_S == pytest.approx(simulate(cell, sequence_of(cell, state)).makespan_s, abs=1e-6)
+    merged = MergedCell(cell)
+    state = merged.start()
+    while not merged.done(state):
+        state = data.draw(st.sampled_from(list(merged.successors(state))))
+    assert state.now / TICKS_PER_S == pytest.approx(simulate(cell, merged.decisions(state)).makespan_s, abs=1e-6)
 
 
 def test_what_is_later_here_and_earlier_there_is_kept(toast_cell: CellMaker, ends: Ends) -> None:
@@ -226,7 +225,7 @@ def test_the_sequencer_is_exact_for_every_objective(toast_cell: CellMaker, objec
 def test_what_is_not_proven_is_improved_by_cp_sat(toast_cell: CellMaker, monkeypatch: pytest.MonkeyPatch) -> None:
     cell = toast_cell("II", 3)
     rough = optimum(cell, max_expanded=0)
-    monkeypatch.setattr("lab.sequencing.methods.proven.optimum", lambda cell: rough)
+    monkeypatch.setattr("lab.sequencing.methods.exact.optimum", lambda cell: rough)
     assert rough.cost > exact(cell, Search(), np.random.default_rng(0)).cost == 700
     monkeypatch.setattr("lab.sequencing.methods.cp_sat.MOST_MOVES", 20)
     assert exact(cell, Search(), np.random.default_rng(0)).cost == rough.cost

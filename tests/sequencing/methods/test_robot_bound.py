@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
+from lab.sequencing.cell.ways import FAR, TICKS_PER_S, distances, follows, ticks, ways_of
 from lab.sequencing.methods.exact import optimum
-from lab.sequencing.methods.robot_bound import FAR, TICKS_PER_S, RobotWork, distances, follows, ticks, ways_of
+from lab.sequencing.methods.lower_bound import LowerBound
+from lab.sequencing.methods.robot_bound import RobotWork
+from lab.sequencing.simulate.merged import MergedCell, State
 from lab.sequencing.simulate.run import Run
-from lab.sequencing.simulate.states import Moves, State
 
 CellMaker = Callable[..., Cell]
 
@@ -22,15 +24,21 @@ def counted(run: Run) -> list[int]:
     return [run.locations.count(place) for place in range(len(run.cell.positions))]
 
 
+def least_s(work: RobotWork, counts: list[int], robot: int) -> float:
+    """What the robot has to do at least with these counts, standing there [s]."""
+    rest = sum(count * each for count, each in zip(counts, work.rest, strict=True))
+    return max(0, work.here[robot] + rest) / TICKS_PER_S
+
+
 def start_s(cell: Cell) -> float:
     """What the robot has to do at least in all [s]."""
-    return RobotWork(cell).least_s(counted(Run(cell)), cell.index(cell.robot_start))
+    return least_s(RobotWork(cell), counted(Run(cell)), cell.index(cell.robot_start))
 
 
 def least_left_s(cell: Cell) -> float:
     """The highest of all bounds at the start [s]."""
-    moves = Moves(cell)
-    return moves.left(moves.start()) / TICKS_PER_S
+    merged = MergedCell(cell)
+    return LowerBound(merged).left(merged.start()) / TICKS_PER_S
 
 
 def test_one_part_by_hand(oven_cell: CellMaker) -> None:
@@ -38,8 +46,8 @@ def test_one_part_by_hand(oven_cell: CellMaker) -> None:
     cell = oven_cell(1)
     work = RobotWork(cell)
     assert start_s(cell) == 14.0
-    assert work.least_s([0, 1, 0], cell.index("oven")) == 12.0
-    assert work.left([0, 0, 1], cell.index("out")) == 0
+    assert least_s(work, [0, 1, 0], cell.index("oven")) == 12.0
+    assert least_s(work, [0, 0, 1], cell.index("out")) == 0
 
 
 def test_another_part_costs_the_way_back_too(oven_cell: CellMaker) -> None:
@@ -82,7 +90,7 @@ def test_never_above_what_a_sequence_still_takes(
     cell = data.draw(cells(max_machines=2, max_parts=4, many=many))
     run, work, least = Run(cell), RobotWork(cell), list[tuple[float, float]]()
     while allowed := run.allowed():
-        least.append((run.now_s, work.least_s(counted(run), run.robot)))
+        least.append((run.now_s, least_s(work, counted(run), run.robot)))
         run.move(data.draw(st.sampled_from(allowed)))
     assert run.done
     assert all(now_s + least_s <= run.now_s + 1e-6 for now_s, least_s in least)
@@ -93,11 +101,12 @@ def test_no_state_is_bound_above_what_follows_it(
     cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject
 ) -> None:
     cell = data.draw(cells(max_machines=2, max_parts=4, many=True))
-    moves = Moves(cell)
-    state, least = moves.start(), list[tuple[State, int]]()
-    while not moves.done(state):
-        least.append((state, moves.left(state)))
-        state = data.draw(st.sampled_from(list(moves.successors(state))))
+    merged = MergedCell(cell)
+    bound = LowerBound(merged)
+    state, least = merged.start(), list[tuple[State, int]]()
+    while not merged.done(state):
+        least.append((state, bound.left(state)))
+        state = data.draw(st.sampled_from(list(merged.successors(state))))
     # A tick for each move that was rounded.
     assert all(before.now + left <= state.now + len(least) for before, left in least)
 
@@ -105,13 +114,14 @@ def test_no_state_is_bound_above_what_follows_it(
 @pytest.mark.parametrize("kind", ["I", "II", "III", "RSRS"])
 def test_no_walk_is_bound_above_its_end(toast_cell: CellMaker, fms_cell: CellMaker, kind: str) -> None:
     """Buffers, pallets, vacuuming and arrivals; whatever is done next, at random."""
-    moves = Moves(fms_cell(kind) if kind == "RSRS" else toast_cell(kind, 3))
+    merged = MergedCell(fms_cell(kind) if kind == "RSRS" else toast_cell(kind, 3))
+    bound = LowerBound(merged)
     rng = np.random.default_rng(7)
     for _ in range(40):
-        state, ends = moves.start(), list[int]()
-        while not moves.done(state):
-            ends.append(state.now + moves.left(state))
-            successors = list(moves.successors(state))
+        state, ends = merged.start(), list[int]()
+        while not merged.done(state):
+            ends.append(state.now + bound.left(state))
+            successors = list(merged.successors(state))
             state = successors[int(rng.integers(len(successors)))]
         assert max(ends) <= state.now
 
@@ -124,9 +134,10 @@ def test_the_shorter_way_on_counts(oven_cell: CellMaker) -> None:
     loaded_s[1, 2] = 100.0
     change = {"stations": stations, "products": (Product("toast", (route,)),), "loaded_s": loaded_s}
     cell = oven_cell(1, **change, empty_s=np.ones((4, 4)) - np.eye(4), buffers="free")
-    moves = Moves(cell)
-    (inside,) = moves.successors(moves.start())
-    assert moves.left(inside) / TICKS_PER_S == 14.0
+    merged = MergedCell(cell)
+    bound = LowerBound(merged)
+    (inside,) = merged.successors(merged.start())
+    assert bound.left(inside) / TICKS_PER_S == 14.0
     assert optimum(cell).cost == 16.0
 
 

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.sequencing.cell.cell import Cell
@@ -12,8 +11,6 @@ from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.srl_time_reacting import reacting
 from lab.sequencing.simulate.execution import replicate
-from lab.sequencing.simulate.merged import Flow, Layout
-from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
 Cells = Callable[..., st.SearchStrategy[Cell]]
@@ -37,21 +34,3 @@ def test_same_seed_same_costs(toast_cell: CellMaker) -> None:
     cell = toast_cell("I", 2)
     one, other = (replicate(cell, reacting(cell, seed=3), Chance(), 5, 1) for _ in range(2))
     assert np.array_equal(one, other)
-
-
-@given(data=st.data())
-def test_a_flow_goes_on_from_a_run(cells: Cells, data: st.DataObject) -> None:
-    """Built from a run on its way, a flow allows the same and ends at the same time as one that took the same way."""
-    cell = data.draw(cells(max_machines=2, max_parts=4, many=True))
-    layout = Layout.of(cell)
-    flow, run = Flow(layout), Run(cell)
-    for _ in range(data.draw(st.integers(0, 8))):
-        if actions := list(flow.actions()):
-            run.move(flow.take(data.draw(st.sampled_from(actions))))
-    other = Flow.from_run(layout, run)
-    while actions := list(flow.actions()):
-        assert list(other.actions()) == actions
-        action = data.draw(st.sampled_from(actions))
-        assert flow.take(action) == other.take(action)
-        assert other.now == pytest.approx(flow.now, abs=10)
-        assert other.least_left() == pytest.approx(flow.least_left(), abs=100)
