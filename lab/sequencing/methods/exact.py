@@ -10,13 +10,13 @@ import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN
-from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
+from lab.sequencing.methods.rules import first_come
 from lab.sequencing.search import Log, Search, gap
 from lab.sequencing.simulate.merged import MergedCell, State
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.simulate.run import simulate
 
 MAX_EXPANDED = 300_000
 
@@ -145,22 +145,3 @@ def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResul
     log.note(sequence, cost, complete=bool(sequence))
     log.check(cell)
     return SequenceResult(log.best, log.best_cost, tuple(log.costs))
-
-
-def first_come(cell: Cell) -> tuple[int, ...]:
-    """A sequence that comes to its end: what is ready first goes first; when that ends in a deadlock, part after part.
-
-    One part alone never meets a full station: its routes are sound, and every station has room for one.
-    """
-    run, sequence = Run(cell), list[int]()
-    while allowed := run.allowed():
-        sequence.append(min(allowed, key=lambda decision: run.ready_s[part_of(decision, cell.parts) - 1]))
-        run.move(sequence[-1])
-    if run.done:
-        return tuple(sequence)
-    run, sequence = Run(cell), []
-    for part in range(1, cell.parts + 1):
-        while run.finished_s[part - 1] is None:
-            sequence.append(next(one for one in run.allowed() if part_of(one, cell.parts) == part))
-            run.move(sequence[-1])
-    return tuple(sequence)

@@ -122,6 +122,25 @@ def dispatched(cell: Cell, rule: Rule, search: Search) -> SequenceResult:
     return SequenceResult(log.best, log.best_cost, tuple(log.costs))
 
 
+def first_come(cell: Cell) -> tuple[int, ...]:
+    """A sequence that comes to its end: what is ready first goes first; when that ends in a deadlock, part after part.
+
+    One part alone never meets a full station: its routes are sound, and every station has room for one.
+    """
+    run, sequence = Run(cell), list[int]()
+    while allowed := run.allowed():
+        sequence.append(min(allowed, key=lambda decision: run.ready_s[part_of(decision, cell.parts) - 1]))
+        run.move(sequence[-1])
+    if run.done:
+        return tuple(sequence)
+    run, sequence = Run(cell), []
+    for part in range(1, cell.parts + 1):
+        while run.finished_s[part - 1] is None:
+            sequence.append(next(one for one in run.allowed() if part_of(one, cell.parts) == part))
+            run.move(sequence[-1])
+    return tuple(sequence)
+
+
 @lru_cache(maxsize=16)
 def work_left_s(cell: Cell) -> tuple[float, ...]:
     """Seconds of moves, services and processing from each position to the end, by the shortest way, processing there left out.

@@ -15,7 +15,8 @@ from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
 from lab.sequencing.cell.ways import ways_of
 from lab.sequencing.methods.cp_sat import cp_sat, cp_sat_sequencer, fits
 from lab.sequencing.methods.cp_sat_times import Times, longest, timed
-from lab.sequencing.methods.exact import first_come, optimum
+from lab.sequencing.methods.exact import optimum
+from lab.sequencing.methods.rules import first_come
 from lab.sequencing.search import Search
 from lab.sequencing.simulate.run import Run, follow, simulate
 

@@ -16,7 +16,7 @@ from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.branch_and_bound import branch_and_bound
-from lab.sequencing.methods.exact import Optimum, exact, first_come, optimum
+from lab.sequencing.methods.exact import Optimum, exact, optimum
 from lab.sequencing.search import Reference, Search
 from lab.sequencing.simulate.merged import MergedCell
 from lab.sequencing.simulate.run import Run, simulate
@@ -199,18 +199,6 @@ def test_a_gap_of_nothing_but_rounding_is_0(bound_s: float, off: float) -> None:
     """-5e-12 is none, however the sums of the two were rounded."""
     cost = bound_s * (1.0 + off)
     assert Optimum(bound_s, (1,), True, bound_s, 1).gap(cost) == Reference(bound_s, True, "A*").gap(cost) == 0.0
-
-
-@given(data=st.data())
-def test_first_come_always_comes_to_its_end(cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject) -> None:
-    cell = data.draw(cells(max_parts=4, many=True))
-    assert simulate(cell, first_come(cell)).makespan_s <= cell.longest_s
-
-
-def test_first_come_gets_around_deadlocks() -> None:
-    """Both are ready at once; the second would block the first."""
-    cell = crossing_cell("PN")
-    assert first_come(cell) == (1, 1, 1, 2, 2, 2)
 
 
 @pytest.mark.parametrize("objective", ["makespan", "mean-tardiness", "tardy-parts", "robot-idle", "machine-idle"])

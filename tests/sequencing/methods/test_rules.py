@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lab.errors import BadInput, WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import Product, Route, Stage, Station
-from lab.sequencing.methods.rules import RULES, dispatch, dispatched, usable, work_left_s
+from lab.sequencing.methods.rules import RULES, dispatch, dispatched, first_come, usable, work_left_s
 from lab.sequencing.search import Search
 from lab.sequencing.simulate.run import Run, simulate
 
@@ -150,3 +150,14 @@ def test_a_rule_may_end_in_a_deadlock() -> None:
 def test_an_objective_that_the_cell_has_no_data_for(oven_cell: CellMaker) -> None:
     with pytest.raises(BadInput, match="due times"):
         dispatched(oven_cell(), RULES["nearest-ready"], Search(objective="tardy-parts"))
+
+
+@given(data=st.data())
+def test_first_come_always_comes_to_its_end(cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject) -> None:
+    cell = data.draw(cells(max_parts=4, many=True))
+    assert simulate(cell, first_come(cell)).makespan_s <= cell.longest_s
+
+
+def test_first_come_gets_around_deadlocks() -> None:
+    """Both are ready at once; the second would block the first."""
+    assert first_come(opposite()) == (1, 1, 1, 2, 2, 2)
