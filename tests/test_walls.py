@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors",),
-    ("lab.data", "lab.files", "lab.tomltext", "lab.compiled"),
+    ("lab.data", "lab.files", "lab.tomltext", "lab.compiled", "lab.learning.splitmix"),
     ("lab.overhead", "lab.view.frames", "lab.mdp", "lab.sequencing", "lab.learning.settings"),
     ("lab.vision",),
     ("lab.learning.selection",),

@@ -44,7 +44,7 @@ def run_sessions(
 ) -> Batch:
     """Learns a table in each of N sessions, seeds (N,) uint64; advice None: nobody to ask.
 
-    The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix(seed)` and
+    The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix.stream(seed)` and
     a `TableAdvisor` on the same draws. Raises BadInput for a learner outside LEARNERS, a selection other than softmax,
     an unknown gate, or advice of another shape.
     """

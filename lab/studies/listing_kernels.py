@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.compiled import lean
+from lab.learning import splitmix
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -20,6 +21,7 @@ SRL, MONTE_CARLO = METHODS.index("srl"), METHODS.index("mc")
 ALPHA, DISCOUNT, GOAL_REWARD = 0.05, 0.9, 1.5
 LATEST_S = 20_000.0  # the listing gives an episode up then
 MOST_MOVES = 10_000_000  # null moves take no time, so time alone would not end every episode; never met
+_following, _mixed, _fraction = lean(splitmix.following), lean(splitmix.mixed), lean(splitmix.fraction)
 ROBOT, STATE, SEEN, MOVED = range(4)  # in Work.whole: its station, the state's number, states visited, toasts moved
 
 
@@ -74,12 +76,9 @@ class Work(NamedTuple):
 
 @lean
 def _uniform(work: Any) -> float:
-    """The next number in [0, 1) of the stream: `lab.learning.selection.splitmix`."""
-    work.stream[0] += np.uint64(0x9E3779B97F4A7C15)
-    z = work.stream[0]
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+    """The next number in [0, 1) of the stream (`splitmix.stream`)."""
+    work.stream[0] = _following(work.stream[0])
+    return float(_fraction(_mixed(work.stream[0])))
 
 
 @lean

@@ -11,9 +11,9 @@ from lab.advice.gates import GATES
 from lab.errors import BadInput
 from lab.learning.batch import LEARNERS, Batch, run_sessions
 from lab.learning.kernels import LANES
-from lab.learning.selection import splitmix
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.splitmix import stream
 from lab.mdp import TabularMDP, grid, optimal_values
 
 SHORT = LearnerSettings("afterstate", episodes=40, max_steps=40, count_start=True)
@@ -34,7 +34,7 @@ def alone(
     mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings, who: Advice | None, seed: int
 ) -> SessionResult:
     """The interactive session with the numbers that the kernel draws for this seed."""
-    draw = splitmix(seed)
+    draw = stream(seed)
     advisor = None if who is None else TableAdvisor(who, draw)
     return run_session(mdp, learner, gate, advisor, np.random.default_rng(0), draw=draw)
 

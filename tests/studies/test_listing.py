@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
+from lab.learning.splitmix import uniform
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.chance import uniform
 from lab.sequencing.simulate.run import simulate
 from lab.studies import listing_kernels as kernels
 from lab.studies.listing import LISTING, Reading, _rules, _work, banned_states, run_sessions, toasts_of

@@ -10,9 +10,8 @@ from math import cos, isfinite, log, pi, sqrt
 from types import MappingProxyType
 
 from lab.errors import BadInput, unknown
+from lab.learning.splitmix import uniform
 from lab.sequencing.cell.cell import Cell
-
-_MASK = (1 << 64) - 1
 
 
 def _constant(mean_s: float, spread: float, u: float, v: float) -> float:
@@ -80,11 +79,3 @@ class Episode:
             return mean_s
         u, v = uniform(self.seed, 2 * number), uniform(self.seed, 2 * number + 1)
         return LAWS[law](mean_s, self.chance.spread, u, v)
-
-
-def uniform(seed: int, number: int) -> float:
-    """The uniform number in [0, 1) that stands at `number` in the stream of a seed (`lab.learning.selection.splitmix`)."""
-    z = (seed + (number + 1) * 0x9E3779B97F4A7C15) & _MASK
-    z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
-    z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
-    return ((z ^ (z >> 31)) >> 11) * 2.0**-53

@@ -5,20 +5,22 @@ from typing import Any
 import numpy as np
 
 from lab.compiled import inner, lean
+from lab.learning import splitmix
 from lab.sequencing.methods import updates
 from lab.sequencing.simulate.arrays import LEARNER_CODES
-from lab.sequencing.simulate.kernels import cost, list_allowed, mixed, move, reset, uniform
+from lab.sequencing.simulate.kernels import cost, fraction, list_allowed, mixed, move, reset, uniform
 
 RANDOM, SRL, MONTE_CARLO = (LEARNER_CODES[name] for name in ("random", "srl", "mc"))
 _explore, _best_of, _log_sum = inner(updates.explore), inner(updates.best_of), inner(updates.log_sum)
+_following = inner(splitmix.following)
 _gain, _log_factor, _average = inner(updates.gain), inner(updates.log_factor), inner(updates.average)
 
 
 @inner
 def _next_uniform(stream: Any) -> float:
-    """`lab.learning.selection.splitmix`: the numbers that `chance.uniform` has in this order."""
-    stream[0] += np.uint64(0x9E3779B97F4A7C15)
-    return float(mixed(stream[0]) >> np.uint64(11)) * 2.0**-53
+    """`splitmix.stream`."""
+    stream[0] = _following(stream[0])
+    return float(fraction(mixed(stream[0])))
 
 
 @inner

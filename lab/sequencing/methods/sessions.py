@@ -6,14 +6,14 @@ both give the same sequences, costs and values. The compiled session is taken wh
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import count
 from math import log
 
 import numpy as np
 
 from lab.errors import BadInput
+from lab.learning.splitmix import MASK, stream, uniform
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.chance import Episode, uniform
+from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.objectives import MAKESPAN, cost
 from lab.sequencing.methods import session_kernels as episodes
 from lab.sequencing.methods.state_keys import Key, Keys, State, decoded, key_of, keys_of, no_keys
@@ -26,7 +26,6 @@ Table = dict[State, dict[int, float]]
 END_REWARD = 1.5  # of the last state in the listings, which keep values per state
 BLOCK = 256  # episodes of a compiled session between two reports to the listener
 ROWS = 2**16  # rows of a table before it has to grow
-_MASK = (1 << 64) - 1
 
 
 @dataclass
@@ -159,8 +158,8 @@ def learn(cell: Cell, search: Search, seed: int, kind: type[Learner]) -> Learned
 
 def learn_readably(cell: Cell, search: Search, seed: int, kind: type[Learner], guide: Guide | None = None) -> Learned:
     """`learn`, one move after the other in Python; a guide has a say in every decision, and is told how it went."""
-    learner, stream = kind(search), count()
-    session = _Session(cell, search, learner, lambda: uniform(seed, next(stream)), Values(learner.first))
+    learner = kind(search)
+    session = _Session(cell, search, learner, stream(seed), Values(learner.first))
     session.guide = guide or session.guide
     noted = Log(search)
     for episode in range(1, search.episodes + 1):
@@ -209,7 +208,7 @@ def choose(keys: list[Key], values: Values, epsilon: float, draw: Callable[[], f
 
 def episode_seed(seed: int, episode: int) -> int:
     """The seed of what chance does in an episode of a session."""
-    return int(uniform(~seed & _MASK, episode) * 2.0**53)
+    return int(uniform(~seed & MASK, episode) * 2.0**53)
 
 
 def learn_compiled(cell: Cell, search: Search, seed: int, kind: type[Learner], keys: Keys) -> Learned:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from lab.compiled import inner, lean
+from lab.learning import splitmix
 from lab.sequencing.simulate.arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES
 
 CLOCK, PICK = ARRIVAL_CODES["clock"], ARRIVAL_CODES["pick"]
@@ -14,20 +15,15 @@ MAKESPAN, TARDINESS, ROBOT_IDLE, MACHINE_IDLE = (
     OBJECTIVE_CODES[name] for name in ("makespan", "mean-tardiness", "robot-idle", "machine-idle")
 )
 
-
-@inner
-def mixed(z: Any) -> Any:
-    """The last step of splitmix: 64 well mixed bits of a uint64 (Steele, Lea and Flood 2014)."""
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return z ^ (z >> np.uint64(31))
+mixed: Any = inner(splitmix.mixed)
+fraction: Any = inner(splitmix.fraction)
+_state_at: Any = inner(splitmix.state_at)
 
 
 @lean
 def uniform(seed: Any, number: int) -> float:
-    """`chance.uniform`."""
-    z = seed + (np.uint64(number) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
-    return float(mixed(z) >> np.uint64(11)) * 2.0**-53
+    """`splitmix.uniform`."""
+    return float(fraction(mixed(_state_at(seed, np.uint64(number)))))
 
 
 @inner

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
+from lab.learning.splitmix import uniform
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance, Episode, uniform
+from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance, Episode
 
 CellMaker = Callable[..., Cell]
 SEEDS = st.integers(0, 2**64 - 1)

@@ -13,7 +13,7 @@ from hypothesis.strategies import DataObject, SearchStrategy
 
 from lab.sequencing.cell import objectives
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance, Episode, uniform
+from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance, Episode
 from lab.sequencing.simulate import kernels
 from lab.sequencing.simulate.arrays import CellArrays, RunArrays, cell_arrays, most_moves, run_arrays
 from lab.sequencing.simulate.run import Run
@@ -90,12 +90,6 @@ def test_most_moves(toast_cell: CellMaker, fms_cell: CellMaker, oven_cell: CellM
     assert most_moves(toast_cell("I", 3)) == 15
     assert most_moves(fms_cell("RS")) == 10
     assert most_moves(oven_cell(4)) == 8
-
-
-@given(seed=SEEDS, number=st.integers(0, 2**40))
-@settings(deadline=None)
-def test_uniform_numbers_are_those_of_chance(seed: int, number: int) -> None:
-    assert kernels.uniform(np.uint64(seed), number) == uniform(seed, number)
 
 
 def test_following_a_sequence(oven_cell: CellMaker) -> None:
