@@ -24,7 +24,7 @@ from lab.view.progress import RunProgress
 from lab.view.terminal import TeachingPrompt
 
 if TYPE_CHECKING:
-    from lab.sequencing.advised import SequenceRequest
+    from lab.sequencing.methods.srl_advised import SequenceRequest
     from lab.stage import Stage
     from lab.view.seat import SeatPage
 

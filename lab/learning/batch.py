@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lab.advice.advisors import Advice, TableAdvisor
 from lab.advice.memory import places
 from lab.errors import BadInput
-from lab.learning import kernels, selection
+from lab.learning import kernels, selection, splitmix
 from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray, TabularMDP
@@ -46,7 +46,7 @@ def run_sessions(
 ) -> Batch:
     """Learns a table in each of N sessions, seeds (N,) uint64; advice None: nobody to ask.
 
-    The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix(seed)` and
+    The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix.stream(seed)` and
     a `TableAdvisor` on the same draws. Raises BadInput for an unknown learner, selection or gate, or advice of another
     shape.
     """
@@ -108,7 +108,7 @@ def _one_by_one(
     q = np.zeros((len(seeds) if keep_tables else 0, *mdp.successor.shape))
     found = _batch(steps, np.zeros(steps.shape, np.bool_), counts, q)
     for n, seed in enumerate(seeds):
-        draw = selection.splitmix(int(seed))
+        draw = splitmix.stream(int(seed))
         advisor = None if advice is None else TableAdvisor(advice, draw)
         one = run_session(mdp, learner, gate, advisor, np.random.default_rng(0), draw=draw)
         if one.interrupted:

@@ -1,9 +1,9 @@
 """Whole sessions compiled with numba, many at once: what studies run.
 
 Many sessions walk side by side: one alone waits for its memory and its exponentials, 24 keep the processor busy.
-Each has uniform numbers of its own (`selection.splitmix`), so its result depends on its seed and on nothing else, and
+Each has uniform numbers of its own (`splitmix`), so its result depends on its seed and on nothing else, and
 equals that of `session.run_session` with the same numbers. Rules come from `selection`, `updates`, `advice.gates` and
-`advice.memory`; numba's cache knows changes of this file only, so whoever changes a rule there deletes `__pycache__` here.
+`advice.memory`.
 """
 
 from dataclasses import fields
@@ -14,7 +14,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from lab.advice import gates, memory
-from lab.learning import selection, updates
+from lab.compiled import compiled
+from lab.learning import selection, splitmix, updates
 from lab.mdp import FloatArray
 
 LANES = 24
@@ -28,6 +29,9 @@ _NOTHING = memory.NOTHING
 _Memory: Any = memory.Memory
 _BELOW_ONE = selection.BELOW_ONE
 _exp_of: Any = njit(selection.exp_of)
+_following: Any = njit(splitmix.following)
+_mixed: Any = njit(splitmix.mixed)
+_fraction: Any = njit(splitmix.fraction)
 _window_mean: Any = njit(gates.window_mean)
 _too_slow: Any = njit(gates.too_slow)
 _misled: Any = njit(gates.misled)
@@ -121,12 +125,9 @@ class Scratch(NamedTuple):
 
 @njit(inline="always")
 def _draw(rng: Any, lane: int) -> float:
-    """selection.splitmix for one lane."""
-    rng[lane] += np.uint64(0x9E3779B97F4A7C15)
-    z = rng[lane]
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+    """`splitmix.stream` for one lane."""
+    rng[lane] = _following(rng[lane])
+    return float(_fraction(_mixed(rng[lane])))
 
 
 @njit
@@ -252,19 +253,15 @@ def _choose(
             total += _exp_of(x)
             values[a * LANES + j] = total
     for j in range(LANES):
-        rng[j] += np.uint64(0x9E3779B97F4A7C15)
-        z = rng[j]
-        z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-        z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-        u = float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
-        mark = u * values[(len(actions) - 1) * LANES + j] * _BELOW_ONE
+        rng[j] = _following(rng[j])
+        mark = _fraction(_mixed(rng[j])) * values[(len(actions) - 1) * LANES + j] * _BELOW_ONE
         action = np.int64(0)
         for a in range(len(actions) - 1):
             action += np.int64(values[a * LANES + j] <= mark)
         chosen[j] = action
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def run(
     problem: Any,
     rules: Any,

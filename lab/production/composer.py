@@ -7,9 +7,9 @@ from math import hypot
 from lab.production.floor import Floor
 from lab.production.recorder import Viewer
 from lab.production.skillset import SkillSet
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import Move, Schedule
-from lab.sequencing.run import Run
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.schedule import Move, Schedule
+from lab.sequencing.simulate.run import Run
 from lab.sim.scene import Layout, Spot, spots
 from lab.sim.world import World
 from lab.skills import Skill

@@ -14,10 +14,10 @@ from lab.policy import Policy
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
 from lab.production.skillset import SkillSet
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import SequenceResult
-from lab.sequencing.exact import Optimum
-from lab.sequencing.run import simulate
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.schedule import SequenceResult
+from lab.sequencing.methods.exact import Optimum
+from lab.sequencing.simulate.run import simulate
 from lab.sim.scene import Layout
 from lab.skills import Skill
 from lab.skills.skill import Photo, Problem

@@ -16,7 +16,7 @@ from lab.production.floor import try_out
 from lab.production.recorder import Viewer, show_scene
 from lab.production.report import Prepared, Report, Taught, write_files
 from lab.production.skillset import SkillSet
-from lab.sequencing.exact import optimum
+from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Reference
 from lab.sim.scene import check_apart, draw_layout
 from lab.skills.skill import Problem

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from lab.errors import counted
-from lab.sequencing.events import Activity, Schedule
-from lab.sequencing.layout import ROBOT
+from lab.sequencing.cell.schedule import Activity, Schedule
+from lab.sequencing.cell.stations import ROBOT
 from lab.view.canvas import BLUE, GREEN, INK, ORANGE, PALE_GREY, PURPLE, RED, SKY, YELLOW, seconds
 
 TOUCHING_S = 1e-3  # measured activities that overlap by less follow one another

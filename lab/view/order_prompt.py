@@ -8,9 +8,9 @@ from rich.text import Text
 
 from lab.advice.requests import AdvisorLeft
 from lab.errors import counted
-from lab.sequencing.advised import SequenceRequest
-from lab.sequencing.positions import part_of
-from lab.sequencing.run import Run
+from lab.sequencing.cell.routes import part_of
+from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.simulate.run import Run
 from lab.view.reader import Outside, ReadLine, default_reader
 from lab.view.screen import folded, room
 

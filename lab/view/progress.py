@@ -13,7 +13,7 @@ from rich.text import Text
 from lab.advice.events import AdviceRejected, AdviceRequested, Event
 from lab.errors import counted
 from lab.listener import Listener
-from lab.sequencing.events import Move, SequenceResult
+from lab.sequencing.cell.schedule import Move, SequenceResult
 from lab.sequencing.search import Reference
 from lab.teaching import Lesson
 from lab.view.figures import beside, gap_of

@@ -7,7 +7,7 @@ from typing import Protocol
 from lab.errors import counted
 from lab.learning.settings import GateSettings
 from lab.listener import Listener
-from lab.sequencing.events import EpisodeSequenced, Move, SequenceResult
+from lab.sequencing.cell.schedule import EpisodeSequenced, Move, SequenceResult
 from lab.sequencing.search import Reference
 from lab.teaching import Lesson
 from lab.view.figures import beside

@@ -15,7 +15,7 @@ from lab.errors import counted
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
-from lab.sequencing.advised import SequenceRequest
+from lab.sequencing.methods.srl_advised import SequenceRequest
 from lab.view.facts import VERDICTS
 from lab.view.seat_curve import Curve
 from lab.view.seat_grid import place_of, slice_of, spot

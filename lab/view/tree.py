@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput, counted
-from lab.sequencing.cell import Cell
-from lab.sequencing.chance import Episode
-from lab.sequencing.run import Run
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import Episode
+from lab.sequencing.simulate.run import Run
 from lab.view.canvas import (
     BLUE,
     GREEN,

@@ -17,8 +17,8 @@ from lab.cli.options import Json
 from lab.cli.output import show
 from lab.errors import WorkFailed
 from lab.learning.updates import UPDATES
-from lab.sequencing.advised import FITTING
-from lab.sequencing.objectives import OBJECTIVES
+from lab.sequencing.cell.objectives import OBJECTIVES
+from lab.sequencing.methods.srl_advised import FITTING
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 

@@ -11,9 +11,9 @@ from lab.advice.gates import GATES, Gate, Steps
 from lab.errors import BadInput
 from lab.learning.batch import Batch, run_sessions
 from lab.learning.kernels import LANES, LEARNERS
-from lab.learning.selection import splitmix
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.splitmix import stream
 from lab.learning.updates import UPDATES
 from lab.mdp import TabularMDP, grid, optimal_values
 
@@ -35,7 +35,7 @@ def alone(
     mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings, who: Advice | None, seed: int
 ) -> SessionResult:
     """The interactive session with the numbers that the kernel draws for this seed."""
-    draw = splitmix(seed)
+    draw = stream(seed)
     advisor = None if who is None else TableAdvisor(who, draw)
     return run_session(mdp, learner, gate, advisor, np.random.default_rng(0), draw=draw)
 

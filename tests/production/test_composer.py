@@ -11,9 +11,9 @@ from lab.production.composer import MAX_TRIES, Outcome, Production, carry_out
 from lab.production.durations import Durations, cell_of, measure
 from lab.production.floor import Floor, try_out
 from lab.production.skillset import SkillSet
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import Move
-from lab.sequencing.run import simulate
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.simulate.run import simulate
 from lab.sim.scene import Layout, spots
 from lab.sim.world import World
 from lab.skills import Butter

@@ -23,8 +23,8 @@ from lab.production.report import FILES, Prepared, Report, Taught, check_out, wr
 from lab.production.run import prepare, teach_all
 from lab.production.skillset import SkillSet
 from lab.sequencing import SEQUENCERS
-from lab.sequencing.events import Schedule
-from lab.sequencing.exact import optimum
+from lab.sequencing.cell.schedule import Schedule
+from lab.sequencing.methods.exact import optimum
 from lab.taskfile import Task, load
 from lab.teaching import Teacher
 from lab.toolbox import Toolbox

@@ -11,8 +11,8 @@ from rich.console import Console
 
 from lab.advice.reasons import TooSlow
 from lab.advice.requests import AdvisorLeft
-from lab.sequencing.advised import SequenceRequest
-from lab.sequencing.run import Run
+from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.simulate.run import Run
 from lab.taskfile import load_cell
 from lab.view.order_prompt import OrderPrompt
 from lab.view.reader import TerminalReader

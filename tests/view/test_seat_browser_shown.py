@@ -16,8 +16,8 @@ from lab.advice.receipt import receipt
 from lab.advice.requests import AdviceRequest
 from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP, grid, optimal_values
-from lab.sequencing.advised import SequenceRequest
-from lab.sequencing.run import Run, follow
+from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.simulate.run import Run, follow
 from lab.taskfile import load_cell
 from lab.view.seat import SeatPage
 

@@ -5,10 +5,10 @@ import pytest
 
 from lab.advice.reasons import Reason, TooSlow
 from lab.learning.settings import GateSettings
-from lab.sequencing.advised import AskedAdvisor, SequenceRequest, advised_srl
-from lab.sequencing.events import Move
-from lab.sequencing.run import Run, follow, simulate
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.methods.srl_advised import AskedAdvisor, SequenceRequest, advised_srl
 from lab.sequencing.search import Search
+from lab.sequencing.simulate.run import Run, follow, simulate
 from lab.taskfile import load_cell
 from lab.view.seat_order import Follower, bars_of, order_of
 

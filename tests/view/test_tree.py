@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.sequencing.cell import Cell
-from lab.sequencing.layout import Stage, Station
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.stations import Stage, Station
 from lab.view import tree
 from lab.view.tree import Branch, branch_plot, branches_of
 

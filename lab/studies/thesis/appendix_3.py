@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.sequencing.chance import LAWS
+from lab.sequencing.cell.chance import LAWS
 from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, agreement, mean_row, row, those
 from lab.studies.runner import Job

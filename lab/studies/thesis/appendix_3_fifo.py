@@ -3,9 +3,9 @@
 from math import inf
 from typing import NamedTuple
 
-from lab.sequencing.cell import Cell
-from lab.sequencing.execute import WAIT, Observed, Policy
-from lab.sequencing.positions import choice_of, part_of
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import choice_of, part_of
+from lab.sequencing.simulate.execution import WAIT, Observed, Policy
 
 MACHINES = ("mill", "lathe-1", "lathe-2")  # of tasks that become possible together those of the mill go first
 MILL = 0

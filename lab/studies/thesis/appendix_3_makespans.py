@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.sequencing import SEQUENCERS
-from lab.sequencing.batch import evaluate, run_sessions
-from lab.sequencing.cell import Cell
-from lab.sequencing.chance import LAWS, Chance
-from lab.sequencing.exact import optimum
-from lab.sequencing.execute import Policy, replan, replicate
-from lab.sequencing.layout import Arrivals
-from lab.sequencing.reactive import reacting
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import LAWS, Chance
+from lab.sequencing.cell.stations import Arrivals
+from lab.sequencing.methods.exact import optimum
+from lab.sequencing.methods.many_sessions import evaluate, run_sessions
+from lab.sequencing.methods.srl_time_reacting import reacting
 from lab.sequencing.search import Search, SrlSettings, kernel_seed
+from lab.sequencing.simulate.execution import Policy, replan, replicate
 from lab.studies.thesis.appendix_3_fifo import STARTS, queued_fifo
 
 Floats = NDArray[np.float64]
@@ -86,7 +86,7 @@ def made(mix: Mix, *, sessions: int, seed: int) -> Made:
 
 
 def times_seeds(seed: int, episodes: int) -> list[int]:
-    """The seeds of the times that `lab.sequencing.execute.replicate` meets, so that lists can be evaluated in the same."""
+    """The seeds of the times that `execution.replicate` meets, so that lists can be evaluated in the same."""
     rng = np.random.default_rng(seed)
     return [kernel_seed(rng) for _ in range(episodes)]
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import unknown
-from lab.sequencing.batch import run_sessions
-from lab.sequencing.cell import Cell as RobotCell
-from lab.sequencing.chance import NO_CHANCE, Chance
+from lab.sequencing.cell.cell import Cell as RobotCell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance
+from lab.sequencing.methods.many_sessions import run_sessions
 from lab.sequencing.search import SAME, Search, SrlSettings
 from lab.studies.findings import Row, mean_row, share_row
 from lab.studies.runner import Job, seeds_of

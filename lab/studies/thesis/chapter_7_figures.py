@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.sequencing.cell import Cell as RobotCell
-from lab.sequencing.run import simulate
+from lab.sequencing.cell.cell import Cell as RobotCell
+from lab.sequencing.simulate.run import simulate
 from lab.studies.charts import PRINTED, bars, curve, legend_below
 from lab.studies.findings import Row, those
 from lab.studies.runner import seeds_of

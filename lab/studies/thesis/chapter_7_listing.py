@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, unknown
-from lab.sequencing.cell import Cell
+from lab.sequencing.cell.cell import Cell
 from lab.studies.thesis import chapter_7_listing_kernels as kernels
 from lab.studies.thesis.chapter_7_listing_kernels import (
     APPLIER,

@@ -1,15 +1,16 @@
-"""Sessions of `chapter_7_listing`, compiled with numba, whose cache knows changes of this file only.
+"""Sessions of `chapter_7_listing`, compiled with numba.
 
 Stations and toasts are numbered from 0 here.
 """
 
-from collections.abc import Callable
 from math import cos, inf, log, pi, sqrt
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from lab.compiled import lean
+from lab.learning import splitmix
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -20,8 +21,8 @@ SRL, MONTE_CARLO, RANDOM = range(3)  # in METHODS
 ALPHA, DISCOUNT, GOAL_REWARD = 0.05, 0.9, 1.5
 LATEST_S = 20_000.0  # the listing gives an episode up then
 MOST_MOVES = 10_000_000  # null moves take no time, so time alone would not end every episode; never met
+_following, _mixed, _fraction = lean(splitmix.following), lean(splitmix.mixed), lean(splitmix.fraction)
 ROBOT, STATE, SEEN, MOVED = range(4)  # in Work.whole: its station, the state's number, states visited, toasts moved
-Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 class Toasts(NamedTuple):
@@ -88,24 +89,14 @@ class Found(NamedTuple):
     sequences: Ints
 
 
-def _compiled(function: Function) -> Function:
-    """Nothing here makes arrays or keeps them, so references need no counting, which would take most of the time."""
-    jit: Any = njit  # its types do not know _nrt
-    compiled: Function = jit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function)
-    return compiled
-
-
-@_compiled
+@lean
 def _uniform(work: Any) -> float:
-    """The next number in [0, 1) of the stream: `lab.learning.selection.splitmix`."""
-    work.stream[0] += np.uint64(0x9E3779B97F4A7C15)
-    z = work.stream[0]
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+    """The next number in [0, 1) of the stream (`splitmix.stream`)."""
+    work.stream[0] = _following(work.stream[0])
+    return float(_fraction(_mixed(work.stream[0])))
 
 
-@_compiled
+@lean
 def processing_s(toasts: Any, work: Any, machine: int) -> float:
     """Not cut off at 0 s, as in the listing. Source: Box and Muller 1958."""
     mean_s = toasts.processing_s[machine]
@@ -115,7 +106,7 @@ def processing_s(toasts: Any, work: Any, machine: int) -> float:
     return float(mean_s * (1.0 + toasts.spread * sqrt(-2.0 * log(1.0 - u)) * cos(2.0 * pi * v)))
 
 
-@_compiled
+@lean
 def _target(work: Any, origin: int) -> int:
     """Where a toast that is picked up at a station goes: to the machine ahead when it is free, else to its buffer."""
     if origin == APPLIER:
@@ -124,7 +115,7 @@ def _target(work: Any, origin: int) -> int:
     return machine - 1 if work.busy[machine] else machine
 
 
-@_compiled
+@lean
 def reset(work: Any) -> None:
     for toast in range(len(work.place)):
         work.place[toast], work.ready_s[toast] = PLATE, 0.0
@@ -134,7 +125,7 @@ def reset(work: Any) -> None:
     work.whole[ROBOT], work.whole[STATE], work.whole[SEEN], work.whole[MOVED] = TOASTER_BUFFER, 0, 0, 0
 
 
-@_compiled
+@lean
 def carry(toasts: Any, rules: Any, work: Any, toast: int) -> None:
     """The robot goes to a toast, waits until it is processed, and takes it on, or leaves it where it is: a null move."""
     origin = work.place[toast]
@@ -155,7 +146,7 @@ def carry(toasts: Any, rules: Any, work: Any, toast: int) -> None:
         work.whole[STATE] += (target - origin) * STATIONS**toast
 
 
-@_compiled
+@lean
 def _visit(work: Any) -> None:
     state = work.whole[STATE]
     if work.visits[state] == 0:
@@ -164,7 +155,7 @@ def _visit(work: Any) -> None:
     work.visits[state] += 1
 
 
-@_compiled
+@lean
 def list_options(toasts: Any, rules: Any, work: Any) -> int:
     """How many next states may be chosen: by toast, the nearer station first."""
     count, state, weight = 0, work.whole[STATE], 1
@@ -185,7 +176,7 @@ def list_options(toasts: Any, rules: Any, work: Any) -> int:
     return count
 
 
-@_compiled
+@lean
 def _choose(rules: Any, work: Any, count: int, epsilon: float) -> int:
     """The toast of one of the options."""
     if _uniform(work) <= epsilon:
@@ -207,7 +198,7 @@ def _choose(rules: Any, work: Any, count: int, epsilon: float) -> int:
     return int(work.toast[chosen])
 
 
-@_compiled
+@lean
 def _episode(toasts: Any, rules: Any, work: Any, epsilon: float) -> float:
     """One episode with the step update of SRL; its time [s], LATEST_S when it does not end."""
     reset(work)
@@ -230,7 +221,7 @@ def _episode(toasts: Any, rules: Any, work: Any, epsilon: float) -> float:
     return LATEST_S
 
 
-@_compiled
+@lean
 def learn(rules: Any, work: Any, time_s: float, best_s: float) -> None:
     """What the time of an episode does to the values of the states visited, the start left out, once for each visit."""
     gain = 1.0 / time_s
@@ -249,7 +240,7 @@ def learn(rules: Any, work: Any, time_s: float, best_s: float) -> None:
             work.values[state] = gain
 
 
-@_compiled
+@lean
 def run_sessions(toasts: Any, rules: Any, work: Any, epsilons: Any, seeds: Any, found: Any) -> None:
     """A session for each seed (N,), with exploration epsilons (E,); what they come to is written to `found`."""
     for n in range(len(seeds)):

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from lab.sequencing.exact import optimum
+from lab.sequencing.methods.exact import optimum
 from lab.studies.findings import Findings
 from lab.studies.ours import sequencing_speed as speed_study
 from lab.studies.ours import srl_time_compared, srl_time_sessions

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.sequencing.exact import optimum
+from lab.sequencing.methods.exact import optimum
 from lab.studies.runner import Job
 from lab.studies.statistics import interval, proportion_interval
 from lab.studies.thesis.chapter_7_cells import (

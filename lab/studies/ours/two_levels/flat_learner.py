@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from lab.compiled import compiled
 from lab.mdp import BoolArray, FloatArray, IntArray
 from lab.studies.ours.two_levels.kitchen import FlatWorld
 
@@ -47,7 +47,7 @@ def learn_flat(
     return np.asarray(_session(problem, settings, np.array(budgets, np.int64), cap, rng))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _session(problem: _Problem, settings: FlatSettings, budgets: Count, cap: int, rng: np.random.Generator) -> Count:
     q = np.zeros(problem.successor.shape)
     makespans = np.full(len(budgets), -1)
@@ -74,7 +74,7 @@ def _session(problem: _Problem, settings: FlatSettings, budgets: Count, cap: int
     return makespans
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _choose(q: FloatArray, state: int, epsilon: float, rng: np.random.Generator) -> int:
     """The best action, equally good ones drawn between, or with probability epsilon any one."""
     actions = q.shape[1]
@@ -93,7 +93,7 @@ def _choose(q: FloatArray, state: int, epsilon: float, rng: np.random.Generator)
     return best
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _learn(problem: _Problem, settings: FlatSettings, q: FloatArray, state: int, action: int) -> None:
     """Q(s,a) = r + gamma max Q(s',.): the rule of `lab.learning.updates.QLearning` with alpha 1."""
     entered = problem.successor[state, action]
@@ -106,7 +106,7 @@ def _learn(problem: _Problem, settings: FlatSettings, q: FloatArray, state: int,
     q[state, action] = value - settings.cost
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _greedy_steps(problem: _Problem, q: FloatArray, cap: int) -> int:
     """Steps of the greedy policy to the end (ties: the lowest index); cap + 1 when it takes more."""
     state = problem.start

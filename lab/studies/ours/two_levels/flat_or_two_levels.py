@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.mdp import shortest_steps
-from lab.sequencing.exact import optimum
+from lab.sequencing.methods.exact import optimum
 from lab.studies.charts import Look, curve, legend_below
 from lab.studies.findings import Findings, Row, agreement, mean_row, row, share_row, those
 from lab.studies.ours.two_levels.flat_learner import FlatSettings, learn_flat

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.mdp import BoolArray, IntArray, TabularMDP, grid
-from lab.sequencing.cell import Cell, needed_moves
-from lab.sequencing.layout import Product as Toast
-from lab.sequencing.layout import Route, Stage, Station
+from lab.sequencing.cell.cell import Cell, needed_moves
+from lab.sequencing.cell.stations import Product as Toast
+from lab.sequencing.cell.stations import Route, Stage, Station
 
 ACTIONS = ("up", "down", "left", "right", "pick", "drop", "wait")  # the first four as `lab.mdp.grid` orders them
 PICK, DROP, WAIT = 4, 5, 6

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from lab.learning.session import run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import greedy_path
-from lab.sequencing.cell import Cell
-from lab.sequencing.run import Run
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.methods.srl_time import srl_time
 from lab.sequencing.search import Search
-from lab.sequencing.srl_time import srl_time
+from lab.sequencing.simulate.run import Run
 from lab.studies.ours.two_levels.kitchen import DROP, PICK, FlatWorld, Kitchen, Way
 
 # Values begin at 0, above the truth as every step costs, so that greedy choices explore: as the flat learner's may.

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.mdp import shortest_steps
-from lab.sequencing.exact import optimum
-from lab.sequencing.run import Run
-from lab.sequencing.srl_time import srl_time
+from lab.sequencing.methods.exact import optimum
+from lab.sequencing.methods.srl_time import srl_time
+from lab.sequencing.simulate.run import Run
 from lab.studies.findings import Findings
 from lab.studies.ours.two_levels import flat_or_two_levels as module
 from lab.studies.ours.two_levels.flat_learner import FlatSettings, learn_flat
