@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.errors import BadInput
-from lab.taskfile import check_number, load
+from lab.tasks.task_file import check_number, load
 
 
 def see_picture(image: Path, grid: str | None, task: str | None, out: Path | None) -> dict[str, Any]:
@@ -15,7 +15,7 @@ def see_picture(image: Path, grid: str | None, task: str | None, out: Path | Non
 
     With a task the grid is the one of its overhead camera; without, the frame is the grid, 12 x 12 unless `grid` says so.
     """
-    from lab.vision import draw, read_picture, see, write_picture
+    from lab.vision.pictures import draw, read_picture, see, write_picture
 
     match = re.fullmatch(r"([1-9]\d{0,2})x([1-9]\d{0,2})", "12x12" if grid is None else grid)
     if match is None:

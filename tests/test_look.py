@@ -12,7 +12,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.look import see_picture, show
-from lab.vision import MARKERS, read_picture, write_picture
+from lab.vision.pictures import MARKERS, read_picture, write_picture
 
 
 @pytest.fixture

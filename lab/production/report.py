@@ -10,7 +10,6 @@ from typing import Any
 from lab.errors import BadInput, WorkFailed, counted
 from lab.files import draft, nearest
 from lab.mdp import TabularMDP, greedy_path
-from lab.policy import Policy
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
 from lab.production.skillset import SkillSet
@@ -18,13 +17,14 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.simulate.run import simulate
+from lab.sim.frames import Recording
 from lab.sim.scene import Layout
 from lab.skills import Skill
 from lab.skills.skill import Photo, Problem
 from lab.skills.surveys import Surveys
-from lab.taskfile import Task
-from lab.teaching import Lesson
-from lab.view.frames import Recording
+from lab.tasks.task_file import Task
+from lab.teaching.teacher import Lesson
+from lab.toolbox.policy import Policy
 
 FILES = {
     "gantt": "gantt.png",
@@ -179,7 +179,7 @@ def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) 
     """The pictures, the replay and the two JSON files."""
     from lab.view.meshcat import replay_html
     from lab.view.plots import gantt, learning_curves
-    from lab.vision import write_picture
+    from lab.vision.pictures import write_picture
 
     paths = {name: folder / file for name, file in FILES.items()}
     predicted = simulate(taught.cell, report.sequenced.sequence)

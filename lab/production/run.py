@@ -7,9 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lab.errors import LabError
-from lab.listener import Listener
 from lab.planner import find_sequence, search_for
-from lab.policy import Policy
 from lab.production.composer import carry_out
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
 from lab.production.floor import try_out
@@ -21,8 +19,10 @@ from lab.sequencing.search import Reference
 from lab.sim.scene import check_apart, draw_layout
 from lab.skills.skill import Problem
 from lab.skills.surveys import Surveys
-from lab.taskfile import Task, check_toasts
-from lab.teaching import Teacher, Trial
+from lab.tasks.task_file import Task, check_toasts
+from lab.teaching.listener import Listener
+from lab.teaching.teacher import Teacher, Trial
+from lab.toolbox.policy import Policy
 
 
 def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prepared:

@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.mdp import NoPath, grid
-from lab.overhead import Marker
 from lab.sim import assets
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import GRASP_DEPTH, Spot, is_toaster, spots
 from lab.skills.place import let_go, release_pose
 from lab.skills.skill import Bench, Photo, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import INSERT_START, Surveys, camera_view, overhead_camera
-from lab.taskfile import Obstacle, Task
-from lab.vision import find_markers, locate, see
+from lab.tasks.task_file import Obstacle, Task
+from lab.vision.overhead import Marker
+from lab.vision.pictures import find_markers, locate, see
 
 if TYPE_CHECKING:
-    from lab.policy import Policy
+    from lab.toolbox.policy import Policy
 
 ACTIONS = ("left", "right", "backward", "forward")  # -x, +x, -y, +y: as the camera's picture shows them
 CLEARANCE_M = 0.006  # between a carried slice and a cube in its way

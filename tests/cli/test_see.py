@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lab.vision import MARKERS, write_picture
+from lab.vision.pictures import MARKERS, write_picture
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 

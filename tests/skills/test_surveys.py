@@ -10,8 +10,8 @@ from lab.sim.assets import SLICE as SIZE
 from lab.sim.scene import GRASP_DEPTH, Layout, spots
 from lab.skills import Insert
 from lab.skills.surveys import INSERT_START, NEAR_SHAPE, NEAR_YAWS, Surveys, camera_view, overhead_camera
-from lab.taskfile import Obstacle, Task
-from lab.vision import see
+from lab.tasks.task_file import Obstacle, Task
+from lab.vision.pictures import see
 
 
 def signatures(surveys: Surveys) -> dict[str, str]:

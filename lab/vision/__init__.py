@@ -1,0 +1,1 @@
+"""Pictures to grids: what an overhead camera saw (numpy and OpenCV only)."""

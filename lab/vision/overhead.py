@@ -1,0 +1,161 @@
+"""What an overhead picture shows: the camera's view of a grid, the markers in it and the grid that they make.
+
+Plain records between the camera (`lab/sim`), the reader of pictures (`lab/vision/pictures.py`) and whoever learns in the grid.
+A marker's pixel goes back along its ray to the plane at the marker's own height, so a tall obstacle is not seen beside
+its place. Pixels are (x, y) from the centre of the top left pixel, to the right and down.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import ceil, floor
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lab.errors import BadInput
+
+Cell = tuple[int, int]
+
+OVERLAP = 0.1  # of a cell's side: a footprint reaching less far into a cell does not block it
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """How a picture shows the grid.
+
+    `pixel_from_world` (3, 4) takes homogeneous world points [m] to homogeneous pixels, with all of the camera's pixel
+    offsets in it (`lab/sim/camera.py`). The grid has `shape` cells of `cell_m` from the corner `origin_m` on, i along x
+    and j along y. By kind of marker: `heights_m` above the world's z = 0, `offsets_m` (dx, dy) from the marker to the
+    thing it stands for, `footprints_m` half the side of the square that the thing covers; 0 where a kind is missing.
+    Raises BadInput when the matrix is not finite, of another shape or flat, or when the grid is empty.
+    """
+
+    pixel_from_world: NDArray[np.float64]
+    origin_m: tuple[float, float]
+    cell_m: float
+    shape: Cell
+    heights_m: Mapping[str, float] = field(default_factory=dict)
+    offsets_m: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    footprints_m: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        matrix = np.asarray(self.pixel_from_world)
+        if matrix.shape != (3, 4) or not np.isfinite(matrix).all() or np.linalg.matrix_rank(matrix) < 3:
+            raise BadInput(f"view: pixel_from_world of shape {matrix.shape}: wanted (3, 4), finite and of rank 3")
+        if min(self.shape) < 1 or not self.cell_m > 0:
+            raise BadInput(
+                f"view: a grid of {self.shape} cells of {self.cell_m} m: wanted at least (1, 1) and above 0 m"
+            )
+
+    def pixel(self, point: ArrayLike) -> NDArray[np.float64]:
+        """The pixel (..., 2) of world points (..., 3) [m]."""
+        points = np.asarray(point, dtype=np.float64)
+        projected = points @ self.pixel_from_world[:, :3].T + self.pixel_from_world[:, 3]
+        pixels: NDArray[np.float64] = projected[..., :2] / projected[..., 2:]
+        return pixels
+
+    def place(self, pixel: ArrayLike, kind: str) -> tuple[float, float]:
+        """The world (x, y) [m] of the thing whose marker of `kind` is at `pixel`: its ray meets the marker's height."""
+        camera = self.pixel_from_world
+        pixel_from_plane = camera[:, [0, 1, 3]].copy()  # at z = height a point is (x, y, 1)
+        pixel_from_plane[:, 2] += camera[:, 2] * self.heights_m.get(kind, 0.0)
+        x, y, w = np.linalg.solve(pixel_from_plane, np.append(np.asarray(pixel, dtype=np.float64), 1.0))
+        dx, dy = self.offsets_m.get(kind, (0.0, 0.0))
+        return float(x / w) + dx, float(y / w) + dy
+
+    def cell(self, place_m: tuple[float, float]) -> Cell:
+        """The cell of a world (x, y) [m]; outside the grid its indices lie outside `shape`."""
+        i, j = ((value - start) / self.cell_m for value, start in zip(place_m, self.origin_m, strict=True))
+        return floor(i), floor(j)
+
+    def centre(self, cell: Cell) -> tuple[float, float]:
+        """The world (x, y) [m] of a cell's middle."""
+        i, j = cell
+        return self.origin_m[0] + (i + 0.5) * self.cell_m, self.origin_m[1] + (j + 0.5) * self.cell_m
+
+    def holds(self, cell: Cell) -> bool:
+        """Whether `cell` lies in the grid."""
+        return 0 <= cell[0] < self.shape[0] and 0 <= cell[1] < self.shape[1]
+
+    def covered(self, kind: str, place_m: tuple[float, float]) -> list[Cell]:
+        """The grid's cells that a thing of `kind` at `place_m` covers: its own and those its footprint reaches into."""
+        half = self.footprints_m.get(kind, 0.0)
+        own, spans = self.cell(place_m), []
+        for value, start, middle in zip(place_m, self.origin_m, own, strict=True):
+            first = floor((value - half - start) / self.cell_m + OVERLAP)
+            last = ceil((value + half - start) / self.cell_m - OVERLAP) - 1
+            spans.append(range(min(first, middle), max(last, middle) + 1))
+        return [(i, j) for i in spans[0] for j in spans[1] if self.holds((i, j))]
+
+    @cached_property
+    def cell_pixels(self) -> float:
+        """The mean area of a cell in the picture [pixels], at z = 0."""
+        rows, columns = self.shape
+        corners = np.array([[0, 0], [rows, 0], [rows, columns], [0, columns]]) * self.cell_m + self.origin_m
+        x, y = self.pixel(np.column_stack([corners, np.zeros(4)])).T
+        return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2 / (rows * columns)
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A round marker found: its sub-pixel centre, and the place [m] and cell of the thing that it stands for."""
+
+    kind: str
+    pixel: tuple[float, float]
+    world_m: tuple[float, float]
+    cell: Cell
+
+
+@dataclass(frozen=True, eq=False)
+class GridView:
+    """What a picture shows: start (gripper), goal (toaster) and blocked cells of a grid of `shape`.
+
+    `residuals_m`: each marker's place minus the middle of its cell, in the order of `markers`. `ignored`: how many
+    spots of a marker's hue were large enough, yet not round or too large: nobody misses an obstacle unawares.
+    """
+
+    shape: Cell
+    start: Cell
+    goal: Cell
+    obstacles: tuple[Cell, ...]
+    markers: tuple[Marker, ...]
+    residuals_m: tuple[tuple[float, float], ...]
+    ignored: int
+    view: View
+
+    @property
+    def blocked(self) -> NDArray[np.bool_]:
+        """The obstacles as an array of `shape`, as `lab.mdp.grid` takes them."""
+        blocked = np.zeros(self.shape, dtype=np.bool_)
+        for cell in self.obstacles:
+            blocked[cell] = True
+        return blocked
+
+    def to_json(self) -> dict[str, Any]:
+        """The record for `lab see --json`."""
+        markers = [
+            {"kind": m.kind, "pixel": list(m.pixel), "world_m": list(m.world_m), "cell": list(m.cell)}
+            for m in self.markers
+        ]
+        return {
+            "grid": list(self.shape),
+            "start": list(self.start),
+            "goal": list(self.goal),
+            "obstacles": [list(cell) for cell in self.obstacles],
+            "markers": markers,
+            "residuals_m": [list(pair) for pair in self.residuals_m],
+            "ignored": self.ignored,
+        }
+
+
+def plain_view(picture: tuple[int, int], shape: Cell) -> View:
+    """The view of a picture of (height, width) pixels that is the grid itself: row i downwards, column j to the right.
+
+    Nothing is known about lengths there: a cell counts as 1 m.
+    """
+    down, right = (pixels / max(cells, 1) for pixels, cells in zip(picture, shape, strict=True))
+    return View(
+        np.array([[0.0, right, 0.0, -0.5], [down, 0.0, 0.0, -0.5], [0.0, 0.0, 0.0, 1.0]]), (0.0, 0.0), 1.0, shape
+    )

@@ -1,0 +1,248 @@
+"""Pictures: an overhead one to a grid, and reading, annotating and writing them (thesis ch. 8.3, step 3).
+
+Round coloured markers are told apart by hue and saturation, never by brightness: a renderer shades flat discs like
+balls, and a room has shadows.
+"""
+
+import zlib
+from dataclasses import dataclass
+from math import pi
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput
+from lab.vision.overhead import Cell, GridView, Marker, View, plain_view
+
+Image = NDArray[np.uint8]  # (H, W, 3), RGB
+
+SATURATION = 100  # of 255; wood, bread, steel and skin stay below it or have another hue
+CHROMA = 12  # of 255, largest minus smallest channel: on black, sensor noise has every hue and full saturation
+MIN_PIXELS = 8.0  # a smaller spot is noise
+RIM = 1.0  # pixels from the spot's hull: the outline's points that are its edge and not a highlight's
+MAX_CELLS = 2.0  # a larger spot is no marker
+ROUNDNESS = 0.72  # of the spot's smallest circle that it fills: a disc near 1, a square 0.64
+PNG = b"\x89PNG\r\n\x1a\n"
+MAX_BYTES = 64_000_000
+MAX_PIXELS = 40_000_000
+MAX_MARKERS = 10_000  # in a picture: a grid of 100 x 100 cells; fitting an ellipse to each of more takes too long
+
+
+@dataclass(frozen=True)
+class Hue:
+    """A marker's colour: OpenCV `hue` (0..179) within `tolerance`, its name, and the RGB (0..255) to paint it with."""
+
+    hue: int
+    colour: str
+    rgb: tuple[int, int, int]
+    tolerance: int = 12
+
+
+MARKERS = {
+    "gripper": Hue(150, "magenta", (255, 0, 255)),
+    "obstacle": Hue(60, "green", (0, 255, 0)),
+    "toaster": Hue(90, "cyan", (0, 255, 255)),
+}
+
+
+def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
+    """All markers in a picture (H, W, 3), by kind, then cell, and how many spots of their hues were no round marker.
+
+    Cells may lie outside the grid. Raises BadInput for a picture of another shape or dtype, or of too many markers.
+    """
+    import cv2
+
+    _check(image)
+    hsv = cv2.cvtColor(image, cv2.COLOR_RGB2HSV)
+    colourful = image.max(axis=2) - image.min(axis=2) >= CHROMA
+    markers, ignored = [], 0
+    for kind, hue in MARKERS.items():
+        low, high = (hue.hue - hue.tolerance, SATURATION, 0), (hue.hue + hue.tolerance, 255, 255)
+        mask = cv2.inRange(hsv, np.array(low), np.array(high)) * colourful
+        for outline in cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]:
+            hull = cv2.convexHull(outline)  # a highlight may bite into the outline
+            area, radius = cv2.contourArea(hull), cv2.minEnclosingCircle(hull)[1]
+            if area < MIN_PIXELS:
+                continue
+            if area > MAX_CELLS * view.cell_pixels or cv2.contourArea(outline) < ROUNDNESS * pi * radius**2:
+                ignored += 1
+                continue
+            rim = [p for p in outline if abs(cv2.pointPolygonTest(hull, tuple(map(float, p[0])), True)) < RIM]
+            (x, y), _, _ = cv2.fitEllipse(np.array(rim))
+            pixel = (float(x), float(y))
+            place = view.place(pixel, kind)
+            markers.append(Marker(kind, pixel, place, view.cell(place)))
+            if len(markers) > MAX_MARKERS:
+                raise BadInput(f"picture: more than {MAX_MARKERS} round coloured spots: no picture of a grid")
+    return tuple(sorted(markers, key=lambda m: (m.kind, m.cell, m.pixel))), ignored
+
+
+def see(image: Image, view: View | None = None, *, shape: Cell = (12, 12), where: str = "picture") -> GridView:
+    """The grid that a picture (H, W, 3) shows; without a view the picture itself is a grid of `shape`.
+
+    Raises BadInput, naming `where`: no markers, not exactly one gripper or one toaster, a marker outside the grid, the
+    start or the goal on an obstacle, a picture of another shape or dtype. Thesis ch. 8.3, fig. 8.2.
+    """
+    _check(image, where)
+    view = view or plain_view(image.shape[:2], shape)
+    markers, ignored = find_markers(image, view)
+    if not markers:
+        wanted = ", ".join(f"{name} ({hue.colour})" for name, hue in MARKERS.items())
+        raise BadInput(f"{where}: no round coloured marker found: wanted {wanted}{_passed_over(ignored)}")
+    gripper, toaster = (_single(markers, ignored, kind, where) for kind in ("gripper", "toaster"))
+    for marker in markers:
+        if not view.holds(marker.cell):
+            raise BadInput(f"{where}: {_outside(marker, view)}")
+    obstacles = {c for m in markers if m.kind == "obstacle" for c in view.covered(m.kind, m.world_m)}
+    for name, marker in (("start", gripper), ("goal", toaster)):
+        if marker.cell in obstacles:
+            raise BadInput(
+                f"{where}: the {name} {marker.cell} ({marker.kind} marker) is on a cell that an obstacle covers"
+            )
+    centres = [view.centre(m.cell) for m in markers]
+    residuals = tuple((m.world_m[0] - x, m.world_m[1] - y) for m, (x, y) in zip(markers, centres, strict=True))
+    found = tuple(sorted(obstacles))
+    return GridView(view.shape, gripper.cell, toaster.cell, found, markers, residuals, ignored, view)
+
+
+def locate(image: Image, view: View, kind: str, *, where: str = "picture") -> Marker:
+    """The one marker of `kind` in a picture (H, W, 3), to compare where the gripper is with where it should be.
+
+    Raises BadInput, naming `where`, when there is none or more than one, or for a picture of another shape or dtype.
+    """
+    _check(image, where)
+    return _single(*find_markers(image, view), kind, where)
+
+
+def _check(image: Image, where: str = "picture") -> None:
+    array = np.asarray(image)
+    if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3 or min(array.shape) < 1:
+        raise BadInput(f"{where}: an array of shape {array.shape} and {array.dtype}: wanted (H, W, 3), RGB, uint8")
+
+
+def _single(markers: tuple[Marker, ...], ignored: int, kind: str, where: str) -> Marker:
+    mine = [m for m in markers if m.kind == kind]
+    if len(mine) != 1:
+        pixels = ", ".join(f"({m.pixel[0]:.0f}, {m.pixel[1]:.0f})" for m in mine)
+        seen = f"{len(mine)} {kind} markers at pixels {pixels}" if mine else f"no {kind} marker"
+        wanted = f"wanted exactly one round {MARKERS[kind].colour} spot for the {kind}"
+        raise BadInput(f"{where}: {seen}: {wanted}{_passed_over(ignored)}")
+    return mine[0]
+
+
+def _passed_over(ignored: int) -> str:
+    return f"; coloured spots passed over as not round or too large: {ignored}" if ignored else ""
+
+
+def _outside(marker: Marker, view: View) -> str:
+    x0, y0 = view.origin_m
+    x1, y1 = x0 + view.shape[0] * view.cell_m, y0 + view.shape[1] * view.cell_m
+    (u, v), (x, y) = marker.pixel, marker.world_m
+    return (
+        f"the {marker.kind} marker at pixel ({u:.0f}, {v:.0f}) lies outside the grid: "
+        f"x {x:.3f}, y {y:.3f} m is not within x {x0:g} to {x1:g}, y {y0:g} to {y1:g} m"
+    )
+
+
+def read_picture(path: Path) -> Image:
+    """A PNG or JPEG file as an RGB array (H, W, 3).
+
+    Raises BadInput, with the reason, when it cannot be read, is cut off, is neither, or is larger than 64 MB or 40
+    million pixels; the size is read from the header, before any memory is spent on the picture.
+    """
+    import cv2
+
+    try:
+        if path.exists() and not path.is_file():
+            raise BadInput(f"{path}: not a file: wanted a PNG or JPEG picture")
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise BadInput(f"{path}: {size} bytes: pictures up to {MAX_BYTES} bytes are read")
+        data = path.read_bytes()
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
+    width, height = _size(data, path)
+    if not 0 < width * height <= MAX_PIXELS:
+        raise BadInput(f"{path}: {width} x {height} pixels: pictures of 1 to {MAX_PIXELS} pixels are read")
+    decoded = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    if decoded is None:
+        raise BadInput(f"{path}: the picture's data are damaged")
+    return np.asarray(cv2.cvtColor(decoded, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+
+
+def _size(data: bytes, path: Path) -> tuple[int, int]:
+    """Width and height from the header of a complete PNG or JPEG file."""
+    if data.startswith(PNG):
+        _check_chunks(data, path)
+        return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+    if not data.startswith(b"\xff\xd8\xff"):
+        raise BadInput(f"{path}: not a picture that can be read: wanted a PNG or JPEG file")
+    at, size = 2, (0, 0)
+    while at + 9 <= len(data) and data[at] == 0xFF:
+        kind, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4], "big")
+        if 0xC0 <= kind <= 0xCF and kind not in (0xC4, 0xC8, 0xCC):  # a frame header
+            size = int.from_bytes(data[at + 7 : at + 9], "big"), int.from_bytes(data[at + 5 : at + 7], "big")
+        if kind == 0xDA:  # the scan, up to the end mark
+            if size == (0, 0) or data.find(b"\xff\xd9", at) < 0:
+                break
+            return size
+        at += 2 + length
+    raise BadInput(f"{path}: the JPEG file is cut off")
+
+
+def _check_chunks(data: bytes, path: Path) -> None:
+    """Walk a PNG file's chunks to its end mark: libpng would write to stderr about a broken one by itself."""
+    at, kind = len(PNG), b""
+    while kind != b"IEND":
+        length, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
+        end = at + 12 + length
+        if end > len(data):
+            raise BadInput(f"{path}: the PNG file is cut off")
+        if zlib.crc32(data[at + 4 : end - 4]) != int.from_bytes(data[end - 4 : end], "big"):
+            raise BadInput(f"{path}: the picture's data are damaged")
+        at = end
+
+
+def write_picture(path: Path, image: Image) -> None:
+    """Write an RGB array (H, W, 3) as the PNG or JPEG file that the name says; raises BadInput when that cannot be."""
+    import cv2
+
+    _check(image, str(path))
+    if path.suffix.lower() not in (".png", ".jpg", ".jpeg"):
+        raise BadInput(f"{path}: pictures are written as .png, .jpg or .jpeg")
+    _, encoded = cv2.imencode(path.suffix, cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    try:
+        path.write_bytes(encoded.tobytes())
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def draw(image: Image, grid: GridView) -> Image:
+    """A copy of the picture (H, W, 3) with the grid's lines, start, goal, obstacles and the markers' centres on it."""
+    import cv2
+
+    _check(image)
+    view = grid.view
+    thin = max(1, round(min(image.shape[:2]) / 400))
+
+    def corners(i: float, j: float, rows: float, columns: float) -> NDArray[np.int32]:
+        square = np.array([(i, j), (i + rows, j), (i + rows, j + columns), (i, j + columns)]) * view.cell_m
+        points = np.column_stack([square + view.origin_m, np.zeros(4)])
+        return np.rint(view.pixel(points)).astype(np.int32)
+
+    filled = np.array(image)
+    for i, j in grid.obstacles:
+        cv2.fillPoly(filled, [corners(i, j, 1, 1)], (200, 40, 40))
+    canvas = np.asarray(cv2.addWeighted(filled, 0.45, image, 0.55, 0.0), dtype=np.uint8)
+    rows, columns = grid.shape
+    for i in range(rows):
+        cv2.polylines(canvas, [corners(i, 0, 1, columns)], True, (255, 255, 255), thin, cv2.LINE_AA)
+    for j in range(columns):
+        cv2.polylines(canvas, [corners(0, j, rows, 1)], True, (255, 255, 255), thin, cv2.LINE_AA)
+    for cell, kind in ((grid.start, "gripper"), (grid.goal, "toaster")):
+        cv2.polylines(canvas, [corners(*cell, 1, 1)], True, MARKERS[kind].rgb, 3 * thin, cv2.LINE_AA)
+    for marker in grid.markers:
+        at = (round(marker.pixel[0]), round(marker.pixel[1]))
+        cv2.drawMarker(canvas, at, (0, 0, 0), cv2.MARKER_CROSS, 10 * thin, thin)
+    return canvas
