@@ -135,18 +135,17 @@ def test_appendix_v_is_as_before(study: Callable[[str], list[Row]], tmp_path: Pa
     same_as_stored("appendix-v.csv", side_by_side(study("appendix-v"), ADVICE), tmp_path)
 
 
-@pytest.mark.parametrize("view", ["full", "limited"])
-def test_the_labs_own_gates_are_as_before(lab: Lab, tmp_path: Path, view: str) -> None:
+def test_the_labs_own_gates_are_as_before(lab: Lab, tmp_path: Path) -> None:
     """Those that the thesis does not have, in one session each."""
     lines = []
     for gate, advisor in product(
         ("cq", "always", "never", "random", "importance", "uncertainty"), ("moderate", "wrong")
     ):
-        asked = ("--view", view, "--gate", gate, "--advisor", advisor, "--episodes", "80", "--seed", "0")
+        asked = ("--gate", gate, "--advisor", advisor, "--episodes", "80", "--seed", "0")
         found = lab("teach", "world-1", *asked, "--toolbox", str(tmp_path / f"{gate}-{advisor}"), "--json").json
         came = {"steps": sum(found["steps_per_episode"]), **{n: found[n] for n in ("requests", "helped_steps")}}
         lines.append({"gate": gate, "advisor": advisor} | came)
-    same_as_stored(f"own-gates-{view}.csv", lines, tmp_path)
+    same_as_stored("own-gates.csv", lines, tmp_path)
 
 
 # ---- chapter 7: sequencing ----------------------------------------------------------------------------------------
