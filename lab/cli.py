@@ -213,8 +213,8 @@ def run(
     from lab import taskfile
     from lab.advice.advisors import PEOPLE
     from lab.advice.counsel import Counsel
+    from lab.production.prepared import prepare
     from lab.production.report import check_out
-    from lab.production.run import prepare
     from lab.production.run import run as run_task
     from lab.sessions import Words, kept_by
     from lab.view.summary import run_summary

@@ -158,8 +158,8 @@ def teach_one(
     problem.
     """
     from lab.production.floor import try_out
+    from lab.production.prepared import prepare
     from lab.production.report import draw_value_map
-    from lab.production.run import prepare
     from lab.production.skillset import SkillSet
 
     toasts = fitting(task, 2)
@@ -172,7 +172,7 @@ def teach_one(
     earlier = teacher.toolbox.find(problem.subtask, problem.mdp.signature, name or plain_name(problem))
     lesson = teacher.one_session(problem, settings, task.name, name)
     policy = prepared.skillset.policies[skill.name] = lesson.policy
-    failure = try_out(prepared.skillset, prepared.surveys, skill) if skill.tried else None
+    failure = try_out(prepared, skill) if skill.tried else None
     if failure is not None and policy.solved:
         policy = teacher.keep_unsolved(policy, earlier)
     document = _document(problem, replace(lesson, policy=policy), teacher, failure)

@@ -15,7 +15,7 @@ from lab.errors import BadInput
 from lab.gridworld import GridWorld
 from lab.gym import ENVIRONMENTS, CellEnv, FmsEnv, TableEnv, ToastCellEnv, WorldEnv, register
 from lab.mdp import coverage, grid
-from lab.production.run import prepare
+from lab.production.prepared import prepare
 from lab.sequencing.cell import Cell
 from lab.sequencing.exact import optimum
 from lab.sequencing.objectives import MAKESPAN, stuck_cost

@@ -150,7 +150,7 @@ def test_a_grasp_that_lifts_nothing_is_not_kept_as_solved(
 def test_bad_words_are_refused_before_the_scene_is_surveyed(
     task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch, subtask: str, options: dict[str, Any], reason: str
 ) -> None:
-    monkeypatch.setattr("lab.production.run.prepare", lambda *_: pytest.fail("surveyed"))
+    monkeypatch.setattr("lab.production.prepared.prepare", lambda *_: pytest.fail("surveyed"))
     with pytest.raises(BadInput, match=reason):
         teach_one(task, subtask, teacher, **options)
     assert not teacher.toolbox.folder.exists()

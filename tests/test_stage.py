@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from lab.gridworld import GridWorld, random_world
 from lab.mdp import FloatArray, TabularMDP, grid
-from lab.production.run import prepare
+from lab.production.prepared import prepare
 from lab.sim import assets
 from lab.sim.kinematics import TOOL, ToolPose, inverse
 from lab.sim.scene import GRASP_DEPTH

@@ -5,16 +5,15 @@ from dataclasses import dataclass, field
 from math import hypot
 
 from lab.production.floor import Floor
+from lab.production.prepared import Prepared
 from lab.production.recorder import Viewer
-from lab.production.skillset import SkillSet
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import Move, Schedule
 from lab.sequencing.run import Run
-from lab.sim.scene import Layout, Spot, spots
+from lab.sim.scene import Spot, spots
 from lab.sim.world import World
 from lab.skills import Skill
 from lab.skills.skill import UPRIGHT, Status
-from lab.skills.surveys import Surveys
 from lab.view.frames import Recording
 
 MAX_TRIES = 3  # a failed step is tried again from the state reached, at most twice
@@ -45,7 +44,6 @@ class Production:
 
     floor: Floor
     cell: Cell
-    surveys: Surveys
     on_move: Callable[[Move], None] | None = None
     on_retry: Callable[[str], None] | None = None
     moves: list[Move] = field(default_factory=list)
@@ -193,9 +191,7 @@ def _slice(toast: int) -> str:
 
 
 def carry_out(
-    skillset: SkillSet,
-    surveys: Surveys,
-    layout: Layout,
+    prepared: Prepared,
     cell: Cell,
     sequence: Sequence[int],
     *,
@@ -208,10 +204,10 @@ def carry_out(
     A toast is delivered when its slice stands on the last station at the end; dropped when it is nowhere upright.
     """
     with World() as world:
-        floor = Floor(world, skillset, layout, cell.parts, film=True, viewer=viewer)
-        floor.stand(surveys.approach(cell.robot_start))
+        floor = Floor(world, prepared.skillset, prepared.layout, cell.parts, film=True, viewer=viewer)
+        floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
-        work = Production(floor, cell, surveys, on_move, on_retry)
+        work = Production(floor, cell, on_move, on_retry)
         floor.on_tick = work.watch
         failure = work.carry_out(sequence)
         floor.recorder.take()  # type: ignore[union-attr]

@@ -13,16 +13,13 @@ from lab.mdp import TabularMDP, greedy_path
 from lab.policy import Policy
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
-from lab.production.skillset import SkillSet
+from lab.production.prepared import Prepared
 from lab.sequencing.cell import Cell
 from lab.sequencing.events import SequenceResult
 from lab.sequencing.exact import Optimum
 from lab.sequencing.run import simulate
-from lab.sim.scene import Layout
 from lab.skills import Skill
-from lab.skills.skill import Photo, Problem
-from lab.skills.surveys import Surveys
-from lab.taskfile import Task
+from lab.skills.skill import Photo
 from lab.teaching import Lesson
 from lab.view.frames import Recording
 
@@ -35,20 +32,6 @@ FILES = {
     "sequence": "sequence.json",
     "run": "run.json",
 }
-
-
-@dataclass
-class Prepared:
-    """A task whose scene is surveyed, which took `wall_s`: nothing is learned yet, and nothing is written."""
-
-    task: Task
-    toasts: int
-    seed: int
-    layout: Layout
-    surveys: Surveys
-    skillset: SkillSet
-    problems: dict[str, Problem]
-    wall_s: float = 0.0
 
 
 @dataclass

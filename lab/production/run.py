@@ -3,37 +3,17 @@
 import time
 from pathlib import Path
 
-import numpy as np
-
 from lab.errors import LabError
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
 from lab.production.composer import carry_out
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
+from lab.production.prepared import Prepared
 from lab.production.recorder import Viewer, show_scene
-from lab.production.report import Prepared, Report, Taught, write_files
-from lab.production.skillset import SkillSet
+from lab.production.report import Report, Taught, write_files
 from lab.sequencing.exact import optimum
 from lab.sequencing.search import Reference
-from lab.sim.scene import check_apart, draw_layout
-from lab.skills.surveys import Surveys
-from lab.taskfile import Task, check_toasts
 from lab.teaching import Teacher
-
-
-def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prepared:
-    """Lay the scene out as the seed says and survey every problem of it, or `only` one skill's.
-
-    BadInput for whatever cannot be; writes nothing.
-    """
-    began = time.perf_counter()
-    check_toasts(toasts, task)
-    check_apart(task, toasts)
-    skillset = SkillSet.of(task, toasts)
-    layout = draw_layout(task, toasts, np.random.default_rng([seed, 1]))
-    surveys = Surveys(task, layout)
-    problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items() if only in (None, name)}
-    return Prepared(task, toasts, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
 
 
 def teach_all(prepared: Prepared, teacher: Teacher, listener: Listener) -> Taught:
@@ -66,7 +46,7 @@ def _durations(prepared: Prepared, teacher: Teacher, listener: Listener) -> Dura
         return kept
     processes = sum(station.process is not None for station in prepared.task.stations)
     listener.phase("measure", len(skillset.moves.loaded) + len(skillset.moves.empty) + processes)
-    durations = measure(skillset, prepared.surveys, listener.measured)
+    durations = measure(prepared, listener.measured)
     if key:
         teacher.toolbox.save_record(RECORDS, key, durations.to_json())
     return durations
@@ -88,9 +68,7 @@ def run(
     listener.sequenced(found, Reference(proven.bound_s, proven.proven, "A*"))
     listener.phase("carry out", len(found.sequence))
     outcome, recording = carry_out(
-        prepared.skillset,
-        prepared.surveys,
-        prepared.layout,
+        prepared,
         taught.cell,
         found.sequence,
         viewer=viewer,

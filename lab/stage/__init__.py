@@ -13,7 +13,7 @@ from lab.stage.world import WorldStage
 from lab.view.frames import Body, Camera, Frame
 
 if TYPE_CHECKING:
-    from lab.production.report import Prepared
+    from lab.production.prepared import Prepared
 
 
 class Stage(Protocol):

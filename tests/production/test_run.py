@@ -19,9 +19,9 @@ from lab.listener import Listener
 from lab.planner import find_sequence, search_for
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
-from lab.production.report import FILES, Prepared, Report, Taught, check_out, write_files
-from lab.production.run import prepare, teach_all
-from lab.production.skillset import SkillSet
+from lab.production.prepared import Prepared, prepare
+from lab.production.report import FILES, Report, Taught, check_out, write_files
+from lab.production.run import teach_all
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.events import Schedule
 from lab.sequencing.exact import optimum
@@ -184,13 +184,14 @@ def toolbox(cold: Ran, tmp_path: Path) -> Toolbox:
 
 
 @pytest.fixture
-def measured(monkeypatch: pytest.MonkeyPatch) -> list[SkillSet]:
-    """The skill sets whose moves were timed; each move takes 5 s."""
-    timed: list[SkillSet] = []
+def measured(monkeypatch: pytest.MonkeyPatch) -> list[Prepared]:
+    """The tasks whose moves were timed; each move takes 5 s."""
+    timed: list[Prepared] = []
 
-    def measure(skillset: SkillSet, *_: object) -> Durations:
-        timed.append(skillset)
-        empty, loaded = (dict.fromkeys(pairs, 5.0) for pairs in (skillset.moves.empty, skillset.moves.loaded))
+    def measure(prepared: Prepared, *_: object) -> Durations:
+        timed.append(prepared)
+        moves = prepared.skillset.moves
+        empty, loaded = (dict.fromkeys(pairs, 5.0) for pairs in (moves.empty, moves.loaded))
         return Durations(empty, loaded, {"butter_applier": 5.0}, 1.0)
 
     monkeypatch.setattr(lab.production.run, "measure", measure)
@@ -201,7 +202,7 @@ def sources(taught: Taught) -> dict[str, str]:
     return {name: lesson.source for name, lesson in taught.lessons.items()}
 
 
-def test_the_same_scene_needs_nothing(prepared: Prepared, toolbox: Toolbox, measured: list[SkillSet]) -> None:
+def test_the_same_scene_needs_nothing(prepared: Prepared, toolbox: Toolbox, measured: list[Prepared]) -> None:
     heard = Heard()
     taught = teach_all(prepared, Teacher(toolbox), heard)
     assert set(sources(taught).values()) == {"reused"}
@@ -230,7 +231,7 @@ def same(one: Prepared, other: Prepared, name: str) -> bool:
     ("cubes", "by", "must"), [("tower left", (0.0, 0.1), "transfer"), ("cubes A", (0.0, -0.05), "insert")]
 )
 def test_a_moved_obstacle_is_learned_around_and_nothing_else(
-    prepared: Prepared, toolbox: Toolbox, measured: list[SkillSet], cubes: str, by: tuple[float, float], must: str
+    prepared: Prepared, toolbox: Toolbox, measured: list[Prepared], cubes: str, by: tuple[float, float], must: str
 ) -> None:
     changed = prepare(move(prepared.task, cubes, by), 1, 0)
     affected = {name for name in prepared.problems if not same(prepared, changed, name)}
@@ -244,7 +245,7 @@ def test_a_moved_obstacle_is_learned_around_and_nothing_else(
 
 
 def test_damaged_policies_are_named_and_learned_again(
-    prepared: Prepared, toolbox: Toolbox, measured: list[SkillSet]
+    prepared: Prepared, toolbox: Toolbox, measured: list[Prepared]
 ) -> None:
     files = {path.stem.partition("-at-")[0]: path for path in toolbox.folder.glob("*-at-*.safetensors")}
     files["insert"].write_bytes(files["insert"].read_bytes()[:-8])
@@ -273,7 +274,7 @@ def test_damaged_policies_are_named_and_learned_again(
     ],
 )
 def test_damaged_durations_are_measured_again(
-    prepared: Prepared, toolbox: Toolbox, measured: list[SkillSet], damage: Callable[[dict[str, Any]], dict[str, Any]]
+    prepared: Prepared, toolbox: Toolbox, measured: list[Prepared], damage: Callable[[dict[str, Any]], dict[str, Any]]
 ) -> None:
     (path,) = (toolbox.folder / "records" / "durations").glob("*.json")
     whole = json.loads(path.read_text(encoding="utf-8"))
