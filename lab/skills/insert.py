@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.mdp import NoPath, grid
-from lab.overhead import Marker
 from lab.sim import assets
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import GRASP_DEPTH, Spot, is_toaster, spots
@@ -18,7 +17,7 @@ from lab.skills.place import let_go, release_pose
 from lab.skills.skill import Bench, Photo, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import INSERT_START, Surveys, camera_view, overhead_camera
 from lab.taskfile import Obstacle, Task
-from lab.vision import find_markers, locate, see
+from lab.vision import Marker, find_markers, locate, see
 
 if TYPE_CHECKING:
     from lab.policy import Policy

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import Environment
 from lab.mdp import NoPath, TabularMDP, greedy_path
-from lab.overhead import GridView
 from lab.sim import assets
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME as ROBOT
 from lab.sim.scene import GRASP_DEPTH, Scene, Spot, spots
 from lab.taskfile import Task
 from lab.view.frames import Body
+from lab.vision import GridView
 
 if TYPE_CHECKING:
     from lab.policy import Policy

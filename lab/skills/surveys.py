@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
-from lab.overhead import View
 from lab.sim import assets
 from lab.sim.camera import Camera
 from lab.sim.kinematics import ToolPose
@@ -28,6 +27,7 @@ from lab.sim.scene import (
 from lab.sim.survey import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.world import World
 from lab.taskfile import InsertGrid, Station, Task
+from lab.vision import View
 
 Cell = tuple[int, ...]
 

@@ -186,7 +186,7 @@ def test_all_that_moves_the_arm_is_in_the_key() -> None:
     assert {
         "lab.mdp",
         "lab.vision",
-        "lab.overhead",
+        "lab.vision.grid_view",
         "lab.production.skillset",
         "lab.production.floor",
     } <= found.texts.keys()

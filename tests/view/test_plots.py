@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.overhead import plain_view
 from lab.view.canvas import ORANGE, RED
 from lab.view.plots import cell_corners, learning_curves, value_map
+from lab.vision import plain_view
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """What an overhead picture shows: the camera's view of a grid, the markers in it and the grid that they make.
 
-Plain records between the camera (`lab/sim`), the reader of pictures (`lab/vision.py`) and whoever learns in the grid.
+Plain records between the camera (`lab/sim`), the reader of pictures (`markers.py`) and whoever learns in the grid.
 A marker's pixel goes back along its ray to the plane at the marker's own height, so a tall obstacle is not seen beside
 its place. Pixels are (x, y) from the centre of the top left pixel, to the right and down.
 """

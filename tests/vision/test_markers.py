@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
-from lab.overhead import View, plain_view
 from lab.sim.camera import Camera
 from lab.sim.world import World
-from lab.vision import MARKERS, Image, draw, find_markers, locate, see
+from lab.vision import MARKERS, Image, View, draw, find_markers, locate, plain_view, see
 
 HEIGHTS = {"gripper": 0.30, "obstacle": 0.15, "toaster": 0.10}
 CELL, SIDE = 0.05, 360
