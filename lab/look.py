@@ -4,59 +4,52 @@ import re
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput
 from lab.taskfile import check_number, load
 
+if TYPE_CHECKING:
+    from lab.vision import View
+
 
 def see_picture(image: Path, grid: str | None, task: str | None, out: Path | None) -> dict[str, Any]:
-    """A picture's markers as a grid, the document of `lab see --json`: '.' free, 'S' start, 'G' goal, '#' an obstacle's marker.
+    """A picture's markers as a grid, the document of `lab see --json`.
 
     With a task the grid is the one of its overhead camera; without, the frame is the grid, 12 x 12 unless `grid` says so.
     """
     from lab.vision import draw, read_picture, see, write_picture
 
-    match = re.fullmatch(r"([1-9]\d{0,2})x([1-9]\d{0,2})", "12x12" if grid is None else grid)
-    if match is None:
-        raise BadInput(f"grid '{grid}' (--grid): wanted ROWSxCOLUMNS, each 1 to 999, such as 12x12")
-    shape = (int(match[1]), int(match[2]))
+    shape = _shape(grid)
     picture = read_picture(image)
     camera = None
     if task is not None:
-        from lab.skills.surveys import camera_view
-
         height, width = picture.shape[:2]
         if height != width:
             raise BadInput(f"{image}: {width} x {height} pixels: the task's camera takes square pictures")
-        camera = camera_view(load(task), height)
-        if grid is not None and shape != camera.shape:
-            own = f"{camera.shape[0]}x{camera.shape[1]}"
-            raise BadInput(f"grid '{grid}' (--grid): the grid of the task's camera is {own}; leave --grid away")
-        shape = camera.shape
+        camera = _camera(task, height, None if grid is None else shape)
     seen = see(picture, camera, shape=shape, where=str(image))
-    cells = [["." for _ in range(shape[1])] for _ in range(shape[0])]
-    for i, j in seen.obstacles:
-        cells[i][j] = "#"
-    cells[seen.start[0]][seen.start[1]], cells[seen.goal[0]][seen.goal[1]] = "S", "G"
     if out is not None:
         write_picture(out, draw(picture, seen))
-    return {
-        "grid": ["".join(row) for row in cells],
-        "start": list(seen.start),
-        "goal": list(seen.goal),
-        "obstacles": [list(cell) for cell in seen.obstacles],
-        "markers": [
-            {
-                "kind": m.kind,
-                "pixel": [float(v) for v in m.pixel],
-                "world_m": [float(v) for v in m.world_m],
-                "cell": list(m.cell),
-            }
-            for m in seen.markers
-        ],
-        "files": {} if out is None else {"picture": str(out)},
-    }
+    return seen.to_json() | {"files": {} if out is None else {"picture": str(out)}}
+
+
+def _shape(grid: str | None) -> tuple[int, int]:
+    match = re.fullmatch(r"([1-9]\d{0,2})x([1-9]\d{0,2})", "12x12" if grid is None else grid)
+    if match is None:
+        raise BadInput(f"grid '{grid}' (--grid): wanted ROWSxCOLUMNS, each 1 to 999, such as 12x12")
+    return int(match[1]), int(match[2])
+
+
+def _camera(task: str, pixels: int, wanted: tuple[int, int] | None) -> "View":
+    """How a task's camera with so many pixels a side sees its grid; BadInput when a grid of another shape is wanted."""
+    from lab.skills.surveys import camera_view
+
+    camera = camera_view(load(task), pixels)
+    if wanted is not None and wanted != camera.shape:
+        own, other = (f"{shape[0]}x{shape[1]}" for shape in (camera.shape, wanted))
+        raise BadInput(f"grid '{other}' (--grid): the grid of the task's camera is {own}; leave --grid away")
+    return camera
 
 
 def show(what: str, toasts: int, seed: int, port: int, tell: Callable[[str, str], None]) -> None:

@@ -88,16 +88,13 @@ def see(image: Image, view: View | None = None, *, shape: Cell = (12, 12), where
     for marker in markers:
         if not view.holds(marker.cell):
             raise BadInput(f"{where}: {_outside(marker, view)}")
-    obstacles = {c for m in markers if m.kind == "obstacle" for c in view.covered(m.kind, m.world_m)}
+    obstacles = {m.cell for m in markers if m.kind == "obstacle"}
     for name, marker in (("start", gripper), ("goal", toaster)):
         if marker.cell in obstacles:
             raise BadInput(
                 f"{where}: the {name} {marker.cell} ({marker.kind} marker) is on a cell that an obstacle covers"
             )
-    centres = [view.centre(m.cell) for m in markers]
-    residuals = tuple((m.world_m[0] - x, m.world_m[1] - y) for m, (x, y) in zip(markers, centres, strict=True))
-    found = tuple(sorted(obstacles))
-    return GridView(view.shape, gripper.cell, toaster.cell, found, markers, residuals, ignored, view)
+    return GridView(view.shape, gripper.cell, toaster.cell, tuple(sorted(obstacles)), markers, view)
 
 
 def locate(image: Image, view: View, kind: str, *, where: str = "picture") -> Marker:
