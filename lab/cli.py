@@ -213,8 +213,8 @@ def run(
     from lab import taskfile
     from lab.advice.advisors import PEOPLE
     from lab.advice.counsel import Counsel
+    from lab.files import check_out
     from lab.production.prepared import prepare
-    from lab.production.report import check_out
     from lab.production.run import run as run_task
     from lab.sessions import Words, kept_by
     from lab.view.summary import run_summary
@@ -298,9 +298,9 @@ def teach(
 
     Each session keeps a journal: --resume goes on with one that was broken off, lab replay shows it again.
     """
+    from lab.files import check_out
     from lab.lesson import check
     from lab.lesson import teach as teach_session
-    from lab.production.report import check_out
     from lab.sessions import Words
     from lab.view.summary import lesson_summary
 

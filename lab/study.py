@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.production.report import check_out
+from lab.files import check_out
 from lab.record import write_whole
 from lab.studies import STUDIES
 from lab.studies.runner import STORE, Job, Progress

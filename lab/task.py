@@ -6,10 +6,10 @@ from typing import Any
 
 from lab.cellfile import CellFile
 from lab.errors import BadInput, LabError
+from lab.files import check_out
 from lab.gridworld import RANDOM, GridWorld, parse_shape, random_world
 from lab.lesson import fitting
 from lab.mdp import shortest_steps
-from lab.production.report import check_out
 from lab.record import read_text, write_whole
 from lab.taskfile import check_number, find, load_any
 from lab.teaching import world_problem

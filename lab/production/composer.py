@@ -82,18 +82,19 @@ class Production:
         for skill in () if start == origin else floor.skillset.travels[start, origin]:
             self._try(toast, origin, skill)
         reach_s = floor.now_s
-        self._await(toast, origin)
+        self.wait_for(toast, origin)
         pick_s = floor.now_s
-        spot = self._free_spot(target)
+        spot = self.free_spot(target)
         self._carry(toast, origin, target, spot)
         self.place, self.spot_of[toast] = target, spot
         process_s = self.plan.move(toast).process_s
         self.moves.append(Move(toast, start, origin, target, leave_s, reach_s, pick_s, floor.now_s, process_s))
-        self._start_machine(toast, target)
+        self.start_machine(toast, target)
         if self.on_move is not None:
             self.on_move(self.moves[-1])
 
-    def _free_spot(self, station: str) -> Spot:
+    def free_spot(self, station: str) -> Spot:
+        """The first spot of a station on which no toast stands."""
         return next(s for s in spots(self.floor.skillset.task.station(station)) if s not in self.spot_of.values())
 
     def _carry(self, toast: int, origin: str, target: str, spot: Spot) -> None:
@@ -145,7 +146,7 @@ class Production:
         if self.on_retry is not None:
             self.on_retry(text)
 
-    def _await(self, toast: int, station: str) -> None:
+    def wait_for(self, toast: int, station: str) -> None:
         """Wait at a machine until it is done with its toast; a learned process that failed is tried again."""
         machine = self.floor.machines.get(station)
         tries = 0
@@ -162,7 +163,8 @@ class Production:
                 return
             self.floor.tick()
 
-    def _start_machine(self, toast: int, station: str) -> None:
+    def start_machine(self, toast: int, station: str) -> None:
+        """Let the machine that a toast has been brought to begin: with its learned process, or for its time."""
         floor, place = self.floor, self.floor.skillset.task.station(station)
         for skill in floor.skillset.processes[station]:
             floor.start(skill.aim(_slice(toast)))

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lab.errors import BadInput, WorkFailed
-from lab.files import draft, nearest
+from lab.errors import WorkFailed
+from lab.files import draft
 from lab.mdp import TabularMDP, greedy_path
 from lab.policy import Policy
 from lab.production.composer import Outcome
@@ -114,18 +114,6 @@ def _skill_row(name: str, lesson: Lesson) -> dict[str, Any]:
     }
 
 
-def check_out(out: Path) -> None:
-    """BadInput unless `out` is a folder that can be written, or can be made; makes nothing."""
-    try:
-        place = nearest(out)
-    except OSError as error:
-        raise BadInput(f"output folder '{out}' (--out): {error.strerror}") from None
-    if not place.is_dir():
-        raise BadInput(f"output folder '{out}' (--out): '{place}' is a file; give a folder")
-    if not os.access(place, os.W_OK | os.X_OK):
-        raise BadInput(f"output folder '{out}' (--out): '{place}' is not writable")
-
-
 def write_files(prepared: Prepared, taught: Taught, report: Report, out: Path) -> None:
     """Write what there is of `FILES` to `out`, all at once at the end: none is ever half written, none is left of a run before.
 
@@ -135,7 +123,7 @@ def write_files(prepared: Prepared, taught: Taught, report: Report, out: Path) -
     try:
         out.mkdir(parents=True, exist_ok=True)
         with draft(out) as beside:
-            _draw_all(prepared, taught, report, beside)
+            draw_all(prepared, taught, report, beside)
             for name, file in FILES.items():
                 if name in report.files:
                     os.replace(beside / file, out / file)
@@ -158,7 +146,7 @@ def _photographed(prepared: Prepared) -> Skill | None:
     return next((skill for skill in prepared.skillset.skills.values() if skill.photo() is not None), None)
 
 
-def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) -> None:
+def draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) -> None:
     """The pictures, the replay and the two JSON files."""
     from lab.view.meshcat import replay_html
     from lab.view.plots import gantt, learning_curves
@@ -168,7 +156,7 @@ def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) 
     predicted = simulate(taught.cell, report.sequenced.sequence)
     if "gantt" in report.files:
         gantt(report.outcome.schedule, paths["gantt"], predicted=predicted)
-    learning_curves(_curves(prepared, taught.lessons), paths["learning_curves"])
+    learning_curves(curves(prepared, taught.lessons), paths["learning_curves"])
     skill = _photographed(prepared)
     photo = None if skill is None else skill.photo()
     if skill is not None and photo is not None:
@@ -181,7 +169,7 @@ def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) 
     _write_json(paths["run"], report.to_json() | {"schedule": report.outcome.schedule.to_json()})
 
 
-def _curves(prepared: Prepared, lessons: dict[str, Lesson]) -> dict[str, Policy]:
+def curves(prepared: Prepared, lessons: dict[str, Lesson]) -> dict[str, Policy]:
     """Each policy once, under the skill that it was first found for."""
     first = {lesson.policy.name: name for name, lesson in reversed(lessons.items())}
     several = {name for name, problem in prepared.problems.items() if problem.mdp.starts}

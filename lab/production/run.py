@@ -55,7 +55,7 @@ def _durations(prepared: Prepared, teacher: Teacher, listener: Listener) -> Dura
 def run(
     prepared: Prepared, teacher: Teacher, out: Path, *, listener: Listener | None = None, viewer: Viewer | None = None
 ) -> Report:
-    """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.production.report.check_out`)."""
+    """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.files.check_out`)."""
     began = time.perf_counter() - prepared.wall_s
     listener = listener or Listener()
     if viewer is not None:

@@ -301,7 +301,7 @@ def test_a_machine_that_failed_while_the_robot_was_away_is_noticed_and_tried_aga
     butter.aim("slice 1")
     floor.machines["butter_applier"] = butter
     butter.status, butter.reason = Status.FAILURE, "the butter missed 9 of 9 cells"
-    work._await(1, "butter_applier")
+    work.wait_for(1, "butter_applier")
     assert work.retries == ["toast 1 at 'butter_applier', try 1: the butter missed 9 of 9 cells"]
     assert butter.status is Status.SUCCESS
     assert len(butter.covered) == 9
@@ -318,7 +318,7 @@ def test_a_machine_that_goes_on_failing_stops_the_run(
     ground.put("slice 1", 0.80, -0.52, 0.0805)
     ground.floor.stand(surveys.approach("butter_applier"))
     work.place = "butter_applier"
-    work._start_machine(1, "butter_applier")
+    work.start_machine(1, "butter_applier")
     failure = work.carry_out((1,))
     assert failure is not None
     assert failure.startswith("toast 1 at 'butter_applier': policy 'butter at butter_applier ")
@@ -327,9 +327,9 @@ def test_a_machine_that_goes_on_failing_stops_the_run(
 
 def test_each_toast_gets_a_free_spot(task: Task, ground: Ground) -> None:
     work, places = ground.work, spots(task.station("finished_plate"))
-    assert work._free_spot("finished_plate") == places[0]
+    assert work.free_spot("finished_plate") == places[0]
     work.spot_of = {1: places[0], 2: places[2], 3: spots(task.station("plate"))[1]}
-    assert work._free_spot("finished_plate") == places[1]
+    assert work.free_spot("finished_plate") == places[1]
 
 
 def test_a_toast_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None:
@@ -341,9 +341,9 @@ def test_a_toast_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None
 
 def test_the_robot_waits_until_the_machine_is_done(ground: Ground) -> None:
     ground.work.ready_s["toaster"] = 0.5
-    ground.work._await(1, "toaster")
+    ground.work.wait_for(1, "toaster")
     assert ground.floor.now_s == pytest.approx(0.5, abs=TIME_STEP)
-    ground.work._await(1, "toaster")
+    ground.work.wait_for(1, "toaster")
     assert ground.floor.now_s == pytest.approx(0.5, abs=TIME_STEP)
 
 

@@ -14,13 +14,13 @@ import pytest
 
 import lab.production.report
 import lab.production.run
-from lab.errors import BadInput, WorkFailed
+from lab.errors import WorkFailed
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
 from lab.production.prepared import Prepared, prepare
-from lab.production.report import FILES, Report, Taught, check_out, write_files
+from lab.production.report import FILES, Report, Taught, curves, write_files
 from lab.production.run import teach_all
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.events import Schedule
@@ -324,7 +324,7 @@ def draw(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) -> 
         if stop is not None:
             raise stop
 
-    monkeypatch.setattr(lab.production.report, "_draw_all", quick)
+    monkeypatch.setattr(lab.production.report, "draw_all", quick)
 
 
 def test_a_failed_run_says_so_and_leaves_no_old_chart(
@@ -363,18 +363,9 @@ def test_nothing_is_half_written(
     assert {path.name: path.read_text() for path in out.iterdir()} == {"run.json": "old"}
 
 
-def test_output_folders(tmp_path: Path) -> None:
-    check_out(tmp_path / "a" / "b")
-    assert os.listdir(tmp_path) == []
-    (tmp_path / "file").write_text("mine")
-    for wrong in ("file", "file/below", "x" * 300):
-        with pytest.raises(BadInput, match=r"output folder '.*' .--out.: "):
-            check_out(tmp_path / wrong)
-
-
 def test_lessons_are_drawn_once_for_each_table(prepared: Prepared, toolbox: Toolbox) -> None:
     taught = teach_all(prepared, Teacher(toolbox), Listener())
-    drawn = lab.production.report._curves(prepared, taught.lessons)
+    drawn = curves(prepared, taught.lessons)
     assert len(drawn) == len({lesson.policy.name for lesson in taught.lessons.values()})
     assert "grasp at plate, starts vary" in drawn
     assert "insert at toaster" in drawn
