@@ -11,10 +11,9 @@ from pydantic import PrivateAttr, ValidationError
 from lab.cellfaults import Fault, file_faults, layout_faults, loc_of, missing_times, travel_faults
 from lab.cellparts import CellFields, CellStage, Times
 from lab.errors import BadInput, unknown
-from lab.sequencing.cell import MAX_PARTS, Cell
-from lab.sequencing.chance import Chance
-from lab.sequencing.deadlock import forced
-from lab.sequencing.layout import Arrivals
+from lab.sequencing.cell.cell import MAX_PARTS, Cell
+from lab.sequencing.cell.chance import Chance
+from lab.sequencing.cell.stations import Arrivals
 from lab.tomltext import TomlText, explain
 
 TOAST_CASES = {"I": "toast-case-1", "II": "toast-case-2", "III": "toast-case-3"}
@@ -39,8 +38,7 @@ class CellFile(CellFields):
     def cell(self, order: Sequence[str] | int | None = None) -> Cell:
         """The cell for an order: a product for each part, or a number of parts of the only one; None: the file's own.
 
-        Raises BadInput, with file and line when it was read from a file, for what cannot be a cell, and for a cell in
-        which every sequence ends in a deadlock.
+        Raises BadInput, with file and line when it was read from a file, for what cannot be a cell.
         """
         built = self._cell_or_fault(order)
         if isinstance(built, Cell):
@@ -85,11 +83,9 @@ class CellFile(CellFields):
         if (fault := next(missing_times(self, len(parts)), None)) is not None:
             return fault
         try:
-            cell = self._built(parts)
+            return self._built(parts)
         except BadInput as error:
             return Fault(loc_of(self, str(error)), str(error))
-        deadlock = forced(cell)
-        return cell if deadlock is None else Fault(("products",), f"no sequence can finish the order: {deadlock}")
 
     def _built(self, parts: tuple[str, ...]) -> Cell:
         arrivals, due_s = self.arrivals, self.due_s

@@ -7,9 +7,9 @@ from pydantic import BeforeValidator, Field
 
 from lab.errors import BadInput, unknown
 from lab.record import Name, Record, as_tuple
-from lab.sequencing.chance import LAWS, Chance
-from lab.sequencing.layout import STATION_KINDS, Product, Stage, Station
-from lab.sequencing.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES
+from lab.sequencing.cell.chance import LAWS, Chance
+from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES
+from lab.sequencing.cell.stations import STATION_KINDS, Product, Stage, Station
 from lab.sequencing.search import SrlSettings
 from lab.tomltext import Loc
 
@@ -55,7 +55,7 @@ class CellStation(Record):
 
 
 class CellStage(Record):
-    """A step of a route (see `lab.sequencing.cell.Stage`); with only a station it may be written as its name."""
+    """A step of a route (see `lab.sequencing.cell.cell.Stage`); with only a station it may be written as its name."""
 
     station: Name
     buffer: Name | None = None
@@ -91,7 +91,7 @@ Law = Annotated[str, BeforeValidator(_known_law)]
 
 
 class Stochastic(Record):
-    """What --stochastic draws the times of an episode from (see `lab.sequencing.chance.Chance`)."""
+    """What --stochastic draws the times of an episode from (see `lab.sequencing.cell.chance.Chance`)."""
 
     processing: Law = "normal"
     arrivals: Law = "constant"

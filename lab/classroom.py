@@ -12,6 +12,7 @@ from lab.advice.journal import Journal
 from lab.advice.panel import Panel
 from lab.advice.receipt import receipt
 from lab.advice.requests import AdviceRequest, Advisor, Ask
+from lab.errors import counted
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.listener import Both, Listener
 from lab.mdp import FloatArray
@@ -23,7 +24,7 @@ from lab.view.progress import RunProgress
 from lab.view.terminal import TeachingPrompt
 
 if TYPE_CHECKING:
-    from lab.sequencing.advised import SequenceRequest
+    from lab.sequencing.methods.srl_advised import SequenceRequest
     from lab.stage import Stage
     from lab.view.seat import SeatPage
 
@@ -148,7 +149,7 @@ class Classroom(Audience):
             self._page.begin(problem, learner, gate)
 
     def goes_on(self, unfinished: Policy) -> None:
-        told = f"'{unfinished.name}' was left unfinished after {len(unfinished.curve)} episodes: it is learned on"
+        told = f"'{unfinished.name}' was left unfinished after {counted(len(unfinished.curve), 'episode')}: it is learned on"
         self.progress.console.print(told, soft_wrap=True)
 
     def meets(self, advisor: Advisor | None) -> None:

@@ -1,4 +1,4 @@
-"""What the lab says when something is wrong: one line, the bad value, where it came from, what is allowed."""
+"""What the lab says when something is wrong: one line, the bad value, where it came from, what is allowed; counts in words."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -45,3 +45,8 @@ def unknown(kind: str, value: object, known: Iterable[str], where: str) -> BadIn
     hint = f" did you mean '{near[0]}'?" if near else ""
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return BadInput(f"unknown {kind} '{value}' ({where}):{hint} known: {', '.join(names[:MOST_NAMES]) or 'none'}{more}")
+
+
+def counted(number: int, what: str) -> str:
+    """How many of something: "1 step", "2 steps"."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"

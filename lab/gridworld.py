@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 from lab.mdp import BoolArray, NoPath, TabularMDP, grid, shortest_steps
 from lab.record import Count, Learned, Name, Record, as_tuple, read_text
 
@@ -128,14 +128,16 @@ class GridWorld(Learned):
         moves = shortest_steps(mdp)
         steps = moves + self.learner.count_start
         if steps > most:
-            need = f"the shortest way has {moves} moves and needs {steps} steps"
+            need = f"the shortest way has {counted(moves, 'move')} and needs {counted(steps, 'step')}"
             raise BadInput(f"world '{self.name}': learner.max_steps = {most}: {need}")
         if not self.obstacles:
             return mdp
         near = int(np.abs(np.subtract(self.obstacles, self.start)).sum(axis=1).min())
         crash, way = self.worth(near, collision), self.worth(moves, self.rewards.goal)
         if crash >= way:
-            worth = f"running into an obstacle is worth {crash:.2f} and the way of {moves} moves only {way:.2f}"
+            worth = (
+                f"running into an obstacle is worth {crash:.2f} and the way of {counted(moves, 'move')} only {way:.2f}"
+            )
             raise BadInput(
                 f"world '{self.name}': rewards.collision = {collision}: at the start, {worth}: "
                 "wanted a lower one, or more for the goal"

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from lab.cellfile import order_from_word, toast_case
 from lab.mdp import FloatArray, TabularMDP
-from lab.sequencing.cell import Cell
-from lab.sequencing.chance import NO_CHANCE, Chance, Episode
-from lab.sequencing.objectives import MAKESPAN, stuck_cost
-from lab.sequencing.positions import entry
-from lab.sequencing.run import Run
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
+from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
+from lab.sequencing.cell.routes import entry
+from lab.sequencing.simulate.run import Run
 from lab.taskfile import load, load_cell, load_world
 
 ROOM = 10  # an episode in a cell may take so many times the decisions that its parts need at most
@@ -117,7 +117,7 @@ class InsertEnv(TableEnv):
 class CellEnv(gymnasium.Env[Any, Any]):
     """Which part the one robot of a cell moves next, so that all are finished early.
 
-    An action is a decision of a sequence (see `lab.sequencing.run.Run`), counted from 0: the part, + the number of parts
+    An action is a decision of a sequence (see `lab.sequencing.simulate.run.Run`), counted from 0: the part, + the number of parts
     for the second way it has. Observed: the position of each part on its route, part 1 first, and the robot's station;
     what a machine still needs is not (info["ready_s"] says when each part may be picked). The reward is minus the
     seconds that passed, so that the return is minus the makespan. info["action_mask"]: what is allowed now; anything

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import asdict, replace
 from difflib import get_close_matches
 from functools import partial
@@ -19,9 +18,9 @@ from lab.errors import BadInput, unknown
 from lab.gridworld import GridWorld
 from lab.mdp import greedy_path
 from lab.record import write_whole
-from lab.sessions import KeptSession, NewSession, Words
-from lab.taskfile import Task, load, load_world, names_file, names_of
-from lab.teaching import Audience, Interrupted, Lesson, Teacher, check_name, plain_name, world_problem
+from lab.sessions import KeptSession, NewSession, Words, check_new
+from lab.taskfile import Task, check_toasts, is_path, load, load_world, names_file, names_of
+from lab.teaching import Audience, Interrupted, Lesson, Teacher, check_name, world_problem
 from lab.toolbox import Toolbox, default_folder
 
 if TYPE_CHECKING:
@@ -33,10 +32,29 @@ if TYPE_CHECKING:
 GYM = "gym:"
 
 
-def check(words: Words) -> None:
-    """Raises BadInput for words that ask for nothing that is there, before anybody is asked or shown anything."""
+def check(words: Words, out: Path | None = None, kept: KeptSession | None = None) -> None:
+    """Raises BadInput for words that ask for nothing that is there, and for an `out` that holds a session already.
+
+    It is called before anybody is asked or shown anything. `kept`: where the words come from, if nobody has typed them.
+    """
     Counsel(words.advisors, asked=words.asked, decide=words.decide).check()
-    _subject(words)
+    if out is not None:
+        check_new(out)
+    _subject(words, kept)
+
+
+def outside(kept: KeptSession) -> list[str]:
+    """The files outside its own folder that a session names, and that are read when it goes on or is shown again."""
+    words = kept.words
+    named: list[object] = [words.subtask, words.task]
+    if words.subtask.startswith(GYM):
+        from lab.gymworld import parse_name
+
+        named = list(parse_name(words.subtask, kept.where).options.values())
+    files = [word for word in named if isinstance(word, str) and is_path(word) and Path(word).is_file()]
+    files += [name.removeprefix("recorded:") for name in words.advisors if name.startswith("recorded:")]
+    here = kept.read.path.parent.resolve()
+    return [name for name in files if not Path(name).resolve().is_relative_to(here)]
 
 
 def teach(words: Words, teacher: Teacher, out: Path | None, kept: KeptSession | None = None) -> dict[str, Any]:
@@ -45,7 +63,9 @@ def teach(words: Words, teacher: Teacher, out: Path | None, kept: KeptSession | 
     Pictures and the receipt go to `out`. Raises BadInput for bad words, WorkFailed, and Interrupted, which says how to go
     on.
     """
-    subject = _subject(words)
+    subject = _subject(words, kept)
+    if kept is None and out is not None:
+        check_new(out)
     session = kept or NewSession(out, teacher.toolbox, words)
     teacher = replace(teacher, keep=session.keep, begun=None if kept is None else kept.begun)
     if out is not None:
@@ -80,17 +100,21 @@ def _resume(session: NewSession | KeptSession, toolbox: Toolbox) -> str:
 def replay(kept: KeptSession, audience: Audience, watch: Watch) -> dict[str, Any]:
     """Shows a kept session again, each question with its answer, to `audience` and `watch`; nothing is learned or written.
 
-    Returns the document of `lab replay --json`. Raises BadInput when the session's problem is not there any more.
+    Returns the document of `lab replay --json`. Raises BadInput when the session's problem is not there any more, and
+    KeyboardInterrupt on Ctrl-C.
     """
     words, read = kept.words, kept.read
     people = dict.fromkeys(PEOPLE, _nobody)  # the journal answers for them
     counsel = Counsel(words.advisors, people, words.asked, words.decide, watch=watch)
-    subject = _subject(words)
+    subject = _subject(words, kept)
     with TemporaryDirectory() as folder:
         teacher = Teacher(Toolbox(folder), counsel, words.seed, audience, keep=kept.keep, begun=kept.begun)
         options = {name: getattr(words, name) for name in ("learner", "gate", "memory", "episodes")}
-        with suppress(Interrupted):  # it was not over
+        try:
             subject(teacher, **options, name=words.save, out=None)
+        except Interrupted:  # by the journal's end, when it was not over, or by Ctrl-C
+            if kept.journal is None or kept.journal.folding:
+                raise KeyboardInterrupt from None
     worth = kept.receipt()
     return {
         "session": str(kept.folder),
@@ -118,19 +142,29 @@ def _worth(session: NewSession | KeptSession) -> dict[str, Any]:
     return {"session": str(session.folder), "receipt": worth.to_json() | {"lines": worth.lines()}}
 
 
-def _subject(words: Words) -> Callable[..., dict[str, Any]]:
-    """What the words ask for: one of the functions below with its first argument. BadInput for bad ones."""
-    if words.subtask.startswith(GYM):
-        from lab.gymworld import gym_world
+def _subject(words: Words, kept: KeptSession | None) -> Callable[..., dict[str, Any]]:
+    """What the words ask for: one of the functions below with its first argument. BadInput for bad ones.
 
-        for option, value in (("--task", words.task), ("--view", words.view)):
+    A module whose name comes out of a file, `kept`, is imported only when the user has said that it is trusted.
+    """
+    if words.subtask.startswith(GYM):
+        from lab.gymworld import gym_world, parse_name
+
+        module = "" if kept is None else parse_name(words.subtask, kept.where).module
+        if kept is not None and module and module not in kept.trusted:
+            raise BadInput(
+                f"journal '{kept.read.path}' ({kept.where}): it names the module '{module}', whose code would run: if you "
+                f"trust whoever made it, say --trust-module {quote(module)}"
+            )
+        for option, value in (("--task", words.task), ("--sight", words.view)):
             if value is not None:
                 raise BadInput(f"{option} {value}: a Gymnasium environment, '{words.subtask}', has none: leave it away")
         return partial(teach_gym, gym_world(words.subtask))
     if not names_file(words.subtask):
         if words.view is not None:
-            raise BadInput(f"view '{words.view}' (--view): only a world has one, '{words.subtask}' is none")
-        return partial(teach_one, load(words.task or "toast"), words.subtask)
+            raise BadInput(f"sight '{words.view}' (--sight): only a world has one, '{words.subtask}' is none")
+        task = load(words.task or "toast")
+        return partial(teach_one, task, words.subtask, toasts=words.toasts, sessions=words.sessions)
     world = load_world(words.subtask)
     if words.task is not None:
         raise BadInput(
@@ -150,37 +184,36 @@ def teach_one(
     episodes: int | None = None,
     name: str | None = None,
     out: Path | None = None,
+    toasts: int | None = None,
+    sessions: int | None = None,
 ) -> dict[str, Any]:
     """One session in one sub-task of a task; the policy is kept. Returns the document of `lab teach --json`.
 
     It goes on from an unfinished policy of the same problem, if there is one. A skill that is tried in physics counts as
-    solved when that succeeds, too; `failure` says why it did not. BadInput when the policy called `name` is of another
-    problem.
+    solved when that succeeds, too; `failure` says why it did not. `toasts` and `sessions`: those of the run that the lesson
+    belongs to. BadInput when the policy called `name` is of another problem.
     """
-    from lab.production.floor import try_out
     from lab.production.prepared import prepare
     from lab.production.report import draw_value_map
+    from lab.production.run import trial_of
     from lab.production.skillset import SkillSet
 
-    toasts = fitting(task, 2)
+    toasts = fitting(task, 2) if toasts is None else toasts
+    check_toasts(toasts, task)
     wanted = find_skill(SkillSet.of(task, toasts).skills, subtask)  # before the scene is surveyed
     settings = task.subtask(wanted.subtask).changed(learner, gate, episodes, memory)
     check_name(name)
     prepared = prepare(task, toasts, teacher.seed, wanted.name)
     skill, problem = prepared.skillset.skills[wanted.name], prepared.problems[wanted.name]
     teacher.audience.stands(prepared, problem)
-    earlier = teacher.toolbox.find(problem.subtask, problem.mdp.signature, name or plain_name(problem))
-    lesson = teacher.one_session(problem, settings, task.name, name)
-    policy = prepared.skillset.policies[skill.name] = lesson.policy
-    failure = try_out(prepared, skill) if skill.tried else None
-    if failure is not None and policy.solved:
-        policy = teacher.keep_unsolved(policy, earlier)
-    document = _document(problem, replace(lesson, policy=policy), teacher, failure)
+    teacher = replace(teacher, trial=trial_of(prepared))
+    lesson = teacher.one_session(problem, settings, task.name, name, sessions=sessions or 1)
+    document = _document(problem, lesson, teacher)
     if out is not None:
-        document["files"] = _draw_curve(problem.name, policy, out)
+        document["files"] = _draw_curve(problem.name, lesson.policy, out)
         photo, map_path = skill.photo(), out / f"{skill.subtask}-value-map.png"
         if photo is not None:
-            draw_value_map(problem.mdp, photo, policy, map_path)
+            draw_value_map(problem.mdp, photo, lesson.policy, map_path)
             document["files"]["value_map"] = str(map_path)
     return document
 
@@ -202,16 +235,16 @@ def teach_world(
     Draws the value map of a world with two axes. BadInput for an unknown view, and when the world has no limited one.
     """
     if view not in ("full", "limited"):
-        raise unknown("view", view, ("full", "limited"), "--view")
+        raise unknown("sight", view, ("full", "limited"), "--sight")
     if view == "limited" and world.view is None:
-        raise BadInput(f"view 'limited' (--view): the file of world '{world.name}' has no [view]")
+        raise BadInput(f"sight 'limited' (--sight): the file of world '{world.name}' has no [view]")
     settings, problem = world.changed(learner, gate, episodes, memory), world_problem(world)
     check_name(name)
     region = world.region() if view == "limited" else None
     teacher = replace(teacher, counsel=replace(teacher.counsel, region=region))
     teacher.audience.stands(world, problem)
     lesson = teacher.one_session(problem, settings, world.name, name)
-    document = _document(problem, lesson, teacher, None) | {"view": view}
+    document = _document(problem, lesson, teacher) | {"view": view}
     if out is not None:
         document["files"] = _draw_curve(world.name, lesson.policy, out)
         if len(world.shape) == 2:
@@ -234,13 +267,13 @@ def teach_gym(
     settings, problem = world.changed(learner, gate, episodes, memory), world.problem()
     check_name(name)
     lesson = teacher.one_session(problem, settings, world.name, name)
-    document = _document(problem, lesson, teacher, None)
+    document = _document(problem, lesson, teacher)
     if out is not None:
         document["files"] = _draw_curve(world.name, lesson.policy, out)
     return document
 
 
-def _document(problem: "Problem", lesson: Lesson, teacher: Teacher, failure: str | None) -> dict[str, Any]:
+def _document(problem: "Problem", lesson: Lesson, teacher: Teacher) -> dict[str, Any]:
     """The document of `lab teach --json`, before any file is written."""
     policy, result = lesson.policy, lesson.result
     assert result is not None
@@ -262,8 +295,9 @@ def _document(problem: "Problem", lesson: Lesson, teacher: Teacher, failure: str
         "rejected_at_episode": result.rejected_at_episode,
         "optimal_steps": result.optimal_steps,
         "final_steps": result.final_steps,
-        "solved": result.solved and failure is None,
-        "failure": failure,
+        "steps_are_means": problem.environment is not None,  # both are means over drawn starts and steps
+        "solved": result.solved and lesson.failure is None,
+        "failure": lesson.failure,
         "source": lesson.source,
         "saved_as": policy.name,
         "files": {},

@@ -7,9 +7,9 @@ import numpy as np
 from lab.cellparts import Sequencing
 from lab.errors import unknown
 from lab.sequencing import SEQUENCERS
-from lab.sequencing.cell import Cell
-from lab.sequencing.chance import NO_CHANCE, Chance
-from lab.sequencing.events import EpisodeSequenced, SequenceResult
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance
+from lab.sequencing.cell.schedule import EpisodeSequenced, SequenceResult
 from lab.sequencing.search import Search
 
 

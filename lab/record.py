@@ -44,11 +44,16 @@ FROM_TABLE = _FromTable()
 
 
 class Learned(Record):
-    """How something is learned: rewards, learner and gate."""
+    """How something is learned: rewards, learner and gate, which spares the best episodes unless a file says otherwise."""
 
     rewards: Annotated[Rewards, FROM_TABLE] = Rewards()
     learner: Annotated[LearnerSettings, FROM_TABLE] = LearnerSettings()
-    gate: Annotated[GateSettings, FROM_TABLE] = GateSettings()
+    gate: Annotated[GateSettings, FROM_TABLE] = GateSettings(spare_best=True)
+
+    @field_validator("gate", mode="before")
+    @classmethod
+    def _best_is_spared(cls, gate: Any) -> Any:
+        return {"spare_best": True} | gate if isinstance(gate, dict) else gate
 
     @field_validator("rewards")
     @classmethod

@@ -16,17 +16,17 @@ from lab.listener import Listener
 from lab.planner import check_method, find_sequence, search_for
 from lab.sequence_drawn import stochastic
 from lab.sequencing import DRAWN
-from lab.sequencing.cell import Cell
-from lab.sequencing.chance import NO_CHANCE, Chance
-from lab.sequencing.events import EpisodeSequenced, LearnedSequence, SequenceResult
-from lab.sequencing.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective, cost
-from lab.sequencing.run import follow, simulate
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance
+from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective, cost
+from lab.sequencing.cell.schedule import EpisodeSequenced, LearnedSequence, SequenceResult
 from lab.sequencing.search import SAME, Reference, Search
+from lab.sequencing.simulate.run import follow, simulate
 from lab.taskfile import Task, load_any
 from lab.teaching import Teacher
 
 if TYPE_CHECKING:
-    from lab.sequencing.advised import AdvisedResult, SequenceRequest
+    from lab.sequencing.methods.srl_advised import AdvisedResult, SequenceRequest
 
     Ask = Callable[[SequenceRequest], int | None]
 
@@ -94,7 +94,7 @@ def sequence_named(
 
 def _check_names(wanted: Wanted, settings: Sequencing) -> None:
     """BadInput for a name that no table holds, and for advice to a method that asks for none; before any work."""
-    from lab.sequencing.advised import check_advice
+    from lab.sequencing.methods.srl_advised import check_advice
 
     method, objective = wanted.method or settings.method, wanted.objective or settings.objective
     check_method(method)
@@ -151,7 +151,9 @@ def sequence_cell(
     shown = known if search.chance == NO_CHANCE else None
     for session in range(wanted.sessions):
         heard = _Heard(listener)
-        listener.sequences(search.episodes, shown, None if wanted.advisor == "none" else GateSettings(wanted.gate))
+        listener.sequences(
+            search.episodes, shown, None if wanted.advisor == "none" else GateSettings(wanted.gate, spare_best=True)
+        )
         try:
             found.append(_session(cell, method, replace(search, on_episode=heard), wanted, session))
         except KeyboardInterrupt:
@@ -193,21 +195,21 @@ def _session(cell: Cell, method: str, search: Search, wanted: Wanted, session: i
 
 def _advised(cell: Cell, method: str, search: Search, wanted: Wanted, session: int) -> "AdvisedResult":
     """A session of SRL with advice."""
-    from lab.sequencing.advised import advised_srl, sequence_advisor
+    from lab.sequencing.methods.srl_advised import advised_srl, sequence_advisor
 
     rng = np.random.default_rng([wanted.seed, 2, session])
     advisor = sequence_advisor(wanted.advisor, cell, np.random.default_rng([wanted.seed, 3, session]), wanted.people)
-    return advised_srl(cell, search, rng, GateSettings(wanted.gate), advisor)
+    return advised_srl(cell, search, rng, GateSettings(wanted.gate, spare_best=True), advisor)
 
 
 def reference(cell: Cell, objective: str) -> Reference:
     """The proven optimum, or the best bound: by A* for the makespan, by CP-SAT for the other objectives."""
     if objective == MAKESPAN:
-        from lab.sequencing.exact import optimum
+        from lab.sequencing.methods.exact import optimum
 
         best = optimum(cell)
         return Reference(best.bound_s, best.proven, "A*")
-    from lab.sequencing.cpsat import cp_sat, fits
+    from lab.sequencing.methods.cp_sat import cp_sat, fits
 
     unit = "" if objective == "tardy-parts" else " s"
     if not fits(cell):
@@ -240,8 +242,8 @@ def _document(
         "luckiest_cost": None if same_times else min(result.cost for result in found),
         "sequence": list(best.sequence),
         "moves": _in_words(cell, best.sequence),
-        "episode_costs": list(found[0].episode_costs),
-        "episode_makespans_s": list(found[0].episode_costs) if timed else None,
+        "episode_costs": list(best.episode_costs),
+        "episode_makespans_s": list(best.episode_costs) if timed else None,
         "optimal_s": optimal if timed else None,
         "optimal_cost": optimal,
         "optimum_proven": known.proven,
@@ -268,7 +270,7 @@ def _advice(found: "Sequence[Any]") -> list[dict[str, Any]]:
 
 def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
     """What each decision of a sequence does."""
-    from lab.sequencing.run import Run
+    from lab.sequencing.simulate.run import Run
 
     run, words = Run(cell), []
     for decision in sequence:

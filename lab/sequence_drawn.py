@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lab.planner import find_sequence
-from lab.sequencing.cell import Cell
-from lab.sequencing.chance import NO_CHANCE, Chance
-from lab.sequencing.events import SequenceResult
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance
+from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.search import Search
 
 if TYPE_CHECKING:
-    from lab.sequencing.execute import Policy
+    from lab.sequencing.simulate.execution import Policy
 
 REPLICATIONS = 200  # drawn episodes in which a list and a policy are compared
 PLANNED = 2000  # of a policy that plans at every decision so many by parts squared, at least FEWEST: it takes its time
@@ -24,8 +24,8 @@ def stochastic(
     cell: Cell, method: str, search: Search, found: SequenceResult, chance: Chance, seed: int
 ) -> dict[str, Any]:
     """The list as it is and a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
-    from lab.sequencing.execute import replicate
-    from lab.sequencing.rules import RULES
+    from lab.sequencing.methods.rules import RULES
+    from lab.sequencing.simulate.execution import replicate
 
     policy, says = _policy(cell, method, search, seed)
     fixed = _planned(cell, method, search, found, seed)
@@ -46,10 +46,10 @@ def stochastic(
 
 def _policy(cell: Cell, method: str, search: Search, seed: int) -> "tuple[Policy, str]":
     """What reacts in the manner of the method, and what that is."""
-    from lab.sequencing.execute import by_rule, replan
-    from lab.sequencing.reactive import reacting
-    from lab.sequencing.rivals import first_in_first_out
-    from lab.sequencing.rules import RULES
+    from lab.sequencing.methods.fifo import first_in_first_out
+    from lab.sequencing.methods.rules import RULES
+    from lab.sequencing.methods.srl_time_reacting import reacting
+    from lab.sequencing.simulate.execution import by_rule, replan
 
     if method == "srl-time":
         return reacting(cell, search.objective, seed), "it goes on learning before every decision"

@@ -1,12 +1,17 @@
 """Sessions kept in folders: where a journal is written, how a session goes on, and how it is looked at again."""
 
+import os
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from shlex import quote
+from typing import Annotated, Any
 
-from lab.advice.entries import FILE, Answer, Read, Session, read_journal
+from annotated_types import Ge, Le
+
+from lab.advice.entries import FILE, Read, Session, read_journal
 from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
 from lab.errors import BadInput, WorkFailed
@@ -15,7 +20,8 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray
 from lab.policy import Policy
 from lab.skills.skill import Problem
-from lab.teaching import Keep
+from lab.taskfile import names_file
+from lab.teaching import MAX_SESSIONS, Keep
 from lab.toolbox import Toolbox, slug
 
 SESSIONS = "sessions"  # the folder in the toolbox
@@ -28,12 +34,16 @@ _OPTIONS = {
     "subtask": "SUBTASK",
     "advisors": "--advisor",
     "asked": "--ask",
+    "view": "--sight",
 }  # that are called otherwise than their fields
 
 
 @dataclass(frozen=True)
 class Words:
-    """The options of `lab teach` that a session depends on, by name; None or empty: not given."""
+    """The options of `lab teach` that a session depends on, by name; None or empty: not given.
+
+    toasts and sessions: how many slices, and at most how many sessions, the lesson of a `lab run` had.
+    """
 
     subtask: str = ""
     task: str | None = None
@@ -44,9 +54,11 @@ class Words:
     advisors: tuple[str, ...] = ()
     asked: str = "together"
     decide: str = "trust-weighted"
-    episodes: int | None = None
-    seed: int = 0
+    episodes: Annotated[int, Ge(1)] | None = None
+    seed: Annotated[int, Ge(0)] = 0
     save: str | None = None
+    toasts: int | None = None
+    sessions: Annotated[int, Ge(1), Le(MAX_SESSIONS)] | None = None
 
     def complete(self) -> "Words":
         """With the advisor that is asked when none is named; BadInput when nothing is named to learn."""
@@ -56,7 +68,6 @@ class Words:
 
     def to_json(self) -> dict[str, Any]:
         """A plain dict, files by their whole paths, so that they are found from another folder."""
-        from lab.taskfile import names_file
 
         def whole(name: str | None) -> str | None:
             return (
@@ -128,10 +139,9 @@ class NewSession(_InFolder):
     def keep(
         self, problem: Problem, learner: LearnerSettings, gate: GateSettings, unfinished: Policy | None
     ) -> Journal:
-        """The journal of a lesson. Raises BadInput when the folder holds a session with answers that is not over."""
+        """The journal of a lesson. Raises BadInput when the folder holds a session already."""
         self.knows(problem, learner, gate)
-        self.folder = self._free(problem) if self._wanted is None else self._wanted
-        _set_aside(self.folder)
+        self.folder = self._claimed(problem, Path.mkdir) if self._wanted is None else self._wanted
         if unfinished is not None:
             Toolbox(self.folder / _BEGUN).save(unfinished)
         head = Session(
@@ -144,15 +154,20 @@ class NewSession(_InFolder):
             "" if unfinished is None else unfinished.name,
         )
         self.journal = Journal.begin(self.folder, head)
+        if self._wanted is not None:
+            target = self.folder.resolve()
+            with suppress(BadInput):  # where links cannot be made, it is only not listed
+                self._claimed(problem, lambda place: place.symlink_to(target, target_is_directory=True))
         return self.journal
 
-    def _free(self, problem: Problem) -> Path:
-        """A new folder for a session of this problem; what two commands make at a time, only one of them gets."""
+    def _claimed(self, problem: Problem, make: Callable[[Path], None]) -> Path:
+        """A new place for a session of this problem; what two commands make at a time, only one of them gets."""
         name = slug(problem.name.lower().replace(" ", "-"))
         for number in range(1, _MOST):
             folder = self._toolbox.folder / SESSIONS / f"{name}-{number}"
             try:
-                folder.mkdir(parents=True)
+                folder.parent.mkdir(parents=True, exist_ok=True)
+                make(folder)
             except FileExistsError:
                 continue
             except OSError as error:
@@ -162,23 +177,26 @@ class NewSession(_InFolder):
 
 
 def kept_by(toolbox: Toolbox, words: Words) -> Keep:
-    """Keeps the journal of each lesson of a run in the toolbox; what people said can be replayed, and advise again."""
+    """Keeps the journal of each lesson of a run in the toolbox; it can be replayed, gone on with, and advise again."""
 
     def keep(problem: Problem, learner: LearnerSettings, gate: GateSettings, unfinished: Policy | None) -> Journal:
-        session = NewSession(None, toolbox, replace(words, subtask=problem.name))
+        session = NewSession(None, toolbox, replace(words, subtask=problem.name, sessions=MAX_SESSIONS))
         return session.keep(problem, learner, gate, unfinished)
 
     return keep
 
 
 class KeptSession(_InFolder):
-    """A session that was kept: to go on with it, or (`read_only`) to look at it again. Raises BadInput for none."""
+    """A session that was kept: to go on with it, or (`read_only`) to look at it again. Raises BadInput for none.
 
-    def __init__(self, folder: Path, where: str, *, read_only: bool = False):
+    trusted: modules that the session may name: it may be somebody else's, and code runs when one is imported.
+    """
+
+    def __init__(self, folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] = ()):
         self.read: Read = read_journal(folder, where)
         self.folder = self.read.path.parent
         self.words = Words.from_json(self.read.session.words, f"journal '{self.read.path}' ({where})")
-        self._read_only, self._where = read_only, where
+        self._read_only, self.where, self.trusted = read_only, where, trusted
 
     def keep(
         self, problem: Problem, learner: LearnerSettings, gate: GateSettings, unfinished: Policy | None
@@ -188,14 +206,15 @@ class KeptSession(_InFolder):
         head = self.read.session
         if head.signature != problem.mdp.signature:
             raise BadInput(
-                f"session '{self.folder}' ({self._where}): it is about '{head.problem}' ({head.signature[:8]}), and the "
+                f"session '{self.folder}' ({self.where}): it is about '{head.problem}' ({head.signature[:8]}), and the "
                 f"task now gives another problem ({problem.mdp.signature[:8]}): its file or the lab has changed"
             )
         for what, then, now in (("learner", head.learner, asdict(learner)), ("gate", head.gate, asdict(gate))):
-            if changed := [name for name in now if then.get(name) != now[name]]:
+            then = now | then  # an older journal does not know all settings of today
+            if changed := [name for name in now if then[name] != now[name]]:
                 name = changed[0]
                 raise BadInput(
-                    f"session '{self.folder}' ({self._where}): its {what} had {name} = {then.get(name)!r}, and the task now "
+                    f"session '{self.folder}' ({self.where}): its {what} had {name} = {then[name]!r}, and the task now "
                     f"gives {now[name]!r}: its file has changed"
                 )
         entries = self.read.effective()
@@ -203,13 +222,14 @@ class KeptSession(_InFolder):
         return self.journal
 
     def same(self, given: Words) -> Words:
-        """The words of the session; BadInput when the command names others."""
+        """The words of the session; BadInput when the command names others, and when the session is over."""
         for name, value in asdict(given).items():
             if value != getattr(Words(), name):
                 option = _OPTIONS.get(name, f"--{name}")
                 raise BadInput(
                     f"{option} beside --resume {self.folder}: a session goes on as it was begun: leave it away"
                 )
+        self.read.check_goes_on()
         return self.words
 
     def begun(self, problem: Problem) -> Policy | None:
@@ -224,8 +244,11 @@ class KeptSession(_InFolder):
 
 
 def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:
-    """The sessions in a toolbox, those changed last first: folder, problem, who advised, and whether it is over."""
-    found = (toolbox.folder / SESSIONS).glob(f"*/{FILE}")
+    """The sessions in a toolbox, those changed last first: folder, problem, who advised, and whether it is over.
+
+    Those kept in a folder elsewhere are links there; of one that is gone nothing is said.
+    """
+    found = {path.resolve() for path in (toolbox.folder / SESSIONS).glob(f"*/{FILE}")}
     rows = []
     for path in sorted(found, key=lambda path: path.stat().st_mtime, reverse=True):
         row = {"session": str(path.parent), "problem": "", "advisor": "", "state": "damaged"}
@@ -238,25 +261,17 @@ def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:
     return rows
 
 
-def _set_aside(folder: Path) -> None:
-    """Gives the journal that a folder holds another name; BadInput when it has answers and is not over."""
+def check_new(folder: Path) -> None:
+    """Raises BadInput when a folder (--out) holds a session: what is kept in it would mean another lesson."""
     path = folder / FILE
-    if not path.is_file():
+    if not os.path.lexists(path):
         return
-    try:
-        found = read_journal(path, "--out")
-    except BadInput:
-        found = None  # whatever it is, it is kept
-    if found is not None and found.closed is None and any(isinstance(entry, Answer) for entry in found.entries):
-        raise BadInput(
-            f"'{folder}' (--out) holds a session that is not over: go on with it (lab teach --resume {folder}), "
-            "or choose another folder"
-        )
-    number = next(n for n in range(1, _MOST) if not path.with_name(f"events-{n}.jsonl").exists())
-    try:
-        path.rename(path.with_name(f"events-{number}.jsonl"))
-    except OSError as error:
-        raise BadInput(f"'{path}' cannot be renamed: {error.strerror or error}") from error
+    is_over = False
+    with suppress(BadInput):
+        is_over = read_journal(path, "--out").closed is not None
+    what, then = ("is over", "look at it again") if is_over else ("is not over", "go on with it")
+    command = f"lab replay {quote(str(folder))}" if is_over else f"lab teach --resume {quote(str(folder))}"
+    raise BadInput(f"'{folder}' (--out) holds a session that {what}: {then} ({command}), or choose another folder")
 
 
 def _version() -> str:

@@ -80,7 +80,7 @@ def write_random(shape: str, density: float, seed: int, out: Path) -> dict[str, 
 
 def reconstruct_world(seed: int, out: Path, progress: Callable[[int, int], None]) -> dict[str, Any]:
     """Look for a world like world II and write it as a task file; the document of `lab task reconstruct --json`."""
-    from lab.studies.reconstruct import COMMENT, reconstruct
+    from lab.studies.thesis.world_2 import COMMENT, reconstruct
 
     if out.suffix != ".toml":
         raise BadInput(f"task file '{out}' (--out): its name must end in .toml")

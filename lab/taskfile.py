@@ -208,16 +208,17 @@ def names_of(wanted: Kind) -> list[str]:
 
 def names_file(word: str) -> bool:
     """Whether a word means a world, a cell or a task, by path, by name or by chance, and no sub-task."""
-    return word.startswith(RANDOM) or _is_path(word) or word in _files()
+    return word.startswith(RANDOM) or is_path(word) or word in _files()
 
 
-def _is_path(task: str) -> bool:
+def is_path(task: str) -> bool:
+    """Whether a word for a task, a cell or a world is the path of a file, which may not be there."""
     return Path(task).suffix in (".toml", ".txt") or "/" in task
 
 
 def find(task: str) -> Path:
     """The file of a task, cell or world given by name or path; BadInput when there is none."""
-    if _is_path(task):
+    if is_path(task):
         if Path(task).is_file():
             return Path(task)
         known = ", ".join(_files())

@@ -14,7 +14,7 @@ from lab.advice.entries import Closed
 from lab.advice.events import AdviceEnded, AdviceRejected, Event
 from lab.advice.journal import Again, Journal
 from lab.advice.requests import Advisor
-from lab.errors import BadInput, WorkFailed
+from lab.errors import BadInput, WorkFailed, counted
 from lab.gridworld import GridWorld
 from lab.learning.environment import TableEnvironment, unreached
 from lab.learning.session import SessionResult, run_session
@@ -31,6 +31,7 @@ MORE_SESSIONS = 3  # to find a shorter way once the goal is reached
 _UNFINISHED = " unfinished"
 _LONGEST_PROBLEM = MAX_NAME_LENGTH - 20  # characters of a policy's name; the rest is for its signature and state
 Keep = Callable[[Problem, LearnerSettings, GateSettings, Policy | None], Journal]
+Trial = Callable[[Problem, Policy], str | None]
 Source = Literal["learned", "reused", "continued"]
 
 
@@ -40,11 +41,15 @@ class Interrupted(KeyboardInterrupt):
 
 @dataclass(frozen=True)
 class Lesson:
-    """A taught skill: its policy with all its history, where that came from, and the sessions now (None when reused)."""
+    """A taught skill: its policy with all its history, where that came from, and the sessions now (None when reused).
+
+    failure: why it failed when it was tried in physics, None when it did not, or was not tried.
+    """
 
     policy: Policy
     source: Source
     result: SessionResult | None = None
+    failure: str | None = None
 
 
 class Audience:
@@ -72,7 +77,7 @@ class Teacher:
 
     `audience` hears how lessons go on; `keep(problem, learner, gate, the policy that is learned on)` gives the journal of a
     lesson, by default one that is not written; `begun(problem)`, in a lesson that is resumed: the policy that it once
-    went on from.
+    went on from; `trial(problem, policy)` tries in physics what was learned, before it is kept: why it failed, or None.
     """
 
     toolbox: Toolbox
@@ -81,6 +86,7 @@ class Teacher:
     audience: Audience = field(default_factory=Audience)
     keep: Keep = lambda problem, learner, gate, unfinished: Journal()
     begun: Callable[[Problem], Policy | None] | None = None
+    trial: Trial | None = None
 
     @property
     def advisor(self) -> str:
@@ -111,10 +117,13 @@ class Teacher:
                 return found
         return None
 
-    def one_session(self, problem: Problem, settings: Learned, task: str, name: str | None) -> Lesson:
+    def one_session(
+        self, problem: Problem, settings: Learned, task: str, name: str | None, *, sessions: int = 1
+    ) -> Lesson:
         """One session that goes on from what was broken off, or left unsolved by the same learner, gate and advisor.
 
-        BadInput when `name` is that of another problem's policy.
+        `sessions`: as many as the lesson of a run had, when that is gone on with. BadInput when `name` is that of
+        another problem's policy.
         """
         for row in self.toolbox.list() if name is not None else ():
             if row["name"] == name and (row["subtask"], row["signature"]) != (problem.subtask, problem.mdp.signature):
@@ -130,13 +139,16 @@ class Teacher:
                 found = None  # another learner, gate or advisor begins anew, so that they can be compared
             if found is not None:
                 self.audience.goes_on(found)
-        return self.teach(problem, settings.learner, settings.gate, task, unfinished=found, name=name, sessions=1)
+        return self.teach(
+            problem, settings.learner, settings.gate, task, unfinished=found, name=name, sessions=sessions
+        )
 
     def _same(self, policy: Policy, settings: Learned) -> bool:
         """Whether a policy was learned in this way, or broken off before anything can be said of its gate and advisor."""
         length = {"episodes": 0}
         broken_off = len(policy.curve) < policy.learner.get("episodes", 0)
-        alike = (policy.gate, policy.advisor) == (asdict(settings.gate), self.advisor)
+        gate = asdict(settings.gate)
+        alike = (gate | policy.gate, policy.advisor) == (gate, self.advisor)  # an older one does not know all settings
         return policy.learner | length == asdict(settings.learner) | length and (alike or broken_off)
 
     def teach(
@@ -161,10 +173,13 @@ class Teacher:
             result = self._run_through(problem, learner, gate, unfinished, sessions, journal)
             whole = result if unfinished is None else _after(unfinished, result)
             policy = self._policy(whole, problem, learner, gate, task, name or self._free_name(problem, result.solved))
+            failure = None
+            if not (result.interrupted or journal.read_only):
+                policy, failure = self._tried(problem, policy)
             if not (result.interrupted and journal.folding):  # what it was before is more
                 self.toolbox.save(policy)
             if not result.interrupted:
-                ended = (len(result.steps), result.final_steps, result.optimal_steps, result.solved)
+                ended = (len(result.steps), result.final_steps, result.optimal_steps, policy.solved)
                 journal.closes(Closed(*ended, saved_as=policy.name))
         finally:
             journal.close()
@@ -173,14 +188,14 @@ class Teacher:
                 self.toolbox.remove(unfinished.name)  # it is finished now, under its plain name
         if result.interrupted:
             raise Interrupted(
-                f"stopped by Ctrl-C after {len(result.steps)} episodes of '{problem.name}'; what was learned is kept"
+                f"stopped by Ctrl-C after {counted(len(result.steps), 'episode')} of '{problem.name}'; what was learned is kept"
             )
-        if sessions > 1 and not fits(result.q, problem, learner):
+        if sessions > 1 and not journal.read_only and not fits(result.q, problem, learner):
             raise WorkFailed(
-                f"'{problem.name}' was not learned in {len(result.steps)} episodes with the advisor '{self.advisor}'; "
+                f"'{problem.name}' was not learned in {counted(len(result.steps), 'episode')} with the advisor '{self.advisor}'; "
                 "what was learned is kept: try a better advisor, or more episodes in the task file"
             )
-        return Lesson(policy, "learned" if unfinished is None else "continued", result)
+        return Lesson(policy, "learned" if unfinished is None else "continued", result, failure)
 
     def _run_through(
         self,
@@ -248,14 +263,20 @@ class Teacher:
             kept = unfinished  # no shorter way: with the same table, what was measured with it still holds
         return replace(whole, q=kept.q, final_steps=kept.final_steps, solved=kept.solved)
 
-    def keep_unsolved(self, policy: Policy, earlier: Policy | None) -> Policy:
-        """Keep a policy that failed in physics as unsolved, and put back the solved one that it has replaced, if any."""
-        if earlier is not None and earlier.solved and earlier.name == policy.name:
-            self.toolbox.save(earlier)
-            policy = replace(policy, name=f"{policy.name[: MAX_NAME_LENGTH - len(_UNFINISHED)]}{_UNFINISHED}")
-        policy = replace(policy, solved=False)
-        self.toolbox.save(policy)
-        return policy
+    def _tried(self, problem: Problem, policy: Policy) -> tuple[Policy, str | None]:
+        """The policy as it is to be kept, and why it failed in physics; then it is unsolved, and replaces no solved one."""
+        if self.trial is None:
+            return policy, None
+        kept, unproven = self.toolbox.find(policy.subtask, policy.signature, policy.name), policy
+        if policy.solved:
+            beside = f"{policy.name[: MAX_NAME_LENGTH - len(_UNFINISHED)]}{_UNFINISHED}"
+            unproven = replace(policy, solved=False, name=beside if kept is not None and kept.solved else policy.name)
+        try:
+            failure = self.trial(problem, policy)
+        except BaseException:  # Ctrl-C, too: what was learned is kept
+            self.toolbox.save(unproven)
+            raise
+        return (policy if failure is None else unproven), failure
 
     def _free_name(self, problem: Problem, solved: bool) -> str:
         """The name to save under; what did not get finished never replaces what is."""

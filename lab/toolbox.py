@@ -5,7 +5,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import fields
 from datetime import datetime
@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, NonNegativeInt, ValidationError, field_validator
 
 from lab import files
 from lab.errors import BadInput, WorkFailed, unknown
@@ -28,6 +29,8 @@ Words = list[str]
 Report = list[tuple[Path, bool, str]]  # path, whether it is sound, what is wrong
 
 _TENSORS = {"q": "F64", "visits": "I64"}
+_METADATA = tuple(field.name for field in fields(Policy) if field.name not in _TENSORS)
+_Setting = str | bool | int | float
 _NOT_WRITABLE = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EEXIST, errno.EISDIR, errno.ENAMETOOLONG}
 
 
@@ -214,50 +217,43 @@ def _reject_constant(text: str) -> None:
     raise ValueError(f"{text} is not allowed")
 
 
-def _is_count(value: Any) -> bool:
-    return type(value) is int and value >= 0
+class _Metadata(BaseModel):
+    """What a policy's file holds beside its tables."""
 
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
+    name: str
+    subtask: str
+    task: str
+    signature: str
+    advisor: str
+    start: NonNegativeInt
+    helped_steps: NonNegativeInt
+    requests: NonNegativeInt
+    learner: dict[str, _Setting]
+    gate: dict[str, _Setting]
+    seed: int
+    optimal_steps: NonNegativeInt | None
+    final_steps: NonNegativeInt | None
+    solved: bool
+    created: str
+    versions: dict[str, str]
+    action_labels: tuple[str, ...]
+    shape: tuple[NonNegativeInt, ...]
+    curve: list[NonNegativeInt]
+    guided: list[bool]
 
-
-def _is_date(value: Any) -> bool:
-    return isinstance(value, str) and datetime.fromisoformat(value) is not None
-
-
-def _is_flag(value: Any) -> bool:
-    return isinstance(value, bool)
-
-
-def _list_of(check: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda value: isinstance(value, list) and all(map(check, value))
-
-
-def _dict_of(check: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda value: isinstance(value, dict) and all(map(check, value.values()))
-
-
-_FIELDS: dict[str, Callable[[Any], bool]] = {
-    **dict.fromkeys(("name", "subtask", "task", "signature", "advisor"), _is_text),
-    **dict.fromkeys(("start", "helped_steps", "requests"), _is_count),
-    **dict.fromkeys(("learner", "gate"), _dict_of(lambda value: isinstance(value, str | int | float))),
-    "seed": lambda value: type(value) is int,
-    **dict.fromkeys(("optimal_steps", "final_steps"), lambda value: value is None or _is_count(value)),
-    "solved": _is_flag,
-    "created": _is_date,
-    "versions": _dict_of(_is_text),
-    "action_labels": _list_of(_is_text),
-    "shape": _list_of(_is_count),
-    "curve": _list_of(_is_count),
-    "guided": _list_of(_is_flag),
-}
+    @field_validator("created")
+    @classmethod
+    def _is_a_date(cls, text: str) -> str:
+        datetime.fromisoformat(text)
+        return text
 
 
 def _encode(policy: Policy) -> bytes:
     from safetensors.numpy import save
 
-    metadata = {name: json.dumps(getattr(policy, name), allow_nan=False) for name in _FIELDS}
+    metadata = {name: json.dumps(getattr(policy, name), allow_nan=False) for name in _METADATA}
     tensors = {name: np.ascontiguousarray(getattr(policy, name)) for name in _TENSORS}
     content: bytes = save(tensors, {"format": FORMAT, **metadata})
     return content
@@ -293,15 +289,20 @@ def _read_tensors(path: Path) -> tuple[dict[str, np.ndarray[Any, Any]], dict[str
 
 
 def _read_metadata(metadata: dict[str, str]) -> dict[str, Any]:
-    values: dict[str, Any] = {}
-    for name, is_sound in _FIELDS.items():
-        if name not in metadata:
-            raise ValueError(f"its field '{name}' is missing")
-        value = json.loads(metadata[name], parse_constant=_reject_constant)
-        if not is_sound(value):
-            raise ValueError(f"its field '{name}' is {str(value)[:60]!r}, which is not allowed")
-        values[name] = tuple(value) if name in ("action_labels", "shape") else value
-    return values
+    values = {
+        name: json.loads(metadata[name], parse_constant=_reject_constant) for name in _METADATA if name in metadata
+    }
+    try:
+        found = _Metadata.model_validate_json(json.dumps(values))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field, why = ".".join(map(str, first["loc"][:1])), first["msg"]
+        if first["type"] == "missing":
+            raise ValueError(f"its field '{field}' is missing") from None
+        raise ValueError(
+            f"its field '{field}' is {str(metadata.get(field))[:60]!r}, which is not allowed: {why}"
+        ) from None
+    return dict(found)
 
 
 def _describe(path: Path, policy: Policy) -> dict[str, Any]:

@@ -54,6 +54,14 @@ class Ran:
         """What stdout holds, one JSON document."""
         return json.loads(self.out)
 
+    @property
+    def gave_nothing(self) -> bool:
+        """Whether stdout is empty, or holds, as --json has it, the error alone that stderr ends with."""
+        if not self.out:
+            return True
+        why = self.err.splitlines()[-1].removeprefix("lab: ")
+        return bool(self.json == {"error": why, "exit_code": self.code})
+
 
 @pytest.fixture
 def lab(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ran]:

@@ -13,7 +13,7 @@ from lab.advice.counsel import Counsel
 from lab.advice.entries import FILE, read_journal
 from lab.advice.requests import AdviceRequest
 from lab.lesson import teach
-from lab.sessions import KeptSession, Words
+from lab.sessions import SESSIONS, KeptSession, Words
 from lab.teaching import Teacher
 from lab.toolbox import Toolbox
 
@@ -24,12 +24,17 @@ def person(request: AdviceRequest) -> int:
     return towards if (request.state * 7 + request.episode) % 5 else 2
 
 
+def lesson_in(folder: Path) -> Path:
+    """Where the session is kept: in the toolbox, without pictures."""
+    return folder / "toolbox" / SESSIONS / "maze-1"
+
+
 def held(folder: Path, maze: Path, *, goes_on: bool = False) -> tuple[Any, ...]:
     """A session, or one gone on with: all that it comes to, wherever it was held."""
-    lesson, box = folder / "lesson", Toolbox(folder / "toolbox")
-    kept = KeptSession(lesson, "--resume") if goes_on else None
+    box = Toolbox(folder / "toolbox")
+    kept = KeptSession(lesson_in(folder), "--resume") if goes_on else None
     words = Words(str(maze), advisors=("terminal",), seed=3, episodes=60) if kept is None else kept.words
-    document = teach(words, Teacher(box, Counsel(words.advisors, {"terminal": person}), seed=3), lesson, kept)
+    document = teach(words, Teacher(box, Counsel(words.advisors, {"terminal": person}), seed=3), None, kept)
     (row,) = box.list()
     policy = box.find("world", row["signature"])
     assert policy is not None
@@ -45,7 +50,7 @@ def killed(folder: Path, maze: Path, at_bytes: int) -> None:
             held(folder, maze)
         finally:
             os._exit(0)
-    journal = folder / "lesson" / FILE
+    journal = lesson_in(folder) / FILE
     while os.waitpid(pid, os.WNOHANG) == (0, 0):
         if journal.exists() and journal.stat().st_size >= at_bytes:
             os.kill(pid, signal.SIGKILL)
@@ -56,16 +61,16 @@ def killed(folder: Path, maze: Path, at_bytes: int) -> None:
 def main(maze: Path, folder: Path, kills: int) -> dict[str, int]:
     """How many sessions were broken off, and how many were the same in the end, to the last byte of the journal."""
     whole = held(folder / "whole", maze)
-    raw = (folder / "whole" / "lesson" / FILE).read_bytes()
+    raw = (lesson_in(folder / "whole") / FILE).read_bytes()
     rng = np.random.default_rng(0)
     counts = {"broken off": 0, "same": 0}
     for number, at_bytes in enumerate(rng.integers(len(raw.split(b"\n")[0]) + 1, len(raw) - 200, kills).tolist()):
         place = folder / str(number)
         killed(place, maze, at_bytes)
-        is_over = read_journal(place / "lesson", "DIR").closed is not None
+        is_over = read_journal(lesson_in(place), "DIR").closed is not None
         counts["broken off"] += not is_over
         same = is_over or held(place, maze, goes_on=True) == whole
-        counts["same"] += same and (place / "lesson" / FILE).read_bytes() == raw
+        counts["same"] += same and (lesson_in(place) / FILE).read_bytes() == raw
     return counts
 
 

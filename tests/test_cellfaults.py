@@ -3,7 +3,6 @@
 import re
 import tomllib
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from lab.cellfaults import MAX_STAGES, SHOWN, loc_of
 from lab.cellfile import CellFile
 from lab.data import tasks_folder
 from lab.errors import BadInput
-from lab.sequencing.cell import Cell
+from lab.sequencing.cell.cell import Cell
 from lab.tomltext import TomlText
 
 FMS = (tasks_folder() / "fms.toml").read_text(encoding="utf-8")
@@ -198,25 +197,6 @@ def test_a_cell_without_a_file_says_what_is_wrong_without_a_line() -> None:
     raw["robot"]["start"] = "on"
     message = refusal(lambda: CellFile.model_validate(raw).cell())
     assert message == "unknown station 'on' (robot.start): did you mean 'oven'? known: in, out, oven"
-
-
-class Jammed(CellFile):
-    """A cell file by rules that no file can ask for today: to leave the oven a part needs room in the oven."""
-
-    def _built(self, parts: tuple[str, ...]) -> Cell:
-        cell, (oven,) = super()._built(parts), (n for n, one in enumerate(self.stations) if one.kind == "machine")
-        way = cell.positions[oven].options[0]
-        jammed = replace(cell.positions[oven], options=(replace(way, needs=(oven,)),))
-        cell.__dict__["positions"] = (*cell.positions[:oven], jammed, *cell.positions[oven + 1 :])
-        return cell
-
-
-def test_a_forced_deadlock_is_said_with_who_waits_for_whom() -> None:
-    message = refusal(lambda: Jammed.checked(TomlText.parsed(Path("mine.toml"), OVEN)))
-    assert message == (
-        "mine.toml: line 11: no sequence can finish the order: deadlock: bun 1 at 'oven' cannot move on: 'oven' full; "
-        "bun 2 at 'in' cannot move on: 'oven' full"
-    )
 
 
 # ---- any file -----------------------------------------------------------------------------------------------------

@@ -11,12 +11,12 @@ import pytest
 from lab.cellfile import TOAST_CASES, CellFile, order_from_word, toast_case
 from lab.data import tasks_folder
 from lab.errors import BadInput
-from lab.sequencing.cell import MAX_PARTS
-from lab.sequencing.chance import Chance
-from lab.sequencing.exact import optimum
-from lab.sequencing.layout import Arrivals
-from lab.sequencing.run import simulate
+from lab.sequencing.cell.cell import MAX_PARTS
+from lab.sequencing.cell.chance import Chance
+from lab.sequencing.cell.stations import Arrivals
+from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import SrlSettings
+from lab.sequencing.simulate.run import simulate
 from lab.taskfile import load_cell, names_of
 from lab.tomltext import TomlText
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.errors import MOST_CHARACTERS, MOST_NAMES, BadInput, LabError, WorkFailed, unknown
+from lab.errors import MOST_CHARACTERS, MOST_NAMES, BadInput, LabError, WorkFailed, counted, unknown
 
 
 @pytest.mark.parametrize(("kind", "code"), [(BadInput, 2), (WorkFailed, 1), (LabError, 1)])
@@ -26,6 +26,10 @@ def test_nothing_near_gives_no_hint() -> None:
 def test_what_cannot_be_printed_is_escaped() -> None:
     message = str(unknown("task", "a\nb\x1b[31m\udcff é", ["toast"], "TASK"))
     assert message == r"unknown task 'a\nb\x1b[31m\udcff é' (TASK): known: toast"
+
+
+def test_one_is_one() -> None:
+    assert [counted(n, "step") for n in (0, 1, 2)] == ["0 steps", "1 step", "2 steps"]
 
 
 PRINTABLE = st.text(st.characters(exclude_categories=("C", "Z")), min_size=1)

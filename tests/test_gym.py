@@ -16,9 +16,9 @@ from lab.gridworld import GridWorld
 from lab.gym import ENVIRONMENTS, CellEnv, FmsEnv, TableEnv, ToastCellEnv, WorldEnv, register
 from lab.mdp import coverage, grid
 from lab.production.prepared import prepare
-from lab.sequencing.cell import Cell
-from lab.sequencing.exact import optimum
-from lab.sequencing.objectives import MAKESPAN, stuck_cost
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
+from lab.sequencing.methods.exact import optimum
 from lab.taskfile import load, load_cell, load_world
 from lab.tomltext import TomlText
 

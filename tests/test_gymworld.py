@@ -464,7 +464,7 @@ def test_settings_fit_the_environment() -> None:
     assert (sure.learner.alpha, chance.learner.alpha, unknown.learner.alpha) == (1.0, 0.1, 0.1)
     assert [world.learner.max_steps for world in (sure, chance, unknown)] == [200, 100, 30]
     assert gym_world("gym:TeachingLab/World1-v0").learner.max_steps == 199
-    assert sure.gate == GateSettings()
+    assert sure.gate == GateSettings(spare_best=True)
 
 
 def test_the_options_of_a_command_change_the_settings() -> None:

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from lab.advice.counsel import Counsel
+from lab.advice.entries import read_journal
 from lab.advice.requests import AdviceRequest
 from lab.errors import BadInput
 from lab.gridworld import GridWorld, View
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.lesson import find_skill, fitting, teach_one, teach_world
+from lab.lesson import find_skill, fitting, teach, teach_one, teach_world
+from lab.sessions import Words
 from lab.skills import Butter, Grasp, Skill
 from lab.taskfile import Task, load
 from lab.teaching import Interrupted, Teacher
@@ -34,7 +36,7 @@ def teacher(tmp_path: Path) -> Teacher:
 TEACH_FIELDS = (
     *("subtask", "skill", "task", "learner", "gate", "advisor", "memory", "seed", "episodes", "steps_per_episode"),
     *("guided_episodes", "requests", "helped_steps", "misleads", "rejected_at_episode", "optimal_steps"),
-    *("final_steps", "solved", "failure", "source", "saved_as", "files"),
+    *("final_steps", "steps_are_means", "solved", "failure", "source", "saved_as", "files"),
 )
 
 
@@ -116,20 +118,48 @@ def test_a_name_of_another_problem_is_refused(task: Task, teacher: Teacher) -> N
 def test_a_grasp_that_lifts_nothing_is_not_kept_as_solved(
     task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lab.production.floor.try_out", lambda *_: "slice 1 is not in the gripper")
+    monkeypatch.setattr("lab.production.run.try_out", lambda *_: "slice 1 is not in the gripper")
     bad = teach_one(task, "grasp", teacher)
     assert (bad["solved"], bad["failure"]) == (False, "slice 1 is not in the gripper")
     assert [(row["name"], row["solved"]) for row in teacher.toolbox.list()] == [(bad["saved_as"], False)]
     monkeypatch.undo()
     good = teach_one(task, "grasp", teacher)
     assert [(row["name"], row["solved"]) for row in teacher.toolbox.list()] == [(good["saved_as"], True)]
-    monkeypatch.setattr("lab.production.floor.try_out", lambda *_: "slice 1 is not in the gripper")
+    monkeypatch.setattr("lab.production.run.try_out", lambda *_: "slice 1 is not in the gripper")
     worse = teach_one(task, "grasp", teacher)
     assert worse["saved_as"] == f"{good['saved_as']} unfinished"
     assert {row["name"]: row["solved"] for row in teacher.toolbox.list()} == {
         good["saved_as"]: True,
         worse["saved_as"]: False,
     }
+
+
+def test_a_journal_says_solved_only_after_the_trial_in_physics(
+    task: Task, teacher: Teacher, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The grasp of a slice as slippery as wet ice is learned, and lifts nothing: journal and toolbox say the same."""
+    ice = task.model_copy(update={"slices": task.slices.model_copy(update={"friction": 0.0})})
+    monkeypatch.setattr("lab.lesson.load", lambda name: ice)
+    document = teach(Words("grasp", advisors=("expert",)), teacher, tmp_path / "lesson")
+    assert (document["solved"], document["final_steps"]) == (False, document["optimal_steps"])
+    assert document["failure"] is not None
+    closed = read_journal(tmp_path / "lesson", "DIR").closed
+    (row,) = teacher.toolbox.list()
+    assert closed is not None
+    assert (closed.solved, closed.saved_as) == (row["solved"], row["name"]) == (False, document["saved_as"])
+
+
+def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
+    task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lab.production.run.try_grasp", stop)
+    with pytest.raises(KeyboardInterrupt):
+        teach_one(task, "grasp", teacher)
+    (row,) = teacher.toolbox.list()
+    assert (row["solved"], row["final_steps"]) == (False, row["optimal_steps"])
 
 
 @pytest.mark.parametrize(
@@ -217,9 +247,9 @@ def test_with_a_limited_view_simulated_advice_helps_less(world: GridWorld, teach
 
 
 def test_a_view_that_is_none(world: GridWorld, teacher: Teacher) -> None:
-    with pytest.raises(BadInput, match=r"^unknown view 'part' .--view.: known: full, limited$"):
+    with pytest.raises(BadInput, match=r"^unknown sight 'part' .--sight.: known: full, limited$"):
         teach_world(world, teacher, view="part")
-    with pytest.raises(BadInput, match=r"^view 'limited' .--view.: the file of world 'small' has no \[view\]$"):
+    with pytest.raises(BadInput, match=r"^sight 'limited' .--sight.: the file of world 'small' has no \[view\]$"):
         teach_world(world.model_copy(update={"view": None}), teacher, view="limited")
     assert not teacher.toolbox.folder.exists()
 

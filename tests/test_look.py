@@ -1,7 +1,9 @@
 """Looking: a picture as a grid, a scene and a replay on a page."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
+from signal import SIGINT, pthread_kill
+from threading import Thread, main_thread
 from typing import Any
 from urllib.request import urlopen
 
@@ -69,35 +71,33 @@ def test_grids_that_are_none(tmp_path: Path, grid: str) -> None:
 # ---- view ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def looked_at(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    """The page is read once, then Ctrl-C is pressed."""
+def looked_at(what: str) -> tuple[str, str]:
+    """The address of what is shown, and its page, which is read once before Ctrl-C is pressed."""
     told: list[str] = []
 
-    def look() -> None:
-        with urlopen(told[0], timeout=10) as page:
-            told.append(page.read().decode())
-        raise KeyboardInterrupt
+    def look(url: str) -> None:
+        with urlopen(url, timeout=10) as page:
+            told.extend((url, page.read().decode()))
+        pthread_kill(main_thread().ident or 0, SIGINT)
 
-    monkeypatch.setattr("lab.look._wait", look)
-    return told  # type: ignore[return-value]
-
-
-def test_a_scene_is_shown_on_this_computer_only(looked_at: list[str]) -> None:
     with pytest.raises(KeyboardInterrupt):
-        show("toast", 1, 0, 0, lambda url, hint: looked_at.append(url))
-    url, page = looked_at
+        show(what, 1, 0, 0, lambda url, hint: Thread(target=look, args=(url,)).start())
+    url, page = told
+    return url, page
+
+
+def test_a_scene_is_shown_on_this_computer_only() -> None:
+    url, page = looked_at("toast")
     assert url.startswith("http://127.0.0.1:")
     assert "<canvas" in page or "<script" in page
     with pytest.raises(OSError, match="refused"):
         urlopen(url, timeout=10)
 
 
-def test_a_runs_replay_is_served(looked_at: list[str], tmp_path: Path) -> None:
+def test_a_runs_replay_is_served(tmp_path: Path) -> None:
     (tmp_path / "replay.html").write_text('<p>replay</p><script id="lab-data"></script>')
-    with pytest.raises(KeyboardInterrupt):
-        show(str(tmp_path), 3, 0, 0, lambda url, hint: looked_at.append(url))
-    assert looked_at[1].startswith("<p>replay</p>")
+    _, page = looked_at(str(tmp_path))
+    assert page.startswith("<p>replay</p>")
 
 
 def test_what_is_neither_a_task_nor_a_run(tmp_path: Path) -> None:

@@ -22,14 +22,14 @@ from lab.sequence import (
     sequence_named,
 )
 from lab.sequencing import DRAWN, SEQUENCERS
-from lab.sequencing.cell import Cell
-from lab.sequencing.chance import NO_CHANCE, Chance
-from lab.sequencing.events import SequenceResult
-from lab.sequencing.execute import replicate
-from lab.sequencing.layout import Stage, Station
-from lab.sequencing.objectives import OBJECTIVES
-from lab.sequencing.run import simulate
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance
+from lab.sequencing.cell.objectives import OBJECTIVES
+from lab.sequencing.cell.schedule import SequenceResult
+from lab.sequencing.cell.stations import Stage, Station
 from lab.sequencing.search import Reference, Search, SrlSettings
+from lab.sequencing.simulate.execution import replicate
+from lab.sequencing.simulate.run import simulate
 from lab.taskfile import load, load_cell
 from lab.teaching import Teacher
 from lab.toolbox import Toolbox
@@ -215,7 +215,7 @@ def test_several_sessions_are_summed_up(method: str) -> None:
     assert document["cost"] == document["makespan_s"] == costs[best]
     assert document["sequence"] == list(alone[best].sequence)
     assert document["mean_best_s"] == document["mean_best_cost"] == pytest.approx(sum(costs) / 8)
-    assert document["episode_makespans_s"] == document["episode_costs"] == list(alone[0].episode_costs)
+    assert document["episode_makespans_s"] == document["episode_costs"] == list(alone[best].episode_costs)
     assert best != 0  # so that the first session is not the best one
     assert document["gap"] == pytest.approx(costs[best] / 513 - 1)
     assert document["success_percent"] == 12.5 * costs.count(513.0)
@@ -537,7 +537,7 @@ KNOWN = ", ".join(sorted(SEQUENCERS))
 def test_what_is_refused_at_once(lab: Lab, folder: Path, words: str, line: str, json_too: bool) -> None:
     before = listed(folder)
     ran = lab("sequence", *words.split(), *(["--json"] if json_too else []))
-    assert (ran.code, ran.out) == (2, "")
+    assert (ran.code, ran.gave_nothing) == (2, True)
     assert line in ran.err
     assert re.fullmatch(r"lab: .*\n", ran.err), "one line"
     assert listed(folder) == before
@@ -579,7 +579,7 @@ def test_what_does_not_fit_is_refused(lab: Lab, folder: Path, words: str, line: 
     before = listed(folder)
     for more in ([], ["--json"]):
         ran = lab("sequence", "oven.toml", *words.split(), *more)
-        assert (ran.code, ran.out) == (2, "")
+        assert (ran.code, ran.gave_nothing) == (2, True)
         assert ran.err.startswith(f"lab: {line}")
         assert len(ran.err.splitlines()) == 1
     assert listed(folder) == before
@@ -608,7 +608,7 @@ def test_a_folder_for_a_picture(lab: Lab, folder: Path) -> None:
 def test_a_deadlock_is_work_that_failed(lab: Lab) -> None:
     """The queue puts both products into the machines at once; a search that looks further gets around it."""
     ran = lab("sequence", "crossing.toml", "--method", "fifo", "--json")
-    assert (ran.code, ran.out) == (1, "")
+    assert (ran.code, ran.gave_nothing) == (1, True)
     assert ran.err.splitlines()[-1] == "lab: no sequence for 2 parts came to its end in 1 episodes: deadlocks"
     document = asked(lab, "crossing.toml --method random --episodes 50")
     assert document["makespan_s"] < max(document["episode_costs"])

@@ -17,7 +17,7 @@ from lab.advice.journal import Journal
 from lab.advice.receipt import SILENT
 from lab.advice.requests import AdviceRequest, Ask
 from lab.errors import BadInput
-from lab.lesson import replay, teach
+from lab.lesson import check, replay, teach
 from lab.sessions import SESSIONS, KeptSession, Words, session_rows
 from lab.taskfile import load_world
 from lab.teaching import Audience, Interrupted, Teacher
@@ -69,9 +69,9 @@ def held(folder: Path, maze: Path) -> tuple[Any, ...]:
 
 
 def gone_on(folder: Path, maze: Path) -> tuple[Any, ...]:
-    """The session gone on with until it is over."""
+    """The session gone on with until it is over, without pictures."""
     kept = KeptSession(folder / "lesson", "--resume")
-    return result(folder, teach(kept.words, teacher(folder), folder / "lesson", kept))
+    return result(folder, teach(kept.words, teacher(folder), None, kept))
 
 
 def test_killed_at_any_moment_and_gone_on_with_it_is_the_same_session(tmp_path: Path, maze: Path, root: Path) -> None:
@@ -145,17 +145,35 @@ def test_a_session_without_a_folder_is_kept_in_the_toolbox(tmp_path: Path, maze:
 
 
 def test_a_folder_that_holds_a_session(tmp_path: Path, maze: Path) -> None:
+    """What it holds goes on meaning the same: it is refused, whatever it is, and nothing in it changes."""
     held(tmp_path, maze)
-    first = (tmp_path / "lesson" / FILE).read_bytes()
-    held(tmp_path, maze)  # one that is over is set aside
-    assert (tmp_path / "lesson" / "events-1.jsonl").read_bytes() == first
-    cut = first.splitlines(keepends=True)
-    at = next(n for n, line in enumerate(cut) if b'"answer"' in line)
-    (tmp_path / "lesson" / FILE).write_bytes(b"".join(cut[: at + 1]))
-    with pytest.raises(BadInput, match=r"holds a session that is not over: go on with it \(lab teach --resume"):
-        held(tmp_path, maze)
-    (tmp_path / "lesson" / FILE).write_bytes(b"".join(cut[:5]))  # nobody has said anything in it
+    journal = tmp_path / "lesson" / FILE
+    whole = journal.read_bytes()
+    for content, reason in (
+        (whole, r"holds a session that is over: look at it again \(lab replay .*lesson\), or choose another folder"),
+        (
+            b"".join(whole.splitlines(keepends=True)[:5]),
+            r"that is not over: go on with it \(lab teach --resume .*lesson",
+        ),
+        (b"nonsense", "that is not over"),
+    ):
+        journal.write_bytes(content)
+        before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+        with pytest.raises(BadInput, match=reason):
+            check(words(maze), tmp_path / "lesson")
+        with pytest.raises(BadInput, match=reason):
+            held(tmp_path, maze)
+        assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_sessions_kept_elsewhere_are_listed(tmp_path: Path, maze: Path) -> None:
     held(tmp_path, maze)
+    teach(words(maze, "novice", episodes=12), teacher(tmp_path, person, "novice"), None)
+    places = {tmp_path / "lesson", tmp_path / "toolbox" / SESSIONS / "maze-2"}
+    assert {Path(row["session"]) for row in session_rows(Toolbox(tmp_path / "toolbox"))} == places
+    (tmp_path / "lesson").rename(tmp_path / "gone")
+    (row,) = session_rows(Toolbox(tmp_path / "toolbox"))
+    assert row["session"] == str(tmp_path / "toolbox" / SESSIONS / "maze-2")
 
 
 def test_another_world_in_the_file_is_noticed(tmp_path: Path, maze: Path) -> None:
@@ -165,6 +183,18 @@ def test_another_world_in_the_file_is_noticed(tmp_path: Path, maze: Path) -> Non
     maze.write_text(MAZE.strip().replace("###", "#.#").replace("S.....", "S....#"))
     with pytest.raises(BadInput, match=r"is about 'maze' .* its file or the lab has changed"):
         gone_on(tmp_path, maze)
+
+
+def test_a_journal_of_an_older_version_knows_fewer_settings_and_verdicts(tmp_path: Path, maze: Path) -> None:
+    held(tmp_path, maze)
+    journal = tmp_path / "lesson" / FILE
+    lines = [json.loads(line) for line in journal.read_text().splitlines()]
+    assert lines[0]["gate"].pop("spare_best")
+    for line in lines:
+        line.pop("verdict", None)
+    journal.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    kept = KeptSession(tmp_path / "lesson", "DIR", read_only=True)
+    assert replay(kept, Audience(), lambda request, action: None)["closed"]
 
 
 def test_words_are_the_same_in_another_folder(tmp_path: Path, maze: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -182,10 +212,16 @@ def test_words_are_the_same_in_another_folder(tmp_path: Path, maze: Path, monkey
 
 def test_a_session_goes_on_as_it_was_begun(tmp_path: Path, maze: Path) -> None:
     held(tmp_path, maze)
+    journal = tmp_path / "lesson" / FILE
+    whole = journal.read_bytes()
+    journal.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))
     kept = KeptSession(tmp_path / "lesson", "--resume")
     assert kept.same(Words()) == kept.words == words(maze)
     with pytest.raises(BadInput, match="--seed beside --resume"):
         kept.same(Words(seed=4))
+    journal.write_bytes(whole)
+    with pytest.raises(BadInput, match="is over: look at it again with lab replay"):
+        KeptSession(tmp_path / "lesson", "--resume").same(Words())
 
 
 class Heard(Audience):

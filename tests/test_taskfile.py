@@ -109,6 +109,7 @@ def test_the_toast_task_is_the_cell_of_the_thesis() -> None:
         learner, gate = settings.learner, settings.gate
         assert (learner.learner, learner.alpha, learner.discount, learner.trace) == ("q-lambda", 0.95, 0.99, 0.5)
         assert (learner.beta, gate.gate) == (1.3, "ccrl")
+        assert gate.spare_best  # the file says nothing of it, and its own gate table leaves it as it is
     assert task.insert.shape == (12, 12)
 
 

@@ -86,3 +86,15 @@ def test_a_question_stands_whole_on_the_screen(
             child.send("2r\r" if world == "world-1" else "right right\r")
             child.expect("tep 3: at")
             child.expect(re.escape(QUESTION))
+
+
+def test_the_readme_shows_what_the_command_prints(tmux: Callable[..., Started], root: Path) -> None:
+    """The first question of the README's lesson, line by line, on a screen of 80 x 24."""
+    told = (root / "README.md").read_text(encoding="utf-8")
+    command = ("teach", "insert", "--advisor", "terminal", "--out", "lesson")
+    _, found, block = told.partition(f"```sh\nlab {' '.join(command)}\n```\n\n```\n")
+    assert found
+    child, screen = tmux(80, 24, *command)
+    child.expect(re.escape(QUESTION))
+    child.expect("explains")
+    assert block.partition("\n```")[0] in "\n".join(line.rstrip() for line in screen().splitlines())

@@ -15,13 +15,13 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors",),
-    ("lab.data", "lab.files", "lab.tomltext", "lab.sources"),
+    ("lab.data", "lab.files", "lab.tomltext", "lab.sources", "lab.compiled", "lab.learning.splitmix"),
     ("lab.vision", "lab.view.frames", "lab.mdp", "lab.sequencing", "lab.learning.settings"),
     ("lab.learning.selection",),
-    ("lab.learning.updates", "lab.learning.environment"),
+    ("lab.learning.updates", "lab.learning.environment", "lab.advice.reasons"),
     ("lab.advice.events", "lab.advice.requests"),
     ("lab.advice",),
-    ("lab.learning", "lab.sequencing.advised"),  # SRL that asks: the one sequencer that knows advice
+    ("lab.learning", "lab.sequencing.methods.srl_advised"),  # SRL that asks: the one sequencer that knows advice
     ("lab.policy",),
     ("lab.toolbox",),
     ("lab.record",),
@@ -39,7 +39,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.sequence_drawn",),
     ("lab.sessions", "lab.gymworld"),
     ("lab.classroom",),
-    ("lab.lesson", "lab.study", "lab.look", "lab.sequence"),
+    ("lab.lesson", "lab.look", "lab.sequence"),
     ("lab.task",),
     ("lab.cli",),
 )
@@ -50,11 +50,13 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "meshcat": {"lab.view.meshcat"},
     "cv2": {"lab.vision.markers", "lab.vision.picture_files", "lab.sim.camera"},
     "PIL": set(),
-    "ortools": {"lab.sequencing.cpsat", "lab.sequencing.cpsat_model"},
-    "pymoo": {"lab.sequencing.genetic"},
+    "numba": {"lab.compiled", "lab.learning.kernels"},  # what is kept of it is kept in one place
+    "ortools": {"lab.sequencing.methods.cp_sat", "lab.sequencing.methods.cp_sat_model"},
+    "pymoo": {"lab.sequencing.methods.genetic"},
     "starlette": {"lab.view.server", "lab.view.server_page"},
     "uvicorn": {"lab.view.server"},
     "websockets": set(),  # uvicorn's
+    "jinja2": {"lab.studies.report"},
     "joblib": {"lab.studies.runner"},  # to work in several processes; its files are pickles, and nobody reads those
 } | {library: set() for library in ("random", "pickle", "dill", "cloudpickle", "shelve", "marshal")}
 NEVER = {  # room -> rooms that it never imports, whatever the layers say
@@ -66,7 +68,7 @@ NEVER = {  # room -> rooms that it never imports, whatever the layers say
 }
 HEAVY = (
     *("numpy", "pydantic", "scipy", "trimesh", "matplotlib", "numba", "meshcat", "cv2", "pybullet", "safetensors"),
-    *("ortools", "pymoo", "starlette", "uvicorn", "gymnasium"),
+    *("ortools", "pymoo", "starlette", "uvicorn", "gymnasium", "jinja2"),
 )
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 
@@ -145,7 +147,7 @@ def code_faults(module: str, tree: ast.Module) -> Iterator[str]:
         line = f"{module}:{getattr(node, 'lineno', 0)}"
         if isinstance(node, ast.Call):
             called = ast.unparse(node.func)
-            if called in ("print", "pprint", "rich.print") and module != "lab.cli":
+            if called in ("print", "pprint", "rich.print") and module != "lab.cli.output":
                 yield f"{line} prints: only the CLI does"
             if called in ("__import__", "import_module", "importlib.import_module"):
                 yield f"{line} imports by a string, which no wall can see"
@@ -247,8 +249,12 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.view.plots", "from meshcat.geometry import Box", "allowed in ['lab.view.meshcat']"),
         ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.sim.camera', 'lab.vision.markers', "),
         ("lab.view.plots", "from PIL import Image", "allowed in no module"),
-        ("lab.sequencing.exact", "from ortools.sat.python import cp_model", "allowed in ['lab.sequencing.cpsat', "),
-        ("lab.sequencing.rivals", "def f():\n    import pymoo", "allowed in ['lab.sequencing.genetic']"),
+        (
+            "lab.sequencing.methods.exact",
+            "from ortools.sat.python import cp_model",
+            "allowed in ['lab.sequencing.methods.cp_",
+        ),
+        ("lab.sequencing.methods.fifo", "def f():\n    import pymoo", "allowed in ['lab.sequencing.methods.genetic']"),
         ("lab.mdp", "import random", "allowed in no module"),
         ("lab.toolbox", "import pickle", "allowed in no module"),
         ("lab.mdp", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import lab.sim.world", "never does"),
@@ -256,18 +262,26 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.learning.session", "from ..view import meshcat", "imports lab.view.meshcat: lab.learning never does"),
         ("lab.advice.gates", "from lab import cli", "imports lab.cli: lab.advice never does"),
         ("lab.advice.gates", "from lab.learning.session import x", "runs back up"),
-        ("lab.sequencing.srl", "from lab.advice.gates import GATES", "runs back up"),
-        ("lab.sequencing.srl", "def f():\n    from lab.sequencing.advised import advised_srl", "runs back up"),
-        ("lab.sequencing.advised", "from lab.view.terminal import ReadLine", "lab.sequencing never does"),
+        ("lab.sequencing.methods.srl", "from lab.advice.gates import GATES", "runs back up"),
+        (
+            "lab.sequencing.methods.srl",
+            "def f():\n    import lab.sequencing.methods.srl_advised",
+            "runs back up",
+        ),
+        ("lab.sequencing.methods.srl_advised", "from lab.view.terminal import ReadLine", "lab.sequencing never does"),
         ("lab.sim.robot", "from ..learning import session", "imports lab.learning.session: lab.sim never does"),
-        ("lab.sim.world", "from lab.sequencing.cell import Cell", "lab.sim never does"),
+        ("lab.sim.world", "from lab.sequencing.cell.cell import Cell", "lab.sim never does"),
         ("lab.production.composer", "from ..cli import main", "runs back up"),
         ("lab.vision", "from lab.sim.world import World", "runs back up"),
         ("lab.mdp", "print('x')", "prints"),
         ("lab.mdp", "import numpy as np\nx = np.random.rand()", "uses np.random.rand"),
         ("lab.mdp", "from numpy.random import shuffle, default_rng", "imports numpy.random.shuffle"),
         ("lab.mdp", "import numpy as np\nrng = np.random.default_rng()", "without a seed"),
-        ("lab.sequencing.batch", "from numpy.random import SeedSequence\nx = SeedSequence()", "without a seed"),
+        (
+            "lab.sequencing.methods.many_sessions",
+            "from numpy.random import SeedSequence\nx = SeedSequence()",
+            "without a seed",
+        ),
         ("lab.toolbox", "np.load(path, allow_pickle=True)", "allows pickles"),
         ("lab.skills.grasp", "import_module('pybullet')", "no wall can see"),
     ],
@@ -281,13 +295,16 @@ def test_a_broken_wall_is_seen(module: str, source: str, fault: str) -> None:
     [
         ("lab.sim.world", "import pybullet"),
         ("lab.sim.camera", "import cv2"),
-        ("lab.cli", "print('x')\nfrom lab.view import meshcat"),
+        ("lab.cli.output", "print('x')\nfrom lab.view import meshcat"),
         ("lab.view.terminal", "console.print('x')"),
         ("lab.learning.session", "from lab.advice.gates import GATES\nfrom .settings import GateSettings"),
         ("lab.sim.world", "from lab.view.frames import Frame"),
         ("lab.mdp", "import numpy as np\ndef f(rng: np.random.Generator): return np.random.default_rng(1)"),
-        ("lab.sequencing.advised", "from lab.advice.gates import GATES\nfrom lab.sequencing.srl import Srl"),
-        ("lab.sequencing.batch", "from numpy.random import SeedSequence\nx = SeedSequence(1)"),
+        (
+            "lab.sequencing.methods.srl_advised",
+            "from lab.advice.gates import GATES\nfrom lab.sequencing.methods.srl import Srl",
+        ),
+        ("lab.sequencing.methods.many_sessions", "from numpy.random import SeedSequence\nx = SeedSequence(1)"),
     ],
 )
 def test_what_is_allowed_passes(module: str, source: str) -> None:

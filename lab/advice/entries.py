@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from errno import EINVAL
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -163,6 +164,11 @@ class Read:
         last = self.entries[-1] if self.entries else None
         return last if isinstance(last, Closed) else None
 
+    def check_goes_on(self) -> None:
+        """Raises BadInput when the session is over."""
+        if self.closed is not None:
+            raise BadInput(f"the session in '{self.path.parent}' is over: look at it again with lab replay")
+
 
 def undoable(entries: Sequence[Entry], by: str) -> int | None:
     """The place of the answer that a person may take back: the last one in the episode under way; None: there is none."""
@@ -182,6 +188,8 @@ def read_journal(folder: Path, where: str) -> Read:
     """
     path = folder / FILE if folder.is_dir() else folder
     try:
+        if path.exists() and not path.is_file():
+            raise OSError(EINVAL, "it is no regular file")
         raw = path.read_bytes()
     except OSError as error:
         raise BadInput(f"journal '{path}' ({where}): cannot be read: {error.strerror or error}") from None

@@ -1,11 +1,17 @@
 """What happens in a session, as records: what the learner tells whoever teaches, watches or keeps a journal."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
+
+Verdict = Literal["", "better", "best", "misled"]  # of a gate on an episode that was open for advice; "": none
 
 
 @dataclass(frozen=True)
 class EpisodeEnded:
-    """An episode is over: `steps` is max_steps + 1 when it failed; the rate is None before 2K episodes."""
+    """An episode is over: `steps` is max_steps + 1 when it failed; the rate is None before 2K episodes.
+
+    verdict: "better" than those before it, no better but the "best" so far, or "misled"; older journals do not know it.
+    """
 
     episode: int
     steps: int
@@ -13,6 +19,7 @@ class EpisodeEnded:
     helped_steps: int
     improvement_rate: float | None
     reached: bool
+    verdict: Verdict = field(default="", compare=False)
 
 
 @dataclass(frozen=True)

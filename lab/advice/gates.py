@@ -5,7 +5,10 @@ The rules that the compiled kernel follows too are plain functions of numbers an
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 
+from lab.advice.events import Verdict
+from lab.advice.reasons import Both, ByChance, Reason, TablesDiffer, TooLong, TooSlow, ValuesAlike, ValuesApart
 from lab.learning.selection import Draw
 from lab.learning.settings import GateSettings
 from lab.learning.updates import Update
@@ -61,18 +64,24 @@ def _width(values: Values) -> float:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a gate may be built with beside its settings: uniform numbers, and tables that learn as the learner does."""
+    """What a gate may be built with beside its settings.
+
+    draw: uniform numbers; learners: so many tables that learn as the learner does, each with start values of its own;
+    several_starts: episodes may begin in different states.
+    """
 
     draw: Draw
-    learners: Callable[[int], Sequence[Update]]  # so many, each with start values of its own
+    learners: Callable[[int], Sequence[Update]]
+    several_starts: bool = False
 
 
 class Gate:
     """The base of all gates, and the gate "always": every step of every episode asks, and nothing is ever rejected.
 
-    A session calls `opens` before each episode, `asks` before each step of an open one, `saw` after each step (if
-    `watches`), and `judges` after the episode. `steps` holds the step counts of the finished episodes, a failed one as
-    max_steps + 1. `why` says in words why the last question was asked.
+    A session calls `opens` before each episode, `begins` where it begins, `asks` before each step of an open one, `saw`
+    after each step (if `watches`), and `judges` after the episode. `steps` holds the step counts of the finished
+    episodes, a failed one as max_steps + 1. `why`: the reason of the last question; `verdict`: what the gate makes of
+    the episode that ended last, see `Verdict`.
     """
 
     watches = False
@@ -82,18 +91,22 @@ class Gate:
         self.misleads = 0
         self.rejected = False
         self.converged = False
-        self.why = "it asks about every step"
+        self.why = Reason()
+        self.verdict: Verdict = ""
 
     def opens(self, episode: int, steps: Steps) -> bool:
         """Whether episode n (from 1) may ask for advice."""
         return True
 
+    def begins(self, state: int) -> None:
+        """Hears in which state the episode begins."""
+
     def asks(self, state: int, values: Values) -> bool:
         """Whether the learner asks in a state; `values` is what it knows there (`Update.gauge`)."""
         return True
 
-    def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int) -> None:
-        """Hears of a step that was made."""
+    def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """Hears of a step that was made, as the learner does (`Update.learn`)."""
 
     def judges(self, steps: Steps, opened: bool) -> None:
         """Assesses the episode that ended last, which was open for advice or not; may set `rejected`."""
@@ -120,7 +133,7 @@ class Introspection(_PerStep):
 
     def asks(self, state: int, values: Values) -> bool:
         """Whether the learner is unsure of its choice."""
-        self.why = f"the values here span {_width(values):.2f}, at most {self.settings.psi:g}"
+        self.why = ValuesAlike(_width(values), self.settings.psi)
         return unsure(_width(values), self.settings.psi)
 
 
@@ -129,7 +142,7 @@ class Importance(_PerStep):
 
     def asks(self, state: int, values: Values) -> bool:
         """Whether much depends on the choice."""
-        self.why = f"the values here span {_width(values):.2f}, at least {self.settings.psi:g}"
+        self.why = ValuesApart(_width(values), self.settings.psi)
         return _width(values) >= self.settings.psi
 
 
@@ -139,15 +152,16 @@ class Random(_PerStep):
     def asks(self, state: int, values: Values) -> bool:
         """Whether chance says so."""
         assert self.around is not None
-        self.why = f"it asks about {self.settings.rate:.0%} of the steps"
+        self.why = ByChance(self.settings.rate)
         return self.around.draw() < self.settings.rate
 
 
 class Uncertainty(_PerStep):
     """Asks where an ensemble of tables disagrees: their values' standard deviation is at least `spread`.
 
-    Each table starts with values of its own within +-0.5 and learns each step with probability 1/2. The deviation is
-    the root of the mean variance over the actions. Source: da Silva et al. 2020 (RCMP), for tables.
+    Each table starts with values of its own within +-0.5 and learns as the learner does, each step with probability
+    1/2, or where steps are learned from together (`Update.chained`), each whole episode. The deviation is the root of
+    the mean variance over the actions. Source: da Silva et al. 2020 (RCMP), for tables.
     """
 
     watches = True
@@ -155,19 +169,33 @@ class Uncertainty(_PerStep):
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
         super().__init__(settings, episodes, max_steps, around)
         self._tables = [] if around is None else around.learners(settings.ensemble)
+        self._learning: list[Update] = []  # those with steps that belong together, that learn this episode
+
+    def begins(self, state: int) -> None:
+        """Each table begins the episode; where its steps belong together, it learns all of them or none."""
+        assert self.around is not None
+        for table in self._tables:
+            table.begin()
+        self._learning = [table for table in self._tables if table.chained and self.around.draw() < 0.5]
 
     def asks(self, state: int, values: Values) -> bool:
         """Whether the tables disagree about this state."""
         spread = deviation([table.gauge(state) for table in self._tables])
-        self.why = f"its {len(self._tables)} tables differ by {spread:.2f} here, at least {self.settings.spread:g}"
+        self.why = TablesDiffer(len(self._tables), spread, self.settings.spread)
         return spread >= self.settings.spread
 
-    def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int) -> None:
+    def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
         """Each table learns the step, or not."""
         assert self.around is not None
+        draw = self.around.draw
         for table in self._tables:
-            if self.around.draw() < 0.5:
-                table.learn(s_tm1, a_tm1, r_t, discount_t, s_t, 0)
+            if table in self._learning if table.chained else draw() < 0.5:
+                table.learn(s_tm1, a_tm1, r_t, discount_t, s_t, a_t)
+
+    def judges(self, steps: Steps, opened: bool) -> None:
+        """The episode is over: the tables learn what is learned at its end."""
+        for table in self._tables:
+            table.end()
 
 
 def deviation(rows: Sequence[Values]) -> float:
@@ -188,7 +216,7 @@ class ConstantPerformance(Gate):
         if episode < settings.first_episode or len(steps) < settings.window:
             return False
         mean = window_mean(steps, len(steps), settings.window)
-        self.why = f"the last {settings.window} episodes took {mean:.1f} steps, more than {settings.enough_steps:g}"
+        self.why = TooLong(settings.window, mean, settings.enough_steps)
         return mean > settings.enough_steps
 
 
@@ -199,12 +227,34 @@ class Ccrl(Gate):
     results below the step limit, and never asks in the last episode, which shows what was learned. An episode that
     was open for advice and is not better than the mean of the K before it is a mislead, also where the advisor's
     limited view let it say nothing (listing); more than Omega of them reject the advisor.
+
+    Not in the thesis, whose episodes all begin in one state: where they begin in different ones, each count before is
+    moved by how much farther the goal is from where the judged episode began. How far that is, the learner knows from
+    its own walks alone: the fewest steps by which it has seen the goal reached from a state, parts of different walks
+    put together. Nobody tells it the shortest way, so that is too many at first, and where steps are left to chance, it
+    is the luckiest. A failed episode keeps its count. With one start nothing is moved. When to ask is decided by the
+    plain counts. `settings.spare_best`: an episode of the fewest steps known from its start is no mislead, for no
+    advice could have made it better; the thesis counts it.
     """
 
     def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
         super().__init__(settings, episodes, max_steps, around)
+        self.watches = around is not None and around.several_starts
+        self._slow = Reason()
         self._last_result: float = 0
         self._equal_results = 0
+        self._starts: dict[int, int] = {}  # where each episode began
+        self._start = 0
+        self._walk = [0]  # the states that this episode left; only its first one where all begin in one
+        self._fewest: dict[int, float] = {}  # known steps to the goal
+
+    def begins(self, state: int) -> None:
+        """Another walk begins."""
+        self._start, self._walk = state, [] if self.watches else [state]
+
+    def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """The walk goes on."""
+        self._walk.append(s_tm1)
 
     def opens(self, episode: int, steps: Steps) -> bool:
         """Whether the improvement rate is below Lambda."""
@@ -213,7 +263,7 @@ class Ccrl(Gate):
             return False
         self._watch_convergence(steps[-1])
         slow = too_slow(improved.current_mean, improved.previous_mean, self.settings.lambda_threshold)
-        self.why = f"its improvement is {improved.rate:+.1%}, below {self.settings.lambda_threshold:.0%}"
+        self.why = self._slow = TooSlow(improved.rate, self.settings.lambda_threshold)
         return slow and not self.converged and episode < self.episodes
 
     def _watch_convergence(self, result: float) -> None:
@@ -225,10 +275,34 @@ class Ccrl(Gate):
 
     def judges(self, steps: Steps, opened: bool) -> None:
         """Counts a mislead and rejects the advisor after more than Omega (eqs. 6.3 and 6.4)."""
-        n, window = len(steps), self.settings.window
+        n, window, result = len(steps), self.settings.window, steps[-1]
+        self._starts[n - 1] = self._start
+        self._knows(result)
+        self.verdict = ""
         if opened and not self.rejected and n > window:
-            self.misleads += misled(steps[-1], window_mean(steps, n - 1, window))
+            if not misled(result, window_mean(self._alike(steps), window, window)):
+                self.verdict = "better"
+            elif self.settings.spare_best and result <= min(self._fewest[self._start], self.max_steps):
+                self.verdict = "best"
+            else:
+                self.verdict = "misled"
+                self.misleads += 1
             self.rejected = self.misleads > self.settings.omega
+
+    def _knows(self, result: float) -> None:
+        """Takes in how far the goal was from each state of the walk."""
+        left = result - len(self._walk) if result <= self.max_steps else inf
+        for state in reversed(self._walk):
+            left = self._fewest[state] = min(left + 1, self._fewest.get(state, inf))
+
+    def _alike(self, steps: Steps) -> Steps:
+        """The K counts before the last one, as if they had begun where it began."""
+        found, here = [], self._fewest[self._start]
+        for i in range(len(steps) - 1 - self.settings.window, len(steps) - 1):
+            start = self._starts.get(i, self._start)
+            moved = start != self._start and here < inf and steps[i] <= self.max_steps
+            found.append(steps[i] - self._fewest[start] + here if moved else steps[i])
+        return found
 
 
 class Combined(Ccrl):
@@ -236,6 +310,7 @@ class Combined(Ccrl):
 
     def asks(self, state: int, values: Values) -> bool:
         """Whether the learner is unsure of its choice."""
+        self.why = Both(self._slow, ValuesAlike(_width(values), self.settings.psi))
         return unsure(_width(values), self.settings.psi)
 
 

@@ -10,7 +10,7 @@ import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from lab.advice.entries import FILE, Answer, Closed, Entry, Read, Session, Undone, line_of, undoable
+from lab.advice.entries import FILE, Answer, Closed, Entry, Read, Session, Undone, line_of, read_journal, undoable
 from lab.advice.events import EpisodeEnded
 from lab.advice.requests import AdviceRequest, AdvisorLeft, Ask
 from lab.errors import BadInput, WorkFailed
@@ -59,16 +59,26 @@ class Journal:
 
     @classmethod
     def resume(cls, found: Read) -> "Journal":
-        """Go on with a journal: what was cut off at its end is taken away first. Raises BadInput when it is over."""
-        if found.closed is not None:
-            raise BadInput(f"the session in '{found.path.parent}' is over: look at it again with lab replay")
-        journal = cls(found.path, found.effective())
+        """Go on with a journal: what was cut off at its end is taken away first. Raises BadInput when it is over.
+
+        Another command may have gone on with it since it was found: it is read again once no other can write it.
+        """
+        journal = cls(found.path)
         try:
             journal._file = os.open(found.path, os.O_WRONLY | os.O_APPEND)
             journal._lock()
-            os.ftruncate(journal._file, found.whole_bytes)
+            now = read_journal(found.path, "--resume")
+            if now.session != found.session:
+                raise BadInput(f"journal '{found.path}': it was another session's when it was first read")
+            now.check_goes_on()
+            os.ftruncate(journal._file, now.whole_bytes)
         except OSError as error:
+            journal.close()
             raise BadInput(f"journal '{found.path}' cannot be written: {error.strerror or error}") from error
+        except BadInput:
+            journal.close()
+            raise
+        journal.entries = now.effective()
         return journal
 
     def _lock(self) -> None:

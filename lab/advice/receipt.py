@@ -19,6 +19,7 @@ from lab.advice.events import (
     EpisodeEnded,
 )
 from lab.advice.trust import Difference, Pair, Skill, differences, skill_of, worse
+from lab.errors import counted
 from lab.learning.settings import GateSettings
 from lab.mdp import FloatArray, TabularMDP
 
@@ -53,13 +54,14 @@ class Receipt:
 
     requests: episodes in which the learner asked; questions: the steps it asked about, taken of them with advice that was
     carried out; refused: by reason, questions without advice and answers that were not carried out; remembered: steps made
-    from memory, without asking; helped_steps, episodes, guided: of finished episodes; better: guided ones with fewer steps
-    than the mean of the K before; mean_before, mean_after: of the K before the first guided one and the K after the last,
+    from memory, without asking; helped_steps, episodes, guided: of finished episodes; better: guided ones that the
+    gate found better than before, or where it judges none, with fewer steps than the mean of the K before; best: others
+    that were as good as the best so far; mean_before, mean_after: of the K before the first guided one and the K after the last,
     None without any; change_percent: from one to the other; agreed: taken, and the learner's own choice, too; into_walls,
     into_obstacles: taken steps that stayed where they were, or ended the episode short of the goal; sent_back: states in
     which advice led back to one asked about before in the episode; against_best: taken steps that were not the best,
     differences: the LISTED most frequent of them, None and nothing where nobody knows; notices: rejections and the like;
-    hints: what would help more next time.
+    hints: what would help more next time; yours: a person gave all of this advice, and is spoken to.
     """
 
     requests: int
@@ -71,6 +73,7 @@ class Receipt:
     episodes: int
     guided: int
     better: int
+    best: int
     mean_before: float | None
     mean_after: float | None
     change_percent: float | None
@@ -83,6 +86,7 @@ class Receipt:
     skill: Skill | None
     voices: tuple[Voice, ...]
     notices: tuple[str, ...]
+    yours: bool = False
     hints: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
@@ -139,6 +143,7 @@ def receipt(
         skill=None if values is None else skill_of(there, values),
         voices=voices if len(voices) > 1 else (),
         notices=tuple(_notices(entries)),
+        yours=any(isinstance(one, Answer) for one in entries) and all(voice.whole for voice in voices),
         **_episodes([one for one in entries if isinstance(one, EpisodeEnded)], window),
     )
     return replace(counted, hints=tuple(_hints(counted, entries, window)))
@@ -209,20 +214,26 @@ def _mean(episodes: Sequence[EpisodeEnded]) -> float | None:
 
 
 def _judged(ended: Sequence[EpisodeEnded], window: int) -> list[bool]:
-    """Whether each guided episode was better than the mean of the K before it; the first one cannot be."""
+    """Whether each guided episode was a good one: better than the mean of the K before it, or as good as the best."""
     means = [_mean(ended[max(0, n - window) : n]) for n in range(len(ended))]
-    return [mean is not None and one.steps < mean for one, mean in zip(ended, means, strict=True) if one.guided]
+    return [
+        one.verdict != "misled" if one.verdict else mean is not None and one.steps < mean
+        for one, mean in zip(ended, means, strict=True)
+        if one.guided
+    ]
 
 
 def _episodes(ended: Sequence[EpisodeEnded], window: int) -> dict[str, Any]:
     guided = [n for n, one in enumerate(ended) if one.guided]
+    best = sum(ended[n].verdict == "best" for n in guided)
     before = _mean(ended[max(0, guided[0] - window) : guided[0]]) if guided else None
     after = _mean(ended[guided[-1] + 1 : guided[-1] + 1 + window]) if guided else None
     return {
         "helped_steps": sum(one.helped_steps for one in ended),
         "episodes": len(ended),
         "guided": len(guided),
-        "better": sum(_judged(ended, window)),
+        "better": sum(_judged(ended, window)) - best,
+        "best": best,
         "mean_before": before,
         "mean_after": after,
         "change_percent": 100.0 * (after / before - 1.0) if before and after is not None else None,
@@ -234,8 +245,8 @@ def _notices(entries: Sequence[Entry]) -> Iterator[str]:
     for n, entry in enumerate(entries):
         if isinstance(entry, AdviceRejected):
             left = sum(isinstance(one, EpisodeEnded) for one in entries[n:])
-            why = f"{_count(entry.misleads, 'episode')} no better than before, {entry.omega} tolerated"
-            yield f"episode {entry.episode}: advice rejected ({why}); alone for the {_count(left, 'episode')} after it"
+            why = f"{counted(entry.misleads, 'episode')} no better than before, {entry.omega} tolerated"
+            yield f"episode {entry.episode}: advice rejected ({why}); alone for the {counted(left, 'episode')} after it"
         elif isinstance(entry, AdviceEnded):
             yield f"episode {entry.episode}: no more advice: {entry.reason}"
         elif isinstance(entry, AdvisorDropped | AdvisorReadmitted):
@@ -248,23 +259,27 @@ def _hints(of: Receipt, entries: Sequence[Entry], window: int) -> Iterator[str]:
     ended = [one for one in entries if isinstance(one, EpisodeEnded)]
     if not of.taken:
         if of.questions:
-            yield f"it asked about {_count(of.questions, 'step')} and was never advised: an answer shows it a way at once"
+            yield f"it asked about {counted(of.questions, 'step')} and was never advised: an answer shows it a way at once"
         return
     if 2 * of.agreed > of.taken:
-        yield f"most of your help, {of.agreed} of {of.taken} steps, was what it would have done by itself: help elsewhere"
+        help_was = f"{of.agreed} of {counted(of.taken, 'step')}, was what it would have done by itself"
+        yield f"most of {'your help' if of.yours else 'the advice'}, {help_was}: help elsewhere"
     if of.sent_back:
-        yield f"in {_count(of.sent_back, 'state')} your advice sent it back to where it had been in that episode"
+        whose = "your" if of.yours else "the"
+        yield f"in {counted(of.sent_back, 'state')} {whose} advice sent it back to where it had been in that episode"
     for steps, what in ((of.into_walls, "against a wall"), (of.into_obstacles, "into an obstacle")):
         if steps:
-            yield f"{_count(steps, 'step')} of yours went {what}"
+            yield f"{counted(steps, 'step' if of.yours else 'advised step')}{' of yours' * of.yours} went {what}"
     if of.against_best is not None and 4 * of.against_best > of.taken:
-        yield f"in {of.against_best} of {of.taken} steps another action was better: see the list"
+        yield f"in {of.against_best} of {counted(of.taken, 'step')} another action was better: see the list"
     if 2 * of.refused.get(SILENT, 0) > of.questions:
-        yield f"you left {of.refused[SILENT]} of {of.questions} questions to it: answer more of them"
+        left = f"{of.refused[SILENT]} of {counted(of.questions, 'question')}"
+        yield (f"you left {left} to it" if of.yours else f"{left} had no answer") + ": answer more of them"
     first = next((one.episode for one in ended if one.guided), 0)
     late = sum(isinstance(one, AdviceRequested) and one.episode < first for one in entries)
     if late:
-        yield f"earlier: it had asked in {_count(late, 'episode')} before you helped for the first time"
+        who = "you helped" if of.yours else "it was helped"
+        yield f"earlier: it had asked in {counted(late, 'episode')} before {who} for the first time"
     judged = _judged(ended, window)
     half = len(judged) // 2
     if half >= 2 and 2 * sum(judged[-half:]) < sum(judged[:half]):
@@ -273,34 +288,37 @@ def _hints(of: Receipt, entries: Sequence[Entry], window: int) -> Iterator[str]:
 
 
 def _lines(of: Receipt) -> Iterator[str]:
-    asked = f"{_count(of.requests, 'episode')} about {_count(of.questions, 'step')}"
-    yield f"advice: it asked in {asked}; {of.taken} of them with your help"
+    if not of.requests and not of.questions:
+        yield "advice: it asked nobody"
+    else:
+        about = f" about {counted(of.questions, 'step')}" if of.questions else ", but about no step"
+        helped = f"; {of.taken} of them with {'your help' if of.yours else 'advice'}" if of.questions else ""
+        yield f"advice: it asked in {counted(of.requests, 'episode')}{about}{helped}"
     if of.refused:
         yield "  not followed: " + ", ".join(f"{count} ({reason})" for reason, count in of.refused.items())
-    guided = f"{_count(of.guided, 'guided episode')}, {of.better} of them better than before"
-    yield f"  {_count(of.helped_steps, 'helped step')} in {guided}"
+    if of.guided:
+        guided = f"{counted(of.guided, 'guided episode')}, {of.better} of them better than before"
+        guided += f", {of.best} as good as the best" if of.best else ""
+        yield f"  {counted(of.helped_steps, 'helped step')} in {guided}"
     if of.remembered:
-        yield f"  {_count(of.remembered, 'step')} more from memory, without asking"
+        yield f"  {counted(of.remembered, 'step')} more from memory, without asking"
     if of.change_percent is not None:
         yield (
             f"  mean steps {of.mean_before:.1f} before the first of them, {of.mean_after:.1f} after the last "
             f"({of.change_percent:+.0f} %; what it learned by itself is in it)"
         )
-    yield f"  {of.agreed} of {of.taken} were its own choice, too"
+    if of.taken:
+        yield f"  {of.agreed} of {of.taken} {'was' if of.taken == 1 else 'were'} its own choice, too"
     if of.skill is not None:
         yield f"  skill {of.skill}"
     if of.against_best:
-        yield f"  another action was better in {_count(of.against_best, 'step')}:"
+        yield f"  another action was better in {counted(of.against_best, 'step')}:"
         for one in of.differences:
             yield f"    {one.label}: said {one.said}, best {' or '.join(one.best)} ({one.times} x)"
     for voice in of.voices:
-        against = "" if voice.against_best is None else f", {voice.against_best} times not the best"
+        against = "" if voice.against_best is None else f", {counted(voice.against_best, 'time')} not the best"
         skill = "" if voice.skill is None else f"; skill {voice.skill}"
         record = "answer" if voice.whole else "disputed answer"
-        yield f"  {voice.name}: {_count(voice.said, record)}, {voice.followed} followed{against}{skill}"
+        yield f"  {voice.name}: {counted(voice.said, record)}, {voice.followed} followed{against}{skill}"
     yield from (f"  {notice}" for notice in of.notices)
     yield from (f"  next time: {hint}" for hint in of.hints)
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" + "s" * (number != 1)

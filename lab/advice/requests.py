@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from lab.advice.reasons import Reason
 from lab.learning.selection import chances
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
@@ -33,7 +34,7 @@ class AdviceRequest:
 
     q: its live action values, q[state][action], not to be changed; step counts from 1; learner_action: what it
     would do itself; the means are step counts over the last K episodes and the K before, None (like the rate)
-    before there are 2K; why: the gate's reason in words; temperature and selection: how it chooses now; place: what can
+    before there are 2K; why: the gate's reason; temperature and selection: how it chooses now; place: what can
     draw the state; undoable: an answer of this episode can be taken back.
     """
 
@@ -46,7 +47,7 @@ class AdviceRequest:
     improvement_rate: float | None
     current_mean: float | None
     previous_mean: float | None
-    why: str = ""
+    why: Reason | None = None
     temperature: float = 1.0
     selection: str = "softmax"
     standing: Standing = Standing()

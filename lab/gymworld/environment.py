@@ -101,11 +101,13 @@ class GymEnvironment:
     def _learned_alone(self, discount: float) -> FloatArray:
         learner = replace(ALONE, discount=discount, max_steps=self.max_steps)
         alone, rng = _Unjudged(self.live.again()), np.random.default_rng(0)
-        q = run_session(alone.mdp, learner, GateSettings(gate="never"), None, rng, environment=alone).q
-        if not (np.ptp(q, axis=1) > 0.0).any():
+        result = run_session(alone.mdp, learner, GateSettings(gate="never"), None, rng, environment=alone)
+        if result.interrupted:
+            raise KeyboardInterrupt
+        if not (np.ptp(result.q, axis=1) > 0.0).any():
             found = f"{ALONE.episodes} episodes of learning alone found nothing to prefer"
             raise WorkFailed(f"{self.live.which}: nobody knows what is best in it: {found}")
-        return q
+        return result.q
 
     def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
         """Exact with a model, else from EPISODES_JUDGED seeded episodes; returns are compared without discount.

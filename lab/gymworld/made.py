@@ -34,6 +34,11 @@ class GymName:
     id: str
     options: Mapping[str, object]
 
+    @property
+    def module(self) -> str:
+        """The module that is imported to make it, "" when the id names none."""
+        return self.id.partition(":")[0] if ":" in self.id else ""
+
     def __str__(self) -> str:
         written = "&".join(f"{key}={json.dumps(value)}" for key, value in self.options.items())
         return f"{self.id}?{written}" if written else self.id
@@ -84,12 +89,12 @@ def quiet() -> Iterator[None]:
 
 
 def make(name: GymName, where: str, render_mode: str | None = None) -> Env:
-    """The environment of that name; its module is also looked for in the current folder. Raises BadInput."""
+    """The environment of that name; a module that it names is also looked for in the current folder. Raises BadInput."""
     register()
     mode = {} if render_mode is None else {"render_mode": render_mode}
     here = str(Path.cwd())
-    found = here in sys.path
-    if not found:
+    adds = bool(name.module) and here not in sys.path
+    if adds:
         sys.path.append(here)
     try:
         with quiet():
@@ -97,7 +102,7 @@ def make(name: GymName, where: str, render_mode: str | None = None) -> Env:
     except Exception as error:
         raise _refusal(name, where, error) from None
     finally:
-        if not found:
+        if adds:
             sys.path.remove(here)
 
 

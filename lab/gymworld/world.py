@@ -5,7 +5,7 @@ from typing import Literal, Self
 
 from pydantic import PrivateAttr
 
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 from lab.gymworld.environment import ALONE, GymEnvironment
 from lab.gymworld.live import Live
 from lab.gymworld.made import parse_name
@@ -31,7 +31,9 @@ class GymWorld(Learned):
         learner, gate = fitting(environment)
         mdp, model = environment.mdp, environment.model
         steps = "steps learned from" if model is None else "certain steps" if model.certain else "steps left to chance"
-        title = f"{environment.live.name.id}: {mdp.n_states} states, {mdp.n_actions} actions, {steps}"
+        title = (
+            f"{environment.live.name.id}: {counted(mdp.n_states, 'state')}, {counted(mdp.n_actions, 'action')}, {steps}"
+        )
         made = cls(name=str(environment.live.name), title=title, learner=learner, gate=gate)
         made._environment = environment
         return made
@@ -64,11 +66,11 @@ def fitting(environment: GymEnvironment) -> tuple[LearnerSettings, GateSettings]
     mdp, model = environment.mdp, environment.model
     entries, most = mdp.n_states * mdp.n_actions, environment.max_steps
     if model is None or not model.certain:
-        gate = GateSettings(window=20, first_episode=40, omega=30)
+        gate = GateSettings(window=20, first_episode=40, omega=30, spare_best=True)
         return replace(ALONE, episodes=_within(20 * entries, CHANCE_EPISODES), max_steps=most), gate
     beta = 0.2 if mdp.starts else 0.7
     learner = replace(ALONE, alpha=1.0, beta=beta, episodes=_within(8 * entries, CERTAIN_EPISODES), max_steps=most)
-    return learner, GateSettings()
+    return learner, GateSettings(spare_best=True)
 
 
 def _within(number: int, limits: tuple[int, int]) -> int:

@@ -1,18 +1,20 @@
-"""Many sessions at once, for studies: settings in, what the compiled kernel made of them out."""
+"""Many sessions at once, for studies: settings in, what the compiled kernel made of them out.
+
+What has no compiled form is run in the interactive session, one after the other: slower, and the same.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.advice.advisors import Advice
+from lab.advice.advisors import Advice, TableAdvisor
 from lab.advice.memory import places
-from lab.errors import BadInput, unknown
-from lab.learning import kernels, selection
+from lab.errors import BadInput
+from lab.learning import kernels, selection, splitmix
+from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray, TabularMDP
-
-LEARNERS = ("afterstate", "q")  # those that chapter 9 needs
 
 
 class Batch(NamedTuple):
@@ -44,18 +46,15 @@ def run_sessions(
 ) -> Batch:
     """Learns a table in each of N sessions, seeds (N,) uint64; advice None: nobody to ask.
 
-    The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix(seed)` and
-    a `TableAdvisor` on the same draws. Raises BadInput for a learner outside LEARNERS, a selection other than softmax,
-    an unknown gate, or advice of another shape.
+    The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix.stream(seed)` and
+    a `TableAdvisor` on the same draws. Raises BadInput for an unknown learner, selection or gate, or advice of another
+    shape.
     """
-    if learner.learner not in LEARNERS:
-        raise unknown("learner", learner.learner, LEARNERS, "compiled sessions")
-    if learner.selection != "softmax":
-        raise unknown("selection", learner.selection, ["softmax"], "compiled sessions")
-    if gate.gate not in kernels.GATE_CODES:
-        raise unknown("gate", gate.gate, kernels.GATE_CODES, "gate settings")
+    check_members(learner, gate)
     if advice is not None and advice.thresholds.shape[1:] != mdp.successor.shape:
         raise BadInput(f"advice of shape {advice.thresholds.shape}: the problem has {mdp.successor.shape}")
+    if not is_compiled(mdp, learner, gate):
+        return _one_by_one(mdp, learner, gate, advice, seeds, keep_tables)
     rules, problem = _rules(learner, gate, advice is not None), _problem(mdp, learner.learner == "afterstate")
     size = mdp.n_states if rules.afterstate else mdp.n_states * mdp.n_actions
     sessions, episodes = len(seeds), learner.episodes
@@ -64,7 +63,7 @@ def run_sessions(
     temperatures = [selection.temperature(n, learner.beta, learner.exploration) for n in range(1, episodes + 1)]
     thresholds = np.zeros((1, 1, mdp.n_actions)) if advice is None else advice.thresholds
     region = np.zeros(mdp.n_states, np.bool_) if advice is None else advice.region
-    others = np.zeros((kernels.LANES, rules.ensemble if rules.gate == kernels.GATE_CODES["uncertainty"] else 0, size))
+    others = np.zeros((kernels.LANES, rules.ensemble if kernels.GATES[rules.gate] == "uncertainty" else 0, size))
     kernels.run(
         problem,
         rules,
@@ -82,9 +81,44 @@ def run_sessions(
         counts,
         kept,
     )
-    return Batch(
-        steps, guided, **{name: counts[name] for name in kernels.COUNTS.names or ()}, q=_action_values(mdp, rules, kept)
-    )
+    return _batch(steps, guided, counts, _action_values(mdp, rules, kept))
+
+
+def _batch(steps: NDArray[np.int32], guided: NDArray[np.bool_], counts: NDArray[np.void], q: FloatArray) -> Batch:
+    return Batch(steps, guided, **{name: counts[name] for name in kernels.COUNTS.names or ()}, q=q)
+
+
+def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings) -> bool:
+    """Whether the kernel knows this learner, its selection, and this gate by all of its settings."""
+    known = learner.learner in kernels.LEARNERS and learner.selection == "softmax" and gate.gate in kernels.GATES
+    as_printed = len(mdp.starts) < 2 and not gate.spare_best  # it judges by the plain counts alone
+    return known and (as_printed or gate.gate not in kernels.JUDGING)
+
+
+def _one_by_one(
+    mdp: TabularMDP,
+    learner: LearnerSettings,
+    gate: GateSettings,
+    advice: Advice | None,
+    seeds: NDArray[np.uint64],
+    keep_tables: bool,
+) -> Batch:
+    """The same sessions, each with the draws that it would have in the kernel."""
+    steps, counts = np.zeros((len(seeds), learner.episodes), np.int32), np.zeros(len(seeds), kernels.COUNTS)
+    q = np.zeros((len(seeds) if keep_tables else 0, *mdp.successor.shape))
+    found = _batch(steps, np.zeros(steps.shape, np.bool_), counts, q)
+    for n, seed in enumerate(seeds):
+        draw = splitmix.stream(int(seed))
+        advisor = None if advice is None else TableAdvisor(advice, draw)
+        one = run_session(mdp, learner, gate, advisor, np.random.default_rng(0), draw=draw)
+        if one.interrupted:
+            raise KeyboardInterrupt
+        found.steps[n], found.guided[n], found.moves[n] = one.steps, one.guided, one.visits.sum()
+        found.requests[n], found.helped_steps[n] = one.requests, one.helped_steps
+        found.misleads[n], found.rejected_at_episode[n] = one.misleads, one.rejected_at_episode or 0
+        if keep_tables:
+            found.q[n] = one.q
+    return found
 
 
 def _scratch(actions: int, episodes: int) -> kernels.Scratch:
@@ -129,7 +163,7 @@ def _rules(learner: LearnerSettings, gate: GateSettings, somebody: bool) -> kern
         learner.max_steps - learner.count_start,
         learner.max_steps,
         int(learner.count_start),
-        kernels.GATE_CODES[gate.gate] if somebody else kernels.GATE_CODES["never"],
+        kernels.GATES.index(gate.gate if somebody else "never"),
         float(gate.lambda_threshold),
         gate.omega,
         gate.first_episode,

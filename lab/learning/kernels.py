@@ -1,9 +1,9 @@
 """Whole sessions compiled with numba, many at once: what studies run.
 
 Many sessions walk side by side: one alone waits for its memory and its exponentials, 24 keep the processor busy.
-Each has uniform numbers of its own (`selection.splitmix`), so its result depends on its seed and on nothing else, and
+Each has uniform numbers of its own (`splitmix`), so its result depends on its seed and on nothing else, and
 equals that of `session.run_session` with the same numbers. Rules come from `selection`, `updates`, `advice.gates` and
-`advice.memory`; numba's cache knows changes of this file only, so whoever changes a rule there deletes `__pycache__` here.
+`advice.memory`.
 """
 
 from dataclasses import fields
@@ -14,20 +14,24 @@ from numba import njit
 from numpy.typing import NDArray
 
 from lab.advice import gates, memory
-from lab.learning import selection, updates
+from lab.compiled import compiled
+from lab.learning import selection, splitmix, updates
 from lab.mdp import FloatArray
 
 LANES = 24
-GATE_CODES = {name: code for code, name in enumerate(gates.GATES)}
-_NEVER, _CCRL, _COMBINED, _IA, _CQ, _RANDOM, _IMPORTANCE, _UNCERTAINTY = (
-    GATE_CODES[name] for name in ("never", "ccrl", "combined", "ia", "cq", "random", "importance", "uncertainty")
-)
+LEARNERS = ("afterstate", "q")  # those that are compiled: what chapter 9 needs
+GATES = ("never", "always", "ccrl", "combined", "ia", "cq", "random", "importance", "uncertainty")
+_NEVER, _ALWAYS, _CCRL, _COMBINED, _IA, _CQ, _RANDOM, _IMPORTANCE, _UNCERTAINTY = range(len(GATES))
+JUDGING = ("ccrl", "combined")
 
 _OWN, _REMEMBERED, _ASKED, _PRACTISED = memory.OWN, memory.REMEMBERED, memory.ASKED, memory.PRACTISED
 _NOTHING = memory.NOTHING
 _Memory: Any = memory.Memory
 _BELOW_ONE = selection.BELOW_ONE
 _exp_of: Any = njit(selection.exp_of)
+_following: Any = njit(splitmix.following)
+_mixed: Any = njit(splitmix.mixed)
+_fraction: Any = njit(splitmix.fraction)
 _window_mean: Any = njit(gates.window_mean)
 _too_slow: Any = njit(gates.too_slow)
 _misled: Any = njit(gates.misled)
@@ -121,12 +125,9 @@ class Scratch(NamedTuple):
 
 @njit(inline="always")
 def _draw(rng: Any, lane: int) -> float:
-    """selection.splitmix for one lane."""
-    rng[lane] += np.uint64(0x9E3779B97F4A7C15)
-    z = rng[lane]
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+    """`splitmix.stream` for one lane."""
+    rng[lane] = _following(rng[lane])
+    return float(_fraction(_mixed(rng[lane])))
 
 
 @njit
@@ -185,7 +186,7 @@ def _opens(rules: Any, lane: Any, steps: Any, rejected: bool) -> bool:
         enough = episode >= rules.first_episode and episode > rules.window
         return bool(enough and _window_mean(steps, episode - 1, rules.window) > rules.enough)
     if gate not in (_CCRL, _COMBINED):
-        return bool(gate != _NEVER)
+        return bool(gate == _ALWAYS)
     if rejected or episode < rules.first_episode or episode <= 2 * rules.window:
         return False
     result = steps[episode - 2]
@@ -252,19 +253,15 @@ def _choose(
             total += _exp_of(x)
             values[a * LANES + j] = total
     for j in range(LANES):
-        rng[j] += np.uint64(0x9E3779B97F4A7C15)
-        z = rng[j]
-        z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-        z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-        u = float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
-        mark = u * values[(len(actions) - 1) * LANES + j] * _BELOW_ONE
+        rng[j] = _following(rng[j])
+        mark = _fraction(_mixed(rng[j])) * values[(len(actions) - 1) * LANES + j] * _BELOW_ONE
         action = np.int64(0)
         for a in range(len(actions) - 1):
             action += np.int64(values[a * LANES + j] <= mark)
         chosen[j] = action
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def run(
     problem: Any,
     rules: Any,
@@ -353,7 +350,7 @@ def run(
                 elif gate == _UNCERTAINTY:
                     asks = _deviation(problem, rules, others[j], np.int64(state)) >= rules.spread
                 else:
-                    asks = True
+                    asks = gate in (_ALWAYS, _CCRL, _CQ)
                 if asks and said != _NOTHING:
                     action, source = np.uint64(said), np.int64(_REMEMBERED)
                 elif asks:

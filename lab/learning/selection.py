@@ -98,23 +98,3 @@ def uniforms(rng: np.random.Generator, block: int = 1024) -> Draw:
             yield from rng.random(block).tolist()
 
     return stream().__next__
-
-
-_MASK = (1 << 64) - 1
-
-
-def splitmix(seed: int) -> Draw:
-    """The uniform numbers in [0, 1) that the compiled kernel draws in a session of this seed, 0 <= seed < 2**64.
-
-    Source: Steele, Lea and Flood, Fast splittable pseudorandom number generators, OOPSLA 2014.
-    """
-    state = seed & _MASK
-
-    def draw() -> float:
-        nonlocal state
-        state = (state + 0x9E3779B97F4A7C15) & _MASK
-        z = ((state ^ (state >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
-        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
-        return ((z ^ (z >> 31)) >> 11) * 2.0**-53
-
-    return draw

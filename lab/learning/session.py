@@ -82,6 +82,16 @@ def run_session(
     return session.result(interrupted)
 
 
+def check_members(learner: LearnerSettings, gate: GateSettings) -> None:
+    """Raises BadInput for an unknown learner, selection or gate."""
+    if learner.learner not in UPDATES:
+        raise unknown("learner", learner.learner, UPDATES, "learner settings")
+    if learner.selection not in SELECTIONS:
+        raise unknown("selection", learner.selection, SELECTIONS, "learner settings")
+    if gate.gate not in GATES:
+        raise unknown("gate", gate.gate, GATES, "gate settings")
+
+
 class _Session:
     """One session under way; everything the inner loop touches is a plain list."""
 
@@ -95,12 +105,7 @@ class _Session:
         q0: FloatArray | None,
         on_event: OnEvent,
     ):
-        if learner.learner not in UPDATES:
-            raise unknown("learner", learner.learner, UPDATES, "learner settings")
-        if learner.selection not in SELECTIONS:
-            raise unknown("selection", learner.selection, SELECTIONS, "learner settings")
-        if gate.gate not in GATES:
-            raise unknown("gate", gate.gate, GATES, "gate settings")
+        check_members(learner, gate)
         check_solvable(environment)
         self.environment, self.mdp, self.settings, self.gate_settings = environment, environment.mdp, learner, gate
         self.advisor, self.advised, self.tell = advisor, advisor is not None, on_event
@@ -109,8 +114,10 @@ class _Session:
         self.q = self.update.q
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
         self.choose, self.draw = SELECTIONS[learner.selection], draw
-        around = Surroundings(draw, self._others)
-        self.gate = GATES[gate.gate](gate, learner.episodes, learner.max_steps, around)
+        several_starts = bool(mdp.starts) or not isinstance(environment, TableEnvironment)
+        around = Surroundings(draw, self._others, several_starts)
+        make = GATES[gate.gate if self.advised else "never"]
+        self.gate = make(gate, learner.episodes, learner.max_steps, around)
         self.max_moves = learner.max_steps - learner.count_start
         self.recall = Recall(mdp.n_states, self.max_moves, learner.episodes, gate.window) if gate.memory else None
         self.judge_unhelped = gate.judge_unhelped and not gate.memory
@@ -158,7 +165,7 @@ class _Session:
         rate = self.improved.rate if self.improved else None
         if self.trail is not None and followed is not None:
             followed(Walked(episode, self.trail, moves is not None, steps, self._mean_before()))
-        self.tell(EpisodeEnded(episode, steps, helped > 0, helped, rate, moves is not None))
+        self.tell(EpisodeEnded(episode, steps, helped > 0, helped, rate, moves is not None, self.gate.verdict))
         if self.gate.rejected and self.rejected_at is None:
             self.rejected_at = episode
             mean_before = self._mean_before()
@@ -185,6 +192,7 @@ class _Session:
         recall = self.recall
         self.update.begin()
         state = self.environment.reset(self.episode, draw)
+        self.gate.begins(state)
         if recall is not None:
             recall.starts(state)
         action = choose(state, 1)
@@ -203,7 +211,7 @@ class _Session:
             if self.trail is not None:
                 self.trail.append((state, action, entered))
             if watch is not None:
-                watch(state, action, reward, discount_t, entered)
+                watch(state, action, reward, discount_t, entered, following)
             if over:
                 return step if reached else None
             if last:

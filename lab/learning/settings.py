@@ -74,7 +74,9 @@ class GateSettings:
     with; spread: the deviation of its tables that lets "uncertainty" ask; rate: the share of steps that "random" asks
     for; enough_steps: the mean step count that satisfies "cq"; ensemble: the tables of "uncertainty"; budget: the
     helped steps that any gate may use in a session; judge_unhelped: an episode that was open for advice and got none,
-    as in a limited view, is judged too (the listing), or not (the text's words); memory: advice is remembered and used
+    as in a limited view, is judged too (the listing), or not (the text's words); spare_best: an episode that is as good
+    as the best so far is no mislead, though it is not better than those before; the default is as printed, lessons and
+    runs set it (see lab/record.py); memory: advice is remembered and used
     again without asking (see lab/advice/memory.py).
     Raises BadInput for a value outside its range, or for X < 2K with a gate that compares moving averages.
     """
@@ -91,6 +93,7 @@ class GateSettings:
     ensemble: Annotated[int, Ge(2), Le(100)] = 5
     budget: Annotated[int, Ge(0), Le(1_000_000_000)] = 1_000_000_000
     judge_unhelped: bool = True
+    spare_best: bool = False
     memory: bool = False
 
     def __post_init__(self) -> None:

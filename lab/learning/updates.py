@@ -42,9 +42,14 @@ def is_greedy(q_t: Row, a_t: int) -> bool:
 
 
 class Update(Protocol):
-    """What a session asks of a learner: `lookahead` says whether learning needs the next action chosen first."""
+    """What a session asks of a learner.
+
+    lookahead: learning needs the next action chosen first; chained: a step is learned from together with those before
+    or after it in the episode, so that none of them may be left out.
+    """
 
     lookahead: bool
+    chained: bool
 
     @property
     def q(self) -> Table:
@@ -69,7 +74,7 @@ class Update(Protocol):
 class _OnTable:
     """What the learners that keep a value per state and action have in common."""
 
-    lookahead = False
+    lookahead = chained = False
 
     def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
         self.q: list[Row] = q
@@ -118,7 +123,7 @@ class _Traced(_OnTable):
     Source: Singh and Sutton 1996; thesis fig. 2.3.
     """
 
-    lookahead = True
+    lookahead = chained = True
 
     def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
         super().__init__(q, settings, mdp)
@@ -173,6 +178,8 @@ class MonteCarlo(_OnTable):
 
     A broken-off episode counts as if nothing came after it. Source: Sutton and Barto 1998, section 5.4.
     """
+
+    chained = True
 
     def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
         super().__init__(q, settings, mdp)
@@ -234,7 +241,7 @@ class Afterstate:
     Source: thesis App. VII (the text speaks of Q(s,a), the listing keeps a value per state).
     """
 
-    lookahead = False
+    lookahead = chained = False
 
     def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
         self._alpha, self._discount = settings.alpha, settings.discount

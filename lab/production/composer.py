@@ -7,9 +7,9 @@ from math import hypot
 from lab.production.floor import Floor
 from lab.production.prepared import Prepared
 from lab.production.recorder import Viewer
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import Move, Schedule
-from lab.sequencing.run import Run
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.schedule import Move, Schedule
+from lab.sequencing.simulate.run import Run
 from lab.sim.scene import Spot, spots
 from lab.sim.world import World
 from lab.skills import Skill
@@ -82,18 +82,18 @@ class Production:
         for skill in () if start == origin else floor.skillset.travels[start, origin]:
             self._try(toast, origin, skill)
         reach_s = floor.now_s
-        self.wait_for(toast, origin)
+        self._await(toast, origin)
         pick_s = floor.now_s
-        spot = self.free_spot(target)
+        spot = self._free_spot(target)
         self._carry(toast, origin, target, spot)
         self.place, self.spot_of[toast] = target, spot
         process_s = self.plan.move(toast).process_s
         self.moves.append(Move(toast, start, origin, target, leave_s, reach_s, pick_s, floor.now_s, process_s))
-        self.start_machine(toast, target)
+        self._start_machine(toast, target)
         if self.on_move is not None:
             self.on_move(self.moves[-1])
 
-    def free_spot(self, station: str) -> Spot:
+    def _free_spot(self, station: str) -> Spot:
         """The first spot of a station on which no toast stands."""
         return next(s for s in spots(self.floor.skillset.task.station(station)) if s not in self.spot_of.values())
 
@@ -146,7 +146,7 @@ class Production:
         if self.on_retry is not None:
             self.on_retry(text)
 
-    def wait_for(self, toast: int, station: str) -> None:
+    def _await(self, toast: int, station: str) -> None:
         """Wait at a machine until it is done with its toast; a learned process that failed is tried again."""
         machine = self.floor.machines.get(station)
         tries = 0
@@ -163,7 +163,7 @@ class Production:
                 return
             self.floor.tick()
 
-    def start_machine(self, toast: int, station: str) -> None:
+    def _start_machine(self, toast: int, station: str) -> None:
         """Let the machine that a toast has been brought to begin: with its learned process, or for its time."""
         floor, place = self.floor, self.floor.skillset.task.station(station)
         for skill in floor.skillset.processes[station]:

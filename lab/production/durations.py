@@ -16,8 +16,8 @@ from lab.policy import Policy
 from lab.production.floor import Floor
 from lab.production.prepared import Prepared
 from lab.production.skillset import route, stations
-from lab.sequencing.cell import Cell
-from lab.sequencing.positions import Moves
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import Moves
 from lab.sim.scene import Layout
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill

@@ -7,17 +7,17 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lab.errors import WorkFailed
+from lab.errors import WorkFailed, counted
 from lab.files import draft
 from lab.mdp import TabularMDP, greedy_path
 from lab.policy import Policy
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
 from lab.production.prepared import Prepared
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import SequenceResult
-from lab.sequencing.exact import Optimum
-from lab.sequencing.run import simulate
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.schedule import SequenceResult
+from lab.sequencing.methods.exact import Optimum
+from lab.sequencing.simulate.run import simulate
 from lab.skills import Skill
 from lab.skills.skill import Photo
 from lab.teaching import Lesson
@@ -123,7 +123,7 @@ def write_files(prepared: Prepared, taught: Taught, report: Report, out: Path) -
     try:
         out.mkdir(parents=True, exist_ok=True)
         with draft(out) as beside:
-            draw_all(prepared, taught, report, beside)
+            _draw_all(prepared, taught, report, beside)
             for name, file in FILES.items():
                 if name in report.files:
                     os.replace(beside / file, out / file)
@@ -146,7 +146,7 @@ def _photographed(prepared: Prepared) -> Skill | None:
     return next((skill for skill in prepared.skillset.skills.values() if skill.photo() is not None), None)
 
 
-def draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) -> None:
+def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) -> None:
     """The pictures, the replay and the two JSON files."""
     from lab.view.meshcat import replay_html
     from lab.view.plots import gantt, learning_curves
@@ -156,20 +156,20 @@ def draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) -
     predicted = simulate(taught.cell, report.sequenced.sequence)
     if "gantt" in report.files:
         gantt(report.outcome.schedule, paths["gantt"], predicted=predicted)
-    learning_curves(curves(prepared, taught.lessons), paths["learning_curves"])
+    learning_curves(_curves(prepared, taught.lessons), paths["learning_curves"])
     skill = _photographed(prepared)
     photo = None if skill is None else skill.photo()
     if skill is not None and photo is not None:
         draw_value_map(skill.problem.mdp, photo, taught.lessons[skill.name].policy, paths["value_map"])
         write_picture(paths["overhead"], photo.picture)
-    title = f"{prepared.task.title or prepared.task.name}: {prepared.toasts} toasts"
+    title = f"{prepared.task.title or prepared.task.name}: {counted(prepared.toasts, 'toast')}"
     replay_html(report.recording, paths["replay"], title=title)
     _write_json(paths["sequence"], _sequence_document(taught, report))
     report.wall_s = time.perf_counter() - report.began_s
     _write_json(paths["run"], report.to_json() | {"schedule": report.outcome.schedule.to_json()})
 
 
-def curves(prepared: Prepared, lessons: dict[str, Lesson]) -> dict[str, Policy]:
+def _curves(prepared: Prepared, lessons: dict[str, Lesson]) -> dict[str, Policy]:
     """Each policy once, under the skill that it was first found for."""
     first = {lesson.policy.name: name for name, lesson in reversed(lessons.items())}
     several = {name for name, problem in prepared.problems.items() if problem.mdp.starts}

@@ -1,24 +1,42 @@
 """The main job: find or learn the skills, measure their durations, sequence, carry out in physics."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from lab.errors import LabError
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
+from lab.policy import Policy
 from lab.production.composer import carry_out
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
+from lab.production.floor import try_out
 from lab.production.prepared import Prepared
 from lab.production.recorder import Viewer, show_scene
 from lab.production.report import Report, Taught, write_files
-from lab.sequencing.exact import optimum
+from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Reference
-from lab.teaching import Teacher
+from lab.skills.skill import Problem
+from lab.teaching import Teacher, Trial
+
+
+def trial_of(prepared: Prepared) -> Trial:
+    """What tries a learned skill in physics before it is kept: a grasp must lift its slice; most skills are not tried."""
+
+    def trial(problem: Problem, policy: Policy) -> str | None:
+        skill = prepared.skillset.skills[problem.name]
+        if not skill.tried:
+            return None
+        prepared.skillset.policies[skill.name] = policy
+        return try_out(prepared, skill)
+
+    return trial
 
 
 def teach_all(prepared: Prepared, teacher: Teacher, listener: Listener) -> Taught:
     """Find or learn every skill, then find or measure the durations of every move."""
     task, skillset = prepared.task, prepared.skillset
+    teacher = replace(teacher, trial=trial_of(prepared))
     known, damaged = teacher.toolbox.index()
     for what in damaged:
         listener.skipped(what)

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 from lab.errors import BadInput, unknown
 from lab.policy import Policy
-from lab.sequencing.cell import needed_moves
-from lab.sequencing.layout import Product, Route, Stage, Station
-from lab.sequencing.positions import Moves
+from lab.sequencing.cell.cell import needed_moves
+from lab.sequencing.cell.routes import Moves
+from lab.sequencing.cell.stations import Product, Route, Stage, Station
 from lab.skills import SKILLS, Skill
 from lab.taskfile import Task
 

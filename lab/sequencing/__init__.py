@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import numpy as np
 
-    from lab.sequencing.cell import Cell
-    from lab.sequencing.events import SequenceResult
+    from lab.sequencing.cell.cell import Cell
+    from lab.sequencing.cell.schedule import SequenceResult
     from lab.sequencing.search import Search
 
 Sequencer = Callable[["Cell", "Search", "np.random.Generator"], "SequenceResult"]
@@ -17,56 +17,56 @@ Sequencer = Callable[["Cell", "Search", "np.random.Generator"], "SequenceResult"
 
 
 def _srl(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    from lab.sequencing.srl import srl
+    from lab.sequencing.methods.srl import srl
 
     return srl(cell, search, rng)
 
 
 def _srl_time(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    from lab.sequencing.srl_time import srl_time
+    from lab.sequencing.methods.srl_time import srl_time
 
     return srl_time(cell, search, rng)
 
 
 def _monte_carlo(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    from lab.sequencing.monte_carlo import monte_carlo
+    from lab.sequencing.methods.monte_carlo import monte_carlo
 
     return monte_carlo(cell, search, rng)
 
 
 def _random(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    from lab.sequencing.rivals import random_search
+    from lab.sequencing.methods.fifo import random_search
 
     return random_search(cell, search, rng)
 
 
 def _fifo(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    from lab.sequencing.rivals import fifo
+    from lab.sequencing.methods.fifo import fifo
 
     return fifo(cell, search, rng)
 
 
 def _genetic(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    from lab.sequencing.genetic import genetic
+    from lab.sequencing.methods.genetic import genetic
 
     return genetic(cell, search, rng)
 
 
 def _exact(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    from lab.sequencing.proven import exact
+    from lab.sequencing.methods.exact import exact
 
     return exact(cell, search, rng)
 
 
 def _cp_sat(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    from lab.sequencing.cpsat import cp_sat_sequencer
+    from lab.sequencing.methods.cp_sat import cp_sat_sequencer
 
     return cp_sat_sequencer(cell, search, rng)
 
 
 def _rule(name: str) -> Sequencer:
     def sequencer(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-        from lab.sequencing.rules import RULES, dispatched
+        from lab.sequencing.methods.rules import RULES, dispatched
 
         return dispatched(cell, RULES[name], search)
 

@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.sequencing.cell import Cell
-from lab.sequencing.chance import NO_CHANCE, Chance
-from lab.sequencing.events import EpisodeSequenced
-from lab.sequencing.objectives import MAKESPAN, check_objective
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance
+from lab.sequencing.cell.objectives import MAKESPAN, check_objective
+from lab.sequencing.cell.schedule import EpisodeSequenced
 
 FACTORS = ("A", "B")
 VALUES = ("pairs", "states")
@@ -69,6 +69,17 @@ class Search:
         check_objective(self.objective, cell)
 
 
+def gap(cost: float, bound: float) -> float:
+    """How much more a cost is than what no cost is below, as a fraction; inf where the bound is 0 and the cost is not.
+
+    What lies below the bound, or less than SAME above it, is due to rounding, and is 0.
+    """
+    if bound <= SAME:
+        return 0.0 if cost <= bound + SAME else inf
+    share = cost / bound - 1.0
+    return share if share >= SAME else 0.0
+
+
 @dataclass(frozen=True)
 class Reference:
     """What no sequence can beat: `bound`, in the objective's unit; `proven`: some sequence reaches it."""
@@ -79,11 +90,9 @@ class Reference:
     unit: str = " s"
 
     def gap(self, cost: float) -> float | None:
-        """How much more a cost is than the bound, as a fraction; None where the bound is 0 and the cost is not."""
-        if self.bound > SAME:
-            gap = cost / self.bound - 1.0
-            return 0.0 if abs(gap) < SAME else gap
-        return 0.0 if cost <= self.bound + SAME else None
+        """`gap` to the bound; None where the bound is 0 and the cost is not."""
+        share = gap(cost, self.bound)
+        return None if share == inf else share
 
 
 @dataclass

@@ -1,111 +1,139 @@
-"""Studies: the tables and figures of the thesis measured again, and comparisons of our own."""
+"""Studies: the tables and figures of the thesis measured again, and comparisons of our own.
 
+A study is a function of a file in `thesis` or `ours` that takes a job and a reading (changes to all settings) and
+returns its findings, and a row of STUDIES. The files are loaded when a study is run: what they need takes a second.
+"""
+
+import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from lab.errors import BadInput, unknown
 
 if TYPE_CHECKING:
     from lab.studies.findings import Findings
     from lab.studies.runner import Job
 
-
-Run = Callable[["Job", Mapping[str, Any]], "Findings"]
+TABLES = ("learned", "exact")  # what advisors know: see `thesis.chapter_9_sessions`
 
 
 @dataclass(frozen=True)
 class Study:
-    """A study: its title, and what runs it with a job and a reading (changes to the settings of chapter 9)."""
+    """A study: its title, what runs it with a job and a reading, and whether it has advisors who know one of TABLES."""
 
     title: str
-    run: Run
+    run: "Run"
+    has_advisors: bool = False
 
 
-def _chapter(number: int, name: str) -> Run:
-    """A study of chapter 7 or 9, by the name of its function."""
+Run = Callable[["Job", Mapping[str, Any]], "Findings"]
 
+
+def _chapter_7(name: str, *of: str) -> Run:
     def run(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-        from lab.studies import chapter7_parts, chapter9_parts
+        from lab.studies.thesis import chapter_7
 
-        findings: Findings = getattr({7: chapter7_parts, 9: chapter9_parts}[number], name)(job, reading)
-        return findings
+        found: Findings = getattr(chapter_7, name)(job, reading, *of)
+        return found
 
     return run
 
 
-def _table(name: str) -> Run:
+def _chapter_9(name: str, *of: str) -> Run:
     def run(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-        from lab.studies.chapter9_parts import best_scores
+        from lab.studies.thesis import chapter_9
 
-        return best_scores(job, reading, name)
+        found: Findings = getattr(chapter_9, name)(job, reading, *of)
+        return found
 
     return run
 
 
 def _appendix_iii(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.appendix3 import appendix_iii
+    from lab.studies.thesis.appendix_3 import appendix_iii
 
     return appendix_iii(job, reading)
 
 
-def _srl_time(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.comparison import srl_time_study
-
-    return srl_time_study(job, reading)
-
-
-def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.comparison_speed import sequencing_speed
-
-    return sequencing_speed(job, reading)
-
-
-def _flat(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.flat import flat
-
-    return flat(job, reading)
-
-
 def _advice_budget(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.budget import advice_budget
+    from lab.studies.ours.advice_budget import advice_budget
 
     return advice_budget(job, reading)
 
 
 def _advisors(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.advisors import advisors
+    from lab.studies.ours.several_advisors import advisors
 
     return advisors(job, reading)
 
 
-def _speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
-    from lab.studies.speed import speed
+def _srl_time(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.srl_time_compared import srl_time_study
 
-    return speed(job)
+    return srl_time_study(job, reading)
+
+
+def _flat(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.two_levels.flat_or_two_levels import flat
+
+    return flat(job, reading)
+
+
+def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.sequencing_speed import sequencing_speed
+
+    return sequencing_speed(job, reading)
+
+
+def _speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.learning_speed import speed
+
+    return speed(job, reading)
 
 
 STUDIES: dict[str, Study] = {
-    "table-9.2": Study("Table 9.2: best scores in world I with full view", _table("table-9.2")),
-    "table-9.3": Study("Table 9.3: best scores in world I with limited view", _table("table-9.3")),
-    "table-9.4": Study("Table 9.4: best scores in world II with full view", _table("table-9.4")),
-    "table-9.5": Study("Table 9.5: best scores in world II with limited view", _table("table-9.5")),
+    "table-9.2": Study(
+        "Table 9.2: best scores in world I with full view", _chapter_9("best_scores", "table-9.2"), True
+    ),
+    "table-9.3": Study(
+        "Table 9.3: best scores in world I with limited view",
+        _chapter_9("best_scores", "table-9.3"),
+        True,
+    ),
+    "table-9.4": Study(
+        "Table 9.4: best scores in world II with full view",
+        _chapter_9("best_scores", "table-9.4"),
+        True,
+    ),
+    "table-9.5": Study(
+        "Table 9.5: best scores in world II with limited view",
+        _chapter_9("best_scores", "table-9.5"),
+        True,
+    ),
     "appendix-v": Study(
-        "Appendix V: all methods, parameters and advisors in both worlds and views", _chapter(9, "all_cells")
+        "Appendix V: all methods, parameters and advisors in both worlds and views",
+        _chapter_9("appendix_v"),
+        True,
     ),
-    "figure-9.4": Study("Figure 9.4: learning alone with several decay factors", _chapter(9, "decay_factors")),
-    "chapter-9": Study("Chapter 9: its tables, Appendix V and figures", _chapter(9, "whole")),
+    "figure-9.4": Study("Figure 9.4: learning alone with several decay factors", _chapter_9("figure_9_4")),
+    "chapter-9": Study("Chapter 9: its tables, Appendix V and figures", _chapter_9("chapter_9"), True),
     "readings": Study(
-        "Readings of chapter 9: what the thesis leaves open, and what comes nearest", _chapter(9, "readings")
+        "Readings of chapter 9: what the thesis leaves open, and what comes nearest",
+        _chapter_9("readings"),
     ),
-    "advice-budget": Study("Success against helped steps: every gate with and without memory", _advice_budget),
-    "advisors": Study("Several advisors at once, beside the best and the worst of them alone", _advisors),
-    "table-7.4": Study("Table 7.4: sequencing case I by session length", _chapter(7, "table_7_4")),
-    "table-7.5": Study("Table 7.5: sequencing case II by session length", _chapter(7, "table_7_5")),
-    "table-7.6": Study("Table 7.6: sequencing case III by session length", _chapter(7, "table_7_6")),
-    "table-iv.1": Study("Table IV.1: SRL with several decay factors", _chapter(7, "table_iv_1")),
-    "table-iv.2": Study("Table IV.2: SRL with reward factors of types A and B", _chapter(7, "table_iv_2")),
-    "chapter-7": Study("Chapter 7 and Appendix IV: tables and figures", _chapter(7, "whole")),
+    "advice-budget": Study("Success against helped steps: every gate with and without memory", _advice_budget, True),
+    "advisors": Study("Several advisors at once, beside the best and the worst of them alone", _advisors, True),
+    "table-7.4": Study("Table 7.4: sequencing case I by session length", _chapter_7("best_results", "I")),
+    "table-7.5": Study("Table 7.5: sequencing case II by session length", _chapter_7("best_results", "II")),
+    "table-7.6": Study("Table 7.6: sequencing case III by session length", _chapter_7("best_results", "III")),
+    "table-iv.1": Study("Table IV.1: SRL with several decay factors", _chapter_7("table_iv_1")),
+    "table-iv.2": Study("Table IV.2: SRL with reward factors of types A and B", _chapter_7("table_iv_2")),
+    "chapter-7": Study("Chapter 7 and Appendix IV: tables and figures", _chapter_7("chapter_7")),
     "readings-7": Study(
-        "Readings of chapter 7: what the thesis leaves open, and what comes nearest", _chapter(7, "readings")
+        "Readings of chapter 7: what the thesis leaves open, and what comes nearest",
+        _chapter_7("readings"),
     ),
     "appendix-iii": Study("Appendix III: a flexible manufacturing system", _appendix_iii),
     "srl-time": Study("SRL improved, beside every rival", _srl_time),
@@ -113,3 +141,49 @@ STUDIES: dict[str, Study] = {
     "sequencing-speed": Study("Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }
+
+
+def run_study(name: str, job: "Job", out: Path, advisor_table: str | None = None) -> dict[str, Any]:
+    """Run a study and write its report, rows and sessions to `out`; the document of `lab study run --json`.
+
+    advisor_table: one of TABLES. BadInput for an unknown study or advisor table and for a folder that cannot be;
+    WorkFailed when it cannot be written.
+    """
+    from lab.files import check_out
+    from lab.studies.runner import STORE
+
+    if name not in STUDIES:
+        raise unknown("study", name, STUDIES, "STUDY")
+    if advisor_table is not None and advisor_table not in TABLES:
+        raise unknown("advisor table", advisor_table, TABLES, "--advisor-table")
+    if advisor_table is not None and not STUDIES[name].has_advisors:
+        raise BadInput(f"advisor table '{advisor_table}' (--advisor-table): the study '{name}' has none to choose")
+    check_out(out)
+    try:
+        found = STUDIES[name].run(
+            replace(job, folder=out), {} if advisor_table is None else {"advisor_table": advisor_table}
+        )
+    except KeyboardInterrupt:
+        goes_on = f"'{out}' keeps what is done, and the same command goes on"
+        kept = goes_on if (out / STORE).is_file() else "nothing is kept"
+        raise KeyboardInterrupt(f"stopped by Ctrl-C; {kept}") from None
+    found = replace(found, summary={"sessions": job.sessions, "seed": job.seed, **found.summary})
+    files = _written(name, found, out)
+    if (out / STORE).is_file():
+        files["sessions"] = str(out / STORE)
+    document = {"study": name, "seed": job.seed, "sessions": job.sessions, "rows": found.rows}
+    return document | {"summary": found.summary, "notes": list(found.notes), "files": files}
+
+
+def _written(name: str, found: "Findings", out: Path) -> dict[str, str]:
+    """Rows, report and pictures are written; where they are."""
+    from lab.studies.report import write_file, write_report, write_rows
+
+    files = {"report": str(out / "report.html"), "rows": str(out / "rows.csv")}
+    write_rows(out / "rows.csv", found.rows)
+    write_report(out / "report.html", STUDIES[name].title, name, found)
+    for number, (caption, picture) in enumerate(found.figures.items(), start=1):
+        path = out / f"{number:02}-{re.sub(r'[^a-z0-9.]+', '-', caption.lower()).strip('-')[:60]}.svg"
+        write_file(path, picture.decode())
+        files[caption] = str(path)
+    return files

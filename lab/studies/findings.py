@@ -1,15 +1,73 @@
-"""What a study comes to."""
+"""What a study comes to: rows, each a measured value beside what is printed, and what is said and drawn of them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from statistics import median
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lab.sequencing.search import SAME
+from lab.studies.statistics import interval, share, within
+
+Row = dict[str, Any]  # settings under their names, then measure, value, ci95, thesis, within
 
 
 @dataclass(frozen=True)
 class Findings:
     """Rows as `lab study run --json` gives them, a summary, pictures (SVG) by caption, remarks."""
 
-    rows: list[dict[str, Any]]
-    summary: dict[str, Any]
+    rows: list[Row]
+    summary: Row
     figures: Mapping[str, bytes] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+
+
+def row(named: Row, measure: str, value: float, ci: Sequence[float] | None = None, thesis: float | None = None) -> Row:
+    """One row of a study: its settings, the measured value with its interval, the printed one, whether they agree."""
+    ends = None if ci is None else [float(ci[0]), float(ci[1])]
+    agrees = None if thesis is None else within(value, ends, thesis, measure)
+    return {**named, "measure": measure, "value": float(value), "ci95": ends, "thesis": thesis, "within": agrees}
+
+
+def share_row(named: Row, measure: str, success: ArrayLike, thesis: float | None = None) -> Row:
+    """The row of how many sessions succeeded, (N,) bool, in percent."""
+    percent, *ends = share(success)
+    return row(named, measure, percent, ends, thesis)
+
+
+def mean_row(named: Row, measure: str, values: ArrayLike, thesis: float | None = None) -> Row:
+    """The row of the mean of values (N,), one a session."""
+    mean, *ends = interval(values)
+    return row(named, measure, mean, ends, thesis)
+
+
+def varying_row(named: Row, measure: str, values: ArrayLike) -> Row:
+    """The row of the mean of values (N,); without an interval where nothing varies."""
+    found = np.asarray(values, np.float64)
+    return row(named, measure, found.mean()) if np.ptp(found) <= SAME else mean_row(named, measure, found)
+
+
+def median_row(named: Row, measure: str, values: Sequence[float]) -> Row:
+    """The row of the median of a few values; its interval: the lowest and the highest."""
+    return row(named, measure, median(values), (min(values), max(values)))
+
+
+def those(rows: Iterable[Row], **wanted: Any) -> list[Row]:
+    """The rows that have these values under these names; None: they have none."""
+    return [one for one in rows if all(one.get(name) == value for name, value in wanted.items())]
+
+
+def agreement(rows: Sequence[Row]) -> Row:
+    """How many cells have a printed figure and how many lie within its bounds, in all and by measure."""
+    compared = [one for one in rows if one["within"] is not None]
+    summary: Row = {"cells": len(compared), "within": sum(one["within"] for one in compared)}
+    for measure in dict.fromkeys(one["measure"] for one in compared):
+        of = [one["within"] for one in those(compared, measure=measure)]
+        summary[f"{measure} cells"], summary[f"{measure} within"] = len(of), sum(of)
+    ranked = [one for one in those(rows, measure="score") if one.get("thesis_rank")]
+    if ranked:
+        summary["ranks"] = len(ranked)
+        summary["ranks as printed"] = sum(one["rank"] == one["thesis_rank"] for one in ranked)
+    return summary

@@ -70,6 +70,12 @@ def proportion_interval(successes: int, n: int, level: float = 0.95) -> tuple[fl
     return 100 * share, 100 * low, 100 * high
 
 
+def share(success: ArrayLike) -> tuple[float, float, float]:
+    """`proportion_interval` of sessions of which each succeeded or not, (N,) bool."""
+    ended = np.asarray(success, np.bool_)
+    return proportion_interval(int(ended.sum()), len(ended))
+
+
 @overload
 def score(sp: float, hs: float, sp_range: Range, hs_range: Range, weight: float = 0.5) -> float: ...
 @overload

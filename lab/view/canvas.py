@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput
+from lab.files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -63,7 +64,7 @@ def picture_file(path: Path, width_inch: float, height_inch: float) -> Iterator[
     with _figure(drawn, path.suffix[1:].lower(), width_inch, height_inch) as figure:
         yield figure
     try:
-        path.write_bytes(drawn.getvalue())
+        write_whole(path, drawn.getvalue())
     except OSError as error:
         raise BadInput(f"picture '{path}' cannot be written: {error.strerror}") from error
 

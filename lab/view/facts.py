@@ -5,7 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from rich.text import Text
 
+from lab.advice.events import EpisodeEnded
+from lab.advice.reasons import TooSlow
 from lab.advice.requests import AdviceRequest, Standing
+from lab.errors import counted
 from lab.learning.environment import TableEnvironment
 from lab.mdp import TabularMDP
 from lab.view.board import Marks, Picture, is_map, nearest_goal, points_by_name
@@ -20,11 +23,6 @@ def percent(share: float) -> str:
     if 0.0 < share < 0.005:
         return "<1%"
     return ">99%" if 0.995 <= share < 1.0 else f"{share:.0%}"
-
-
-def counted(number: int, what: str) -> str:
-    """ "1 move", "2 moves"."""
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def is_known(mdp: TabularMDP) -> bool:
@@ -57,7 +55,7 @@ def leads(request: AdviceRequest, action: int) -> str:
 
 
 def choice(request: AdviceRequest, marks: Marks, brief: bool = False) -> str:
-    """What the learner would do itself, how sure it is, and what it likes better when it is only trying something.
+    """What the learner drew for this step, and which move it rates best.
 
     brief: only where that leads, "" when that is nothing special; the rest stands in the list of moves.
     """
@@ -66,13 +64,14 @@ def choice(request: AdviceRequest, marks: Marks, brief: bool = False) -> str:
     where = leads(request, own)
     if brief:
         return f"{marks.named(request.mdp, own)} {where}." if where else ""
-    said = f"The learner itself would go {marks.named(request.mdp, own)} ({percent(chances[own])})"
-    said += f", which {where}" if where else ""
+    said = f"Alone the learner would now go {marks.named(request.mdp, own)}"
+    where = f"; that {where}" if where else ""
     if max(chances) - min(chances) < ALIKE and len(chances) > 1:
-        return f"{said}; all moves are alike to it here."
+        return f"{said}, drawn at random: all moves are alike to it here ({percent(chances[own])} each){where}."
     if chances[best] - chances[own] < ALIKE:
-        return f"{said}."
-    return f"{said}; it prefers {marks.named(request.mdp, best)} ({percent(chances[best])})."
+        return f"{said}, the move it rates best ({percent(chances[own])}){where}."
+    rated = f"the move it rates best is {marks.named(request.mdp, best)} ({percent(chances[best])})"
+    return f"{said}, drawn at random ({percent(chances[own])}){where}; {rated}."
 
 
 def moves(request: AdviceRequest, marks: Marks) -> list[Text]:
@@ -109,15 +108,14 @@ def progress(request: AdviceRequest, brief: bool = False) -> list[str]:
     """Why it asks, and the moving averages beside the threshold; brief: the averages alone, in one line."""
     rate, current, previous = request.improvement_rate, request.current_mean, request.previous_mean
     least = request.standing.lambda_threshold
-    why = f"It asks because {request.why}" if request.why and not brief else ""
-    reason = [f"{why}."] if why else []
+    reason = [f"It asks because {request.why}."] if request.why and not brief else []
     if rate is None or current is None or previous is None:
         return [*reason, "Too few episodes for averages." if brief else "Too few episodes so far for moving averages."]
     if brief:
         sign = "<" if rate < least else ">="
         return [f"Steps {previous:.1f}, now {current:.1f}: {rate:+.1%} {sign} {least:.0%}"]
-    if "its improvement" in why:  # that is its rate and the threshold
-        return [f"{why}: lately {current:.1f} steps per episode, before that {previous:.1f}."]
+    if isinstance(request.why, TooSlow):  # that is its rate and the threshold
+        return [f"It asks because {request.why}: lately {current:.1f} steps per episode, before that {previous:.1f}."]
     means = f"lately {current:.1f}, before that {previous:.1f}; improvement {rate:+.1%}, threshold {least:.0%}"
     return [*reason, f"Steps per episode: {means}."]
 
@@ -128,7 +126,7 @@ def standing(request: AdviceRequest, brief: bool = False) -> str:
     allowed = f" of {now.budget}" if now.budget < Standing().budget else ""
     said = f"{now.helped_steps}{allowed} moves" if allowed else counted(now.helped_steps, "move")
     if brief:
-        return f"Advised {said}; misled {now.misleads} of {now.omega}."
+        return f"Advised {said}; misled {now.misleads}" + (f" of {now.omega}." if now.omega else ", none allowed.")
     return f"Advised so far: {said}; episodes misled: {now.misleads}, tolerated: {now.omega}."
 
 
@@ -285,7 +283,24 @@ def _verdict(now: Standing, guided: int) -> str:
     return f"{misled(now.misleads, guided, 'It')}; the learner tolerates {now.omega}, and then asks no more."
 
 
+VERDICTS = {"better": "better than before", "best": "as good as the best so far", "misled": "no better than before"}
+
+
+def verdict(event: EpisodeEnded, mean_before: float | None) -> tuple[bool | None, str]:
+    """Whether an episode with advice was a good one, and in words; mean_before: of the plain step counts before it.
+
+    What the gate says counts; where none judges, the mean does. (None, ""): there is nothing to compare it with.
+    """
+    if mean_before is None:
+        return (None, "") if not event.verdict else (event.verdict != "misled", VERDICTS[event.verdict])
+    shorter = event.steps < mean_before
+    good = event.verdict != "misled" if event.verdict else shorter
+    if event.verdict == "best" or good != shorter:  # the plain mean does not show it: other episodes began elsewhere
+        return good, VERDICTS[event.verdict]
+    return good, f"{'better' if good else 'no better'} than the {mean_before:.1f} before"
+
+
 def misled(misleads: int, guided: int, whose: str = "Your advice") -> str:
     """ "Your advice did not help in 3 of 4 episodes"; of how many is left out where that is not known."""
-    of = f"{misleads} of {guided} episodes" if guided >= misleads else counted(misleads, "episode")
+    of = f"{misleads} of {counted(guided, 'episode')}" if guided >= misleads else counted(misleads, "episode")
     return f"{whose} did not help in {of}"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lab.errors import BadInput
-from lab.sequencing.events import Schedule
+from lab.sequencing.cell.schedule import Schedule
 from lab.view.canvas import GREY, INK, RED, picture_bytes, picture_file, seconds, tip
 from lab.view.gantt_bars import LOOKS, Bar, Chart, mixed
 

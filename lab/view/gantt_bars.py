@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from lab.sequencing.events import Activity, Schedule
-from lab.sequencing.layout import ROBOT
+from lab.errors import counted
+from lab.sequencing.cell.schedule import Activity, Schedule
+from lab.sequencing.cell.stations import ROBOT
 from lab.view.canvas import BLUE, GREEN, INK, ORANGE, PALE_GREY, PURPLE, RED, SKY, YELLOW, seconds
 
 TOUCHING_S = 1e-3  # measured activities that overlap by less follow one another
@@ -101,7 +102,7 @@ class Chart:
         """How many of what, and how long it takes."""
         products = [self.product(part) for part in self.names]
         counts = [f"{products.count(name)} × {name}" for name in self.products if name]
-        return f"{', '.join([*counts, f'{self.moves} moves'])}: {seconds(self.schedule.makespan_s)}"
+        return f"{', '.join([*counts, counted(self.moves, 'move')])}: {seconds(self.schedule.makespan_s)}"
 
     def page_inch(self, strips: bool) -> tuple[float, float]:
         """Width and height of the page [inch]: rows become lower when there are many."""

@@ -7,15 +7,16 @@ from rich.table import Table
 from rich.text import Text
 
 from lab.advice.requests import AdvisorLeft
-from lab.sequencing.advised import SequenceRequest
-from lab.sequencing.positions import part_of
-from lab.sequencing.run import Run
+from lab.errors import counted
+from lab.sequencing.cell.routes import part_of
+from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.simulate.run import Run
 from lab.view.reader import Outside, ReadLine, default_reader
 from lab.view.screen import folded, room
 
 HELP = (
     "Type a number of the list: that move is made next. Enter: what the learner would do. why: why it asks, with the "
-    "numbers. skip: leave this step to the learner. auto: it goes on alone from here. quit, or Ctrl-C, ends the session "
+    "numbers. skip: leave this step to the learner. auto: it goes on alone from here. quit, q or Ctrl-C ends the session "
     "and shows the best order so far."
 )
 NO_UNDO = "An order cannot be taken back here: the episode goes on, and the next one begins anew."
@@ -62,7 +63,7 @@ class OrderPrompt:
             match word:
                 case "auto" | "done":
                     raise AdvisorLeft
-                case "quit":
+                case "quit" | "q":
                     raise KeyboardInterrupt
                 case "skip":
                     return None
@@ -105,7 +106,9 @@ class OrderPrompt:
         self._say(_progress(request))
         run = request.run
         name, target = _row(run, request.own)[1], _row(run, request.own)[3]
-        self._say(f"It would move {name} to {target} itself ({request.own}), one of {len(request.allowed)} moves.")
+        self._say(
+            f"It would move {name} to {target} itself ({request.own}), one of {counted(len(request.allowed), 'move')}."
+        )
         self._say("After the episode it compares its cost with the mean of those before it.")
 
     def _say(self, text: str, style: str = "") -> None:

@@ -11,10 +11,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.text import Text
 
 from lab.advice.events import AdviceRejected, AdviceRequested, Event
+from lab.errors import counted
 from lab.listener import Listener
-from lab.sequencing.events import Move, SequenceResult
+from lab.sequencing.cell.schedule import Move, SequenceResult
 from lab.sequencing.search import Reference
 from lab.teaching import Lesson
+from lab.view.figures import beside, gap_of
 
 BARS = "▁▂▃▄▅▆▇█"
 PLAIN_BARS = "_.-:=+*#"
@@ -121,10 +123,11 @@ class RunProgress(Listener):
             return ["never asked"]
         asked = self._asked.get(name, [])
         when = f" from episode {asked[0]}" if asked else ""
-        parts = [f"asked {requests} x{when}, {helped_steps} helped steps"]
+        parts = [f"asked {requests} x{when}, {counted(helped_steps, 'helped step')}"]
         rejected = self._rejected.get(name)
         if rejected is not None:
-            parts.append(f"rejected its advisor in episode {rejected.episode} after {rejected.misleads} misleads")
+            after = counted(rejected.misleads, "mislead")
+            parts.append(f"rejected its advisor in episode {rejected.episode} after {after}")
         return parts
 
     def _tell_reused(self) -> None:
@@ -144,11 +147,11 @@ class RunProgress(Listener):
         self._advance()
 
     def sequenced(self, best: SequenceResult, known: Reference | None) -> None:
-        unit = " s" if known is None else known.unit
         order = " ".join(map(str, best.sequence[:_SHOWN_MOVES]))
         more = f" and {len(best.sequence) - _SHOWN_MOVES} more" if len(best.sequence) > _SHOWN_MOVES else ""
-        found = f"{best.cost:.1f}{unit} found in episode {best.episode_costs.index(best.cost) + 1} of {len(best.episode_costs)}"
-        parts = [f"  parts {order}{more}:", f"{found}, {_beside(known, best.cost)}"]
+        shown, reference = _beside(known, best.cost)
+        found = f"{shown} found in episode {best.episode_costs.index(best.cost) + 1} of {len(best.episode_costs)}"
+        parts = [f"  parts {order}{more}:", f"{found}, {reference}"]
         self._pack(list(map(Text, parts)), gap=" ")
         self._advance()
 
@@ -200,10 +203,11 @@ def sparkline(steps: Sequence[int], width: int = _CURVE, bars: str = BARS) -> st
     return "".join(bars[min(len(bars) - 1, int(height / top * len(bars)))] for height in means)
 
 
-def _beside(known: Reference | None, cost: float) -> str:
-    """What a cost stands beside: None, it was drawn, and there is nothing to compare it with."""
+def _beside(known: Reference | None, cost: float) -> tuple[str, str]:
+    """A cost, and what it stands beside: None, it was drawn, and there is nothing to compare it with."""
     if known is None:
-        return "its luckiest drawn episode"
+        return f"{cost:.1f} s", "its luckiest drawn episode"
     gap = known.gap(cost)
+    found, bound = beside(cost, known.bound, known.unit, 1)
     what = "proven optimum" if known.proven else "proven bound"
-    return f"{what} {known.bound:.1f}{known.unit}" + ("" if gap is None else f", gap {gap:.1%}")
+    return found, f"{what} {bound}" + ("" if gap is None else f", gap {gap_of(gap, 1)}")

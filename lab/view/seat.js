@@ -4,7 +4,7 @@
 const seat = (() => {
   const ARROWS = ["↑", "↓", "←", "→", "▾", "▴"], ARROW_KEYS = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight", "PageDown", "PageUp"];
   const PLACES = ["1 / 2", "3 / 2", "2 / 1", "2 / 3", "3 / 5", "1 / 5"]; // row and column of each direction's button
-  const LETTERS = { y: "own", Enter: "own", s: "skip", u: "undo", w: "why", a: "auto", q: "auto" };
+  const LETTERS = { y: "own", Enter: "own", s: "skip", u: "undo", w: "why", a: "auto", q: "quit" };
   const SURE_MS = 3000, REFUSAL_MS = 6000, SLOW_PAUSE_MS = 600, URGENT = new Set(["question", "you", "ended"]);
   const el = (id) => document.getElementById(id);
   const state = { place: null, slice: null, work: null }, dirty = new Set(), title = document.title;
@@ -57,12 +57,12 @@ const seat = (() => {
     document.body.classList.toggle("mine", Boolean(you.seat));
     document.title = `${shown && you.seat ? "● " : ""}${title}`;
     el("lesson").textContent = lesson.title || lesson.page;
-    const chair = finished ? "" : !send ? "connection lost: trying again" : you.seat ? `You have the seat${you.pages > 1 ? `; ${you.pages - 1} watch` : ""}` : you.free ? "The seat is free" : "You are watching: another page has the seat";
+    const chair = finished ? "" : !send ? "connection lost: trying again" : you.seat ? `You answer here${you.pages > 1 ? `; ${seatSide.count(you.pages - 1, "other page")} watching` : ""}` : you.free ? "No page answers yet" : "You are watching: another page answers";
     el("chair-text").textContent = chair;
     el("chair").classList.toggle("yours", Boolean(you.seat && send));
     const button = el("chair-button");
     button.hidden = !(send && (you.seat ? you.pages > 1 : you.free));
-    button.textContent = you.seat ? "Hand it over" : "Take the seat";
+    button.textContent = you.seat ? "Hand over" : "Answer here";
     el("says").textContent = shown ? shown.title : state.ended || idle();
     el("detail").textContent = shown ? detail() : "";
     el("words").hidden = !shown;
@@ -84,8 +84,16 @@ const seat = (() => {
 
   function detail() {
     const own = ownMove(), leads = { nowhere: ", which leads nowhere", goal: ", to the goal", obstacle: ", into an obstacle" }[own.leads] || "";
-    const would = shown.kind === "order" ? `I would move ${own.label} from ${own.from} to ${own.to}.` : `I would go ${named(own)} (${percent(own.chance)} sure)${leads}.`;
-    return `${would}${shown.why ? ` I ask because ${shown.why}.` : ""}${shown.offered ? " The terminal asks, too." : ""}`;
+    const would = shown.kind === "order" ? `Alone it would move ${own.label} from ${own.from} to ${own.to}.` : `Alone it would now go ${named(own)}${rated(own)}${leads}.`;
+    return `${would}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered ? " The terminal asks, too." : ""}`;
+  }
+
+  // What was drawn for this step, beside the move it rates best
+  function rated(own) {
+    const chances = shown.moves.map((move) => move.chance), top = Math.max(...chances);
+    if (chances.length > 1 && top === Math.min(...chances)) return `, drawn at random: all moves are alike to it here (${percent(top)} each)`;
+    if (own.chance === top) return `, the move it rates best (${percent(top)})`;
+    return `, drawn at random (${percent(own.chance)}; it rates ${named(shown.moves.find((move) => move.chance === top))} best, ${percent(top)})`;
   }
 
   function countDown() {
@@ -153,7 +161,7 @@ const seat = (() => {
     }
     text("chance", `${own ? "★ " : ""}${percent(move.chance)}`);
     button.querySelector(".sure").style.width = move.chance < 0.01 ? "0" : `${100 * move.chance}%`;
-    button.setAttribute("aria-label", `${move.label}: the learner is ${percent(move.chance)} sure${own ? ", its own choice" : ""}${move.leads ? `, leads ${move.leads === "nowhere" ? "nowhere" : `to the ${move.leads}`}` : ""}`);
+    button.setAttribute("aria-label", `${move.label}: chance ${percent(move.chance)}${own ? ", its own choice" : ""}${move.leads ? `, leads ${move.leads === "nowhere" ? "nowhere" : `to the ${move.leads}`}` : ""}`);
   }
 
   // ---- answers
@@ -173,7 +181,7 @@ const seat = (() => {
   function answer(what, event) {
     if (event && event.detail) event.currentTarget.blur(); // after a click, Enter means "agree" again
     if (!canAnswer()) {
-      if (shown && state.you && !state.you.seat) refused(state.you.free ? "The seat is free: take it first." : "This page only watches.");
+      if (shown && state.you && !state.you.seat) refused(state.you.free ? "No page answers yet: press 'Answer here' first." : "This page only watches.");
       return;
     }
     refused("");

@@ -17,8 +17,8 @@ from lab.errors import BadInput
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.listener import Listener
 from lab.mdp import NoPath, TabularMDP, shortest_steps
-from lab.sequencing.advised import SequenceRequest
-from lab.sequencing.events import EpisodeSequenced, Move
+from lab.sequencing.cell.schedule import EpisodeSequenced, Move
+from lab.sequencing.methods.srl_advised import SequenceRequest
 from lab.view.meshcat import LiveView
 from lab.view.seat_events import hear
 from lab.view.seat_order import Follower, bars_of
@@ -26,7 +26,7 @@ from lab.view.seat_panel import CLOSED, SeatPanel
 from lab.view.seat_state import Learning, Pending, Progress, standing_of
 from lab.view.seat_talk import Answer
 
-TITLE = "Teaching lab: the seat"
+TITLE = "Teaching lab"
 MOST_STATES = 50_000  # of problems whose shortest way is looked for
 
 

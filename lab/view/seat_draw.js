@@ -190,7 +190,7 @@ const seatDraw = (() => {
     }
     svg.replaceChildren(...parts);
     const now = means.length ? `, lately ${nice(means[means.length - 1])} ${unit}` : "";
-    svg.setAttribute("aria-label", `${count} episodes${now}, ${guided.filter(Boolean).length} ${per > 1 ? "stretches" : "episodes"} guided`);
+    svg.setAttribute("aria-label", `${seatSide.count(count, "episode")}${now}, ${guided.filter(Boolean).length} ${per > 1 ? "stretches" : "episodes"} guided`);
   }
 
   // The improvement rate as a bar from 0, the threshold as a mark: left of it the learner asks
@@ -236,7 +236,8 @@ const seatDraw = (() => {
     parts.push(node("line", { x1: x(now_s), x2: x(now_s), y1: 0, y2: foot + 4, stroke: "#222222", "stroke-dasharray": "3 3" }));
     parts.push(node("text", { x: Math.min(x(now_s), wide - 40), y: foot + 16, "text-anchor": "middle", fill: "#222222" }, `${Math.round(now_s)} s`));
     svg.replaceChildren(...parts);
-    svg.setAttribute("aria-label", `${all.filter((bar) => ["carry", "pallet"].includes(bar[1])).length} moves so far, ${Math.round(now_s)} s`);
+    const moves = all.filter((bar) => ["carry", "pallet"].includes(bar[1])).length;
+    svg.setAttribute("aria-label", `${seatSide.count(moves, "move")} so far, ${Math.round(now_s)} s`);
   }
 
   return { grid, curve, rate, bars, trust, nice };

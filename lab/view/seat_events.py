@@ -12,6 +12,7 @@ from lab.advice.events import (
     EpisodeEnded,
     Event,
 )
+from lab.errors import counted
 from lab.view.seat_state import Learning
 
 ENDED = {
@@ -78,8 +79,9 @@ def _episode(learning: Learning, event: EpisodeEnded) -> tuple[str, ...]:
 def _rejected(learning: Learning, event: AdviceRejected) -> str:
     asked = max(learning.requests, event.misleads)
     return (
-        f"Your advice did not help in {event.misleads} of {asked} episodes, {event.omega} are tolerated: I go on alone. "
-        f"Episode {event.episode} took {event.steps} steps, those before it {event.mean_before:.1f} on average."
+        f"Advice did not help in {event.misleads} of {counted(asked, 'episode')}, {event.omega} are tolerated: I go on "
+        f"alone. Episode {event.episode} took {counted(event.steps, 'step')}, those before it {event.mean_before:.1f} "
+        "on average."
     )
 
 

@@ -4,11 +4,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Protocol
 
+from lab.errors import counted
 from lab.learning.settings import GateSettings
 from lab.listener import Listener
-from lab.sequencing.events import EpisodeSequenced, Move, SequenceResult
+from lab.sequencing.cell.schedule import EpisodeSequenced, Move, SequenceResult
 from lab.sequencing.search import Reference
 from lab.teaching import Lesson
+from lab.view.figures import beside
 from lab.view.progress import PHASES
 from lab.view.seat_state import MOST_LINES, Progress
 
@@ -53,7 +55,7 @@ class SeatListener(Listener):
     def lesson(self, name: str, lesson: Lesson) -> None:
         """A skill was found or learned."""
         reached, fewest = lesson.policy.final_steps, lesson.policy.optimal_steps
-        steps = "the goal is not reached" if reached is None else f"{reached} steps"
+        steps = "the goal is not reached" if reached is None else counted(reached, "step")
         best = "" if reached is None or fewest is None or reached <= fewest else f", the fewest are {fewest}"
         helped = "" if lesson.result is None else f", {lesson.result.helped_steps} of all moves advised"
         self._say(f"{lesson.source} {name}: {steps}{best}{helped}")
@@ -72,11 +74,13 @@ class SeatListener(Listener):
 
     def sequenced(self, best: SequenceResult, known: Reference | None) -> None:
         """An order was found."""
-        unit = " s" if known is None else known.unit
         order = " ".join(map(str, best.sequence[:SHOWN_MOVES]))
         more = f" and {len(best.sequence) - SHOWN_MOVES} more" if len(best.sequence) > SHOWN_MOVES else ""
-        bound = "" if known is None else f"; no order takes less than {known.bound:.1f}{unit}"
-        self._say(f"order {order}{more}: {best.cost:.1f}{unit}{bound}")
+        cost, bound = f"{best.cost:.1f} s", ""
+        if known is not None:
+            cost, least = beside(best.cost, known.bound, known.unit, 1)
+            bound = f"; no order takes less than {least}"
+        self._say(f"order {order}{more}: {cost}{bound}")
 
     def moved(self, move: Move) -> None:
         """A toast was brought on."""

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from lab.sequencing.advised import SequenceRequest
-from lab.sequencing.events import Move, robot_activities
-from lab.sequencing.layout import ROBOT
-from lab.sequencing.positions import part_of
-from lab.sequencing.run import Run
+from lab.sequencing.cell.routes import part_of
+from lab.sequencing.cell.schedule import Move, robot_activities
+from lab.sequencing.cell.stations import ROBOT
+from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.simulate.run import Run
 from lab.view.seat_question import progress_of
 
 Json = dict[str, Any]
@@ -23,7 +23,7 @@ def order_of(request: SequenceRequest) -> Json:
         "at": [],
         "own": request.own,
         "moves": [_allowed(run, decision) for decision in request.allowed],
-        "why": request.why,
+        "why": str(request.why),
         "undoable": False,
         "picture": [],
         **progress_of(request.improvement_rate, request.current_mean, request.previous_mean),

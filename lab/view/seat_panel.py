@@ -141,7 +141,9 @@ class SeatPanel:
         pending = self.known.pending
         if self.chair.holder != page:
             raise Refused(
-                "The seat is free: take it first." if self.chair.holder is None else "This page only watches."
+                "No page answers yet: press 'Answer here' first."
+                if self.chair.holder is None
+                else "This page only watches."
             )
         if pending is None or answer.question != pending.number:
             raise Refused("This question waits no more: the answer came too late.")

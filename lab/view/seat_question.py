@@ -23,7 +23,7 @@ def question_of(request: AdviceRequest) -> Json:
         "at": spot(mdp, state),
         "own": request.learner_action,
         "moves": moves_of(request),
-        "why": request.why,
+        "why": str(request.why or ""),
         "temperature": request.temperature,
         "selection": request.selection,
         "undoable": request.undoable,

@@ -49,7 +49,7 @@ const seatSide = (() => {
       rows.push(["Moves helped", now.budget === null ? String(now.helped_steps) : `${now.helped_steps} of ${now.budget}`]);
     }
     if (now.remembered) rows.push(["From memory", count(now.remembered, "step")]);
-    if (now.omega !== null && lesson.kind === "steps") rows.push(["Did not help", now.misleads > now.omega ? `${now.misleads}, only ${now.omega} tolerated` : `${now.misleads} of ${now.omega} tolerated`, now.misleads > now.omega ? "bad" : ""]);
+    if (now.omega !== null && lesson.kind === "steps") rows.push(["Did not help", now.misleads > now.omega ? `${now.misleads}, only ${now.omega} tolerated` : now.omega ? `${now.misleads} of ${now.omega} tolerated` : "never; none tolerated", now.misleads > now.omega ? "bad" : ""]);
     el("standing").replaceChildren(...rows.flatMap(([name, value, kind]) => [make("dt", name), make("dd", value, kind || "")]));
   }
 
@@ -87,13 +87,14 @@ const seatSide = (() => {
   // The rows of a session's receipt; of a document that is none, all that is in it
   function receiptRows(of) {
     if (!("questions" in of && "taken" in of)) return Object.entries(of).map(([key, value]) => [key.replaceAll("_", " "), worded(value)]);
-    const rows = [["It asked in", `${count(of.requests, "episode")}, about ${count(of.questions, "step")}`], ["With your help", `${count(of.taken, "step")}, ${of.agreed} its own choice, too`]];
+    const rows = [["It asked in", `${count(of.requests, "episode")}, about ${count(of.questions, "step")}`]];
+    if (of.taken) rows.push([of.yours ? "With your help" : "With advice", `${count(of.taken, "step")}, ${of.agreed} its own choice, too`]);
     for (const [why, times] of Object.entries(of.refused)) rows.push(["Not followed", `${times}: ${why}`]);
-    rows.push(["Guided", `${count(of.guided, "episode")}, ${of.better} better than before`]);
+    if (of.guided) rows.push(["Guided", `${count(of.guided, "episode")}, ${of.better} better than before${of.best ? `, ${of.best} as good as the best` : ""}`]);
     if (of.remembered) rows.push(["From memory", count(of.remembered, "step")]);
     if (of.change_percent !== null) rows.push(["Steps an episode", `${seatDraw.nice(of.mean_before)} before, ${seatDraw.nice(of.mean_after)} after (${of.change_percent > 0 ? "+" : ""}${Math.round(of.change_percent)} %)`]);
-    if (of.skill) rows.push(["Your skill", `${of.skill.word}: tau ${seatDraw.nice(of.skill.tau)}, ${seatDraw.nice(of.skill.low)} to ${seatDraw.nice(of.skill.high)}`]);
-    if (of.against_best !== null) rows.push(["Not the best", `${of.against_best} of ${of.taken}`]);
+    if (of.skill) rows.push([of.yours ? "Your skill" : "Skill", `${of.skill.word}: tau ${seatDraw.nice(of.skill.tau)}, ${seatDraw.nice(of.skill.low)} to ${seatDraw.nice(of.skill.high)}`]);
+    if (of.against_best !== null && of.taken) rows.push(["Not the best", `${of.against_best} of ${of.taken}`]);
     for (const one of of.differences) rows.push(["", `at ${one.label}: said ${one.said}, best ${one.best.join(" or ")}${one.times > 1 ? ` (${one.times} times)` : ""}`]);
     for (const voice of of.voices) rows.push([voice.name, `${count(voice.said, "answer")}, ${voice.followed} followed`]);
     return [...rows, ...of.hints.map((hint, k) => [k ? "" : "Next time", hint])];
@@ -114,5 +115,5 @@ const seatSide = (() => {
     box.querySelector("ol").replaceChildren(...[...progress.lines].reverse().map((line) => make("li", line)));
   }
 
-  return { show, make, percent };
+  return { show, make, percent, count };
 })();

@@ -11,10 +11,12 @@ from typing import Any
 from lab.advice.events import EpisodeEnded
 from lab.advice.gates import improvement
 from lab.advice.requests import AdviceRequest, Standing
+from lab.errors import counted
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
-from lab.sequencing.advised import SequenceRequest
+from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.view.facts import VERDICTS
 from lab.view.seat_curve import Curve
 from lab.view.seat_grid import place_of, slice_of, spot
 from lab.view.seat_order import order_of
@@ -65,8 +67,10 @@ class Notice:
         """What is said of a guided episode, in words."""
         if isinstance(told, Notice):
             return told
-        outcome = f"I reached the goal in {told.steps} steps" if told.reached else "I did not reach the goal"
-        return cls(f"Episode {told.episode}: {outcome}; moves advised: {told.helped_steps}.", "good" * told.reached)
+        outcome = f"I reached the goal in {counted(told.steps, 'step')}" if told.reached else "I did not reach the goal"
+        verdict = f", {VERDICTS[told.verdict]}" if told.verdict else ""
+        tone = "bad" if told.verdict == "misled" else "good" * told.reached
+        return cls(f"Episode {told.episode}: {outcome}{verdict}; moves advised: {told.helped_steps}.", tone)
 
 
 @dataclass

@@ -81,10 +81,10 @@ class Chair:
         """Give the seat away, or take it. Raises Refused when it is not free, or not the page's own."""
         if seat.wish == "give":
             if self.holder != page:
-                raise Refused("This page has not the seat: there is nothing to hand over.")
+                raise Refused("This page does not answer: there is nothing to hand over.")
             self.holder = None
         elif self.holder not in (None, page):
-            raise Refused("Another page has the seat: it has to hand it over first.")
+            raise Refused("Another page answers: it has to hand over first.")
         else:
             self.holder = page
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 from lab.view.canvas import (
     BLUE,
     GREEN,
@@ -163,7 +163,7 @@ def _draw_stuck(axes: "Axes", stuck: NDArray[np.bool_]) -> None:
     where = np.flatnonzero(stuck.any(axis=0))
     if len(where):
         look: dict[str, Any] = {"linestyle": "none", "marker": "x", "color": INK, "markersize": 4, "clip_on": False}
-        label = f"deadlock ({stuck.sum()} of {stuck.size} episodes)"
+        label = f"deadlock ({stuck.sum()} of {counted(stuck.size, 'episode')})"
         axes.plot(where + 1, np.ones(len(where)), transform=axes.get_xaxis_transform(), label=label, **look)
 
 

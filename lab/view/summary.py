@@ -8,6 +8,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from lab.errors import counted
+from lab.view.figures import beside, gap_of
+
 _STUDY_ROWS = 30
 
 SHOWN_MOVES = 60
@@ -21,24 +24,25 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", justify="right")
     table.add_column(overflow="fold")
-    done = f"{report['delivered']} of {report['toasts']} toasts delivered"
+    done = f"{report['delivered']} of {counted(report['toasts'], 'toast')} delivered"
     table.add_row("outcome", Text(f"{done} (seed {report['seed']})", "green" if report["success"] else "red"))
     if report["dropped"]:
-        table.add_row("dropped", f"{report['dropped']} toasts")
+        table.add_row("dropped", counted(report["dropped"], "toast"))
     if report["failure"]:
         table.add_row("stopped", Text(report["failure"], "red"))
     if report["retries"]:
         table.add_row("retries", Text("\n".join(report["retries"])))
     learned = sources.count("learned") + sources.count("continued")
-    table.add_row("skills", f"{learned} learned, {sources.count('reused')} reused, {helped} helped steps")
+    table.add_row("skills", f"{learned} learned, {sources.count('reused')} reused, {counted(helped, 'helped step')}")
     table.add_row("sequence", " ".join(map(str, report["sequence"])))
     measured = report["measured_makespan_s"]
-    text = f"{report['predicted_makespan_s']:.1f} s predicted"
+    predicted, bound = beside(report["predicted_makespan_s"], report["bound_s"], " s", 1)
+    text = f"{predicted} predicted"
     if measured is not None:
         text += f", {measured:.1f} s measured ({measured / report['predicted_makespan_s'] - 1:+.2%})"
     table.add_row("makespan", text)
     proven = "proven optimum" if report["optimum_proven"] else "proven bound"
-    table.add_row(proven, f"{report['bound_s']:.1f} s, gap {report['optimality_gap']:.2%}")
+    table.add_row(proven, f"{bound}, gap {gap_of(report['optimality_gap'], 2)}")
     rate = report["sim_s"] / report["wall_s"] if report["wall_s"] else 0.0
     table.add_row(
         "time",
@@ -53,11 +57,10 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
     """The end of `lab teach`, from its JSON document."""
     from lab.view.progress import sparkline
 
-    final = "does not reach the goal" if lesson["final_steps"] is None else f"{lesson['final_steps']} steps"
     lines = [
-        f"{lesson['skill']}: {lesson['episodes']} episodes   {sparkline(lesson['steps_per_episode'], 40)}",
-        f"learned way: {final}{_shortest(lesson)}: {_verdict(lesson)}",
-        _advice(lesson),
+        f"{lesson['skill']}: {counted(lesson['episodes'], 'episode')}   {sparkline(lesson['steps_per_episode'], 40)}",
+        f"learned way: {_way(lesson)}: {_verdict(lesson)}",
+        *([_advice(lesson)] if lesson["requests"] else []),  # else the receipt says that it asked nobody
         *(["it went on from what was left unfinished"] if lesson["source"] == "continued" else []),
         *lesson["receipt"]["lines"],
         f"saved as '{lesson['saved_as']}' (seed {lesson['seed']})",
@@ -72,12 +75,16 @@ def replay_summary(replay: Mapping[str, Any]) -> RenderableType:
     closed = replay["closed"]
     over = "it is not over: lab teach --resume goes on with it"
     if closed is not None:
-        over = f"over after {closed['episodes']} episodes, {'solved' if closed['solved'] else 'not solved'}"
+        over = f"over after {counted(closed['episodes'], 'episode')}, {'solved' if closed['solved'] else 'not solved'}"
     return Group(*map(Text, [f"{replay['problem']} in {replay['session']}: {over}", *replay["receipt"]["lines"]]))
 
 
-def _shortest(lesson: Mapping[str, Any]) -> str:
-    return "" if lesson["optimal_steps"] is None else f", the shortest takes {lesson['optimal_steps']}"
+def _way(lesson: Mapping[str, Any]) -> str:
+    """The steps of the learned way beside the fewest; where starts or steps are drawn, both are means of the ways there."""
+    final, best, drawn = lesson["final_steps"], lesson["optimal_steps"], lesson["steps_are_means"]
+    found = "does not reach the goal" if final is None else counted(final, "step")
+    found += " on average, where it reaches the goal" if drawn and final is not None else ""
+    return found if best is None else f"{found}, the {'best way' if drawn else 'shortest'} takes {best}"
 
 
 def _verdict(lesson: Mapping[str, Any]) -> str:
@@ -87,16 +94,18 @@ def _verdict(lesson: Mapping[str, Any]) -> str:
         return "solved"
     if lesson["final_steps"] is None:
         return "not solved"
+    if lesson["steps_are_means"]:
+        return (
+            "not solved" if lesson["optimal_steps"] is None else "not solved, its mean return is below the best way's"
+        )
     longer = lesson["optimal_steps"] is not None and lesson["final_steps"] > lesson["optimal_steps"]
     return "not solved, it is longer" if longer else "not solved, it is not there from every start"
 
 
 def _advice(lesson: Mapping[str, Any]) -> str:
-    if not lesson["requests"]:
-        return "the learner asked nobody"
-    text = (
-        f"asked in {lesson['requests']} episodes, {lesson['helped_steps']} helped steps, {lesson['misleads']} misleads"
-    )
+    counts = {"helped step": lesson["helped_steps"], "mislead": lesson["misleads"]}
+    asked = f"asked in {counted(lesson['requests'], 'episode')}"
+    text = ", ".join([asked, *(counted(number, what) for what, number in counts.items())])
     episode = lesson["rejected_at_episode"]
     return text if episode is None else f"{text}: rejected its advisor in episode {episode}"
 
@@ -105,11 +114,12 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     """The end of `lab sequence`, from its JSON document."""
     what, unit = _measured(found["objective"])
     proven = "proven optimum" if found["optimum_proven"] else "proven bound"
-    gap = "" if found["gap"] is None else f", gap {found['gap']:.2%}"
+    gap = "" if found["gap"] is None else f", gap {gap_of(found['gap'], 2)}"
+    cost, bound = beside(found["cost"], found["bound_cost"], unit, 2)
     lines = [
-        f"{found['method']}: {what}{found['cost']:.2f}{unit} for {_ordered(found['order'])} (seed {found['seed']})",
+        f"{found['method']}: {what}{cost} for {_ordered(found['order'])} (seed {found['seed']})",
         f"order of the transfers: {_begun(found['sequence'], len(found['order']))}",
-        f"{proven} {found['bound_cost']:.2f}{unit}{gap} ({found['bound_by']})",
+        f"{proven} {bound}{gap} ({found['bound_by']})",
     ]
     if found["luckiest_cost"] is not None:
         lines.append(f"by the mean times; in its luckiest drawn episode {found['luckiest_cost']:.2f}{unit}")
@@ -119,7 +129,8 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     for number, advice in enumerate(found["advice"] or [], 1):
         if advice["requests"] is None:
             continue
-        text = f"session {number}: asked in {advice['requests']} episodes, {advice['helped_steps']} moves advised"
+        asked, helped = counted(advice["requests"], "episode"), counted(advice["helped_steps"], "move")
+        text = f"session {number}: asked in {asked}, {helped} advised"
         episode = advice["rejected_at_episode"]
         lines.append(text if episode is None else f"{text}; rejected its advisor in episode {episode}")
     if found["stochastic"] is not None:
@@ -146,7 +157,7 @@ def _measured(objective: str) -> tuple[str, str]:
 def _ordered(order: Sequence[str]) -> str:
     """An order in words: how many of each product."""
     counts = Counter(order)
-    return ", ".join(f"{count} {name}{'s' * (count > 1)}" for name, count in counts.items())
+    return ", ".join(counted(count, name) for name, count in counts.items())
 
 
 def _drawn(stochastic: Mapping[str, Any], unit: str) -> list[str]:
@@ -157,7 +168,7 @@ def _drawn(stochastic: Mapping[str, Any], unit: str) -> list[str]:
         return f"{stochastic[name]['mean']:.2f}{unit} ({low:.2f} to {high:.2f})"
 
     return [
-        f"{stochastic['replications']} drawn episodes: the list as it is {mean('fixed')}",
+        f"{counted(stochastic['replications'], 'drawn episode')}: the list as it is {mean('fixed')}",
         f"reacting {mean('reacting')}: {stochastic['reacting']['policy']}",
         f"saved by reacting {mean('saved_by_reacting')}",
     ]
@@ -192,7 +203,7 @@ def study_summary(study: Mapping[str, Any]) -> RenderableType:
         for row in study["rows"][:_STUDY_ROWS]
     ]
     more = len(study["rows"]) - len(rows)
-    lines = [f"... and {more} more rows"] * (more > 0) + [""]
+    lines = [f"... and {counted(more, 'more row')}"] * (more > 0) + [""]
     lines += [f"{key}: {_number(value)}" for key, value in study["summary"].items()]
     lines += [f"{key}: {path}" for key, path in study["files"].items()]
     columns = (*varied, "measure", "value", "95 %", "printed", "inside")
@@ -224,7 +235,8 @@ def policy_summary(policy: Mapping[str, Any]) -> RenderableType:
     shown = {
         **policy,
         "curve": f"{sparkline(curve, 40)}  {min(curve)} to {max(curve)} steps",
-        "guided": f"{len(guided)} episodes" + (f", the first {guided[0]}, the last {guided[-1]}" if guided else ""),
+        "guided": counted(len(guided), "episode")
+        + (f", the first {guided[0]}, the last {guided[-1]}" if guided else ""),
         "created": policy["created"].replace("T", " "),
         "solved": "yes" if policy["solved"] else "no",
         **{name: ", ".join(f"{k} {v}" for k, v in policy[name].items()) for name in ("learner", "gate", "versions")},
@@ -238,7 +250,10 @@ def policy_summary(policy: Mapping[str, Any]) -> RenderableType:
 def verify_summary(report: Mapping[str, Any]) -> RenderableType:
     """What `lab toolbox verify` shows, from its JSON document: the damaged files, and how many are sound."""
     files, damaged = report["files"], [row for row in report["files"] if not row["ok"]]
-    lines = [Text(f"{len(files) - len(damaged)} of {len(files)} files in {report['folder']} are sound")]
+    if not files:
+        return Text(f"nothing in {report['folder']}")
+    are = "is" if len(files) == 1 else "are"
+    lines = [Text(f"{len(files) - len(damaged)} of {counted(len(files), 'file')} in {report['folder']} {are} sound")]
     return Group(*lines, *(Text(row["reason"], "red") for row in damaged))
 
 
@@ -248,5 +263,6 @@ def grid_summary(seen: Mapping[str, Any]) -> RenderableType:
     rows = ["".join(row) for row in seen["grid"]]
     turned = ["  ".join(marks[rows[i][j]] for i in range(len(rows))) for j in reversed(range(len(rows[0])))]
     ends = f"start {tuple(seen['start'])}, goal {tuple(seen['goal'])}"
-    found = f"{ends}, {len(seen['obstacles'])} cells with obstacles, {len(seen['markers'])} markers"
+    blocked, markers = counted(len(seen["obstacles"]), "cell"), counted(len(seen["markers"]), "marker")
+    found = f"{ends}, {blocked} with obstacles, {markers}"
     return Group(*map(Text, turned), Text(found))

@@ -19,6 +19,7 @@ from lab.advice.events import (
 )
 from lab.advice.journal import Undo
 from lab.advice.requests import AdviceRequest, AdvisorLeft
+from lab.errors import counted
 from lab.mdp import TabularMDP
 from lab.view import facts
 from lab.view.board import Marks, draw
@@ -87,8 +88,8 @@ class TeachingPrompt:
         self._print([*gap, *screen(request, self._marks, width, height - len(gap) - 1 - len(asked) // width)])
 
     def told(self, request: AdviceRequest, action: int | None) -> None:
-        """Says what was answered to a request, such as "You said: right"; None: the step was left to the learner."""
-        self._say(f"You said: {'skip' if action is None else self._marks.named(request.mdp, action)}", "bold")
+        """Says what was answered to a request, such as "Answer: right"; None: the step was left to the learner."""
+        self._say(f"Answer: {'skip' if action is None else self._marks.named(request.mdp, action)}", "bold")
 
     # ---- what the person says ---------------------------------------------------------------------------------------
 
@@ -105,9 +106,7 @@ class TeachingPrompt:
                     return self._give(request, answer)
                 case tuple():
                     self._path = _Path(request, answer)
-                    self._say(
-                        f"A path of {facts.counted(len(answer), 'move')}: {self._drawn(request.mdp, answer)}", "dim"
-                    )
+                    self._say(f"A path of {counted(len(answer), 'move')}: {self._drawn(request.mdp, answer)}", "dim")
                     return self._give(request, self._path.step())
                 case "own":
                     return request.learner_action
@@ -203,7 +202,7 @@ class TeachingPrompt:
             case AdviceRejected():
                 self._say(
                     f"The learner takes no more advice (episodes misled: {event.misleads}, tolerated: {event.omega}). "
-                    f"Episode {event.episode} counted {event.steps} steps, those before it {event.mean_before:.1f}.",
+                    f"Episode {event.episode} counted {counted(event.steps, 'step')}, those before it {event.mean_before:.1f}.",
                     "bold red",
                 )
             case AdviceEnded(reason="converged"):
@@ -231,14 +230,14 @@ class TeachingPrompt:
     def _episode_ended(self, event: EpisodeEnded) -> None:
         """One line on an episode with advice: its steps beside the mean before it."""
         self._guided += 1
-        style, verdict = "", ""
-        if self._mean_before is not None:
-            better = event.steps < self._mean_before
-            style = "green" if better else "yellow"
-            verdict = f", {'better' if better else 'no better'} than the {self._mean_before:.1f} before"
+        good, verdict = facts.verdict(event, self._mean_before)
+        style = {True: "green", False: "yellow", None: ""}[good]
         outcome = "reached the goal in" if event.reached else "did not reach the goal:"
-        steps = facts.counted(event.steps, "step")
-        self._say(f"Episode {event.episode} {outcome} {steps}{verdict}; moves advised: {event.helped_steps}.", style)
+        steps = counted(event.steps, "step")
+        self._say(
+            f"Episode {event.episode} {outcome} {steps}{verdict and f', {verdict}'}; moves advised: {event.helped_steps}.",
+            style,
+        )
 
     def _disagreed(self, event: AdvisorsDisagreed) -> None:
         """Who said what, and whom the learner follows."""

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lab.errors import BadInput
-from lab.sequencing.cell import Cell
-from lab.sequencing.chance import Episode
-from lab.sequencing.run import Run
+from lab.errors import BadInput, counted
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import Episode
+from lab.sequencing.simulate.run import Run
 from lab.view.canvas import (
     BLUE,
     GREEN,
@@ -116,10 +116,10 @@ def _drawing(
     branches: Sequence[Branch], title: str, near: bool
 ) -> tuple[Callable[["Figure"], None], tuple[float, float]]:
     """What draws the tree on a figure, and the figure's width and height [inch]."""
-    columns, rows = _layout(branches)
+    columns, rows = layout(branches)
     if near:
         branches = _near(branches)
-        columns, rows = _layout(branches)
+        columns, rows = layout(branches)
     if len(branches) > MAX_NODES:
         raise BadInput(f"search tree of {len(branches)} nodes: allowed are {MAX_NODES}, or only those near the optimum")
     leaves = int(max(rows)) + 1
@@ -187,11 +187,13 @@ def _near(branches: Sequence[Branch]) -> list[Branch]:
             hidden = 0 if branch.optimal or branch.parent is None else below[index]
             parent = None if branch.parent is None else new[branch.parent]
             new[index] = len(found)
-            found.append(replace(branch, parent=parent, when=branch.when + f" (+{hidden} nodes)" * (hidden > 0)))
+            found.append(
+                replace(branch, parent=parent, when=branch.when + f" (+{counted(hidden, 'node')})" * (hidden > 0))
+            )
     return found
 
 
-def _layout(branches: Sequence[Branch]) -> tuple[list[int], list[float]]:
+def layout(branches: Sequence[Branch]) -> tuple[list[int], list[float]]:
     """Column (number of moves) and row of each node: leaves one below the other, others amid their children."""
     children: list[list[int]] = [[] for _ in branches]
     columns: list[int] = []

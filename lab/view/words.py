@@ -18,7 +18,8 @@ COMMANDS = {  # what is typed -> what it is called, what it does; "path" begins 
     "skip": ("skip", "leave this step to the learner"),
     "auto": ("auto", "no more advice for this skill: the learner goes on alone"),
     "done": ("done", "no more advice in this whole run, whatever is learned"),
-    "quit": ("quit", "stop the session, as Ctrl-C does; what has been learned is kept"),
+    "quit": ("quit", "or q: stop the session, as Ctrl-C does; what has been learned is kept"),
+    "q": ("quit", ""),
     "?": ("help", "this list"),
     "help": ("help", ""),
 }
@@ -121,7 +122,7 @@ def example(mdp: TabularMDP) -> str:
 def _unknown(word: str, mdp: TabularMDP) -> str:
     near = get_close_matches(word, [*COMMANDS, *mdp.action_labels], n=1, cutoff=0.7)
     hint = f"did you mean '{near[0]}'? " if near else ""
-    known = ", ".join([*mdp.action_labels, *(name for name in COMMANDS if name not in ("", "?", "help"))])
+    known = ", ".join([*mdp.action_labels, *(name for name in COMMANDS if name not in ("", "?", "help", "q"))])
     return f"'{word[:20]}' is no direction: {hint}type {known} or ?"
 
 

@@ -1,12 +1,14 @@
 """When gates open, ask, stop and reject: step counts worked out by hand; good and bad advisors at each gate."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from lab.advice.advisors import make_advisor
 from lab.advice.gates import GATES, Gate, Surroundings, deviation, improvement
+from lab.advice.reasons import TooSlow
 from lab.errors import BadInput
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -79,6 +81,60 @@ def test_a_helped_episode_that_is_not_better_is_a_mislead(name: str) -> None:
     assert not one.opens(50, [FAILED] * 49)
 
 
+def test_as_good_as_the_best_so_far_may_be_spared() -> None:
+    # 10 is the best of episodes 1 and 2; episode 3 equals it, 4 does not, 5 is better than before, 6 failed
+    results, printed = [10, 10, 10, 12, 9, FAILED], gate("ccrl")
+    spared = gate("ccrl", replace(SETTINGS, spare_best=True))
+    verdicts: dict[Gate, list[str]] = {printed: [], spared: []}
+    for one, found in verdicts.items():
+        for n in range(1, len(results) + 1):
+            one.judges(results[:n], opened=n > 2)
+            found.append(one.verdict)
+    assert verdicts[printed] == ["", "", "misled", "misled", "", ""]  # rejected by then
+    assert verdicts[spared] == ["", "", "best", "misled", "better", "misled"]
+    assert (spared.misleads, spared.rejected) == (2, True)
+
+
+def corridor_walks(one: Gate, starts: Sequence[int], opened: int, extra: Sequence[int] = ()) -> Sequence[str]:
+    """Walks to cell 0 from these cells, some with steps in place at their start; the verdicts, open from episode n on."""
+    results, found = list[int](), []
+    for n, start in enumerate(starts, start=1):
+        one.begins(start)
+        wasted = extra[n - 1] if extra else 0
+        for cell in [*[start] * wasted, *range(start, 0, -1)]:
+            one.saw(cell, 0, -0.1, 1.0, cell - 1, 0)
+        results.append(start + wasted)
+        one.judges(results, opened=n >= opened)
+        found.append(one.verdict)
+    return found
+
+
+@pytest.mark.parametrize("name", ["ccrl", "combined"])
+def test_walks_from_different_starts_are_compared_by_how_far_the_goal_was(name: str) -> None:
+    several = Surroundings(lambda: 0.0, lambda count: [], several_starts=True)
+
+    def made(spare_best: bool) -> Gate:
+        return GATES[name](replace(SETTINGS, spare_best=spare_best), 100, LIMIT, several)
+
+    # the first two waste 2 steps each; 9 cells in 10 steps are better than that, though 10 is more than 3 and 4
+    assert corridor_walks(made(False), [1, 2, 9], 3, [2, 2, 1]) == ["", "", "better"]
+    # 2 cells in 5 steps waste more, though 5 is less than 9 and 8
+    assert corridor_walks(made(True), [9, 8, 2], 3, [0, 0, 3]) == ["", "", "misled"]
+    # nobody wastes a step: no better than before, as printed, but nobody could be
+    assert corridor_walks(made(False), [9, 8, 2, 6], 3) == ["", "", "misled", "misled"]
+    assert corridor_walks(made(True), [9, 8, 2, 6], 3) == ["", "", "best", "best"]
+
+
+def test_a_failed_episode_is_a_mislead_wherever_it_began() -> None:
+    several = Surroundings(lambda: 0.0, lambda count: [], several_starts=True)
+    one = GATES["ccrl"](replace(SETTINGS, spare_best=True), 100, LIMIT, several)
+    for n in range(1, 5):
+        one.begins(n)
+        one.saw(n, 0, -0.1, 1.0, n, 0)
+        one.judges([FAILED] * n, opened=n > 2)
+    assert one.misleads == 2
+
+
 @pytest.mark.parametrize("name", ["ia", "combined"])
 def test_introspection_asks_where_the_values_lie_close(name: str) -> None:
     one = gate(name)
@@ -129,7 +185,7 @@ def test_experts_and_novices_at_every_gate(name: str) -> None:
 def test_cq_asks_while_the_mean_is_above_a_constant() -> None:
     one = gate("cq", GateSettings("cq", first_episode=3, window=2, enough_steps=10.0))
     assert opened(one, [FAILED, 11, 10, 10, 9, 12]) == [3, 4, 7]  # means before 3..7: 106, 10.5, 10, 9.5, 10.5
-    assert "the last 2 episodes took 10.5 steps, more than 10" in one.why
+    assert str(one.why) == "the last 2 episodes took 10.5 steps, more than 10"
 
 
 def test_importance_asks_where_the_values_lie_far_apart() -> None:
@@ -160,10 +216,48 @@ def test_uncertainty_falls_where_the_learner_has_been() -> None:
         return made
 
     one = GATES["uncertainty"](GateSettings(spread=0.05), 10, LIMIT, Surroundings(rng.random, tables))
+    one.begins(3)
     assert one.asks(3, [])
     for _ in range(40):
         for action in range(4):
             entered = int(mdp.successor[3, action])
-            one.saw(3, action, -0.1, 0.0, entered)
+            one.saw(3, action, -0.1, 0.0, entered, 0)
     assert not one.asks(3, [])
     assert one.asks(2, [])
+
+
+@pytest.mark.parametrize("learner", UPDATES)
+def test_the_ensemble_learns_as_the_learner_does(learner: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A table that learns from every step and starts as the learner does ends as the learner; some episodes break off."""
+    mdp, settings, made = (
+        grid((2, 3), np.zeros((2, 3), bool), (0, 0), (1, 2)),
+        LearnerSettings(learner, episodes=9, max_steps=5),
+        [],
+    )
+
+    def ensemble(of: GateSettings, episodes: int, max_steps: int, around: Surroundings | None) -> Gate:
+        tables = [UPDATES[learner](np.zeros((6, 4)).tolist(), settings, mdp) for _ in range(of.ensemble)]
+        made.extend(tables)
+        return GATES["uncertainty"](of, episodes, max_steps, Surroundings(lambda: 0.0, lambda count: tables))
+
+    monkeypatch.setitem(GATES, "certain", ensemble)
+    adviser = make_advisor("novice", mdp, 0.99, np.random.default_rng(1))
+    asks = GateSettings("certain", first_episode=3, spread=0.0, ensemble=2)
+    result = run_session(mdp, settings, asks, adviser, np.random.default_rng(0))
+    assert result.helped_steps > 0
+    for table in made:
+        np.testing.assert_array_equal(list(table.q), result.q)
+
+
+def test_the_combined_gate_says_both_of_its_reasons() -> None:
+    one = gate("combined")
+    assert one.opens(5, [100, 100, 96, 96])
+    assert one.asks(0, [0.0, 0.25])
+    assert str(one.why) == "its improvement is +4.0%, below 5%, and the values here span 0.25, at most 0.5"
+
+
+def test_each_reason_is_a_record_of_its_figures() -> None:
+    one = gate("ccrl")
+    assert one.opens(5, [100, 100, 96, 96])
+    assert isinstance(one.why, TooSlow)
+    assert (round(one.why.rate, 9), one.why.threshold) == (0.04, 0.05)

@@ -1,10 +1,11 @@
 """The journal: what is written, read again however it was cut, and how a session is folded out of it."""
 
 import json
+import os
 from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from lab.advice.entries import (
     read_journal,
     undoable,
 )
-from lab.advice.events import AdviceGiven, EpisodeEnded, Event
+from lab.advice.events import AdviceGiven, EpisodeEnded, Event, Verdict
 from lab.advice.journal import Again, Journal, Undo
 from lab.advice.requests import AdviceRequest, AdvisorLeft, Ask
 from lab.errors import BadInput, WorkFailed
@@ -283,6 +284,7 @@ BY_FIELD: dict[str, Any] = {
     ),
     "said": st.lists(st.tuples(st.text(max_size=5), whole_numbers), max_size=3).map(tuple),
     "action": st.one_of(st.none(), whole_numbers),
+    "verdict": st.sampled_from(get_args(Verdict)),
     **dict.fromkeys(("improvement_rate", "current_mean", "previous_mean"), some_numbers),
     **dict.fromkeys(("final_steps", "optimal_steps"), st.one_of(st.none(), whole_numbers)),
     **dict.fromkeys(("mean_before", "trust"), st.floats(allow_nan=False, allow_infinity=False)),
@@ -361,3 +363,33 @@ def test_two_commands_do_not_write_one_journal(tmp_path: Path) -> None:
         Journal.resume(read_journal(tmp_path, "--resume"))
     journal.close()
     Journal.resume(read_journal(tmp_path, "--resume")).close()
+
+
+def test_what_another_command_added_before_the_lock_was_taken_stays(tmp_path: Path) -> None:
+    """The journal was found, another command went on with it and ended: its answers are neither cut away nor unknown."""
+    Journal.begin(tmp_path, HEAD).close()
+    found = read_journal(tmp_path, "--resume")
+    first = Journal.resume(found)
+    first.tell(AdviceGiven(1, 1, 0, 3, 0))
+    first.close()
+    raw = found.path.read_bytes()
+    second = Journal.resume(found)
+    second.close()
+    assert found.path.read_bytes() == raw
+    assert second.entries == [AdviceGiven(1, 1, 0, 3, 0)]
+    third = Journal.resume(found)
+    third.tell(AdviceGiven(1, 1, 0, 3, 0))
+    third.closes(Closed(30, 5, 5, True, "board"))
+    third.close()
+    with pytest.raises(BadInput, match="is over: look at it again with lab replay"):
+        Journal.resume(found)
+    found.path.unlink()
+    Journal.begin(tmp_path, replace(HEAD, problem="another")).close()
+    with pytest.raises(BadInput, match="it was another session's when it was first read"):
+        Journal.resume(found)
+
+
+def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / FILE)
+    with pytest.raises(BadInput, match="cannot be read: it is no regular file"):
+        read_journal(tmp_path, "DIR")

@@ -1,6 +1,7 @@
 """The receipt: counted by hand in small journals, held against real sessions, and true to any journal at all."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from lab.advice.events import (
     AdvisorsDisagreed,
     EpisodeEnded,
     Event,
+    Verdict,
 )
 from lab.advice.journal import Journal
 from lab.advice.panel import panel_of
@@ -84,7 +86,7 @@ def test_a_lesson_counted_by_hand() -> None:
     ]
     assert (found.skill, found.voices, found.notices) == (None, (), ())
     assert found.lines() == [
-        "advice: it asked in 2 episodes about 5 steps; 3 of them with your help",
+        "advice: it asked in 2 episodes about 5 steps; 3 of them with advice",
         "  not followed: 2 (nothing was said)",
         "  3 helped steps in 1 guided episode, 1 of them better than before",
         "  7 steps more from memory, without asking",
@@ -94,9 +96,9 @@ def test_a_lesson_counted_by_hand() -> None:
         "  another action was better in 2 steps:",
         "    (0,): said left, best right (1 x)",
         "    (1,): said left, best right (1 x)",
-        "  next time: in 1 state your advice sent it back to where it had been in that",
+        "  next time: in 1 state the advice sent it back to where it had been in that",
         "    episode",
-        "  next time: 1 step of yours went against a wall",
+        "  next time: 1 advised step went against a wall",
         "  next time: in 2 of 3 steps another action was better: see the list",
     ]
 
@@ -123,7 +125,7 @@ def test_advice_into_an_obstacle() -> None:
     mdp = grid((2, 2), np.array([[False, True], [False, False]]), (0, 0), (1, 1))
     found = receipt([AdviceGiven(1, 1, 0, 3, 3)], mdp, None)
     assert (found.into_obstacles, found.into_walls) == (1, 0)
-    assert "1 step of yours went into an obstacle" in found.hints
+    assert "1 advised step went into an obstacle" in found.hints
 
 
 def test_nothing_and_no_answer() -> None:
@@ -138,14 +140,53 @@ def test_nothing_and_no_answer() -> None:
 def test_hints_come_from_the_numbers() -> None:
     same: list[Entry] = [AdviceGiven(1, n, 0, RIGHT, RIGHT) for n in (1, 2, 3)]
     assert receipt(same, corridor(), VALUES).hints == (
-        "most of your help, 3 of 3 steps, was what it would have done by itself: help elsewhere",
+        "most of the advice, 3 of 3 steps, was what it would have done by itself: help elsewhere",
     )
     late: list[Entry] = [asked(1), ended(1, 9), asked(2), AdviceGiven(2, 1, 0, RIGHT, LEFT), ended(2, 3, 1)]
     assert receipt(late, corridor(), VALUES).hints == (
-        "earlier: it had asked in 1 episode before you helped for the first time",
+        "earlier: it had asked in 1 episode before it was helped for the first time",
     )
     silent: list[Entry] = [AdviceGiven(1, n, 0, action, LEFT) for n, action in enumerate((None, None, RIGHT))]
-    assert receipt(silent, corridor(), VALUES).hints == ("you left 2 of 3 questions to it: answer more of them",)
+    assert receipt(silent, corridor(), VALUES).hints == ("2 of 3 questions had no answer: answer more of them",)
+
+
+def test_only_a_person_is_spoken_to() -> None:
+    """The same lesson, each answer a person's; with another advisor beside, the advice is not all theirs."""
+    person: list[Entry] = []
+    for entry in LESSON:
+        person += [_said(entry), entry] if isinstance(entry, AdviceGiven) else [entry]
+    found = receipt(person, corridor(), VALUES, window=2)
+    assert found.yours
+    assert found.lines()[0] == "advice: it asked in 2 episodes about 5 steps; 3 of them with your help"
+    assert "1 step of yours went against a wall" in found.hints
+    dispute = AdvisorsDisagreed(3, 1, 0, (("terminal", RIGHT), ("wrong", LEFT)), RIGHT)
+    several = [*person[:3], dispute, *person[3:]]
+    for entries in (LESSON, several):
+        others = receipt(entries, corridor(), VALUES, window=2)
+        assert not others.yours
+        assert "you" not in " ".join([*others.lines(), *others.hints])
+
+
+def _said(given: AdviceGiven) -> Answer:
+    return Answer("terminal", given.episode, given.step, given.state, given.action)
+
+
+def test_nothing_is_counted_of_nothing() -> None:
+    """Nobody asked; asked, and never answered: no line says 0 of 0."""
+    assert receipt([ended(1, 5)], corridor(), VALUES).lines() == ["advice: it asked nobody"]
+    silent = receipt([asked(1), AdviceGiven(1, 1, 0, None, RIGHT), ended(1, 5)], corridor(), VALUES)
+    assert not any("0 of 0" in line or "in 0 guided" in line for line in silent.lines())
+    one = receipt([asked(1), AdviceGiven(1, 1, 0, RIGHT, RIGHT), ended(1, 5, 1)], corridor(), VALUES).lines()
+    assert "  1 of 1 was its own choice, too" in one
+
+
+def test_what_the_gate_makes_of_an_episode_counts() -> None:
+    """Steps 9, then guided 9, 9, 9: the gate found the first two as good as the best, and the last one, a near start, not."""
+    verdicts: tuple[Verdict, ...] = ("", "best", "best", "misled")
+    entries = [replace(ended(n, 9, int(n > 1)), verdict=verdict) for n, verdict in enumerate(verdicts, start=1)]
+    found = receipt(entries, corridor(), VALUES, window=1)
+    assert (found.guided, found.better, found.best) == (3, 0, 2)
+    assert "  3 helped steps in 3 guided episodes, 0 of them better than before, 2 as good" in found.lines()
 
 
 def test_help_that_went_on_for_too_long() -> None:

@@ -1,4 +1,4 @@
-"""Compiled sessions equal the interactive one, number by number, and do not depend on their company."""
+"""Sessions run by the batch equal the interactive one, number by number, compiled or not, whatever their company."""
 
 from dataclasses import replace
 from typing import Any
@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from lab.advice.advisors import Advice, TableAdvisor, skill
-from lab.advice.gates import GATES
+from lab.advice.gates import GATES, Gate, Steps
 from lab.errors import BadInput
-from lab.learning.batch import LEARNERS, Batch, run_sessions
-from lab.learning.kernels import LANES
-from lab.learning.selection import splitmix
+from lab.learning.batch import Batch, run_sessions
+from lab.learning.kernels import LANES, LEARNERS
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.splitmix import stream
+from lab.learning.updates import UPDATES
 from lab.mdp import TabularMDP, grid, optimal_values
 
 SHORT = LearnerSettings("afterstate", episodes=40, max_steps=40, count_start=True)
@@ -34,7 +35,7 @@ def alone(
     mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings, who: Advice | None, seed: int
 ) -> SessionResult:
     """The interactive session with the numbers that the kernel draws for this seed."""
-    draw = splitmix(seed)
+    draw = stream(seed)
     advisor = None if who is None else TableAdvisor(who, draw)
     return run_session(mdp, learner, gate, advisor, np.random.default_rng(0), draw=draw)
 
@@ -55,24 +56,67 @@ def assert_same(batch: Batch, n: int, one: SessionResult) -> None:
 
 
 @pytest.mark.parametrize("gate", GATES)
-@pytest.mark.parametrize("learner", LEARNERS)
-def test_compiled_and_interactive_sessions_are_the_same(learner: str, gate: str) -> None:
+@pytest.mark.parametrize("learner", UPDATES)
+def test_batch_and_interactive_sessions_are_the_same(learner: str, gate: str) -> None:
     mdp, settings, how = board(), replace(SHORT, learner=learner), replace(EAGER, gate=gate)
     who = advice(mdp, [1.0, 0.1], np.arange(25) > 4)
-    seeds = np.arange(100, 100 + LANES + 6, dtype=np.uint64)
+    seeds = np.arange(100, 100 + (LANES + 6 if learner in LEARNERS else 2), dtype=np.uint64)
     batch = run_sessions(mdp, settings, how, who, seeds, keep_tables=True)
-    for n in (0, 7, LANES + 5):
+    for n in {0, min(7, len(seeds) - 1), len(seeds) - 1}:
         assert_same(batch, n, alone(mdp, settings, how, who, int(seeds[n])))
-    assert (batch.helped_steps.sum() > 0) == (gate != "never")
+    if learner in LEARNERS:
+        assert (batch.helped_steps.sum() > 0) == (gate != "never")
 
 
-# the gate "uncertainty" draws its tables also when nobody is there, but not in compiled sessions
-VIEWS = [
-    (gate, view)
-    for gate in GATES
-    for view in ("full", "limited", "nobody")
-    if (gate, view) != ("uncertainty", "nobody")
-]
+@pytest.mark.parametrize("gate", GATES)
+@pytest.mark.parametrize("learner", UPDATES)
+def test_they_are_the_same_with_nobody_to_ask(learner: str, gate: str) -> None:
+    mdp, settings, how = board(), replace(SHORT, learner=learner, episodes=20), replace(EAGER, gate=gate)
+    batch = run_sessions(mdp, settings, how, None, np.array([7], np.uint64), keep_tables=True)
+    assert_same(batch, 0, alone(mdp, settings, how, None, 7))
+
+
+@pytest.mark.parametrize("gate", ["ccrl", "combined"])
+@pytest.mark.parametrize("spare_best", [False, True])
+def test_they_are_the_same_where_gates_judge_and_episodes_begin_anywhere(gate: str, spare_best: bool) -> None:
+    anywhere = replace(board(), starts=tuple(np.flatnonzero(~board().terminal).tolist()))
+    how, seeds = replace(EAGER, gate=gate, spare_best=spare_best), np.arange(3, dtype=np.uint64)
+    batch = run_sessions(anywhere, SHORT, how, advice(anywhere, 1.0), seeds, keep_tables=True)
+    for n in range(3):
+        assert_same(batch, n, alone(anywhere, SHORT, how, advice(anywhere, 1.0), n))
+    assert batch.misleads.sum() > 0
+
+
+class EveryOther(Gate):
+    """A gate of somebody else's, which has no compiled form."""
+
+    def opens(self, episode: int, steps: Steps) -> bool:
+        return episode % 2 == 0
+
+
+def test_a_gate_without_a_compiled_form_is_run_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(GATES, "every-other", EveryOther)
+    mdp, how = board(), replace(EAGER, gate="every-other")
+    batch = run_sessions(mdp, SHORT, how, advice(mdp), np.array([1, 2], np.uint64), keep_tables=True)
+    for n in range(2):
+        assert_same(batch, n, alone(mdp, SHORT, how, advice(mdp), n + 1))
+    assert not batch.guided[:, ::2].any()  # episodes 1, 3, ...
+
+
+def test_a_learner_without_a_compiled_form_is_run_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(UPDATES, "another", UPDATES["sarsa"])
+    mdp, settings = board(), replace(SHORT, learner="another")
+    batch = run_sessions(mdp, settings, EAGER, advice(mdp), np.array([1], np.uint64), keep_tables=True)
+    assert_same(batch, 0, alone(mdp, replace(SHORT, learner="sarsa"), EAGER, advice(mdp), 1))
+
+
+def test_a_selection_without_a_compiled_form_is_run_all_the_same() -> None:
+    settings = replace(SHORT, selection="epsilon-greedy")
+    batch = run_sessions(board(), settings, EAGER, None, np.array([1], np.uint64), keep_tables=True)
+    assert_same(batch, 0, alone(board(), settings, EAGER, None, 1))
+
+
+VIEWS = [(gate, view) for gate in GATES for view in ("full", "limited", "nobody")]
 
 
 @pytest.mark.parametrize(("gate", "view"), VIEWS)
@@ -138,12 +182,12 @@ def test_without_an_advisor_nobody_is_asked() -> None:
     assert none.steps.shape == (0, 40)
 
 
-def test_what_the_kernel_cannot_do_is_refused() -> None:
+def test_what_nobody_knows_is_refused() -> None:
     mdp, seeds = board(), np.arange(1, dtype=np.uint64)
-    with pytest.raises(BadInput, match="unknown learner 'sarsa'"):
-        run_sessions(mdp, replace(SHORT, learner="sarsa"), EAGER, None, seeds)
-    with pytest.raises(BadInput, match="unknown selection 'greedy'"):
-        run_sessions(mdp, replace(SHORT, selection="greedy"), EAGER, None, seeds)
+    with pytest.raises(BadInput, match="unknown learner 'sarsi'"):
+        run_sessions(mdp, replace(SHORT, learner="sarsi"), EAGER, None, seeds)
+    with pytest.raises(BadInput, match="unknown selection 'greed'"):
+        run_sessions(mdp, replace(SHORT, selection="greed"), EAGER, None, seeds)
     with pytest.raises(BadInput, match="unknown gate 'maybe'"):
         run_sessions(mdp, SHORT, replace(EAGER, gate="maybe"), None, seeds)
     with pytest.raises(BadInput, match=r"advice of shape \(1, 9, 4\): the problem has \(25, 4\)"):

@@ -14,7 +14,6 @@ from lab.learning.selection import (
     exp_of,
     greedy,
     softmax,
-    splitmix,
     temperature,
     uniforms,
 )
@@ -87,10 +86,3 @@ def test_the_choice_has_the_softmax_probabilities(values: list[float], tau: floa
             assert choose_softmax(values, tau, end + 1e-6) > action
         if end > 1e-6:
             assert choose_softmax(values, tau, end - 1e-6) <= action
-
-
-def test_splitmix_is_the_published_stream() -> None:
-    # the first outputs of the reference program for seed 1234567, as 53-bit fractions
-    published = (6457827717110365317, 3203168211198807973, 9817491932198370423)
-    draw = splitmix(1234567)
-    assert [draw() for _ in range(3)] == [(number >> 11) * 2.0**-53 for number in published]

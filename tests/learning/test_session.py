@@ -156,7 +156,32 @@ def test_the_gate_says_why_and_keeps_to_its_budget() -> None:
     gate = GateSettings("always", budget=4)
     result = run_session(corridor(4), LearnerSettings(episodes=5), gate, right, np.random.default_rng(0))
     assert result.helped_steps == len(right.requests) == 4
-    assert {request.why for request in right.requests} == {"it asks about every step"}
+    assert {str(request.why) for request in right.requests} == {"it asks about every step"}
+
+
+def test_an_expert_on_the_shortest_way_misleads_as_printed_but_not_where_the_best_is_spared() -> None:
+    settings, events = LearnerSettings("q", episodes=30, max_steps=20), list[Event]()
+    for spare_best in (False, True):
+        # Lambda 1: it asks until 2K + 1 results were the same; nobody can be better than 3 steps
+        gate = GateSettings(first_episode=4, window=2, omega=3, lambda_threshold=1.0, spare_best=spare_best)
+        right = Scripted(lambda request: 1)
+        result = run_session(corridor(4), settings, gate, right, np.random.default_rng(0), on_event=events.append)
+        assert (result.misleads > 0) == (not spare_best)
+        verdicts = {one.verdict for one in events if isinstance(one, EpisodeEnded) and one.guided}
+        assert ("misled" in verdicts, "best" in verdicts) == (not spare_best, spare_best)
+        events.clear()
+
+
+@pytest.mark.parametrize(("advisor", "rejected"), [("expert", False), ("wrong", True)])
+def test_who_is_rejected_does_not_hang_on_where_episodes_begin(advisor: str, rejected: bool) -> None:
+    open_field = grid((8, 8), np.zeros((8, 8), bool), (0, 0), (7, 7))
+    anywhere = replace(open_field, starts=tuple(np.flatnonzero(~open_field.terminal).tolist()))
+    settings, gate = LearnerSettings(episodes=120, max_steps=60), GateSettings(spare_best=True)
+    results = []
+    for seed in range(8):
+        adviser = make_advisor(advisor, anywhere, settings.discount, np.random.default_rng([seed, 1]))
+        results.append(run_session(anywhere, settings, gate, adviser, np.random.default_rng(seed)))
+    assert all((result.rejected_at_episode is not None) == rejected for result in results)
 
 
 @pytest.mark.parametrize("selection", SELECTIONS)

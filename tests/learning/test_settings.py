@@ -37,6 +37,7 @@ def test_the_defaults_are_those_of_the_thesis() -> None:
         "ensemble": 5,
         "budget": 1_000_000_000,
         "judge_unhelped": True,
+        "spare_best": False,
         "memory": False,
     }
 

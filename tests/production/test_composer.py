@@ -12,11 +12,11 @@ from lab.production.durations import Durations, cell_of, measure
 from lab.production.floor import Floor, try_out
 from lab.production.prepared import Prepared
 from lab.production.skillset import SkillSet
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import Move
-from lab.sequencing.run import simulate
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.simulate.run import simulate
 from lab.sim.scene import Layout, spots
-from lab.sim.world import TIME_STEP, World
+from lab.sim.world import World
 from lab.skills import Butter
 from lab.skills.skill import Status
 from lab.skills.surveys import Surveys
@@ -292,44 +292,47 @@ def test_a_slice_set_down_beside_its_spot_on_the_last_plate_is_taken_up_again_an
     assert floor.bench.stands("slice 1", ground.work.spot_of[1].grasp(), 0.012)
 
 
-def test_a_machine_that_failed_while_the_robot_was_away_is_noticed_and_tried_again(ground: Ground) -> None:
-    """The butter's failure is over long before the robot asks for the slice."""
+def at_butter(ground: Ground, surveys: Surveys) -> Butter:
+    """Toast 1 and the robot are at the butter applier, whose skill is aimed at it."""
     floor, work = ground.floor, ground.work
+    floor.bench.held = None
+    for decision in (1, 1):  # plate to toaster, toaster to butter_applier
+        work.plan.move(decision)
+    ground.put("slice 1", 0.80, -0.52, 0.0805)
+    floor.stand(surveys.approach("butter_applier"))
+    work.place = "butter_applier"
     butter = floor.skillset.skills["butter at butter_applier"]
     assert isinstance(butter, Butter)
-    floor.scene.world.put("slice 1", (0.80, -0.52, 0.0805))
     butter.aim("slice 1")
     floor.machines["butter_applier"] = butter
+    return butter
+
+
+def test_a_machine_that_failed_while_the_robot_was_away_is_noticed_and_tried_again(
+    ground: Ground, surveys: Surveys, task: Task
+) -> None:
+    """The butter's failure is over long before the robot asks for the slice; that goes to the first plate that is free."""
+    work, places = ground.work, spots(task.station("finished_plate"))
+    butter = at_butter(ground, surveys)
     butter.status, butter.reason = Status.FAILURE, "the butter missed 9 of 9 cells"
-    work.wait_for(1, "butter_applier")
+    work.spot_of |= {2: places[0], 3: spots(task.station("plate"))[1]}
+    assert work.carry_out((1,)) is None
     assert work.retries == ["toast 1 at 'butter_applier', try 1: the butter missed 9 of 9 cells"]
     assert butter.status is Status.SUCCESS
     assert len(butter.covered) == 9
+    assert work.spot_of[1] == places[1]
 
 
 def test_a_machine_that_goes_on_failing_stops_the_run(
     ground: Ground, clueless: Callable[[str], None], surveys: Surveys
 ) -> None:
     clueless("butter at butter_applier")
-    work = ground.work
-    ground.floor.bench.held = None
-    for decision in (1, 1):  # plate to toaster, toaster to butter_applier
-        work.plan.move(decision)
-    ground.put("slice 1", 0.80, -0.52, 0.0805)
-    ground.floor.stand(surveys.approach("butter_applier"))
-    work.place = "butter_applier"
-    work.start_machine(1, "butter_applier")
-    failure = work.carry_out((1,))
+    butter = at_butter(ground, surveys)
+    butter.start(ground.floor.bench, ground.floor.skillset.policies[butter.name])
+    failure = ground.work.carry_out((1,))
     assert failure is not None
     assert failure.startswith("toast 1 at 'butter_applier': policy 'butter at butter_applier ")
     assert failure.endswith(f"(tried {MAX_TRIES} times)")
-
-
-def test_each_toast_gets_a_free_spot(task: Task, ground: Ground) -> None:
-    work, places = ground.work, spots(task.station("finished_plate"))
-    assert work.free_spot("finished_plate") == places[0]
-    work.spot_of = {1: places[0], 2: places[2], 3: spots(task.station("plate"))[1]}
-    assert work.free_spot("finished_plate") == places[1]
 
 
 def test_a_toast_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None:
@@ -337,14 +340,6 @@ def test_a_toast_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None
         ground.work.plan.move(decision)
     assert ground.work.carry_out((1,)) == "toast 1 is already at 'finished_plate'"
     assert ground.work.done() == [1]
-
-
-def test_the_robot_waits_until_the_machine_is_done(ground: Ground) -> None:
-    ground.work.ready_s["toaster"] = 0.5
-    ground.work.wait_for(1, "toaster")
-    assert ground.floor.now_s == pytest.approx(0.5, abs=TIME_STEP)
-    ground.work.wait_for(1, "toaster")
-    assert ground.floor.now_s == pytest.approx(0.5, abs=TIME_STEP)
 
 
 def test_a_grasp_can_be_tried_alone(prepared: Prepared, clueless: Callable[[str], None]) -> None:

@@ -14,7 +14,7 @@ import lab.data
 from lab.errors import BadInput, WorkFailed
 from lab.policy import Policy
 from lab.production.durations import Durations, durations_key
-from lab.sequencing.positions import Moves
+from lab.sequencing.cell.routes import Moves
 from lab.sim.scene import Layout
 from lab.taskfile import Task, load
 

@@ -12,24 +12,26 @@ from typing import Any
 import numpy as np
 import pytest
 
-import lab.production.report
 import lab.production.run
 from lab.errors import WorkFailed
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
+from lab.policy import Policy
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
 from lab.production.prepared import Prepared, prepare
-from lab.production.report import FILES, Report, Taught, curves, write_files
+from lab.production.report import FILES, Report, Taught, write_files
 from lab.production.run import teach_all
 from lab.sequencing import SEQUENCERS
-from lab.sequencing.events import Schedule
-from lab.sequencing.exact import optimum
+from lab.sequencing.cell.schedule import Schedule
+from lab.sequencing.methods.exact import optimum
 from lab.taskfile import Task, load
 from lab.teaching import Teacher
 from lab.toolbox import Toolbox
 from lab.view.frames import Recording
 from lab.vision import read_picture
+
+Lab = Callable[..., Any]
 
 RUN_FIELDS = (
     *("task", "seed", "toasts", "success", "delivered", "dropped", "failure", "retries", "skills", "sequence"),
@@ -317,19 +319,24 @@ def report(prepared: Prepared, toolbox: Toolbox) -> tuple[Taught, Report]:
     return taught, made
 
 
-def draw(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) -> None:
-    def quick(prepared: Prepared, taught: Taught, report: Report, folder: Path) -> None:
-        for name in report.files:
-            (folder / FILES[name]).write_text("new")
+def drawn(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) -> list[str]:
+    """The names of the learning curves, which are not drawn."""
+    names: list[str] = []
+
+    def quick(policies: dict[str, Policy], path: Path) -> None:
+        names.extend(policies)
+        path.write_text("new")
         if stop is not None:
             raise stop
 
-    monkeypatch.setattr(lab.production.report, "draw_all", quick)
+    monkeypatch.setattr("lab.view.plots.learning_curves", quick)
+    return names
 
 
 def test_a_failed_run_says_so_and_leaves_no_old_chart(
     prepared: Prepared, report: tuple[Taught, Report], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Its lessons are drawn once for each table."""
     taught, failed = report
     document = failed.to_json()
     assert (document["success"], document["delivered"], document["dropped"]) == (False, 0, 1)
@@ -339,10 +346,12 @@ def test_a_failed_run_says_so_and_leaves_no_old_chart(
     (tmp_path / "mine.txt").write_text("mine")
     (tmp_path / ".run-k3pt_0ab").mkdir()  # a run that was killed while it drew has left this
     (tmp_path / ".run-k3pt_0ab" / "gantt.png").write_text("half")
-    draw(monkeypatch)
+    curves = drawn(monkeypatch)
     write_files(prepared, taught, failed, tmp_path)
     assert sorted(failed.files) == sorted(set(FILES) - {"gantt"})
     assert sorted(os.listdir(tmp_path)) == sorted(["mine.txt", "toolbox", *map(FILES.__getitem__, failed.files)])
+    assert len(curves) == len({lesson.policy.name for lesson in taught.lessons.values()})
+    assert {"grasp at plate, starts vary", "insert at toaster"} < set(curves)
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt(), OSError(28, "No space left on device")])
@@ -357,15 +366,55 @@ def test_nothing_is_half_written(
     out = tmp_path / "out"
     out.mkdir()
     (out / "run.json").write_text("old")
-    draw(monkeypatch, stop)
+    drawn(monkeypatch, stop)
     with pytest.raises((KeyboardInterrupt, WorkFailed)):
         write_files(prepared, taught, failed, out)
     assert {path.name: path.read_text() for path in out.iterdir()} == {"run.json": "old"}
 
 
-def test_lessons_are_drawn_once_for_each_table(prepared: Prepared, toolbox: Toolbox) -> None:
-    taught = teach_all(prepared, Teacher(toolbox), Listener())
-    drawn = curves(prepared, taught.lessons)
-    assert len(drawn) == len({lesson.policy.name for lesson in taught.lessons.values()})
-    assert "grasp at plate, starts vary" in drawn
-    assert "insert at toaster" in drawn
+def short_task(root: Path) -> str:
+    """Toast carried from plate to plate; a grasp is learned in short sessions, a person helps for 8 steps in each."""
+    text = (root / "tasks" / "toast.toml").read_text(encoding="utf-8")
+    for station, buffer in (("toaster", "toaster_buffer"), ("butter_applier", "butter_buffer")):
+        text = text.replace(f'[[route]]\nstation = "{station}"\nbuffer = "{buffer}"\n', "")
+    head, grasp, rest = text.partition("[subtasks.grasp]")
+    rest = rest.replace("episodes = 600", "episodes = 200", 1)
+    return (
+        head + grasp + rest.replace("first_episode = 30", "first_episode = 10, budget = 8, judge_unhelped = false", 1)
+    )
+
+
+def test_the_lessons_of_a_run_are_replayed_and_gone_on_with(
+    lab: Lab, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A grasp takes six sessions, and a person answers in each; the long transfer is never learned, and says so."""
+    monkeypatch.setenv("LAB_TOOLBOX", str(tmp_path / "toolbox"))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "short.toml").write_text(short_task(root), encoding="utf-8")
+    typed = ["right", "skip", *[""] * 60]  # an empty line: what the learner would do itself
+    ran = lab("run", "short.toml", "--toasts", "1", "--advisor", "terminal", stdin="\n".join(typed))
+    assert (ran.code, "was not learned in 4000 episodes" in ran.err) == (1, True)
+    rows = {row["problem"]: row for row in lab("replay", "--json").json["sessions"]}
+    assert {problem: row["state"] for problem, row in rows.items()} == {
+        "grasp at plate": "solved",
+        "transfer plate to finished_plate with slice": "over",
+    }
+    for row in rows.values():
+        assert lab("replay", row["session"], "--json").code == 0
+    journal = Path(rows["grasp at plate"]["session"]) / "events.jsonl"
+    whole, box = journal.read_bytes(), Toolbox(tmp_path / "toolbox")
+    lines = whole.splitlines(keepends=True)
+    begun = [n for n, line in enumerate(lines) if b'"kind": "episode", "episode": 1,' in line]
+    answers = [n for n, line in enumerate(lines) if b'"kind": "answer"' in line]
+    assert [sum(first < n for n in answers) for first in begun] == [49, 40, 32, 24, 16, 8]
+    (path,) = tmp_path.glob("toolbox/grasp-*.safetensors")
+    learned = box.load(path)
+    path.unlink()
+    journal.write_bytes(b"".join(lines[: answers[20]]))  # in the third session
+    ran = lab("teach", "--resume", str(journal.parent), "--json", stdin="\n" * 60)
+    assert (ran.code, ran.json["solved"], ran.json["saved_as"]) == (0, True, learned.name)
+    assert journal.read_bytes() == whole
+    again = box.load(path)
+    assert np.array_equal(again.q, learned.q)
+    assert np.array_equal(again.visits, learned.visits)
+    assert (again.curve, again.guided, again.requests) == (learned.curve, learned.guided, learned.requests)

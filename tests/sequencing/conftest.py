@@ -8,9 +8,9 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from lab.sequencing.cell import Cell, needed_moves
-from lab.sequencing.layout import Arrivals, Product, Route, Stage, Station
-from lab.sequencing.run import Run, branch
+from lab.sequencing.cell.cell import Cell, needed_moves
+from lab.sequencing.cell.stations import Arrivals, Product, Route, Stage, Station
+from lab.sequencing.simulate.run import Run, branch
 
 X = math.nan
 # Thesis table 7.2, robot times [s], row from, column to, stations 1 to 6.

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.sequencing import SEQUENCERS
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import EpisodeSequenced, SequenceResult
-from lab.sequencing.exact import optimum
-from lab.sequencing.objectives import OBJECTIVES, cost
-from lab.sequencing.run import Run, simulate
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import OBJECTIVES, cost
+from lab.sequencing.cell.schedule import EpisodeSequenced, SequenceResult
+from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Search
+from lab.sequencing.simulate.run import Run, simulate
 
 CellMaker = Callable[..., Cell]
 NAMES = sorted(SEQUENCERS)

@@ -77,3 +77,13 @@ def test_the_global_style_is_left_alone(form: str) -> None:
 
 def test_seconds() -> None:
     assert [seconds(513), seconds(12.34), seconds(10.04)] == ["513 s", "12.3 s", "10 s"]
+
+
+def test_a_link_is_replaced_and_not_followed(tmp_path: Path) -> None:
+    """A folder that somebody else gave may hold one that leads out of it."""
+    (tmp_path / "elsewhere").write_text("dear")
+    (tmp_path / "plot.svg").symlink_to(tmp_path / "elsewhere")
+    with picture_file(tmp_path / "plot.svg", 3, 2) as figure:
+        draw(figure)
+    assert (tmp_path / "elsewhere").read_text() == "dear"
+    assert (tmp_path / "plot.svg").read_bytes() == picture_bytes(draw, 3, 2, "svg")

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lab.advice.events import EpisodeEnded, Verdict
+from lab.advice.reasons import TooSlow, ValuesAlike
 from lab.advice.requests import AdviceRequest, Standing
 from lab.learning.environment import TableEnvironment
 from lab.mdp import TabularMDP, coverage, grid
@@ -12,7 +14,7 @@ from lab.view import facts
 from lab.view.board import Marks, picture_of
 
 MARKS = Marks()
-WHY = "its improvement is +1.2%, below 5%"
+WHY = TooSlow(0.012, 0.05)
 
 
 def board() -> TabularMDP:
@@ -43,18 +45,26 @@ def test_percents(share: float, text: str) -> None:
 
 def test_the_own_choice_and_what_is_preferred() -> None:
     assert facts.choice(request(), MARKS) == (
-        "The learner itself would go → right (25%); all moves are alike to it here."
+        "Alone the learner would now go → right, drawn at random: all moves are alike to it here (25% each)."
     )
-    assert facts.choice(request(q=(0, 0, 0, 1)), MARKS) == "The learner itself would go → right (100%)."
+    assert facts.choice(request(q=(0, 0, 0, 1)), MARKS) == (
+        "Alone the learner would now go → right, the move it rates best (100%)."
+    )
     assert facts.choice(request(q=(0, 1, 0, 0)), MARKS) == (
-        "The learner itself would go → right (0%); it prefers ↓ down (100%)."
+        "Alone the learner would now go → right, drawn at random (0%); the move it rates best is ↓ down (100%)."
     )
 
 
 def test_where_the_own_choice_leads() -> None:
-    assert "go ↓ down (100%), which leads into an obstacle." in facts.choice(request(None, 1, 1, (0, 1, 0, 0)), MARKS)
-    assert "go → right (100%), which leads to the goal." in facts.choice(request(None, 3, 10, (0, 0, 0, 1)), MARKS)
-    assert "go ↑ up (100%), which leads nowhere." in facts.choice(request(None, 0, 0, (1, 0, 0, 0)), MARKS)
+    assert "go ↓ down, the move it rates best (100%); that leads into an obstacle." in facts.choice(
+        request(None, 1, 1, (0, 1, 0, 0)), MARKS
+    )
+    assert "go → right, the move it rates best (100%); that leads to the goal." in facts.choice(
+        request(None, 3, 10, (0, 0, 0, 1)), MARKS
+    )
+    assert "go ↑ up, the move it rates best (100%); that leads nowhere." in facts.choice(
+        request(None, 0, 0, (1, 0, 0, 0)), MARKS
+    )
     assert facts.choice(request(None, 1, 1), MARKS, brief=True) == "↓ down leads into an obstacle."
     assert facts.choice(request(None, 0), MARKS, brief=True) == "↑ up leads nowhere."
     assert facts.choice(request(), MARKS, brief=True) == ""
@@ -78,13 +88,13 @@ def test_the_averages_and_the_threshold() -> None:
         "It asks because its improvement is +1.2%, below 5%: lately 39.5 steps per episode, before that 40.0."
     ]
     assert facts.progress(request(), brief=True) == ["Steps 40.0, now 39.5: +1.2% < 5%"]
-    other = replace(request(), why="the values here span 0.20, at most 1")
+    other = replace(request(), why=ValuesAlike(0.2, 1.0))
     assert facts.progress(other) == [
         "It asks because the values here span 0.20, at most 1.",
         "Steps per episode: lately 39.5, before that 40.0; improvement +1.2%, threshold 5%.",
     ]
-    assert facts.progress(replace(other, why=""))[0].startswith("Steps per episode")
-    early = replace(request(), improvement_rate=None, current_mean=None, previous_mean=None, why="")
+    assert facts.progress(replace(other, why=None))[0].startswith("Steps per episode")
+    early = replace(request(), improvement_rate=None, current_mean=None, previous_mean=None, why=None)
     assert facts.progress(early) == ["Too few episodes so far for moving averages."]
     assert facts.progress(early, brief=True) == ["Too few episodes for averages."]
 
@@ -130,7 +140,8 @@ def test_sentences_say_all_without_a_picture() -> None:
         "down: border.",
         "left: free.",
         "right: goal.",
-        "The learner itself would go right (0%), which leads to the goal; it prefers down (100%).",
+        "Alone the learner would now go right, drawn at random (0%); that leads to the goal; the move it rates best is down "
+        "(100%).",
         "Its chances: up 0%, down 100%, left 0%, right 0%.",
         "It asks because its improvement is +1.2%, below 5%: lately 39.5 steps per episode, before that 40.0.",
         "Advised so far: 12 of 150 moves; episodes misled: 3, tolerated: 7.",
@@ -160,7 +171,8 @@ def test_sentences_of_a_map_a_board_and_states_without_a_grid() -> None:
         "wait: leads nowhere.",
         "go: leads to 1.",
         "fall: an end that is no goal.",
-        "The learner itself would go fall (33%), which leads to an end that is no goal; all moves are alike to it here.",
+        "Alone the learner would now go fall, drawn at random: all moves are alike to it here (33% each); that leads to an "
+        "end that is no goal.",
     ]
 
 
@@ -196,7 +208,9 @@ def test_of_a_table_that_knows_nothing_nothing_is_said() -> None:
     no = np.zeros(2, bool)
     mdp = TabularMDP(np.array([[0, 0], [1, 1]]), np.zeros((2, 2)), no, no, 0, ("wait", "go"))
     asked = replace(request(mdp, 1), place=Elsewhere())
-    assert facts.choice(asked, MARKS) == "The learner itself would go go (50%); all moves are alike to it here."
+    assert facts.choice(asked, MARKS) == (
+        "Alone the learner would now go go, drawn at random: all moves are alike to it here (50% each)."
+    )
     assert facts.sentences(asked)[2:4] == ["wait: nobody knows where it leads.", "go: nobody knows where it leads."]
 
 
@@ -211,7 +225,7 @@ def test_why_it_asks_with_all_its_numbers() -> None:
         "Advice so far: 12 moves of 150 that it may use. It did not help in 3 of 4 episodes; the learner tolerates 7, and "
         "then asks no more.",
     ]
-    bare = replace(asked, why="", improvement_rate=None, selection="greedy", standing=Standing(1, omega=7))
+    bare = replace(asked, why=None, improvement_rate=None, selection="greedy", standing=Standing(1, omega=7))
     lines = facts.reasons(replace(bare, q=[[0.0] * 4] * 12), MARKS, 0)
     assert lines[0] == "It asks about every step."
     assert lines[1] == "There are too few episodes so far for moving averages."
@@ -219,6 +233,26 @@ def test_why_it_asks_with_all_its_numbers() -> None:
         "Left to itself it may go anywhere, 25% each: chosen by greedy.",
         "Advice so far: 1 move. It tolerates 7 episodes with advice that are no shorter than those before.",
     ]
+
+
+@pytest.mark.parametrize(
+    ("steps", "verdict", "mean", "expected"),
+    [
+        (12, "", 16.0, (True, "better than the 16.0 before")),  # no gate judges it
+        (16, "", 16.0, (False, "no better than the 16.0 before")),
+        (16, "", None, (None, "")),
+        (12, "better", 16.0, (True, "better than the 16.0 before")),
+        (16, "best", 16.0, (True, "as good as the best so far")),
+        (17, "misled", 16.0, (False, "no better than the 16.0 before")),
+        (19, "better", 16.0, (True, "better than before")),  # it began farther away than those before
+        (12, "misled", 16.0, (False, "no better than before")),  # it began nearer
+        (16, "misled", None, (False, "no better than before")),
+    ],
+)
+def test_whether_an_episode_with_advice_was_good(
+    steps: int, verdict: Verdict, mean: float | None, expected: tuple[bool | None, str]
+) -> None:
+    assert facts.verdict(EpisodeEnded(31, steps, True, 4, None, True, verdict), mean) == expected
 
 
 def test_misled_episodes_of_how_many() -> None:

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.sequencing.cell import Cell
-from lab.sequencing.events import Activity, Schedule
-from lab.sequencing.layout import Arrivals, Product, Stage, Station
-from lab.sequencing.run import Run, simulate
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.schedule import Activity, Schedule
+from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
+from lab.sequencing.simulate.run import Run, simulate
 from lab.view.canvas import BLUE, GREEN, ORANGE, RED, SKY
 from lab.view.gantt import gantt
 from lab.view.gantt_bars import WIDEST_INCH, Chart, mixed

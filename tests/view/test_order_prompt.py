@@ -9,9 +9,10 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from rich.console import Console
 
+from lab.advice.reasons import TooSlow
 from lab.advice.requests import AdvisorLeft
-from lab.sequencing.advised import SequenceRequest
-from lab.sequencing.run import Run
+from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.simulate.run import Run
 from lab.taskfile import load_cell
 from lab.view.order_prompt import OrderPrompt
 from lab.view.reader import TerminalReader
@@ -21,7 +22,7 @@ def request(own: int = 1, episode: int = 30) -> SequenceRequest:
     """At the start of the thesis's case I with 3 toasts, one of them in the toaster."""
     run = Run(load_cell("toast-case-1").cell(3))
     run.move(1)
-    return SequenceRequest(run, run.allowed(), own, episode, 0.012, 606.0, 613.4, "its improvement is +1.2%, below 5%")
+    return SequenceRequest(run, run.allowed(), own, episode, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
 
 
 def prompt(*lines: str, width: int = 100, plain: bool = False) -> tuple[OrderPrompt, StringIO]:
@@ -67,8 +68,9 @@ def test_what_is_shown() -> None:
     assert written.getvalue().count("Episode 30") == 1, "an episode is announced once"
 
 
-def test_quit_ends_the_session() -> None:
-    ask, _ = prompt("quit")
+@pytest.mark.parametrize("word", ["quit", "q"])
+def test_quit_ends_the_session(word: str) -> None:
+    ask, _ = prompt(word)
     with pytest.raises(KeyboardInterrupt):
         ask(request())
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 from rich.text import Text
 
+from lab.advice.reasons import TooSlow
 from lab.advice.requests import AdviceRequest, Standing
 from lab.mdp import TabularMDP
 from lab.view.board import Marks
@@ -20,7 +21,7 @@ LABELS = {
     3: ("left", "right", "backward", "forward", "down", "up"),
     4: ("left", "right", "backward", "forward", "down", "up", "turn right", "turn left"),
 }
-WHY = "its improvement is -8.3%, below 5%"
+WHY = TooSlow(-0.083, 0.05)
 
 
 def world(shape: tuple[int, ...], density: float = 0.0) -> TabularMDP:

@@ -14,14 +14,15 @@ import pytest
 from lab.advice.advisors import Person
 from lab.advice.events import EpisodeEnded, Event
 from lab.advice.journal import Undo
+from lab.advice.reasons import Reason, TooSlow
 from lab.advice.requests import AdviceRequest, AdvisorLeft
 from lab.errors import BadInput, WorkFailed
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
-from lab.sequencing.advised import SequenceRequest
-from lab.sequencing.events import EpisodeSequenced, Move, SequenceResult
-from lab.sequencing.run import follow
+from lab.sequencing.cell.schedule import EpisodeSequenced, Move, SequenceResult
+from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.simulate.run import follow
 from lab.skills.skill import Problem
 from lab.taskfile import load_cell
 from lab.view.seat import SeatPage
@@ -48,7 +49,7 @@ def page() -> Iterator[SeatPage]:
 
 @pytest.fixture
 def request_1(mdp: TabularMDP) -> AdviceRequest:
-    return AdviceRequest(mdp, [[0.0] * 4 for _ in range(3)], 0, 1, 1, 2, None, None, None, "it asks about every step")
+    return AdviceRequest(mdp, [[0.0] * 4 for _ in range(3)], 0, 1, 1, 2, None, None, None, Reason())
 
 
 def meanwhile(function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
@@ -211,7 +212,7 @@ def test_one_page_advises_and_the_others_watch(page: SeatPage, request_1: Advice
             assert second.refused({"answer": {"question": shown["question"]["number"], "action": 0}}) == (
                 "This page only watches."
             )
-            assert "hand it over" in second.refused({"seat": "take"})
+            assert "has to hand over first" in second.refused({"seat": "take"})
             answer(first, action=1)
             assert asked.result(20) == 1
 
@@ -228,7 +229,7 @@ def test_another_page_takes_over_when_the_advisors_has_gone(
         number = second.hear_until(lambda seat: seat.get("you", {}).get("free") and seat["question"])["question"][
             "number"
         ]
-        assert "take it first" in second.refused({"answer": {"question": number, "action": 0}})
+        assert "No page answers yet" in second.refused({"answer": {"question": number, "action": 0}})
         second.say({"seat": "take"})
         second.hear_until(lambda seat: seat["you"]["seat"])
         answer(second, action=2)
@@ -317,7 +318,7 @@ def test_a_session_that_is_only_shown_takes_no_answers(
 
 def order_request(*decisions: int) -> SequenceRequest:
     run = follow(load_cell("toast-case-1").cell(3), decisions)
-    return SequenceRequest(run, run.allowed(), 1, 30, 0.012, 606.0, 613.4, "it is slow")
+    return SequenceRequest(run, run.allowed(), 1, 30, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
 
 
 def test_the_order_is_asked_and_the_work_shown(page: SeatPage, opens: "Opens") -> None:

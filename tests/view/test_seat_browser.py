@@ -108,6 +108,9 @@ OVER = "document.getElementById('says').textContent === 'The lesson is over.'"
 
 def test_a_whole_session_by_keys(tab: "Page", page: SeatPage, until: Until) -> None:
     session = Teaching(page).start()
+    until(tab, says(1))
+    assert tab.inner_text("#chair") == "You answer here"
+    assert "drawn at random: all moves are alike to it here (25 % each)" in tab.inner_text("#detail")
     for step, key in enumerate(["ArrowRight", "ArrowRight", "ArrowDown"], start=1):
         until(tab, says(step))
         tab.keyboard.press(key)
@@ -116,10 +119,12 @@ def test_a_whole_session_by_keys(tab: "Page", page: SeatPage, until: Until) -> N
     assert "Episode 1: I reached the goal in 3 steps; moves advised: 3." in tab.inner_text("#notices")
     tab.keyboard.press("s")  # this one is the learner's own
     until(tab, "document.getElementById('standing').textContent.includes('1 left to it')")
-    tab.keyboard.press("q")
+    tab.keyboard.press("q")  # as in the terminal it ends the session, once it is sure
+    until(tab, "document.querySelector('[data-word=quit]').classList.contains('armed')")
+    tab.keyboard.press("a")
     until(tab, "document.querySelector('[data-word=auto]').classList.contains('armed')")
     assert not session.done()
-    tab.keyboard.press("q")
+    tab.keyboard.press("a")
     until(tab, OVER)
     result = session.result(20)
     assert result.steps[0] == 3
@@ -194,14 +199,14 @@ def test_a_second_viewer_watches_and_takes_over(tab: "Page", page: SeatPage, bro
     until(tab, says(1))
     other = browser.new_page()
     other.goto(page.url)
-    until(other, "document.getElementById('chair').textContent.startsWith('You are watching')")
+    until(other, "document.getElementById('chair').textContent.startsWith('You are watching: another page answers')")
     until(other, "document.getElementById('says').textContent.startsWith('Episode 1, step 1')")
     assert other.locator("#moves button:enabled").count() == 0
     other.keyboard.press("ArrowRight")
     until(other, "document.getElementById('refusal').textContent === 'This page only watches.'")
     tab.goto("about:blank")
     until(other, "!document.getElementById('chair-button').hidden")
-    other.click("text=Take the seat")
+    other.click("text=Answer here")
     until(other, says(1))
     other.keyboard.press("ArrowRight")
     until(other, says(2))

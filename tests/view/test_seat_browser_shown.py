@@ -11,12 +11,13 @@ import pytest
 
 from lab.advice.entries import Entry
 from lab.advice.events import AdviceGiven, AdviceRequested, EpisodeEnded
+from lab.advice.reasons import Reason, TooSlow
 from lab.advice.receipt import receipt
 from lab.advice.requests import AdviceRequest
 from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP, grid, optimal_values
-from lab.sequencing.advised import SequenceRequest
-from lab.sequencing.run import Run, follow
+from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.simulate.run import Run, follow
 from lab.taskfile import load_cell
 from lab.view.seat import SeatPage
 
@@ -71,7 +72,7 @@ def space() -> TabularMDP:
 
 def test_a_space_is_shown_in_layers(tab: "Page", page: SeatPage, until: Until) -> None:
     mdp = space()
-    request = AdviceRequest(mdp, [[0.0] * 6 for _ in range(18)], mdp.start, 1, 1, 5, None, None, None, "it wants to")
+    request = AdviceRequest(mdp, [[0.0] * 6 for _ in range(18)], mdp.start, 1, 1, 5, None, None, None, Reason())
     asked = ask(page, request)
     until(tab, "document.getElementById('layer-name').textContent === '1 of 0–2: robot'")
     tab.fill("#layer", "2")
@@ -102,7 +103,7 @@ def test_an_environments_own_drawing_is_shown_as_text(tab: "Page", page: SeatPag
 
 def test_the_order_is_advised(tab: "Page", page: SeatPage, until: Until) -> None:
     run = follow(load_cell("toast-case-1").cell(3), [1])
-    request = SequenceRequest(run, run.allowed(), 1, 30, 0.012, 606.0, 613.4, "its improvement is +1.2%, below 5%")
+    request = SequenceRequest(run, run.allowed(), 1, 30, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
     page.begin_order("toast", 100, GateSettings(), 213.0)
     ThreadPoolExecutor(1).submit(page.ask_order, replace(request, run=follow(run.cell, ()), allowed=(1, 2, 3)))
     until(tab, "document.querySelectorAll('#moves button:enabled').length === 3")
@@ -119,7 +120,7 @@ def test_a_pallets_move_is_no_carry(tab: "Page", page: SeatPage, until: Until) -
     run = Run(load_cell("fms").cell(("rook",)))
     page.begin_order("fms", 100, GateSettings(), None)
     while run.allowed():
-        request = SequenceRequest(deepcopy(run), run.allowed(), run.allowed()[0], 1, None, None, None, "")
+        request = SequenceRequest(deepcopy(run), run.allowed(), run.allowed()[0], 1, None, None, None, Reason())
         ThreadPoolExecutor(1).submit(page.ask_order, request)
         carries = run.move(run.allowed()[0]).carries
         until(tab, "document.querySelector('#moves button:enabled')")
@@ -150,7 +151,7 @@ def test_the_receipt_is_shown(tab: "Page", page: SeatPage, until: Until) -> None
     until(tab, "!document.getElementById('receipt').hidden")
     shown = tab.inner_text("#receipt")
     assert "It asked in\n1 episode, about 2 steps" in shown
-    assert "With your help\n1 step, 1 its own choice, too" in shown
+    assert "With advice\n1 step, 1 its own choice, too" in shown
     assert "Not followed\n1: nothing was said" in shown
     assert "Not the best\n0 of 1" in shown
 

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from lab.advice.reasons import Reason, TooSlow
 from lab.learning.settings import GateSettings
-from lab.sequencing.advised import AskedAdvisor, SequenceRequest, advised_srl
-from lab.sequencing.events import Move
-from lab.sequencing.run import Run, follow, simulate
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.methods.srl_advised import AskedAdvisor, SequenceRequest, advised_srl
 from lab.sequencing.search import Search
+from lab.sequencing.simulate.run import Run, follow, simulate
 from lab.taskfile import load_cell
 from lab.view.seat_order import Follower, bars_of, order_of
 
@@ -15,13 +16,13 @@ from lab.view.seat_order import Follower, bars_of, order_of
 def request_after(*decisions: int, episode: int = 30) -> SequenceRequest:
     """Where the thesis's case I with 3 toasts stands after these decisions."""
     run = follow(load_cell("toast-case-1").cell(3), decisions)
-    return SequenceRequest(run, run.allowed(), run.allowed()[0], episode, 0.012, 606.0, 613.4, "it is slow")
+    return SequenceRequest(run, run.allowed(), run.allowed()[0], episode, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
 
 
 def test_a_question_lists_the_allowed_moves() -> None:
     asked = order_of(request_after(1))
     assert asked["title"] == "Episode 30, 57 s: the robot is at toaster"
-    assert (asked["kind"], asked["own"], asked["why"], asked["rate"]) == ("order", 1, "it is slow", 0.012)
+    assert (asked["kind"], asked["own"], asked["why"], asked["rate"]) == ("order", 1, str(TooSlow(0.012, 0.05)), 0.012)
     assert asked["moves"][0] == {
         "action": 1,
         "label": "toast 1",
@@ -43,7 +44,7 @@ def test_the_moves_that_nobody_was_asked_about_are_made_out() -> None:
     run = Run(load_cell("toast-case-1").cell(1))
     made = [run.move(1), run.move(1)]
     follower = Follower()
-    follower.follow(SequenceRequest(run, run.allowed(), 1, 1, None, None, None, ""))
+    follower.follow(SequenceRequest(run, run.allowed(), 1, 1, None, None, None, Reason()))
     assert follower.moves == made
 
 

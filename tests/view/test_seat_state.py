@@ -18,7 +18,9 @@ from lab.advice.events import (
     AdvisorsDisagreed,
     EpisodeEnded,
     Event,
+    Verdict,
 )
+from lab.advice.reasons import TooSlow
 from lab.advice.requests import AdviceRequest, Standing
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
@@ -48,7 +50,7 @@ def known(mdp: TabularMDP) -> Known:
 
 def request_in(mdp: TabularMDP) -> AdviceRequest:
     q = [[0.0] * 4, [0.0, 0.0, 0.0, 1.0], [0.0] * 4, [0.0] * 4]
-    return AdviceRequest(mdp, q, 1, 30, 2, 3, -0.25, 50.0, 40.0, "it does not improve", 1.0, "greedy")
+    return AdviceRequest(mdp, q, 1, 30, 2, 3, -0.25, 50.0, 40.0, TooSlow(-0.25, 0.05), 1.0, "greedy")
 
 
 def tell(known: Known, events: Sequence[Event]) -> list[str]:
@@ -78,7 +80,7 @@ def test_a_question_says_where_what_and_why(known: Known, mdp: TabularMDP) -> No
     asked = document(known, now_s=96.5)["question"]
     assert asked["title"] == "Episode 30, step 2: at (0, 1)"
     assert (asked["number"], asked["kind"], asked["own"], asked["at"]) == (7, "step", 3, [0, 1, 0])
-    assert (asked["why"], asked["rate"]) == ("it does not improve", -0.25)
+    assert (asked["why"], asked["rate"]) == ("its improvement is -25.0%, below 5%", -0.25)
     assert (asked["wait_s"], asked["left_s"]) == (10.0, 3.5)
     assert asked["words"] == ["skip", "auto", "quit", "undo"]
     assert [move["leads"] for move in asked["moves"]] == ["nowhere", "nowhere", "", "goal"]
@@ -171,11 +173,22 @@ def test_a_guided_episode_is_told_and_an_unguided_one_is_not(known: Known) -> No
     ]
 
 
+def test_a_guided_episode_is_as_good_as_its_verdict(known: Known) -> None:
+    verdicts: tuple[Verdict, ...] = ("better", "best", "misled")
+    told = tell(known, [replace(ended(n, 16, helped=1), verdict=verdict) for n, verdict in enumerate(verdicts)])
+    assert told == [
+        "Episode 0: I reached the goal in 16 steps, better than before; moves advised: 1.",
+        "Episode 1: I reached the goal in 16 steps, as good as the best so far; moves advised: 1.",
+        "Episode 2: I reached the goal in 16 steps, no better than before; moves advised: 1.",
+    ]
+    assert [notice["tone"] for notice in document(known)["notices"]] == ["good", "good", "bad"]
+
+
 def test_a_rejection_is_told_with_its_numbers(known: Known) -> None:
     asked = [AdviceRequested(n, None, None, None) for n in range(4)]
     (text,) = tell(known, [*asked, AdviceRejected(33, 3, 2, 50, 41.25)])
     assert text == (
-        "Your advice did not help in 3 of 4 episodes, 2 are tolerated: I go on alone. "
+        "Advice did not help in 3 of 4 episodes, 2 are tolerated: I go on alone. "
         "Episode 33 took 50 steps, those before it 41.2 on average."
     )
     assert document(known)["standing"]["verdict"] == "rejected"

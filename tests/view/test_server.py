@@ -13,6 +13,7 @@ from urllib.request import Request, urlopen
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
 
 from lab.errors import BadInput
 from lab.view.frames import IDENTITY, Body, Frame, Shape
@@ -79,9 +80,8 @@ def test_nobody_gets_in_without_the_token(view: LiveView) -> None:
             assert text == "This page needs the token of its address: open the whole link that the lab printed.\n"
 
 
-def test_no_websocket_without_the_token(view: LiveView, opens: "Opens", monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(view, "_token", "wrong")
-    with pytest.raises(InvalidStatus, match="403") as error, opens(view):
+def test_no_websocket_without_the_token(view: LiveView) -> None:
+    with pytest.raises(InvalidStatus, match="403") as error, connect(f"ws://127.0.0.1:{view.port}/frames?token=wrong"):
         pass
     assert b"needs the token" in error.value.response.body
 

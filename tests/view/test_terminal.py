@@ -22,6 +22,7 @@ from lab.advice.events import (
     AdvisorsDisagreed,
     EpisodeEnded,
 )
+from lab.advice.reasons import TooSlow
 from lab.advice.requests import AdviceRequest, AdvisorLeft, Standing
 from lab.mdp import TabularMDP, grid
 from lab.view.reader import PlainReader, TerminalReader
@@ -90,7 +91,7 @@ def test_a_question_shows_picture_numbers_and_choice() -> None:
     shown = ask("\n")[1].splitlines()
     assert shown[1].rstrip() == "Episode 31, step 2: at (0, 0)"
     assert shown[2].startswith(" R → · ·     ↑ up     ██▌         25%")
-    assert "The learner itself would go → right (25%); all moves are alike to it here." in shown[7]
+    assert "Alone the learner would now go → right, drawn at random: all moves are alike to it here" in shown[7]
     assert "lately 39.5, before that 40.0; improvement +1.2%, threshold 0%." in " ".join(shown[8:11])
     assert shown[-1] == f"{QUESTION} "
 
@@ -110,7 +111,7 @@ def test_a_question_mark_explains() -> None:
 
 
 def test_why_explains_with_numbers() -> None:
-    answer, shown = ask("why\nup\n", replace(request(), why="its improvement is +1.2%, below 5%"))
+    answer, shown = ask("why\nup\n", replace(request(), why=TooSlow(0.012, 0.05)))
     assert answer == 0
     assert "It asks because its improvement is +1.2%, below 5%." in shown
     assert "Its last episodes took 39.5 steps on average, those before them 40.0" in shown
@@ -306,6 +307,16 @@ def test_events_are_told_with_their_numbers() -> None:
     ]
 
 
+def test_an_episode_as_good_as_the_best_is_no_bad_one() -> None:
+    shown = console()
+    prompt = TeachingPrompt(shown)
+    prompt.on_event(AdviceRequested(30, 0.0, 16.0, 16.0))
+    prompt.on_event(EpisodeEnded(30, 16, True, 9, 0.0, True, "best"))
+    assert said(shown).splitlines()[1:] == [
+        "Episode 30 reached the goal in 16 steps, as good as the best so far; moves advised: 9."
+    ]
+
+
 def test_misled_episodes_are_counted_aloud() -> None:
     """Four episodes with advice, three of which the learner counts as misled."""
     prompt, shown = prompted("up\n" * 5)
@@ -353,7 +364,7 @@ def test_a_question_can_be_shown_with_its_answer() -> None:
     prompt.told(request(), None)
     assert "Episode 31, step 2: at (0, 0)" in said(shown)
     assert "Which way?" not in said(shown)
-    assert said(shown).splitlines()[-2:] == ["You said: → right", "You said: skip"]
+    assert said(shown).splitlines()[-2:] == ["Answer: → right", "Answer: skip"]
 
 
 def test_plain_sentences_for_a_screen_reader() -> None:

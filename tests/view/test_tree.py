@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.sequencing.cell import Cell
-from lab.sequencing.layout import Stage, Station
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.stations import Stage, Station
 from lab.view import tree
 from lab.view.tree import Branch, branch_plot, branches_of
 
@@ -126,7 +126,7 @@ def test_what_is_no_tree(tmp_path: Path, branches: list[Branch], says: str) -> N
 @given(st.lists(st.integers(0, 99), max_size=60))
 def test_no_two_nodes_share_a_place_and_parents_are_amid_their_children(numbers: list[int]) -> None:
     parents = [None, *(number % (index + 1) for index, number in enumerate(numbers))]
-    columns, rows = tree._layout([Branch(parent, "", "", "") for parent in parents])
+    columns, rows = tree.layout([Branch(parent, "", "", "") for parent in parents])
     assert len(set(zip(columns, rows, strict=True))) == len(parents)
     for index, parent in enumerate(parents[1:], 1):
         assert parent is not None

@@ -39,6 +39,10 @@ def test_labels_come_before_directions() -> None:
     assert [understand(word, plane) for word in ("right", "→", "forward", "↑", "u")] == [1, 1, 3, 3, 3]
 
 
+def test_q_is_quit() -> None:
+    assert understand("q", board()) == understand("quit", board()) == "quit"
+
+
 def test_words_of_the_prompt() -> None:
     for word, (called, _) in COMMANDS.items():
         if word != "path":
@@ -117,7 +121,11 @@ def test_the_example_is_a_path() -> None:
 
 def test_every_word_is_explained_once() -> None:
     rows = explained(board())
-    assert [word for word, _ in rows] == ["a move", "enter", *(word for word in COMMANDS if word not in ("", "help"))]
+    assert [word for word, _ in rows] == [
+        "a move",
+        "enter",
+        *(word for word in COMMANDS if word not in ("", "help", "q")),
+    ]
     assert "letters: u up, d down, l left, r right" in rows[0][1]
     assert "path rru, or 3u for uuu" in dict(rows)["path"]
 

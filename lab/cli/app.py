@@ -1,0 +1,129 @@
+"""The `lab` command: all commands in one table, and how each of them ends. Contract: see the README."""
+
+import sys
+from collections.abc import Callable
+from functools import wraps
+from io import TextIOWrapper
+from typing import Annotated, Any, NamedTuple
+
+import typer
+
+from lab import __version__
+from lab.cli import glossary, replay, run, see, sequence, study, task, teach, toolbox, view
+from lab.cli.interrupt import ctrl_c_is_heard
+from lab.cli.output import begin, end, fail, silence, write
+from lab.errors import LabError
+
+STOPPED = "stopped by Ctrl-C; what was learned is kept"
+GROUPS = {
+    "toolbox": "The policies that were learned.",
+    "task": "Task files.",
+    "study": "The thesis's tables and figures again, and comparisons of our own.",
+}
+
+
+class Command(NamedTuple):
+    """What a command calls, an example of its use, and what its help says below that."""
+
+    function: Callable[..., None]
+    example: str
+    more: str = ""
+
+
+COMMANDS = {  # what is typed after `lab` -> the command
+    "run": Command(run.run, "lab run toast --toasts 3"),
+    "teach": Command(teach.teach, "lab teach insert --advisor terminal", glossary.help_text()),
+    "replay": Command(replay.replay, "lab replay lesson"),
+    "sequence": Command(sequence.sequence, "lab sequence toast --case II --toasts 4 --gantt order.svg"),
+    "see": Command(see.see, "lab see overhead.png --task toast"),
+    "view": Command(view.view, "lab view toast"),
+    "toolbox list": Command(toolbox.toolbox_list, "lab toolbox list"),
+    "toolbox show": Command(toolbox.toolbox_show, "lab toolbox show 'insert at toaster 1a2b3c4d'"),
+    "toolbox verify": Command(toolbox.toolbox_verify, "lab toolbox verify"),
+    "toolbox remove": Command(toolbox.toolbox_remove, "lab toolbox remove 'insert at toaster 1a2b3c4d'"),
+    "task list": Command(task.task_list, "lab task list"),
+    "task show": Command(task.task_show, "lab task show toast"),
+    "task random": Command(task.task_random, "lab task random 10x10x10 --density 0.06 --seed 7 --out my-world.toml"),
+    "task reconstruct": Command(task.task_reconstruct, "lab task reconstruct --seed 0 --out world-2.toml"),
+    "task check": Command(task.task_check, "lab task check my-toast.toml"),
+    "study list": Command(study.study_list, "lab study list"),
+    "study run": Command(study.study_run, "lab study run table-9.2 --workers 2"),
+}
+
+
+def guarded(function: Callable[..., None]) -> Callable[..., None]:
+    """A command whose errors end it with one line and the exit code of the contract."""
+
+    @wraps(function)
+    def run_guarded(*args: Any, **kwargs: Any) -> None:
+        try:
+            function(*args, **kwargs)
+        except LabError as error:
+            end(str(error), error.exit_code)
+        except KeyboardInterrupt as stopped:
+            end(str(stopped) or STOPPED, 130)
+        except BrokenPipeError:
+            silence()
+            end("", 1)
+        except OSError as error:  # a full disk, a folder taken away meanwhile
+            end(str(error), 1)
+
+    return run_guarded
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        write(f"lab {__version__}\n")
+        raise typer.Exit
+
+
+def _lab(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Teach a robot."""
+
+
+def made() -> typer.Typer:
+    """The command `lab` as the tables say."""
+    app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
+    groups = {name: typer.Typer(no_args_is_help=True, help=text) for name, text in GROUPS.items()}
+    app.callback()(_lab)
+    for words, command in COMMANDS.items():
+        group, _, name = words.rpartition(" ")
+        epilog = "\n\n".join(filter(None, [f"Example: {command.example}", command.more]))
+        (groups[group] if group else app).command(name, epilog=epilog)(guarded(command.function))
+    for name, group_app in groups.items():
+        app.add_typer(group_app, name=name)
+    return app
+
+
+def main() -> None:
+    """The `lab` command; typer's own complaints come in one line, too."""
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: a name must not end a command
+    begin()
+    try:
+        with ctrl_c_is_heard():
+            code = made()(prog_name="lab", standalone_mode=False)
+    except (KeyboardInterrupt, typer.Abort):  # before any command had begun
+        fail("stopped by Ctrl-C", 130)
+        code = 130
+    except Exception as error:
+        code = _usage(error)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _usage(error: Exception) -> int:
+    """Say in one line what is wrong with the words of a command; raises again what is no complaint of typer's."""
+    explain, context = getattr(error, "format_message", None), getattr(error, "ctx", None)
+    if explain is None:
+        raise error
+    if type(error).__name__ == "NoArgsIsHelpError":
+        error.show()  # type: ignore[attr-defined]
+    else:
+        path = context.command_path if context is not None else "lab"
+        text = " ".join(str(explain()).split()).rstrip(".")
+        fail(f"{text[:1].lower()}{text[1:]} (see {path} --help)", 2)
+    return 2

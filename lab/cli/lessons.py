@@ -1,0 +1,86 @@
+"""What the commands that teach share: who is in the room, the teacher that the options describe, a kept session."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lab.cli.output import complain, console
+from lab.errors import LabError
+
+if TYPE_CHECKING:
+    from lab.classroom import Classroom
+    from lab.sessions import KeptSession
+    from lab.teaching import Teacher
+
+
+@contextmanager
+def lesson_room(
+    names: Sequence[str], *, page: bool = False, port: int = 0, wait_s: float | None = None, plain: bool = False
+) -> Iterator["Classroom"]:
+    """Who sits in the lessons of a command: the progress lines, and, when they are wanted, the prompt and the page."""
+    from contextlib import ExitStack
+
+    from lab.classroom import Classroom
+    from lab.view.progress import RunProgress
+    from lab.view.terminal import TeachingPrompt
+
+    progress = RunProgress(console())
+    with ExitStack() as stack:
+        shown = None
+        if page or "web" in names:
+            from lab.view.seat import SeatPage
+
+            shown = stack.enter_context(SeatPage(port, wait_s=wait_s))
+            progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
+        prompt = TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
+        room = Classroom(progress, prompt, shown, plain=plain)
+        stack.callback(room.leave)
+        try:
+            yield room
+        except LabError as error:
+            if shown is not None:
+                shown.finished(str(error))
+            raise
+
+
+def teacher_of(
+    toolbox: Path | None,
+    names: Sequence[str],
+    seed: int,
+    room: "Classroom",
+    asked: str = "together",
+    decide: str = "trust-weighted",
+) -> "Teacher":
+    """The teacher that the options describe; raises BadInput for options and folders that cannot be."""
+    from lab.advice.counsel import Counsel
+    from lab.teaching import Teacher
+    from lab.toolbox import Toolbox
+
+    counsel = Counsel(tuple(names), room.people(), asked, decide, watch=room.passing)
+    counsel.check()
+    for journal in counsel.cut_records():
+        complain(f"journal '{journal.path}': its last line was cut off and is left out: {journal.cut[:60]!r}")
+    teacher = Teacher(Toolbox(toolbox), counsel, seed, room)
+    teacher.toolbox.check()
+    return teacher
+
+
+def kept_session(
+    folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] | None = None
+) -> "KeptSession":
+    """A session that was kept; what was cut off at its end is said."""
+    from lab.sessions import KeptSession
+
+    kept = KeptSession(folder, where, read_only=read_only, trusted=trusted or ())
+    if kept.read.cut:
+        complain(f"journal '{kept.read.path}': its last line was cut off and is left out: {kept.read.cut[:60]!r}")
+    return kept
+
+
+def say_outside(kept: "KeptSession") -> None:
+    """Says which files the session has the lab read that are not its own."""
+    from lab.lesson import outside
+
+    if files := outside(kept):
+        complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(files)}")

@@ -1,0 +1,46 @@
+"""The options that several commands have."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+MAX_EPISODES = 1_000_000
+MAX_SESSIONS = 10_000
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Where all chance comes from.")]
+ToolboxFolder = Annotated[
+    Path | None,
+    typer.Option("--toolbox", envvar="LAB_TOOLBOX", help="Where policies are kept; default: your data folder."),
+]
+AdvisorNames = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--advisor",
+        help="Who advises: expert, moderate, limited, novice, tau=X, tau=X..Y (changing over the episodes), wrong, "
+        "terminal, web, recorded:DIR (a session's folder), none; several times for several advisors.",
+    ),
+]
+Asked = Annotated[str, typer.Option("--ask", help="Several advisors are asked: together, in-turn.")]
+Decide = Annotated[
+    str, typer.Option("--decide", help="Whom of several to follow: majority, best-trusted, trust-weighted.")
+]
+Plain = Annotated[bool, typer.Option("--plain", help="Plain sentences instead of pictures, as screen readers want.")]
+ShowPage = Annotated[
+    bool, typer.Option("--page", help="Show it on a page on 127.0.0.1, too, where questions can be answered as well.")
+]
+Port = Annotated[int, typer.Option("--port", min=0, max=65535, help="Of the page; 0: any free one.")]
+Wait = Annotated[
+    float | None,
+    typer.Option(
+        "--wait", min=1.0, help="Seconds to wait for an answer of the advisor web; then the learner goes on alone."
+    ),
+]
+TrustModule = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--trust-module", help="A module that the session names (gym:MODULE:ID) may be imported: its code runs."
+    ),
+]
+Toasts = Annotated[int, typer.Option("--toasts", "-n", help="How many slices, 1 to 50.")]

@@ -1,0 +1,86 @@
+"""What a command writes: its document to stdout, as JSON or as text, and everything else to stderr. Only here is printed."""
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from lab.errors import LabError
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+_FILE_WIDTH = 200  # characters; where stdout is no terminal, nothing needs to be folded
+_PLAIN = str.maketrans("▁▂▃▄▅▆▇█·", "_.-:=+*#.")  # for a stdout that is not Unicode
+
+
+class Stdout:
+    """Whether this command has printed its JSON document: there is one and no more, whatever comes."""
+
+    told = False
+
+
+def begin() -> None:
+    """A command begins: nothing is printed yet."""
+    Stdout.told = False
+
+
+def write(text: str) -> None:
+    """Text to stdout as it is, at once."""
+    print(text, end="", flush=True)
+
+
+def write_json(document: dict[str, Any]) -> None:
+    """The command's one document, in one line."""
+    Stdout.told = True
+    write(json.dumps(document, allow_nan=False) + "\n")
+
+
+def fail(message: str, code: int) -> None:
+    """Say in one line why a command ends; with --json also as its document, unless that has come already."""
+    line = LabError(" ".join(message.split()))
+    complain(str(line))
+    if "--json" in sys.argv[1:] and not Stdout.told:
+        try:
+            write_json({"error": str(line), "exit_code": code})
+        except BrokenPipeError:
+            silence()
+
+
+def end(message: str, code: int) -> NoReturn:
+    """End the command so. "": there is nothing to say, or nobody to hear it."""
+    if message:
+        fail(message, code)
+    sys.exit(code)
+
+
+def complain(message: str) -> None:
+    """Write one line to stderr, whatever the message holds."""
+    sys.stderr.write(f"lab: {LabError(' '.join(message.split()))}\n")
+
+
+def silence() -> None:
+    """Nobody reads stdout any more: let the interpreter's last flush go nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def console() -> "Console":
+    """The terminal that stderr goes to."""
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False)
+
+
+def show(document: dict[str, Any], as_json: bool, render: Callable[[dict[str, Any]], "RenderableType"]) -> None:
+    """Print a document as JSON, or as `render` shows it."""
+    if as_json:
+        write_json(document)
+        return
+    from rich.console import Console
+
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else _FILE_WIDTH)
+    with console.capture() as shown:
+        console.print(render(document), soft_wrap=not sys.stdout.isatty())
+    text = "".join(f"{line.rstrip()}\n" for line in shown.get().splitlines())
+    write(text if console.encoding.lower().startswith("utf") else text.translate(_PLAIN))

@@ -1,0 +1,58 @@
+"""`lab run`: the main job."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lab.cli.lessons import lesson_room, teacher_of
+from lab.cli.options import AdvisorNames, Asked, Decide, Json, Port, Seed, ShowPage, Toasts, ToolboxFolder, Wait
+from lab.cli.output import end, show
+from lab.errors import counted
+
+
+def run(
+    task: Annotated[str, typer.Argument(help="A task that ships, or a .toml file.")] = "toast",
+    toasts: Toasts = 3,
+    advisor: AdvisorNames = None,
+    asked: Asked = "together",
+    decide: Decide = "trust-weighted",
+    page: ShowPage = False,
+    view: Annotated[bool, typer.Option("--view/--no-view", hidden=True)] = False,  # the old word for --page
+    port: Port = 0,
+    wait: Wait = None,
+    seed: Seed = 0,
+    toolbox: ToolboxFolder = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for pictures, replay and JSON; default: TASK-run.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Find or learn the skills, time them, find their best order, and carry them out in physics."""
+    from dataclasses import replace
+
+    from lab import taskfile
+    from lab.advice.advisors import PEOPLE
+    from lab.advice.counsel import Counsel
+    from lab.files import check_out
+    from lab.production.prepared import prepare
+    from lab.production.run import run as run_task
+    from lab.sessions import Words, kept_by
+    from lab.view.summary import run_summary
+
+    loaded = taskfile.load(task)
+    folder = out or Path(f"{loaded.name}-run")
+    check_out(folder)
+    names = advisor or ["expert"]
+    Counsel(tuple(names), asked=asked, decide=decide).check()
+    prepared = prepare(loaded, toasts, seed)
+    with lesson_room(names, page=page or view, port=port, wait_s=wait) as room:
+        teacher = teacher_of(toolbox, names, seed, room, asked, decide)
+        if any(name in PEOPLE for name in names):
+            words = Words(task=task, advisors=tuple(names), asked=asked, decide=decide, seed=seed, toasts=toasts)
+            teacher = replace(teacher, keep=kept_by(teacher.toolbox, words))
+        with room.progress:
+            report = run_task(prepared, teacher, folder, listener=room.listener, viewer=room.viewer)
+    show(report.to_json(), as_json, run_summary)
+    if not report.success:
+        end(report.outcome.failure or f"{len(report.outcome.delivered)} of {counted(toasts, 'toast')} delivered", 1)

@@ -1,0 +1,86 @@
+"""`lab task`: task files."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from lab.cli.options import Json, Seed
+from lab.cli.output import console, end, show, write, write_json
+from lab.errors import counted
+
+
+def task_list(as_json: Json = False) -> None:
+    """The tasks, the cells for lab sequence and the grid worlds that ship."""
+    from lab import taskfile
+    from lab.view.summary import table_of
+
+    kinds = taskfile.shipped()
+    rows = [{"name": name, "kind": kind} for name, kind in kinds.items()]
+    show({"tasks": list(kinds), "kinds": kinds}, as_json, lambda _: table_of(rows, ("name", "kind")))
+
+
+def task_show(task: str, as_json: Json = False) -> None:
+    """The text of a task file, of a task, a cell or a world: copy it, change it, use it."""
+    from lab.task import describe
+
+    text, document = describe(task)
+    if as_json:
+        write_json(document)
+    else:
+        write(text)
+
+
+def task_random(
+    shape: Annotated[str, typer.Argument(help="Cells along 2 or 3 axes, each 1 to 100: 12x12, 10x10x10.")],
+    out: Annotated[Path, typer.Option("--out", help="The .toml file to write.")],
+    density: Annotated[float, typer.Option("--density", help="The share of cells that are obstacles, 0 to 0.6.")] = 0.1,
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """Write a random grid world as a task file; a way always leads from its start to its goal."""
+    from lab.task import write_random
+
+    def told(d: dict[str, Any]) -> str:
+        return (
+            f"{d['file']}: {counted(d['obstacles'], 'obstacle')}, the shortest way takes "
+            f"{counted(d['optimal_steps'], 'move')} (seed {seed})"
+        )
+
+    show(write_random(shape, density, seed, out), as_json, told)
+
+
+def task_reconstruct(
+    out: Annotated[Path, typer.Option("--out", help="The .toml file to write.")], seed: Seed = 0, as_json: Json = False
+) -> None:
+    """Look for a world like the thesis's world II, of which only a picture is printed; takes a few minutes."""
+    from lab.task import reconstruct_world
+    from lab.view.progress import counting
+
+    with counting(console(), "layouts and views compared") as progress:
+        document = reconstruct_world(seed, out, progress)
+    show(document, as_json, lambda d: f"{d['file']}: {d['title']}")
+
+
+def task_check(
+    file: str,
+    toasts: Annotated[
+        int | None,
+        typer.Option(
+            "--toasts", "-n", help="How many slices, 1 to 50; default: 3, if they fit. Of a cell: parts, 1 to 200."
+        ),
+    ] = None,
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """Check a task file: its text, its reach, and that a way exists for every sub-task, or through the world. Exit 2 when not.
+
+    Of a cell: that its order can be made, with the line of what is wrong. With --json the document comes in both cases.
+    """
+    from lab.task import check_task
+
+    errors = check_task(file, toasts, seed)
+    if as_json or not errors:
+        show({"valid": not errors, "errors": errors}, as_json, lambda _: f"{file} is sound")
+    if errors:
+        end(errors[0], 2)

@@ -1,0 +1,124 @@
+"""`lab teach`: one teaching session."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lab.cli.lessons import kept_session, lesson_room, say_outside, teacher_of
+from lab.cli.options import (
+    MAX_EPISODES,
+    AdvisorNames,
+    Asked,
+    Decide,
+    Json,
+    Plain,
+    Port,
+    Seed,
+    ShowPage,
+    ToolboxFolder,
+    TrustModule,
+    Wait,
+)
+from lab.cli.output import end, show
+from lab.errors import BadInput, counted
+
+
+def teach(
+    subtask: Annotated[
+        str | None,
+        typer.Argument(
+            help="transfer, grasp, insert, butter, place, one skill by its full name; a world: its name, a .toml file, a "
+            ".txt grid, random:SHAPE:DENSITY:SEED; a Gymnasium environment: gym:ID, such as gym:FrozenLake-v1."
+        ),
+    ] = None,
+    task: Annotated[
+        str | None, typer.Option("--task", help="A task that ships, or a .toml file; default: toast. None for a world.")
+    ] = None,
+    learner: Annotated[
+        str | None,
+        typer.Option(
+            "--learner",
+            help="q, sarsa, q-lambda, sarsa-lambda, monte-carlo, afterstate; default: the task's.",
+        ),
+    ] = None,
+    gate: Annotated[
+        str | None,
+        typer.Option(
+            "--gate",
+            help="When it asks: ccrl, ia, combined, cq, always, never, random, importance, uncertainty; default: the task's.",
+        ),
+    ] = None,
+    memory: Annotated[
+        bool | None,
+        typer.Option("--memory/--no-memory", help="Remember advice and use it again unasked; default: the task's."),
+    ] = None,
+    advisor: AdvisorNames = None,
+    asked: Asked = "together",
+    decide: Decide = "trust-weighted",
+    episodes: Annotated[
+        int | None,
+        typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the task's."),
+    ] = None,
+    save: Annotated[str | None, typer.Option("--save", help="Name of the policy in the toolbox.")] = None,
+    sight: Annotated[
+        str | None,
+        typer.Option(
+            "--sight",
+            help="Where in a world the advisor sees the robot: full, or limited to the region in its file; default: full.",
+        ),
+    ] = None,
+    view: Annotated[str | None, typer.Option("--view", hidden=True)] = None,  # the old word for --sight
+    resume: Annotated[
+        Path | None, typer.Option("--resume", help="Go on with the session in this folder, as it was begun.")
+    ] = None,
+    trust_module: TrustModule = None,
+    page: ShowPage = False,
+    port: Port = 0,
+    wait: Wait = None,
+    plain: Plain = False,
+    seed: Seed = 0,
+    toolbox: ToolboxFolder = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder for the session's journal, receipt, learning curve (and value map)."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """One teaching session: learn one sub-task, a world or a Gymnasium environment with an advisor, and keep the policy.
+
+    Each session keeps a journal: --resume goes on with one that was broken off, lab replay shows it again.
+    """
+    from lab.files import check_out
+    from lab.lesson import check
+    from lab.lesson import teach as teach_session
+    from lab.sessions import Words
+    from lab.view.summary import lesson_summary
+
+    advisors = tuple(advisor or ())
+    given = Words(
+        subtask or "", task, sight or view, learner, gate, memory, advisors, asked, decide, episodes, seed, save
+    )
+    kept = None if resume is None else kept_session(resume, "--resume", trusted=trust_module)
+    if kept is not None and out is not None:
+        raise BadInput(f"--out {out} beside --resume {resume}: a session goes on in its own folder: leave it away")
+    words = given.complete() if kept is None else kept.same(given)
+    if kept is not None:
+        say_outside(kept)
+    check(words, out, kept)
+    folder = out if kept is None else kept.folder
+    if folder is not None:
+        check_out(folder)
+    with lesson_room(words.advisors, page=page, port=port, wait_s=wait, plain=plain) as room:
+        teacher = teacher_of(toolbox, words.advisors, words.seed, room, words.asked, words.decide)
+        document = teach_session(words, teacher, folder, kept)
+        room.ends(document)
+    show(document, as_json, lesson_summary)
+    if document["failure"] is not None:
+        end(document["failure"], 1)
+    if document["final_steps"] is None:
+        end(
+            f"'{document['skill']}' does not reach its goal after {counted(document['episodes'], 'episode')}: "
+            "try another advisor, more --episodes or another --learner",
+            1,
+        )

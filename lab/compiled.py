@@ -1,0 +1,109 @@
+"""Functions compiled with numba and kept between runs, under a key of every source that is compiled in.
+
+numba's own cache knows changes of the function's file only, and writes beside it. Here a function's folder, in the
+user's cache, is named by a hash of its module and of all modules of the same package that are imported at the top of
+it, and of those. Where that folder cannot be made, nothing is kept and each run compiles anew.
+"""
+
+import ast
+import hashlib
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import cache
+from importlib.util import resolve_name
+from pathlib import Path
+from shutil import rmtree
+from typing import Any, TypeVar
+
+import numba
+from platformdirs import user_cache_dir
+
+MOST_FOLDERS = 60  # of a few MB at the most each; a version of the lab has about ten
+_CONFIG: Any = numba.config  # its types do not know what it holds
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def compiled(function: Function, **options: Any) -> Function:
+    """The function compiled, without the GIL, for each kind of arguments that it meets; options: those of `numba.njit`."""
+    jit: Any = numba.njit  # its types do not know all options
+    folder = _made(cache_folder() / key(function.__module__))
+    before, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(folder or "")  # read when a function is decorated
+    try:
+        jitted: Function = jit(cache=folder is not None, nogil=True, **options)(function)
+    finally:
+        _CONFIG.CACHE_DIR = before
+    return jitted
+
+
+def lean(function: Function, **options: Any) -> Function:
+    """For what makes no arrays and keeps none: references need no counting, which would take most of the time."""
+    return compiled(function, error_model="numpy", _nrt=False, **options)
+
+
+def inner(function: Function) -> Function:
+    """For what only lean functions call: what Python would need to call it takes a third of the time to compile."""
+    return lean(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def cache_folder() -> Path:
+    """The folder "compiled" in the user's cache folder, or "teaching-lab" in NUMBA_CACHE_DIR where that is set."""
+    if _CONFIG.CACHE_DIR:
+        return Path(_CONFIG.CACHE_DIR, "teaching-lab")
+    return Path(user_cache_dir("teaching-lab", appauthor=False), "compiled")
+
+
+@cache
+def key(module: str) -> str:
+    """The name of a loaded module and a hash of all sources that may be compiled into its functions."""
+    sources, pending = dict[str, bytes](), [module]
+    while pending:
+        name = pending.pop()
+        file = getattr(sys.modules.get(name), "__file__", None)
+        if file is not None and name not in sources:
+            sources[name] = Path(file).read_bytes()
+            pending += [other for other in _imported(name, sources[name]) if _package(other) == _package(module)]
+    digest = hashlib.sha256()
+    for name in sorted(sources):
+        digest.update(f"{name} {len(sources[name])} ".encode() + sources[name])
+    return f"{module}-{digest.hexdigest()[:16]}"
+
+
+def _package(module: str) -> str:
+    return module.partition(".")[0]
+
+
+def _imported(module: str, source: bytes) -> Iterator[str]:
+    """The modules that a module imports at its top, and names in them, which may be modules."""
+    is_package = Path(sys.modules[module].__file__ or "").stem == "__init__"
+    inside = module if is_package else module.rpartition(".")[0]
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = resolve_name("." * node.level + (node.module or ""), inside) if node.level else node.module or ""
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def _made(folder: Path) -> Path | None:
+    """The folder, made and marked as used now, once the oldest beyond MOST_FOLDERS are gone; None: it cannot be."""
+    try:
+        if not folder.is_dir():
+            folder.mkdir(parents=True)
+            _clear(folder.parent)
+        os.utime(folder)
+    except FileExistsError:
+        pass  # by another process, just now
+    except OSError:
+        return None
+    return folder if os.access(folder, os.W_OK | os.X_OK) else None
+
+
+def _clear(parent: Path) -> None:
+    """Removes the folders that have not been used for longest; whoever still needs one compiles again."""
+    with suppress(OSError):
+        used = sorted((folder.stat().st_mtime, folder) for folder in parent.iterdir() if folder.is_dir())
+        for _, folder in used[:-MOST_FOLDERS]:
+            rmtree(folder, ignore_errors=True)

@@ -1,0 +1,48 @@
+"""Splitmix, the uniform numbers of all that is compiled: plain functions of whole numbers, which numba compiles as well.
+
+Source: Steele, Lea and Flood, Fast splittable pseudorandom number generators, OOPSLA 2014.
+"""
+
+from collections.abc import Callable
+
+STEP = 0x9E3779B97F4A7C15
+MASK = (1 << 64) - 1
+
+
+def following(state: int) -> int:
+    """The state after a state, 0 to 2**64 - 1; a seed is the first one. Compiled: of uint64, as all of these."""
+    return state + STEP & MASK
+
+
+def mixed(state: int) -> int:
+    """64 well mixed bits of a state."""
+    z = (state ^ (state >> 30)) * 0xBF58476D1CE4E5B9 & MASK
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EB & MASK
+    return z ^ (z >> 31)
+
+
+def fraction(bits: int) -> float:
+    """The uniform number in [0, 1) that mixed bits stand for."""
+    return (bits >> 11) * 2.0**-53
+
+
+def state_at(seed: int, number: int) -> int:
+    """The state of the number that stands at `number`, from 0, in the stream of a seed."""
+    return seed + STEP + number * STEP & MASK
+
+
+def uniform(seed: int, number: int) -> float:
+    """The uniform number at `number`, from 0, in the stream of a seed."""
+    return fraction(mixed(state_at(seed, number)))
+
+
+def stream(seed: int) -> Callable[[], float]:
+    """The uniform numbers of a seed, one after the other: those that a compiled session of this seed draws."""
+    state = seed
+
+    def draw() -> float:
+        nonlocal state
+        state = following(state)
+        return fraction(mixed(state))
+
+    return draw

@@ -1,0 +1,207 @@
+"""A cell: stations, products with their routes, an order of parts, and one transfer robot. What is to be sequenced."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lab.errors import BadInput, unknown
+from lab.sequencing.cell.routes import Moves, Position, moves_between, positions_of
+from lab.sequencing.cell.stations import MAX_S, Arrivals, Product, Route, Station, check_layout, check_seconds, is_count
+
+MAX_PARTS = 200
+BUFFER_USES = ("busy", "free")
+ARRIVALS_AFTER = ("clock", "pick")
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """What is to be sequenced: the parts of an order along the routes of their products, moved by one robot.
+
+    order: a product's name for each part. Parts are numbered from 1. empty_s and loaded_s: (n, n) seconds from station
+    row to station column, in the order of `stations`; NaN: no such move; staying takes 0 s. arrivals None: all parts
+    wait at their first station, and may be taken in any order; else they come, and are taken, in their order. buffers:
+    "busy", a buffer is used only when the station ahead is full; "free", the robot chooses. due_s: when each part is
+    wanted [s].
+    Raises BadInput for what cannot be a cell, and for a missing time that a route needs (see `needed_moves`).
+    Source: thesis ch. 7 (rules), tables 7.1 and 7.2 (times); App. III (pallets, arrivals, vacuuming).
+    """
+
+    stations: tuple[Station, ...]
+    products: tuple[Product, ...]
+    order: tuple[str, ...]
+    empty_s: NDArray[np.float64]
+    loaded_s: NDArray[np.float64]
+    robot_start: str
+    arrivals: Arrivals | None = None
+    buffers: Literal["busy", "free"] = "busy"
+    due_s: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        check_layout(self.stations, self.products)
+        if self.robot_start not in self.names:
+            raise unknown("station", self.robot_start, self.names, "start of the robot")
+        if self.buffers not in BUFFER_USES:
+            raise unknown("use of buffers", self.buffers, BUFFER_USES, "cell")
+        self._check_order()
+        self._check_times()
+        for field, needed in (("empty_s", self.needed.empty), ("loaded_s", self.needed.loaded)):
+            object.__setattr__(self, field, _checked_table(field, getattr(self, field), self.names, needed))
+
+    @classmethod
+    def alike(
+        cls,
+        stations: tuple[Station, ...],
+        route: Route,
+        empty_s: NDArray[np.float64],
+        loaded_s: NDArray[np.float64],
+        robot_start: str,
+        parts: int,
+        product: str = "toast",
+    ) -> "Cell":
+        """A cell of so many alike parts along one route, all there at the start. BadInput as for any cell."""
+        check_parts(parts)
+        return cls(stations, (Product(product, (route,)),), (product,) * parts, empty_s, loaded_s, robot_start)
+
+    @property
+    def parts(self) -> int:
+        """How many parts are ordered."""
+        return len(self.order)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Station names, by index."""
+        return tuple(station.name for station in self.stations)
+
+    @cached_property
+    def capacities(self) -> tuple[int, ...]:
+        """Room for parts, by station index."""
+        return tuple(station.capacity for station in self.stations)
+
+    @cached_property
+    def positions(self) -> tuple[Position, ...]:
+        """Every place on a route where a part of the order may stand between two moves."""
+        return positions_of(self.stations, self.products, self.buffers)
+
+    @cached_property
+    def starts(self) -> tuple[int, ...]:
+        """The position in which each part begins, part 1 first."""
+        first = {place.product: index for index, place in reversed([*enumerate(self.positions)])}
+        return tuple(first[[product.name for product in self.products].index(name)] for name in self.order)
+
+    @cached_property
+    def needed(self) -> Moves:
+        """The moves that some allowed sequence may contain (see `needed_moves`)."""
+        return needed_moves(self.stations, self.products, self.robot_start, self.parts, self.buffers)
+
+    @cached_property
+    def longest_s(self) -> float:
+        """A time that no sequence exceeds: everything slowest, one after the other [s]."""
+        slowest_s = sum(float(np.nanmax(table, initial=0.0)) for table in (self.empty_s, self.loaded_s))
+        service_s = max((option.service_s for place in self.positions for option in place.options), default=0.0)
+        process_s = sum(place.processing_s or 0.0 for place in self.positions)
+        come_s = sum(self.arrivals.interval_s) if self.arrivals else 0.0
+        return self.parts * (len(self.positions) * (slowest_s + service_s) + process_s) + come_s
+
+    def index(self, name: str) -> int:
+        """Index of a station by its name; BadInput when unknown."""
+        try:
+            return self.names.index(name)
+        except ValueError:
+            raise unknown("station", name, self.names, "cell") from None
+
+    def part_name(self, part: int) -> str:
+        """What a part is called in pictures and schedules: its product and its number."""
+        return f"{self.order[part - 1]} {part}"
+
+    def _check_order(self) -> None:
+        check_parts(len(self.order))
+        known = [product.name for product in self.products]
+        for number, name in enumerate(self.order, 1):
+            if name not in known:
+                raise unknown("product", name, known, f"part {number} of the order")
+        for name in self.names:
+            if any(name == self.part_name(part) for part in range(1, self.parts + 1)):
+                raise BadInput(f"station '{name}': a part has that name; call the station something else")
+        for end in self._ends() if self.arrivals is None else ():
+            room = self.stations[self.index(end)].capacity
+            most = sum(self.order.count(product.name) for product in self.products if end in _ends_of(product))
+            if room < most:
+                raise BadInput(f"station '{end}': capacity {room} cannot hold all {most} parts")
+
+    def _ends(self) -> list[str]:
+        return sorted({end for product in self.products for end in _ends_of(product)})
+
+    def _check_times(self) -> None:
+        if self.arrivals is not None:
+            if self.arrivals.after not in ARRIVALS_AFTER:
+                raise unknown("arrivals after", self.arrivals.after, ARRIVALS_AFTER, "cell")
+            _check_one_each("arrivals", self.arrivals.interval_s, self.parts)
+        if self.due_s is None:
+            return
+        _check_one_each("due_s", self.due_s, self.parts)
+        came_s = 0.0
+        for part, due_s in enumerate(self.due_s, 1):
+            came_s += self.arrivals.interval_s[part - 1] if self.arrivals else 0.0
+            if due_s < came_s:
+                raise BadInput(f"due_s of part {part} = {due_s:g} s, but it only arrives at {came_s:g} s")
+
+
+def _ends_of(product: Product) -> set[str]:
+    return {stage.station for route in product.routes for stage in (route[0], route[-1])}
+
+
+def needed_moves(
+    stations: Sequence[Station],
+    products: Sequence[Product],
+    robot_start: str,
+    parts: int,
+    buffers: Literal["busy", "free"] = "busy",
+) -> Moves:
+    """Every move that some allowed sequence of this cell may contain: what must be measured before a Cell can be built.
+
+    Loaded: along the routes, directly and through the buffers. Empty: from the start to the first stations, and from
+    where something was dropped to where something may be picked next. Staying is never listed. For few parts the list
+    may be longer than strictly needed. Raises BadInput as Cell does for stations and routes.
+    """
+    check_layout(stations, products)
+    return moves_between(stations, positions_of(stations, products, buffers), robot_start, parts)
+
+
+def check_parts(parts: object) -> None:
+    """BadInput unless it is a whole number from 1 to MAX_PARTS."""
+    if not is_count(parts) or int(parts) > MAX_PARTS:  # type: ignore[call-overload]
+        raise BadInput(f"parts = {parts!r}: allowed are 1 to {MAX_PARTS}")
+
+
+def _check_one_each(field: str, given: Sequence[float], parts: int) -> None:
+    if len(given) != parts:
+        raise BadInput(f"{field} has {len(given)} times; {parts} parts need {parts}")
+    for part, seconds in enumerate(given, 1):
+        check_seconds(f"{field} of part {part}", seconds)
+
+
+def _checked_table(
+    field: str, given: ArrayLike, names: tuple[str, ...], needed: tuple[tuple[str, str], ...]
+) -> NDArray[np.float64]:
+    """The table as a read-only copy (n, n), once every value is a time or NaN and no needed one is NaN."""
+    table = np.array(given, dtype=np.float64)
+    size = len(names)
+    if table.shape != (size, size):
+        raise BadInput(f"{field} has shape {table.shape}; {size} stations need ({size}, {size})")
+    for row, column in np.argwhere((table > MAX_S) | (table < 0)):
+        pair = f"'{names[row]}' -> '{names[column]}'"
+        raise BadInput(f"{field} {pair} = {table[row, column]}; allowed are 0 to {MAX_S:g} s")
+    for name, stay in zip(names, np.diag(table), strict=True):
+        if not (np.isnan(stay) or stay == 0):
+            raise BadInput(f"{field} '{name}' -> '{name}' = {stay}; staying takes 0 s")
+    missing = [pair for pair in needed if np.isnan(table[names.index(pair[0]), names.index(pair[1])])]
+    for origin, target in missing:
+        ways = [pair for pair in needed if pair[1] == target]
+        never = "; no time leads there: it cannot be reached" if len(ways) > 1 and set(ways) <= set(missing) else ""
+        raise BadInput(f"{field} '{origin}' -> '{target}' is missing, but the route needs it{never}")
+    table.setflags(write=False)
+    return table

@@ -1,0 +1,80 @@
+"""What a sequence is judged by: one number of a finished run, the lower the better."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from lab.errors import BadInput, unknown
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.simulate.run import Run
+
+MAKESPAN = "makespan"
+WITH_DUE_TIMES = ("mean-tardiness", "tardy-parts")
+
+
+def _makespan(run: Run) -> float:
+    """When the last part reaches the end of its route [s]."""
+    return run.now_s
+
+
+def _mean_tardiness(run: Run) -> float:
+    """How much later than due the parts are finished, on average; an early part counts 0 [s]."""
+    return sum(_late_s(run)) / run.cell.parts
+
+
+def _tardy_parts(run: Run) -> float:
+    """How many parts are finished later than due."""
+    return float(sum(late > 0 for late in _late_s(run)))
+
+
+def _robot_idle(run: Run) -> float:
+    """How long the robot waits, at machines and for parts to arrive [s]."""
+    return run.waited_s
+
+
+def _machine_idle(run: Run) -> float:
+    """How long the places of the routes' machines stand without work, added up, from time 0 to the makespan [s]."""
+    return machine_places(run.cell) * run.now_s - run.processed_s
+
+
+def machine_places(cell: Cell) -> int:
+    """How many parts the machines that a route leads to can process at once."""
+    used = {station for place in cell.positions for station in place.holds}
+    return sum(cell.capacities[station] for station in used if cell.stations[station].kind == "machine")
+
+
+# name -> function(run) of a finished run
+OBJECTIVES: Mapping[str, Callable[[Run], float]] = MappingProxyType(
+    {
+        MAKESPAN: _makespan,
+        "mean-tardiness": _mean_tardiness,
+        "tardy-parts": _tardy_parts,
+        "robot-idle": _robot_idle,
+        "machine-idle": _machine_idle,
+    }
+)
+
+
+def check_objective(name: str, cell: Cell) -> None:
+    """BadInput for an unknown objective, and for one that needs due times when the cell has none."""
+    if name not in OBJECTIVES:
+        raise unknown("objective", name, OBJECTIVES, "--objective")
+    if name in WITH_DUE_TIMES and cell.due_s is None:
+        untimed = [other for other in OBJECTIVES if other not in WITH_DUE_TIMES]
+        raise BadInput(f"objective '{name}': the cell has no due times (due_s); without them: {', '.join(untimed)}")
+
+
+def cost(run: Run, objective: str) -> float:
+    """The objective's value of a run; of one that ended in a deadlock, more than any that did not."""
+    return OBJECTIVES[objective](run) if run.done else stuck_cost(run.cell, objective)
+
+
+def stuck_cost(cell: Cell, objective: str) -> float:
+    """More than the objective's value of any finished run, unless times are drawn that are ten times their means."""
+    if objective == "tardy-parts":
+        return cell.parts + 1.0
+    return 10.0 * cell.longest_s * (machine_places(cell) if objective == "machine-idle" else 1.0) + 1.0
+
+
+def _late_s(run: Run) -> list[float]:
+    due_s = run.cell.due_s or (0.0,) * run.cell.parts
+    return [max(0.0, (end or 0.0) - due) for end, due in zip(run.finished_s, due_s, strict=True)]

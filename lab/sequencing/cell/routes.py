@@ -1,0 +1,195 @@
+"""Where a part may stand between two moves, and where it can go from there: the routes of a cell, laid out flat.
+
+What a route says in words (a buffer when the machine is busy, a pallet that has to follow) becomes positions and the
+options to leave them. The simulations, the bound and the searches know these only.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from graphlib import TopologicalSorter
+from typing import Literal, TypeVar
+
+from lab.sequencing.cell.stations import Product, Route, Stage, Station
+
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True)
+class Option:
+    """One way on from a position: the robot picks at station `origin`, drops at `target`, the part is in `to` then.
+
+    choice: what the decision is called when a position has several (see `entry`). needs: stations, by index, where there
+    must be room. if_full: only allowed when this station is full. service_s: the robot's work before the pick [s].
+    waits: only after the processing is finished. carries: "part" or "pallet".
+    """
+
+    choice: int
+    to: int
+    origin: int
+    target: int
+    needs: tuple[int, ...]
+    if_full: int | None = None
+    service_s: float = 0.0
+    waits: bool = True
+    carries: Literal["part", "pallet"] = "part"
+
+    def possible(self, full: Sequence[bool]) -> bool:
+        """Whether there is room for it, and no more than it may find; `full`: whether each station is."""
+        for station in self.needs:  # a loop: this is asked often
+            if full[station]:
+                return False
+        return self.if_full is None or full[self.if_full]
+
+
+@dataclass(frozen=True)
+class Position:
+    """A part at `station` (index) on a route of `product` (index); `holds`: stations where it, or its pallet, takes room.
+
+    processing_s: what begins when the part gets here [s]; None: nothing begins, and what was begun goes on. No options:
+    the part is finished. Ends of routes hold no room.
+    """
+
+    product: int
+    station: int
+    holds: tuple[int, ...]
+    processing_s: float | None
+    options: tuple[Option, ...]
+
+
+@dataclass(frozen=True)
+class Moves:
+    """The (origin, target) station names between which the robot may have to travel empty, and carry something."""
+
+    empty: tuple[tuple[str, str], ...]
+    loaded: tuple[tuple[str, str], ...]
+
+
+def entry(part: int, choice: int, parts: int) -> int:
+    """How a decision is written in a sequence: the part's number, + `parts` for the second choice it has, and so on."""
+    return part + choice * parts
+
+
+def part_of(entry: int, parts: int) -> int:
+    """The part's number in a sequence's entry."""
+    return (entry - 1) % parts + 1
+
+
+def choice_of(entry: int, parts: int) -> int:
+    """The choice in a sequence's entry, from 0."""
+    return (entry - 1) // parts
+
+
+def positions_of(
+    stations: Sequence[Station], products: Sequence[Product], buffers: Literal["busy", "free"]
+) -> tuple[Position, ...]:
+    """The positions of all products, each product's start first; routes that are sound are taken for granted."""
+    layout = _Layout(stations, buffers)
+    for number, product in enumerate(products):
+        layout.add(number, product)
+    return tuple(layout.positions)
+
+
+def from_the_ends(positions: Sequence[Position], value: Callable[[int, list[Value]], Value]) -> list[Value]:
+    """The value of each position, found after those that its options lead to: value(position, theirs, in their order)."""
+    ahead = {number: [option.to for option in place.options] for number, place in enumerate(positions)}
+    found = dict[int, Value]()
+    for number in TopologicalSorter(ahead).static_order():
+        found[number] = value(number, [found[to] for to in ahead[number]])
+    return [found[number] for number in range(len(positions))]
+
+
+def moves_between(stations: Sequence[Station], positions: Sequence[Position], robot_start: str, parts: int) -> Moves:
+    """The moves that may follow one another, and those that carry something; staying is left out."""
+    names = [station.name for station in stations]
+    options = [(place, option) for place in positions for option in place.options]
+    reached = {option.to for _, option in options}
+    starts = [place for index, place in enumerate(positions) if index not in reached]
+    loaded = dict.fromkeys((option.origin, option.target) for _, option in options)
+    begin = names.index(robot_start)
+    empty = dict.fromkeys((begin, option.origin) for place in starts for option in place.options)
+    for left, done in options:
+        there = positions[done.to]
+        empty |= dict.fromkeys((done.target, own.origin) for own in there.options)
+        full = {place for place in there.holds if stations[place].capacity == 1}
+        gone = {place for place in left.holds if stations[place].capacity == 1 and place not in there.holds}
+        for _, other in options if parts > 1 else ():
+            if other.origin not in gone and not full.intersection(other.needs):
+                empty[done.target, other.origin] = None
+    named = [tuple((names[a], names[b]) for a, b in pairs if a != b) for pairs in (empty, loaded)]
+    return Moves(named[0], named[1])
+
+
+class _Layout:
+    """Positions as they are added, route by route."""
+
+    def __init__(self, stations: Sequence[Station], buffers: str) -> None:
+        self.positions: list[Position] = []
+        self._stations, self._buffers = stations, buffers
+        self._index = {station.name: index for index, station in enumerate(stations)}
+
+    def add(self, product: int, described: Product) -> None:
+        """All positions of a product: its start, then route by route, ends of the same name only once."""
+        start = self._position(product, described.routes[0][0].station, ())
+        ends: dict[str, int] = {}
+        for route in described.routes:
+            self._add_route(product, route, start, ends)
+
+    def _add_route(self, product: int, route: Route, start: int, ends: dict[str, int]) -> None:
+        leave, service_s = start, 0.0
+        for before, stage, after in zip(route[:-1], route[1:], [*route[2:], None], strict=True):
+            if after is None:
+                reach = ends.get(stage.station)
+                if reach is None:
+                    reach = ends[stage.station] = self._position(product, stage.station, ())
+            elif stage.pallet:
+                holds = (stage.station, before.station)
+                reach = self._position(product, before.station, holds, self._processing_s(stage))
+            else:
+                reach = self._position(product, stage.station, (stage.station,), self._processing_s(stage))
+            self._link(leave, reach, stage, service_s)
+            leave, service_s = reach, stage.service_s
+            if stage.pallet and after is not None:
+                leave = self._position(product, stage.station, (stage.station, after.station), None)
+                self._join(reach, leave, after.station, waits=False, carries="pallet")
+
+    def _link(self, leave: int, reach: int, stage: Stage, service_s: float) -> None:
+        """The ways from a position to a stage: directly, and through its buffer."""
+        self._join(leave, reach, stage.station, service_s=service_s)
+        if stage.buffer is None:
+            return
+        wait = self._position(self.positions[leave].product, stage.buffer, (stage.buffer,))
+        if self._buffers == "busy":
+            # Never both at once: the decision is the same, and the cell says where it leads.
+            choice = self.positions[leave].options[-1].choice
+            full = self._index[stage.station]
+            self._join(leave, wait, stage.buffer, service_s=service_s, choice=choice, if_full=full)
+        else:
+            self._join(leave, wait, stage.buffer, service_s=service_s)
+        self._join(wait, reach, stage.station)
+
+    def _position(self, product: int, station: str, holds: tuple[str, ...], processing_s: float | None = 0.0) -> int:
+        held = tuple(self._index[name] for name in holds)
+        self.positions.append(Position(product, self._index[station], held, processing_s, ()))
+        return len(self.positions) - 1
+
+    def _join(
+        self,
+        leave: int,
+        reach: int,
+        target: str,
+        *,
+        service_s: float = 0.0,
+        choice: int | None = None,
+        if_full: int | None = None,
+        waits: bool = True,
+        carries: Literal["part", "pallet"] = "part",
+    ) -> None:
+        place, there = self.positions[leave], self.positions[reach]
+        number = choice if choice is not None else 1 + max((option.choice for option in place.options), default=-1)
+        needs = tuple(station for station in there.holds if station not in place.holds)
+        option = Option(number, reach, place.station, self._index[target], needs, if_full, service_s, waits, carries)
+        self.positions[leave] = replace(place, options=(*place.options, option))
+
+    def _processing_s(self, stage: Stage) -> float:
+        station = self._stations[self._index[stage.station]]
+        return station.processing_s if stage.processing_s is None else stage.processing_s

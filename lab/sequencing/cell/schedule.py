@@ -1,0 +1,185 @@
+"""What a run of a cell comes to: timed moves, the Schedule of robot, machines and parts that they make, and results."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, get_args
+
+from lab.errors import BadInput
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.stations import ROBOT
+
+Kind = Literal["carry", "pallet", "empty", "wait", "service", "process", "blocked", "store"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+_ROWS = ("robot", "machines", "parts")
+
+
+@dataclass(frozen=True)
+class Activity:
+    """What one resource does from `start_s` to `end_s`; for a stay, `origin` and `target` are the same station.
+
+    Robot: "carry" (a part), "pallet" (an empty one), "empty", "wait", "service". Machine: "process", "blocked"
+    (finished, not fetched yet). Part: "store" (storage or buffer), "process", "blocked", "carry". `part` is None where
+    none is involved.
+    """
+
+    resource: str
+    kind: Kind
+    part: int | None
+    origin: str
+    target: str
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class Move:
+    """One decision carried out: the robot leaves `start`, reaches what it picks at `origin`, and drops it at `target`.
+
+    process_s: the processing that begins with the drop [s]. service_s: the robot's work that ends with the pick [s].
+    """
+
+    part: int
+    start: str
+    origin: str
+    target: str
+    leave_s: float
+    reach_s: float
+    pick_s: float
+    drop_s: float
+    process_s: float = 0.0
+    service_s: float = 0.0
+    carries: Literal["part", "pallet"] = "part"
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """A timed run, predicted or measured: activities by start for the robot, the machines and the parts; seconds.
+
+    `makespan_s` is when the last part reaches the end of its route. `sequence`: the decisions (see `Run`). Raises
+    BadInput for an activity that ends before it starts, times that are not finite, or an unknown kind.
+    Source: fig. IV.1.
+    """
+
+    robot: tuple[Activity, ...]
+    machines: tuple[Activity, ...]
+    parts: tuple[Activity, ...]
+    makespan_s: float
+    sequence: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        for activity in (*self.robot, *self.machines, *self.parts):
+            _check_activity(activity)
+
+    @classmethod
+    def from_moves(
+        cls,
+        cell: Cell,
+        moves: Sequence[Move],
+        sequence: Sequence[int] | None = None,
+        came_s: Sequence[float] | None = None,
+    ) -> "Schedule":
+        """A schedule from timed moves, simulated or measured; sequence None: the parts moved, in their order.
+
+        came_s: when each part came to its first station [s]; None: all at 0.
+        """
+        robot = [activity for move in moves for activity in robot_activities(move)]
+        end_s = max((move.drop_s for move in moves), default=0.0)
+        parts: list[Activity] = []
+        machines: list[Activity] = []
+        for part in range(1, cell.parts + 1):
+            own = [move for move in moves if move.part == part and move.carries == "part"]
+            rows = _part_activities(cell, part, own, 0.0 if came_s is None else came_s[part - 1], end_s)
+            parts += rows[0]
+            machines += rows[1]
+        order = [move.part for move in moves] if sequence is None else sequence
+        return cls(tuple(robot), _by_start(machines), tuple(parts), end_s, tuple(order))
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain dicts, lists, numbers and strings, for `json.dumps`."""
+        rows = {name: [asdict(a) for a in getattr(self, name)] for name in _ROWS}
+        return {"makespan_s": self.makespan_s, "sequence": list(self.sequence)} | rows
+
+
+@dataclass(frozen=True)
+class EpisodeSequenced:
+    """One sequence tried: number from 1, its cost (see `SequenceResult`) and the best one so far, empty: there is none."""
+
+    episode: int
+    cost: float
+    best_cost: float
+    best: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class SequenceResult:
+    """What every sequencer returns: the best sequence found, its cost, and the cost of each sequence tried.
+
+    The cost is the value of the objective asked for: the makespan [s] unless it was another one.
+    """
+
+    sequence: tuple[int, ...]
+    cost: float
+    episode_costs: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class LearnedSequence(SequenceResult):
+    """What a learning sequencer returns beside: the cost of its greedy policy at the end."""
+
+    final_cost: float
+
+
+def robot_activities(move: Move) -> list[Activity]:
+    """What the robot does in one move, without what takes no time."""
+    served_s = move.pick_s - move.service_s
+    carries: Kind = "carry" if move.carries == "part" else "pallet"
+    spans: tuple[tuple[Kind, int | None, str, str, float, float], ...] = (
+        ("empty", None, move.start, move.origin, move.leave_s, move.reach_s),
+        ("wait", move.part, move.origin, move.origin, move.reach_s, served_s),
+        ("service", move.part, move.origin, move.origin, served_s, move.pick_s),
+        (carries, move.part, move.origin, move.target, move.pick_s, move.drop_s),
+    )
+    return [Activity(ROBOT, *span) for span in spans if span[5] > span[4]]
+
+
+def _part_activities(
+    cell: Cell, part: int, moves: Sequence[Move], came_s: float, end_s: float
+) -> tuple[list[Activity], list[Activity]]:
+    """Rows of one part, and of the machines that it passes, from its arrival to `end_s`."""
+    row, since_s, process_s = cell.part_name(part), came_s, 0.0
+    place = cell.names[cell.positions[cell.starts[part - 1]].station]
+    rows: list[Activity] = []
+    machines: list[Activity] = []
+    for move in [*moves, None]:
+        until_s = end_s if move is None else move.pick_s
+        if cell.stations[cell.index(place)].kind == "machine":
+            # A measured run may fetch a little before the nominal end: processing then ends with the pick.
+            done_s = min(since_s + process_s, until_s)
+            for resource, log in ((row, rows), (place, machines)):
+                log.append(Activity(resource, "process", part, place, place, since_s, done_s))
+                log.append(Activity(resource, "blocked", part, place, place, done_s, until_s))
+        else:
+            rows.append(Activity(row, "store", part, place, place, since_s, until_s))
+        if move is not None:
+            rows.append(Activity(row, "carry", part, move.origin, move.target, move.pick_s, move.drop_s))
+            since_s, place, process_s = move.drop_s, move.target, move.process_s
+    return _lasting(rows), _lasting(machines)
+
+
+def _lasting(activities: Iterable[Activity]) -> list[Activity]:
+    return [activity for activity in activities if activity.end_s > activity.start_s]
+
+
+def _by_start(activities: Iterable[Activity]) -> tuple[Activity, ...]:
+    return tuple(sorted(activities, key=lambda a: (a.start_s, a.end_s)))
+
+
+def _check_activity(activity: Activity) -> None:
+    if activity.kind not in KINDS:
+        raise BadInput(f"activity of '{activity.resource}': unknown kind '{activity.kind}'; known: {', '.join(KINDS)}")
+    times = f"from {activity.start_s} to {activity.end_s} s"
+    if not (math.isfinite(activity.start_s) and math.isfinite(activity.end_s)):
+        raise BadInput(f"activity '{activity.kind}' of '{activity.resource}' {times}: times must be finite")
+    if activity.end_s < activity.start_s:
+        raise BadInput(f"activity '{activity.kind}' of '{activity.resource}' {times}: it ends before it starts")

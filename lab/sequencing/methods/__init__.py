@@ -1,0 +1,1 @@
+"""How a sequence is found: one file a method, and what several of them share."""

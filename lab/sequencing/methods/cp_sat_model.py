@@ -1,0 +1,283 @@
+"""The cell as a constraint model for OR-Tools' CP-SAT: the robot's tour through the moves, and time along it.
+
+It shares the cell's positions with the simulation, and nothing else: no states, no order of events.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ortools.sat.python import cp_model
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, machine_places
+from lab.sequencing.cell.routes import entry
+from lab.sequencing.cell.ways import Way, distances, follows, ways_of
+from lab.sequencing.methods.cp_sat_times import Timed, Times, longest, timed
+
+
+class Task(NamedTuple):
+    """A move that one part may make: whether it does, and when the robot begins it, its waiting over, and drops.
+
+    waits: whether the robot has to wait before; None: it never does.
+    """
+
+    part: int
+    way: Way
+    done: cp_model.IntVar
+    begin: cp_model.IntVar
+    drop: cp_model.LinearExpr
+    waits: cp_model.IntVar | None
+
+
+class Visit(NamedTuple):
+    """A part's room at a station: whether it comes there, from the begin of the move that brings it to the last drop."""
+
+    part: int
+    station: int
+    here: cp_model.IntVar
+    begin: cp_model.IntVar
+    leave: cp_model.IntVar
+
+
+class Model:
+    """The variables and constraints. worth: what a unit of the model's objective is in the cell's.
+
+    blur: by how many units rounding may change a sequence's cost; 0 when no time is rounded. Parts are numbered from 0
+    here.
+    """
+
+    def __init__(self, cell: Cell, objective: str, hint: Sequence[int]) -> None:
+        self.cell, self.model, self._ways = cell, cp_model.CpModel(), ways_of(cell)
+        self.times = Times(cell, self._ways)
+        known = timed(cell, self.times, self._ways, hint)
+        self._longest = known[-1].drop if objective == MAKESPAN else longest(cell, self.times, self._ways)
+        self._holds = [[s in place.holds for place in cell.positions] for s in range(len(cell.stations))]
+        self._distances = distances(cell, self.times.per_s)
+        self._tasks: list[Task] = []
+        self._arcs: dict[tuple[int, int], cp_model.IntVar] = {}
+        self._come: dict[tuple[int, int], cp_model.IntVar] = {}
+        self._travels: list[cp_model.LinearExpr] = []
+        self._waits: list[cp_model.LinearExpr] = []
+        self._first = [self._moment(f"first {part}") for part in range(cell.parts)]
+        self._taken = [self._moment(f"taken {part}") for part in range(cell.parts)]
+        self._end = self._moment("makespan")
+        for part in range(cell.parts):
+            self._add_part(part)
+        self._add_tour()
+        self._add_full([visit for station in range(len(cell.stations)) for visit in self._add_room(station)])
+        self._add_order(objective)
+        self.worth = self._add_objective(objective)
+        each = {"machine-idle": machine_places(cell), "mean-tardiness": cell.parts, "tardy-parts": 0}.get(objective, 1)
+        self.blur = 2 * each * len(self._tasks) if self.times.rounded_s else 0
+        self._suggest(known)
+
+    def sequence(self, solver: cp_model.CpSolver) -> tuple[int, ...]:
+        """The decisions of the solution, in the order of the robot's tour."""
+        after = {left: then for (left, then), arc in self._arcs.items() if solver.boolean_value(arc)}
+        decisions, number = list[int](), 0
+        while number in after:
+            number = after[number]
+            task = self._tasks[number - 1]
+            decisions.append(entry(task.part + 1, task.way.option.choice, self.cell.parts))
+        return tuple(decisions)
+
+    def _suggest(self, known: Sequence[Timed]) -> None:
+        """Give the solver a sequence to begin with."""
+        tasks = {(task.part, task.way): number for number, task in enumerate(self._tasks, 1)}
+        hints = dict.fromkeys([*self._arcs.values(), *self._come.values()], 0)
+        for task in self._tasks:
+            hints |= {task.done: 0, task.begin: 0}
+        before = 0
+        for move in known:
+            number = tasks[move.part, move.way]
+            task = self._tasks[number - 1]
+            hints |= {task.done: 1, task.begin: move.begin, self._arcs[before, number]: 1}
+            hints[self._come[move.part, move.way.option.to]] = move.drop
+            before = number
+        hints[self._end] = known[-1].drop
+        for variable, value in hints.items():
+            self.model.add_hint(variable, value)
+
+    def _moment(self, name: str) -> cp_model.IntVar:
+        return self.model.new_int_var(0, self._longest, name)
+
+    def _add_part(self, part: int) -> None:
+        """The part's way from its start to an end: one option of each position that it comes to."""
+        reached, own = [self.cell.starts[part]], list[Task]()
+        for place in reached:
+            self._come[part, place] = self._moment(f"come {part} {place}")
+            for way in self._ways:
+                if way.place == place:
+                    own.append(self._task(part, way))
+                    reached += [way.option.to] if way.option.to not in reached else []
+        self._tasks += own
+        self.model.add(self._come[part, reached[0]] == 0)
+        for place in reached:
+            into = [task.done for task in own if task.way.option.to == place]
+            out = [task.done for task in own if task.way.place == place]
+            if out:
+                self.model.add(sum(out) == (sum(into) if into else 1))
+        for task in own:
+            self.model.add(self._come[part, task.way.option.to] == task.drop).only_enforce_if(task.done)
+            if task.way.place == reached[0]:
+                self.model.add(self._first[part] == task.begin).only_enforce_if(task.done)
+                self.model.add(self._taken[part] == task.drop).only_enforce_if(task.done)
+
+    def _task(self, part: int, way: Way) -> Task:
+        """A move that begins when what was begun before is finished; if the robot is there earlier, just then."""
+        done, begin, waits = self.model.new_bool_var("does"), self._moment("begin"), None
+        self.model.add(begin >= self._come[part, way.place]).only_enforce_if(done)
+        ready = self._ready(part, way) if way.option.waits else None
+        if ready is not None:
+            waits = self.model.new_bool_var("waits")
+            self.model.add(begin >= ready).only_enforce_if(done)
+            self.model.add(begin <= ready).only_enforce_if(done, waits)
+        return Task(part, way, done, begin, begin + self.times.work(way), waits)
+
+    def _ready(self, part: int, way: Way) -> cp_model.LinearExprT | None:
+        """When the part is finished, or has come; None: it always is, when the robot is there."""
+        place, arrivals = way.place, self.cell.arrivals
+        if place == self.cell.starts[part]:
+            if arrivals is None:
+                return None
+            intervals = [self.times.whole(seconds) for seconds in arrivals.interval_s[: part + 1]]
+            after_pick = part > 0 and arrivals.after == "pick"
+            return self._first[part - 1] + intervals[-1] if after_pick else sum(intervals)
+        while self.cell.positions[place].processing_s is None:
+            place = next(before.place for before in self._ways if before.option.to == place)
+        process = self.times.processing(place)
+        return self._come[part, place] + process if process else None
+
+    def _add_tour(self) -> None:
+        """The robot goes from move to move, in one tour from its start to the last end; time follows."""
+        start, arcs = self.cell.index(self.cell.robot_start), list[tuple[int, int, cp_model.LiteralT]]()
+        for number, task in enumerate(self._tasks, 1):
+            arcs.append((number, number, ~task.done))
+            if task.way.place == self.cell.starts[task.part]:
+                arcs.append((0, number, self._arc(0, number, self.times.travel(start, task.way.option.origin), 0)))
+            if not self.cell.positions[task.way.option.to].options:
+                arcs.append((number, 0, self.model.new_bool_var("last")))
+            for other, after in enumerate(self._tasks, 1):
+                same = task.part == after.part
+                if follows(self.cell, task.way, after.way, same):
+                    travel = self.times.travel(task.way.option.target, after.way.option.origin)
+                    process = self.times.processing(after.way.place) if same and after.way.option.waits else 0
+                    arcs.append((number, other, self._arc(number, other, travel, max(0, process - travel))))
+        self.model.add_circuit(arcs)
+
+    def _arc(self, left: int, then: int, travel: int, wait: int) -> cp_model.IntVar:
+        done = self._arcs[left, then] = self.model.new_bool_var("follows")
+        before, task = self._tasks[left - 1].drop if left else 0, self._tasks[then - 1]
+        self.model.add(task.begin >= before + travel).only_enforce_if(done)
+        # No later either, unless it waits: else the solver would find the same tour again and again, a little later.
+        at_once = [done] if task.waits is None else [done, ~task.waits]
+        self.model.add(task.begin <= before + travel).only_enforce_if(*at_once)
+        self._travels.append(travel * done)
+        self._waits.append(wait * done)
+        return done
+
+    def _add_room(self, station: int) -> list[Visit]:
+        """A station never holds more than it can: a part has its room from when it is begun to be brought.
+
+        With room for one, the robot also has to get from where it took the part before to where it fetches the next.
+        """
+        holds, room = self._holds[station], self.cell.capacities[station]
+        into = [way for way in self._ways if holds[way.option.to] and not holds[way.place]]
+        out = [way for way in self._ways if holds[way.place] and not holds[way.option.to]]
+        ways = [self._distances[left.option.target][way.option.origin] for left in out for way in into]
+        change = min([*ways, self._longest]) if room == 1 and self.cell.parts > 1 else 0
+        visits, intervals, least = list[Visit](), list[cp_model.IntervalVar](), list[cp_model.LinearExpr]()
+        for part in range(self.cell.parts):
+            own = [task for task in self._tasks if task.part == part]
+            brings, takes = [t for t in own if t.way in into], [t for t in own if t.way in out]
+            if brings:
+                visit = Visit(part, station, *self._visit(brings, takes))
+                size = self._moment("stay")
+                least.append(self._least(brings, takes) + change * visit.here)
+                self.model.add(size >= least[-1])
+                span = visit.begin, size, visit.leave + change, visit.here
+                intervals.append(self.model.new_optional_interval_var(*span, "visit"))
+                visits.append(visit)
+        if room == 1 and visits:
+            self.model.add_no_overlap(intervals)
+            self.model.add(self._end >= sum(least) - change)
+        elif room < len(visits):
+            self.model.add_cumulative(intervals, [1] * len(visits), room)
+        return visits
+
+    def _visit(self, brings: list[Task], takes: list[Task]) -> tuple[cp_model.IntVar, cp_model.IntVar, cp_model.IntVar]:
+        here, begin, leave = self.model.new_bool_var("here"), self._moment("from"), self._moment("until")
+        self.model.add(sum(task.done for task in brings) == here)
+        for task in brings:
+            self.model.add(begin == task.begin).only_enforce_if(task.done)
+        for task in takes:
+            self.model.add(leave == task.drop).only_enforce_if(task.done)
+        return here, begin, leave
+
+    def _least(self, brings: list[Task], takes: list[Task]) -> cp_model.LinearExpr:
+        """How long a visit lasts at least: the moves that begin and end it, and the processing."""
+        waits = all(task.way.option.waits for task in takes)
+        process = [self.times.processing(task.way.option.to) if waits else 0 for task in brings]
+        begins = [(self.times.work(t.way) + more) * t.done for t, more in zip(brings, process, strict=True)]
+        ends = [self.times.work(task.way) * task.done for task in takes]
+        return cp_model.LinearExpr.sum([*begins, *ends])
+
+    def _add_full(self, visits: Sequence[Visit]) -> None:
+        """A buffer is used only when the station ahead is full at that moment, where the cell says so."""
+        for task in self._tasks:
+            station = task.way.option.if_full
+            if station is None:
+                continue
+            inside = []
+            for visit in visits:
+                if visit.station == station and visit.part != task.part:
+                    then = self.model.new_bool_var("inside")
+                    self.model.add_implication(then, visit.here)
+                    self.model.add(visit.begin < task.begin).only_enforce_if(then)
+                    self.model.add(visit.leave > task.drop).only_enforce_if(then)
+                    inside.append(then)
+            self.model.add(sum(inside) >= self.cell.capacities[station]).only_enforce_if(task.done)
+
+    def _add_order(self, objective: str) -> None:
+        """Parts that arrive are taken in their order; of parts that are alike in all, the first in number goes first."""
+        cell = self.cell
+        due_s = cell.due_s if cell.due_s and objective in WITH_DUE_TIMES else (0.0,) * cell.parts
+        latest: dict[object, int] = {}
+        for part, product in enumerate(cell.order):
+            kind = None if cell.arrivals is not None else (product, due_s[part])
+            if kind in latest:
+                self.model.add(self._first[part] >= self._taken[latest[kind]])
+            latest[kind] = part
+
+    def _add_objective(self, objective: str) -> float:
+        """What is to be as low as possible; the worth of its unit in the cell's."""
+        model, positions = self.model, self.cell.positions
+        busy = sum(self._travels) + sum(self.times.work(task.way) * task.done for task in self._tasks)
+        model.add(self._end >= busy + sum(self._waits))
+        ends = [task for task in self._tasks if not positions[task.way.option.to].options]
+        for task in ends:
+            model.add(self._end >= task.drop).only_enforce_if(task.done)
+        if objective == MAKESPAN:
+            model.minimize(self._end)
+        elif objective == "robot-idle":
+            model.minimize(self._end - busy)
+        elif objective == "machine-idle":
+            processed = sum(self.times.processing(task.way.option.to) * task.done for task in self._tasks)
+            model.minimize(machine_places(self.cell) * self._end - processed)
+        else:
+            return self._add_late(ends, objective)
+        return 1.0 / self.times.per_s
+
+    def _add_late(self, ends: Sequence[Task], objective: str) -> float:
+        due = [self.times.whole(due_s) for due_s in self.cell.due_s or ()]
+        if objective == "tardy-parts":
+            late = [self.model.new_bool_var("late") for _ in due]
+            for task in ends:
+                self.model.add(task.drop <= due[task.part]).only_enforce_if(task.done, ~late[task.part])
+            self.model.minimize(sum(late))
+            return 1.0
+        lateness = [self._moment("late") for _ in due]
+        for task in ends:
+            self.model.add(lateness[task.part] >= task.drop - due[task.part]).only_enforce_if(task.done)
+        self.model.minimize(sum(lateness))
+        return 1.0 / self.times.per_s / self.cell.parts

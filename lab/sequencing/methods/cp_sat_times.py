@@ -1,0 +1,116 @@
+"""The times of a cell as whole numbers, as CP-SAT wants them."""
+
+from collections.abc import Sequence
+from itertools import accumulate
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import from_the_ends, part_of
+from lab.sequencing.cell.ways import Way
+from lab.sequencing.simulate.run import Run
+
+UNITS_PER_S = (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
+MOST_UNITS = 1e12  # no time above it, in units: sums of many then stay exact
+_SAME = 1e-12  # of the longest time: what two floats that are equal may differ by
+
+
+class Times:
+    """The cell's times in whole units: the largest unit in which they all are whole, else the smallest.
+
+    rounded_s: by how much a time is changed at the most [s]; 0 when all are whole.
+    """
+
+    def __init__(self, cell: Cell, ways: Sequence[Way]) -> None:
+        carries = [float(cell.loaded_s[way.option.origin, way.option.target]) for way in ways]
+        tables = np.concatenate([cell.empty_s.ravel(), cell.loaded_s.ravel()])
+        given = np.array(
+            [
+                *tables[~np.isnan(tables)],
+                *(place.processing_s or 0.0 for place in cell.positions),
+                *(way.option.service_s for way in ways),
+                *(cell.arrivals.interval_s if cell.arrivals else ()),
+                *(cell.due_s or ()),
+            ]
+        )
+        longest_s = cell.longest_s + max(cell.due_s or (0.0,))
+        fine = [per_s for per_s in UNITS_PER_S if longest_s * per_s <= MOST_UNITS] or [MOST_UNITS / longest_s]
+        fit = [per_s for per_s in fine if _off_s(given, per_s) <= _SAME * longest_s and min(carries) * per_s > 0.5]
+        self.per_s = fit[0] if fit else fine[-1]
+        # A carried move that takes no time is given a unit, see `work`.
+        added_s = 1.0 / self.per_s if min(carries) == 0 else 0.0
+        self.rounded_s = 0.0 if fit else max(_off_s(given, self.per_s), added_s)
+        self._cell = cell
+
+    def whole(self, seconds: float) -> int:
+        """A time in units."""
+        return round(seconds * self.per_s)
+
+    def travel(self, origin: int, target: int) -> int:
+        """The robot's empty way between two stations."""
+        return 0 if origin == target else self.whole(float(self._cell.empty_s[origin, target]))
+
+    def work(self, way: Way) -> int:
+        """Service and carrying; at least a unit, so that the order of moves is the order of their times."""
+        carry_s = float(self._cell.loaded_s[way.option.origin, way.option.target])
+        return self.whole(way.option.service_s) + max(1, self.whole(carry_s))
+
+    def processing(self, place: int) -> int:
+        """What begins in a position."""
+        return self.whole(self._cell.positions[place].processing_s or 0.0)
+
+
+class Timed(NamedTuple):
+    """A move of a sequence in units: its part from 0, its way, when it begins, its waiting over, and when it drops."""
+
+    part: int
+    way: Way
+    begin: int
+    drop: int
+
+
+def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]) -> list[Timed]:
+    """A sequence with the model's times; BadInput for a decision that may not be taken, and when parts are left."""
+    run, moves = Run(cell), list[Timed]()
+    intervals = [times.whole(seconds) for seconds in cell.arrivals.interval_s] if cell.arrivals else [0] * cell.parts
+    clock = cell.arrivals is None or cell.arrivals.after == "clock"
+    ready = list(accumulate(intervals)) if clock else intervals
+    now = 0
+    for decision in sequence:
+        part, option = part_of(decision, cell.parts) - 1, run.option(decision)
+        place = run.locations[part]
+        if option is None:
+            raise BadInput(f"hint: {run.refusal(decision)}")
+        way = next(way for way in ways if way.place == place and way.option == option)
+        begin = now + times.travel(run.robot, option.origin)
+        begin = max(begin, ready[part]) if option.waits else begin
+        if place in cell.starts and not clock and part + 1 < cell.parts:
+            ready[part + 1] += begin
+        now = begin + times.work(way)
+        if cell.positions[option.to].processing_s is not None:
+            ready[part] = now + times.processing(option.to)
+        run.move(decision)
+        moves.append(Timed(part, way, begin, now))
+    if not run.done:
+        raise BadInput(f"hint: the sequence ends after {len(moves)} moves, but not all parts are finished")
+    return moves
+
+
+def longest(cell: Cell, times: Times, ways: Sequence[Way]) -> int:
+    """No sequence takes longer than this many units, if the robot never waits without need."""
+    travel = max((times.travel(a, b) for a, b in np.argwhere(~np.isnan(cell.empty_s)).tolist()), default=0)
+
+    def longest_from(place: int, ahead: list[int]) -> int:
+        own = [travel + times.work(way) for way in ways if way.place == place]
+        return times.processing(place) + max((here + then for here, then in zip(own, ahead, strict=True)), default=0)
+
+    most = from_the_ends(cell.positions, longest_from)
+    arrive = sum(times.whole(seconds) for seconds in cell.arrivals.interval_s) if cell.arrivals else 0
+    return arrive + sum(most[start] for start in cell.starts)
+
+
+def _off_s(given: NDArray[np.float64], per_s: float) -> float:
+    return float(np.abs(given - np.round(given * per_s) / per_s).max(initial=0.0))

@@ -1,0 +1,147 @@
+"""The proven optimum of a cell: best-first search over its decision states, with alike parts merged."""
+
+import heapq
+from dataclasses import dataclass
+from itertools import chain
+from math import inf
+from operator import le
+
+import numpy as np
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN
+from lab.sequencing.cell.schedule import SequenceResult
+from lab.sequencing.cell.ways import TICKS_PER_S
+from lab.sequencing.methods.lower_bound import LowerBound
+from lab.sequencing.methods.rules import first_come
+from lab.sequencing.search import Log, Search, gap
+from lab.sequencing.simulate.merged import MergedCell, State
+from lab.sequencing.simulate.run import simulate
+
+MAX_EXPANDED = 300_000
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The best sequence known, and what is proven: no sequence is shorter than `bound_s`.
+
+    cost: its makespan [s]. `proven`: the sequence is optimal (to a nanosecond a move) and `bound_s` is its makespan.
+    `expanded`: states opened.
+    """
+
+    cost: float
+    sequence: tuple[int, ...]
+    proven: bool
+    bound_s: float
+    expanded: int
+
+    @property
+    def optimal_s(self) -> float | None:
+        """The makespan when it is proven to be optimal, else None [s]."""
+        return self.cost if self.proven else None
+
+    def gap(self, cost: float) -> float:
+        """How much longer a makespan is than the proven optimum, or than the bound when there is none (see `search.gap`)."""
+        return gap(cost, self.bound_s)
+
+
+class _Search:
+    """The states that are queued and those that were reached; `expanded`: how many were opened."""
+
+    def __init__(self, cell: Cell) -> None:
+        self.merged = MergedCell(cell)
+        self._least = LowerBound(self.merged)
+        self._waits = (
+            len(self.merged.slots) + self.merged.one_by_one
+        )  # what the clock brings is no wait: it comes anyway
+        self.expanded = self.bound = self._serial = 0
+        self._fronts: dict[tuple[int, int], list[tuple[int, ...]]] = {}
+        self._heap: list[tuple[int, int, State]] = []
+        self._greedy = False
+        self._reach(self.merged.start())
+
+    def run(self, most: int) -> State | None:
+        """The first complete state; None: when `most` states were opened in all there was none."""
+        while self._heap:
+            bound, serial, state = heapq.heappop(self._heap)
+            if self._times(state) not in self._fronts[state.counts, state.robot]:
+                continue  # overtaken since it was queued
+            self.bound = max(self.bound, bound)
+            if self.merged.done(state):
+                return state
+            if self.expanded >= most:
+                heapq.heappush(self._heap, (bound, serial, state))
+                return None
+            self.expanded += 1
+            for successor in self.merged.successors(state):
+                self._reach(successor)
+        return None
+
+    def hasten(self) -> None:
+        """From now on open what has the least left to do first: any end will do."""
+        self._greedy = True
+        self._heap = [(self._least.left(state), serial, state) for _, serial, state in self._heap]
+        heapq.heapify(self._heap)
+
+    def _reach(self, state: State) -> None:
+        """Queue a state unless one that is alike otherwise is no later anywhere; those that it beats are forgotten."""
+        if self.merged.one_by_one:
+            # Since when a part waits to be picked does not matter either.
+            state = state._replace(waits=(*state.waits[:-1], tuple([max(at, state.now) for at in state.waits[-1][:1]])))
+        times = self._times(state)
+        front = self._fronts.setdefault((state.counts, state.robot), [])
+        if any(all(map(le, other, times)) for other in front):
+            return
+        front[:] = [other for other in front if not all(map(le, times, other))]
+        front.append(times)
+        # Of equally promising states the newest comes first, hence the falling serial number.
+        self._serial -= 1
+        left = self._least.left(state)
+        heapq.heappush(self._heap, (left if self._greedy else state.now + left, self._serial, state))
+
+    def _times(self, state: State) -> tuple[int, ...]:
+        """Now and all that is waited for: of states with equal counts and robot, one that is nowhere later is no worse."""
+        return (state.now, *chain.from_iterable(state.waits[: self._waits]))
+
+
+def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
+    """The shortest makespan of the cell and a sequence that reaches it, alike parts numbered first in, first out.
+
+    States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
+    optimal; a deadlock leads nowhere. After `max_expanded` states it gives up and opens as many again, nearest to the end
+    first, for the sequence it returns: `proven` False, and the bound reached so far.
+    Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
+    states that are otherwise alike is the thesis's branch and bound, App. IV.
+    """
+    search = _Search(cell)
+    state = search.run(max_expanded)
+    if state is not None:
+        sequence = search.merged.decisions(state)
+        cost = simulate(cell, sequence).makespan_s
+        return Optimum(cost, sequence, True, cost, search.expanded)
+    bound_s, expanded = search.bound / TICKS_PER_S, search.expanded
+    search.hasten()
+    state = search.run(2 * max_expanded)
+    sequence = first_come(cell) if state is None else search.merged.decisions(state)
+    return Optimum(simulate(cell, sequence).makespan_s, sequence, False, bound_s, expanded)
+
+
+def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
+    """The proven best sequence by the mean times; it draws nothing from `rng`.
+
+    The makespan is minimised by `optimum`; when that gives up, and for other objectives, by CP-SAT within its time limit,
+    which may not prove its sequence. Raises BadInput as these do.
+    """
+    search.check(cell)
+    found = optimum(cell) if search.objective == MAKESPAN else None
+    sequence, cost = (found.sequence, found.cost) if found else ((), inf)
+    if found is None or not found.proven:
+        from lab.sequencing.methods.cp_sat import cp_sat, fits  # only where it is needed: OR-Tools takes its time
+
+        if found is None or fits(cell):
+            other = cp_sat(cell, search.objective, hint=sequence or None)
+            sequence, cost = min((cost, sequence), (other.cost, other.sequence))[::-1]
+    log = Log(search)
+    log.note(sequence, cost, complete=bool(sequence))
+    log.check(cell)
+    return SequenceResult(log.best, log.best_cost, tuple(log.costs))

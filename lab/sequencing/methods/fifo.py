@@ -1,0 +1,120 @@
+"""Plain sequencers to compare with: random search, and first in, first out."""
+
+import numpy as np
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Episode
+from lab.sequencing.cell.objectives import cost
+from lab.sequencing.cell.routes import choice_of, part_of
+from lab.sequencing.cell.schedule import SequenceResult
+from lab.sequencing.methods.sessions import Learner, learn
+from lab.sequencing.search import Log, Search, kernel_seed
+from lab.sequencing.simulate.execution import WAIT, Choose, Observed, carry_out
+
+
+def random_search(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
+    """The best of so many sequences, each decision drawn evenly from the allowed ones.
+
+    By chance, each sequence is judged by the times of its own episode. Raises BadInput for an objective that the cell
+    does not allow, WorkFailed when every sequence ends in a deadlock. Source: thesis 7.6, random search.
+    """
+    log = learn(cell, search, kernel_seed(rng), Learner).log
+    log.check(cell)
+    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+
+
+def drawn_times(cell: Cell, search: Search, rng: np.random.Generator) -> Episode:
+    """The times of the next episode; a search without chance draws nothing."""
+    return Episode(cell) if search.chance == NO_CHANCE else Episode(cell, search.chance, kernel_seed(rng))
+
+
+def fifo(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
+    """One sequence, by the cell's own times: what is possible first is served first (see `first_in_first_out`).
+
+    When nothing is possible yet, the robot goes where something will be next and waits there: the sequence costs what
+    its simulation does. Raises BadInput and WorkFailed as `random_search`.
+    """
+    search.check(cell)
+    execution = carry_out(cell, lambda cell: _Queue(cell, stays=False))
+    log = Log(search)
+    log.note(tuple(execution.sequence), cost(execution.run, search.objective), execution.run.done)
+    log.check(cell)
+    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+
+
+def first_in_first_out(cell: Cell) -> Choose:
+    """The policy of a robot with a queue of tasks: a task joins it when an event makes it possible; the head is served.
+
+    Possible: there is room for it, the part has come, its machine has finished. With an empty queue the robot stays
+    where it is until the next event, so it costs more than the simulation of its sequence, where the robot goes ahead.
+    Parts that may choose between routes take them in turn, whether another has room or not. Tasks of the same moment:
+    first the part that has been ready longest, then the lowest decision. Source: thesis App. III.
+    """
+    return _Queue(cell, stays=True)
+
+
+class _Queue:
+    """Since when the next task of each part has been possible, as far as room is concerned; an entry a part."""
+
+    def __init__(self, cell: Cell, *, stays: bool) -> None:
+        self._routes = _route_of_choice(cell)
+        self._stays = stays
+        self._room_since_s: dict[int, float] = {}
+
+    def __call__(self, seen: Observed, allowed: tuple[int, ...]) -> int:
+        parts = seen.cell.parts
+        tasks: dict[int, int] = {}
+        for decision in allowed:
+            if self._in_turn(seen, decision):
+                tasks.setdefault(part_of(decision, parts), decision)
+        self._room_since_s = {part: self._room_since_s.get(part, seen.now_s) for part in tasks}
+        waiting = {part for part, decision in tasks.items() if _waits(seen, decision) and not seen.ready[part - 1]}
+        if self._stays and len(waiting) == len(tasks) and _something_comes(seen):
+            return WAIT
+        if not tasks:
+            return allowed[0]
+
+        def order(part: int) -> tuple[float, float, int]:
+            ready_s = seen.ready_s[part - 1]
+            possible_s = max(self._room_since_s[part], ready_s if _waits(seen, tasks[part]) else 0.0)
+            return possible_s, ready_s, tasks[part]
+
+        ready = [part for part in tasks if part not in waiting]
+        return tasks[min(ready or tasks, key=order)]
+
+    def _in_turn(self, seen: Observed, decision: int) -> bool:
+        """Whether the route that a part is about to take is the next one of its product; True once it is on one."""
+        cell, part = seen.cell, part_of(decision, seen.cell.parts)
+        if seen.locations[part - 1] != cell.starts[part - 1]:
+            return True
+        alike = [other for other in range(1, cell.parts + 1) if cell.order[other - 1] == cell.order[part - 1]]
+        gone = sum(seen.locations[other - 1] != cell.starts[other - 1] for other in alike)
+        routes = self._routes[cell.order[part - 1]]
+        return routes[choice_of(decision, cell.parts)] == gone % (routes[-1] + 1)
+
+
+def _waits(seen: Observed, decision: int) -> bool:
+    option = seen.option(decision)
+    return option is None or option.waits
+
+
+def _something_comes(seen: Observed) -> bool:
+    """Whether an event is still to come by itself: an arrival, the end of a process."""
+    arrivals = seen.cell.arrivals
+    to_arrive = arrivals is not None and seen.fetched < seen.cell.parts and not seen.ready[seen.fetched]
+    return to_arrive or any(
+        not ready and location != start
+        for ready, location, start in zip(seen.ready, seen.locations, seen.cell.starts, strict=True)
+    )
+
+
+def _route_of_choice(cell: Cell) -> dict[str, tuple[int, ...]]:
+    """Product -> the number of the route, from 0, that each choice at its start belongs to."""
+    return {
+        product.name: tuple(
+            number
+            for number, route in enumerate(product.routes)
+            for _ in range(2 if route[1].buffer is not None and cell.buffers == "free" else 1)
+        )
+        for product in cell.products
+    }

@@ -1,0 +1,150 @@
+"""Many sessions, for studies: each with uniform numbers of its own, whoever runs it, and in whatever company."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.random import SeedSequence
+from numpy.typing import NDArray
+
+from lab.errors import BadInput, unknown
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance
+from lab.sequencing.cell.objectives import MAKESPAN, check_objective
+from lab.sequencing.methods import session_kernels as episodes
+from lab.sequencing.methods.monte_carlo import MonteCarlo
+from lab.sequencing.methods.sessions import Learner, learn
+from lab.sequencing.methods.srl import Srl
+from lab.sequencing.methods.state_keys import Keys
+from lab.sequencing.search import Search
+from lab.sequencing.simulate import arrays, kernels
+from lab.sequencing.simulate.arrays import Floats, Ints
+
+METHODS: Mapping[str, type[Learner]] = MappingProxyType({kind.name: kind for kind in (Srl, MonteCarlo, Learner)})
+CHUNK = 2**20  # episodes at once: what their costs take is 8 MiB
+MOST_ROWS = 2**22  # a table that may need more rows grows as it is filled, session by session
+
+
+class Sessions(NamedTuple):
+    """What N sessions of E episodes came to, in the order of their numbers.
+
+    best_cost (N,): the best episode's, inf where all ended in deadlocks; sequences (N, L): its decisions, then zeros.
+    final_cost (N,): the greedy policy's at the end, with the cell's own times; NaN for random search, which has none.
+    convergence (N,): the first episode from which on the cost stays the same to the end (eq. 7.1). costs (N, E), of no
+    sessions unless asked for.
+    """
+
+    best_cost: Floats
+    final_cost: Floats
+    convergence: Ints
+    sequences: Ints
+    costs: Floats
+
+
+def run_sessions(
+    cell: Cell, method: str, search: Search, sessions: int, seed: int, *, first: int = 0, keep_costs: bool = False
+) -> Sessions:
+    """Sessions number `first` and on of a seed, from 0, by a method of METHODS; nobody is told of their episodes.
+
+    Session n has the same random numbers whatever `first` and `sessions` are: workers may share them out. With chance,
+    every episode of every session meets times of its own.
+    Raises BadInput for an unknown method, fewer than 1 session, and as `learn` does.
+    """
+    if method not in METHODS:
+        raise unknown("method", method, METHODS, "sessions")
+    if sessions < 1 or first < 0:
+        raise BadInput(f"sessions = {sessions} from number {first}: allowed are at least 1, from number 0")
+    search.check(cell)
+    seeds = session_seeds(seed, first + sessions)[first:]
+    size = max(1, CHUNK // search.episodes)
+    found = []
+    for n in range(0, sessions, size):
+        chunk = _chunk(cell, METHODS[method], search, seeds[n : n + size])
+        found.append(chunk if keep_costs else chunk._replace(costs=chunk.costs[:0]))
+    return Sessions(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def evaluate(
+    cell: Cell,
+    sequences: Sequence[Sequence[int]],
+    seeds: Sequence[int],
+    chance: Chance = NO_CHANCE,
+    objective: str = MAKESPAN,
+) -> Floats:
+    """The costs (N, M) of N sequences in M episodes; an episode's seed means the same times as in `chance.Episode`.
+
+    A sequence that leaves something undone costs as much as a deadlock.
+    Raises BadInput for an objective that the cell cannot be judged by, and for a sequence that it cannot carry out.
+    """
+    check_objective(objective, cell)
+    lengths = np.array([len(sequence) for sequence in sequences], np.int64)
+    rows = np.zeros((len(sequences), lengths.max(initial=0)), np.int64)
+    for row, sequence in zip(rows, sequences, strict=True):
+        row[: len(sequence)] = sequence
+    costs = np.zeros((len(sequences), len(seeds)))
+    there = arrays.cell_arrays(cell, objective, chance)
+    kernels.follow_all(there, arrays.run_arrays(cell), rows, lengths, np.array(seeds, np.uint64), costs)
+    for sequence in (sequences[n] for n in np.flatnonzero(np.isnan(costs).any(axis=1)).tolist()):
+        raise BadInput(f"sequence {list(sequence)}: it has a decision that may not be taken there")
+    return costs
+
+
+def session_seeds(seed: int, sessions: int) -> NDArray[np.uint64]:
+    """The seeds of sessions 0 to `sessions` - 1."""
+    return np.asarray(SeedSequence(seed).generate_state(sessions, np.uint64), np.uint64)
+
+
+def _chunk(cell: Cell, kind: type[Learner], search: Search, seeds: NDArray[np.uint64]) -> Sessions:
+    """Some sessions, with all their costs."""
+    keys, moves = kind.keys(cell, search.settings), arrays.most_moves(cell)
+    costs, sequences = np.zeros((len(seeds), search.episodes)), np.zeros((len(seeds), moves), np.int64)
+    ends = np.zeros((len(seeds), 2))
+    if keys is None or min(keys.size, search.episodes * moves) > MOST_ROWS:
+        for n, seed in enumerate(seeds.tolist()):
+            learned = learn(cell, replace(search, on_episode=None), seed, kind)
+            costs[n], ends[n] = learned.log.costs, (learned.log.best_cost, learned.final_cost)
+            sequences[n, : len(learned.log.best)] = learned.log.best
+    else:
+        _together(cell, kind(search), search, keys, seeds, costs, sequences, ends)
+    if kind is Learner:
+        ends[:, 1] = np.nan
+    return Sessions(ends[:, 0], ends[:, 1], _convergence(costs), sequences, costs)
+
+
+def _together(
+    cell: Cell,
+    learner: Learner,
+    search: Search,
+    keys: Keys,
+    seeds: NDArray[np.uint64],
+    costs: Floats,
+    sequences: Ints,
+    ends: Floats,
+) -> None:
+    """Sessions in one compiled call; their costs, best sequences, and best and final costs are written to the last three."""
+    numbers = range(1, search.episodes + 1)
+    memory = arrays.memory_for(keys.size, search.episodes * arrays.most_moves(cell), learner.first)
+    episodes.advance(
+        arrays.cell_arrays(cell, search.objective, search.chance),
+        arrays.cell_arrays(cell, search.objective),
+        keys,
+        learner.rules,
+        arrays.work_for(cell, memory),
+        seeds,
+        np.array([learner.epsilon(episode) for episode in numbers]),
+        1,
+        costs,
+        np.zeros(costs.shape, np.bool_),
+        sequences,
+        ends,
+    )
+    learner.check(float(costs.min()))
+
+
+def _convergence(costs: Floats) -> Ints:
+    """By session, the first episode of the equal ones at the end. Source: thesis eq. 7.1 and its listing."""
+    changes = costs[:, 1:] != costs[:, :-1]
+    episode = np.arange(2, costs.shape[1] + 1)
+    return np.asarray(np.max(np.where(changes, episode, 1), axis=1, initial=1), np.int64)

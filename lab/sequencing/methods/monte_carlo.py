@@ -1,0 +1,54 @@
+"""The Monte Carlo method that thesis ch. 7.6 compares SRL with."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.schedule import LearnedSequence
+from lab.sequencing.methods.sessions import GreedyLearner, Table, Values, learn
+from lab.sequencing.methods.state_keys import Key
+from lab.sequencing.methods.updates import average, gain
+from lab.sequencing.search import Search, kernel_seed
+
+
+@dataclass(frozen=True)
+class MonteCarloResult(LearnedSequence):
+    """A sequencer's result, and what was learned: `q` by state and decision (see `keys.key_of`), where visited."""
+
+    q: Table
+
+
+class MonteCarlo(GreedyLearner):
+    """Q is the average of the returns of the episodes in which a pair was visited; 1 before the first, as in the listing.
+
+    No return of the thesis's cells comes near 1, so the greedy choice tries what was never tried before all else.
+    """
+
+    name = "mc"
+    first = 1.0
+
+    def __init__(self, search: Search) -> None:
+        super().__init__(search)
+        self.visits: dict[Key, int] = {}
+
+    def end(self, values: Values, trail: list[Key], cost: float, best_before: float) -> None:
+        """Takes the episode's return into the averages, once for each visit."""
+        worth = gain(cost, self.rules.offset)
+        for key in trail:
+            before = self.visits.get(key, 0)
+            values[key] = average(values[key], before, worth)
+            self.visits[key] = before + 1
+
+
+def monte_carlo(cell: Cell, search: Search, rng: np.random.Generator) -> MonteCarloResult:
+    """Learn a sequence in so many episodes; the best one found is the result.
+
+    The return of an episode is 1 / T of its makespan [s], or 1 / (1 + cost) of another objective. Decisions are chosen
+    as in `srl`. Raises BadInput for an objective that the cell has not got what it takes for, and for a makespan of 0 s;
+    WorkFailed when every episode ended in a deadlock. Source: thesis ch. 7.6 and its listing (Q = 1 at the start).
+    """
+    learned = learn(cell, search, kernel_seed(rng), MonteCarlo)
+    log = learned.log
+    log.check(cell)
+    return MonteCarloResult(log.best, log.best_cost, tuple(log.costs), learned.final_cost, learned.table)

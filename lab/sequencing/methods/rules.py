@@ -1,0 +1,236 @@
+"""Dispatching rules: which of the allowed decisions to take next, by one number; ties go to the lowest decision.
+
+A rule looks at a run as it stands and never ahead, so it plans (by a cell's own times) as well as it reacts (see
+`execute`). Every rule may end in a deadlock where a cell has one.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from types import MappingProxyType
+
+from lab.errors import BadInput
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import Episode
+from lab.sequencing.cell.objectives import cost
+from lab.sequencing.cell.routes import Option, from_the_ends, part_of
+from lab.sequencing.cell.schedule import SequenceResult
+from lab.sequencing.search import Log, Search
+from lab.sequencing.simulate.run import Run
+
+Rule = Callable[[Run, tuple[int, ...]], int]
+
+
+def shortest_move(run: Run, allowed: tuple[int, ...]) -> int:
+    """The shortest move: travel to the pick, service there, and the way to the drop; waiting does not count.
+
+    Source: shortest travel time, STT/D, of Egbelu and Tanchoco 1984, with the loaded part of the way.
+    """
+
+    def seconds(option: Option) -> float:
+        return _reach_s(run, option) + option.service_s + float(run.cell.loaded_s[option.origin, option.target])
+
+    return min(allowed, key=lambda decision: (seconds(_option(run, decision)), decision))
+
+
+def longest_remaining_work(run: Run, allowed: tuple[int, ...]) -> int:
+    """The part with the most work left: what its machine still has to do, then processing, moves and services to the end.
+
+    Where a part has several ways on, the shortest one counts. Source: MWKR in Panwalkar and Iskander 1977.
+    """
+    left_s = work_left_s(run.cell)
+
+    def seconds(decision: int) -> float:
+        index = part_of(decision, run.cell.parts) - 1
+        return max(0.0, run.ready_s[index] - run.now_s) + left_s[run.locations[index]]
+
+    return min(allowed, key=lambda decision: (-seconds(decision), decision))
+
+
+def most_urgent_machine(run: Run, allowed: tuple[int, ...]) -> int:
+    """The decision that feeds, or empties, the machine most behind; of several the one that drops soonest.
+
+    Most behind: the machine that would end last if from now on it never stood still, which is when it is through with
+    what it has, plus all processing still to come to it (divided by its capacity; where parts may choose between routes,
+    an even share for each). A machine with nothing to come is never behind. A decision feeds the first machine that the
+    part comes to, and empties the one it leaves. Source: bottleneck starvation avoidance, Glassey and Resende 1988.
+    """
+    ends_s = _machine_ends_s(run)
+    feeds = _feeds(run.cell)
+
+    def key(decision: int) -> tuple[float, float, int]:
+        option = _option(run, decision)
+        here = run.cell.positions[run.locations[part_of(decision, run.cell.parts) - 1]]
+        served = {*feeds[option.to], *here.holds}
+        return -max((ends_s.get(station, 0.0) for station in served), default=0.0), _drop_s(run, decision), decision
+
+    return min(allowed, key=key)
+
+
+def earliest_due(run: Run, allowed: tuple[int, ...]) -> int:
+    """The part that is due first; BadInput when the cell has no due times. Source: EDD, Jackson 1955."""
+    due_s = run.cell.due_s
+    if due_s is None:
+        raise BadInput("rule 'earliest-due': the cell has no due times (due_s)")
+    return min(allowed, key=lambda decision: (due_s[part_of(decision, run.cell.parts) - 1], decision))
+
+
+def nearest_ready(run: Run, allowed: tuple[int, ...]) -> int:
+    """The decision whose pick, or service before it, can begin soonest: the later of getting there and being ready.
+
+    Source: earliest start first, as non-delay schedules are generated (Baker 1974), with the robot as the resource.
+    """
+    return min(allowed, key=lambda decision: (_begin_s(run, decision), decision))
+
+
+# name -> function(run, allowed decisions) -> one of them
+RULES: Mapping[str, Rule] = MappingProxyType(
+    {
+        "shortest-move": shortest_move,
+        "longest-remaining-work": longest_remaining_work,
+        "most-urgent-machine": most_urgent_machine,
+        "earliest-due": earliest_due,
+        "nearest-ready": nearest_ready,
+    }
+)
+WITH_DUE_TIMES = ("earliest-due",)
+
+
+def usable(cell: Cell) -> dict[str, Rule]:
+    """The rules that this cell has the data for."""
+    return {name: rule for name, rule in RULES.items() if cell.due_s is not None or name not in WITH_DUE_TIMES}
+
+
+def dispatch(cell: Cell, rule: Rule, times: Episode | None = None) -> tuple[Run, tuple[int, ...]]:
+    """The run that a rule makes of a cell, to the end or to a deadlock, and its decisions."""
+    run, sequence = Run(cell, times), []
+    while allowed := run.allowed():
+        sequence.append(rule(run, allowed))
+        run.move(sequence[-1])
+    return run, tuple(sequence)
+
+
+def dispatched(cell: Cell, rule: Rule, search: Search) -> SequenceResult:
+    """A rule as a sequencer: its one sequence, by the cell's own times.
+
+    Raises BadInput for an objective or a rule that the cell has no data for, WorkFailed when it ends in a deadlock.
+    """
+    search.check(cell)
+    run, sequence = dispatch(cell, rule)
+    log = Log(search)
+    log.note(sequence, cost(run, search.objective), run.done)
+    log.check(cell)
+    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+
+
+def first_come(cell: Cell) -> tuple[int, ...]:
+    """A sequence that comes to its end: what is ready first goes first; when that ends in a deadlock, part after part.
+
+    One part alone never meets a full station: its routes are sound, and every station has room for one.
+    """
+    run, sequence = Run(cell), list[int]()
+    while allowed := run.allowed():
+        sequence.append(min(allowed, key=lambda decision: run.ready_s[part_of(decision, cell.parts) - 1]))
+        run.move(sequence[-1])
+    if run.done:
+        return tuple(sequence)
+    run, sequence = Run(cell), []
+    for part in range(1, cell.parts + 1):
+        while run.finished_s[part - 1] is None:
+            sequence.append(next(one for one in run.allowed() if part_of(one, cell.parts) == part))
+            run.move(sequence[-1])
+    return tuple(sequence)
+
+
+@lru_cache(maxsize=16)
+def work_left_s(cell: Cell) -> tuple[float, ...]:
+    """Seconds of moves, services and processing from each position to the end, by the shortest way, processing there left out.
+
+    (positions,) in the order of `cell.positions`.
+    """
+
+    def left_s(place: int, ahead: list[float]) -> float:
+        ways = [
+            option.service_s
+            + float(cell.loaded_s[option.origin, option.target])
+            + (cell.positions[option.to].processing_s or 0.0)
+            + then
+            for option, then in zip(cell.positions[place].options, ahead, strict=True)
+        ]
+        return min(ways, default=0.0)
+
+    return tuple(from_the_ends(cell.positions, left_s))
+
+
+@lru_cache(maxsize=16)
+def _loads_s(cell: Cell) -> tuple[dict[int, float], ...]:
+    """For each position, station index -> processing still to come there [s], averaged over the ways on."""
+
+    def loads_s(place: int, ahead: list[dict[int, float]]) -> dict[int, float]:
+        total: dict[int, float] = {}
+        for option, then in zip(cell.positions[place].options, ahead, strict=True):
+            there, own = cell.positions[option.to], dict(then)
+            if there.processing_s and (machine := _machine(cell, option.to)) is not None:
+                own[machine] = own.get(machine, 0.0) + there.processing_s
+            for station, seconds in own.items():
+                total[station] = total.get(station, 0.0) + seconds / len(ahead)
+        return total
+
+    return tuple(from_the_ends(cell.positions, loads_s))
+
+
+@lru_cache(maxsize=16)
+def _feeds(cell: Cell) -> tuple[frozenset[int], ...]:
+    """For each position, the machines that a part there is at, or else comes to first."""
+
+    def feeds(place: int, ahead: list[frozenset[int]]) -> frozenset[int]:
+        machine = _machine(cell, place)
+        return frozenset().union(*ahead) if machine is None else frozenset({machine})
+
+    return tuple(from_the_ends(cell.positions, feeds))
+
+
+def _machine(cell: Cell, position: int) -> int | None:
+    """The machine, by station index, that the part takes room in; None: it is in none."""
+    holds = cell.positions[position].holds
+    return next((station for station in holds if cell.stations[station].kind == "machine"), None)
+
+
+def _machine_ends_s(run: Run) -> dict[int, float]:
+    """Station index -> when the machine would end without ever standing still [s]; only machines with work to come."""
+    cell, loads_s = run.cell, _loads_s(run.cell)
+    to_come_s: dict[int, float] = {}
+    through_s: dict[int, list[float]] = {}
+    for index, position in enumerate(run.locations):
+        for station, seconds in loads_s[position].items():
+            to_come_s[station] = to_come_s.get(station, 0.0) + seconds / cell.capacities[station]
+        if (machine := _machine(cell, position)) is not None:
+            through_s.setdefault(machine, []).append(run.ready_s[index])
+    ends_s = {}
+    for station, seconds in to_come_s.items():
+        busy_s = through_s.get(station, [])
+        # The first of its places to be through with its part counts, once all are taken.
+        free_s = min(busy_s) if len(busy_s) == cell.capacities[station] else 0.0
+        ends_s[station] = max(run.now_s, free_s) + seconds
+    return ends_s
+
+
+def _option(run: Run, decision: int) -> Option:
+    option = run.option(decision)
+    if option is None:
+        raise BadInput(run.refusal(decision))
+    return option
+
+
+def _reach_s(run: Run, option: Option) -> float:
+    return 0.0 if run.robot == option.origin else float(run.cell.empty_s[run.robot, option.origin])
+
+
+def _begin_s(run: Run, decision: int) -> float:
+    option = _option(run, decision)
+    ready_s = run.ready_s[part_of(decision, run.cell.parts) - 1] if option.waits else 0.0
+    return max(run.now_s + _reach_s(run, option), ready_s)
+
+
+def _drop_s(run: Run, decision: int) -> float:
+    option = _option(run, decision)
+    return _begin_s(run, decision) + option.service_s + float(run.cell.loaded_s[option.origin, option.target])

@@ -1,0 +1,211 @@
+"""Sessions that learn in the simulation of `kernels`, compiled with numba; held equal to `sessions`."""
+
+from typing import Any
+
+import numpy as np
+
+from lab.compiled import inner, lean
+from lab.learning import splitmix
+from lab.sequencing.methods import updates
+from lab.sequencing.simulate.arrays import LEARNER_CODES
+from lab.sequencing.simulate.kernels import cost, fraction, list_allowed, mixed, move, reset, uniform
+
+RANDOM, SRL, MONTE_CARLO = (LEARNER_CODES[name] for name in ("random", "srl", "mc"))
+_explore, _best_of, _log_sum = inner(updates.explore), inner(updates.best_of), inner(updates.log_sum)
+_following = inner(splitmix.following)
+_gain, _log_factor, _average = inner(updates.gain), inner(updates.log_factor), inner(updates.average)
+
+
+@inner
+def _next_uniform(stream: Any) -> float:
+    """`splitmix.stream`."""
+    stream[0] = _following(stream[0])
+    return float(fraction(mixed(stream[0])))
+
+
+@inner
+def _episode_seed(seed: Any, episode: int) -> Any:
+    """`sessions.episode_seed`."""
+    return np.uint64(uniform(~seed, episode) * 2.0**53)
+
+
+@inner
+def _find(memory: Any, key: int) -> Any:
+    """The row of a key, 0 when it has none."""
+    if memory.dense:
+        return np.int64(memory.rows[key])
+    mask = np.uint64(len(memory.rows) - 1)
+    at = mixed(np.uint64(key)) & mask
+    while memory.rows[at] != 0 and memory.keys[memory.rows[at]] != key:
+        at = (at + np.uint64(1)) & mask
+    return np.int64(memory.rows[at])
+
+
+@inner
+def _add(memory: Any, key: int, value: float, visits: int) -> Any:
+    """A row for a key that has none."""
+    row = memory.used[0] + 1
+    memory.used[0], memory.keys[row], memory.values[row], memory.visits[row] = row, key, value, visits
+    at = np.uint64(key)
+    if not memory.dense:
+        mask = np.uint64(len(memory.rows) - 1)
+        at = mixed(at) & mask
+        while memory.rows[at] != 0:
+            at = (at + np.uint64(1)) & mask
+    memory.rows[at] = row
+    return row
+
+
+@lean
+def copy_rows(memory: Any, larger: Any) -> None:
+    """All rows of a table into an empty one with more room."""
+    for row in range(1, memory.used[0] + 1):
+        _add(larger, memory.keys[row], memory.values[row], memory.visits[row])
+
+
+@inner
+def _begin(work: Any, seed: Any) -> None:
+    """Forgets what a session has learned, and begins the random numbers of a seed (uint64)."""
+    memory = work.memory
+    if memory.dense:
+        for row in range(1, memory.used[0] + 1):
+            memory.rows[memory.keys[row]] = 0
+    else:
+        memory.rows[:] = 0
+    memory.used[0], work.stream[0] = 0, seed
+    work.best[:], work.best_cost[0] = 0, np.inf
+
+
+@inner
+def _state_number(keys: Any, run: Any) -> int:
+    number = 0
+    for part in range(len(run.locations)):
+        number += keys.weight[part, run.locations[part]]
+        if keys.merged and run.ready_s[part] <= run.clock[0]:
+            number += keys.done[run.locations[part]]
+    return number
+
+
+@inner
+def _key(cell: Any, keys: Any, run: Any, state: int, i: int) -> Any:
+    """`keys.key_of`: of the i-th allowed decision in a state of this number."""
+    part, o = (run.allowed[i] - 1) % len(run.locations), run.options[i]
+    here, there = run.locations[part], cell.to[o]
+    if keys.pairs:
+        label = here + cell.choice[o] * len(cell.begins) if keys.merged else run.allowed[i] - 1
+        return state * keys.labels + label
+    after = state - keys.weight[part, here] + keys.weight[part, there]
+    if keys.merged and run.ready_s[part] <= run.clock[0]:
+        after -= keys.done[here]
+        if not cell.begins[there]:
+            after += keys.done[there]
+    return after
+
+
+@inner
+def _choose(cell: Any, keys: Any, work: Any, state: int, count: int, epsilon: float) -> int:
+    """`sessions.choose`: which of the allowed decisions; no number is drawn where there is only one."""
+    if count == 1:
+        return 0
+    u = _next_uniform(work.stream)
+    if u < epsilon:
+        return int(_explore(u, epsilon, count))
+    for i in range(count):
+        work.values[i] = work.memory.values[_find(work.memory, _key(cell, keys, work.run, state, i))]
+    return int(_best_of(work.values, count, (u - epsilon) / (1.0 - epsilon)))
+
+
+@inner
+def _episode(cell: Any, keys: Any, rules: Any, work: Any, epsilon: float, seed: Any, learns: bool) -> int:
+    """`sessions.walk`: one pass with the step update of SRL where it learns; how many moves were made."""
+    run, memory = work.run, work.memory
+    reset(cell, run, seed)
+    moves, row, state = 0, 0, 0
+    count = list_allowed(cell, run)
+    while count > 0:
+        if rules.learner != RANDOM:
+            state = _state_number(keys, run)
+        i = _choose(cell, keys, work, state, count, epsilon)
+        if learns:
+            key = _key(cell, keys, run, state, i)
+            following = _find(memory, key)
+            if following == 0:
+                following = _add(memory, key, memory.values[0], 0)
+            if rules.learner == SRL and moves > 0:
+                value = memory.values[row] + rules.log_keep
+                memory.values[row] = _log_sum(value, memory.values[following] + rules.log_take)
+            work.trail[moves] = row = following
+        work.sequence[moves] = run.allowed[i]
+        moves += 1
+        move(cell, run, i, seed)
+        count = list_allowed(cell, run)
+    if learns and rules.learner == SRL:
+        if run.whole[2] == 0:
+            memory.values[row] = _log_sum(memory.values[row] + rules.end_keep, rules.end_add)
+        else:
+            memory.values[row] += rules.log_keep
+    return moves
+
+
+@inner
+def _learn(rules: Any, work: Any, moves: int, value: float, best_before: float) -> None:
+    """`Learner.end`: what the cost of an episode does to the values of what was visited, once for each visit."""
+    memory = work.memory
+    if rules.learner == SRL:
+        factor = _log_factor(value, best_before, rules.type_a, rules.offset)
+        for m in range(moves):
+            memory.values[work.trail[m]] += factor
+    elif rules.learner == MONTE_CARLO:
+        worth = _gain(value, rules.offset)
+        for m in range(moves):
+            row = work.trail[m]
+            memory.values[row] = _average(memory.values[row], memory.visits[row], worth)
+            memory.visits[row] += 1
+
+
+@inner
+def _advance(
+    cell: Any, keys: Any, rules: Any, work: Any, seed: Any, epsilons: Any, first: int, costs: Any, complete: Any
+) -> None:
+    """Episodes of a session, numbered from `first`; epsilons, costs and complete (E,) are theirs."""
+    for n in range(len(epsilons)):
+        moves = _episode(cell, keys, rules, work, epsilons[n], _episode_seed(seed, first + n), rules.learner != RANDOM)
+        costs[n], complete[n] = cost(cell, work.run), work.run.whole[2] == 0
+        _learn(rules, work, moves, costs[n], work.best_cost[0])
+        if complete[n] and costs[n] < work.best_cost[0]:
+            work.best_cost[0] = costs[n]
+            for m in range(len(work.best)):
+                work.best[m] = work.sequence[m] if m < moves else 0
+
+
+@lean
+def advance(
+    cell: Any,
+    calm: Any,
+    keys: Any,
+    rules: Any,
+    work: Any,
+    seeds: Any,
+    epsilons: Any,
+    first: int,
+    costs: Any,
+    complete: Any,
+    sequences: Any,
+    ends: Any,
+) -> None:
+    """Sessions of the seeds (N,): E episodes numbered from `first`, and what the greedy policy costs then.
+
+    first: 1, or how far the last session has come, as left in `work`. calm: the cell without chance. epsilons (E,);
+    costs, complete (N, E): of the episodes. sequences (N, L): the best so far; ends (N, 2): its cost, and the greedy
+    policy's. The only entry to this module's compiled sessions: each one more would take seconds to compile.
+    """
+    for n in range(len(seeds)):
+        if first == 1:
+            _begin(work, seeds[n])
+        _advance(cell, keys, rules, work, seeds[n], epsilons, first, costs[n], complete[n])
+        stream = work.stream[0]
+        _episode(calm, keys, rules, work, 0.0, seeds[n], False)
+        work.stream[0] = stream
+        ends[n, 0], ends[n, 1] = work.best_cost[0], cost(calm, work.run)
+        for m in range(len(work.best)):
+            sequences[n, m] = work.best[m]

@@ -1,0 +1,192 @@
+"""SRL improved: what time costs is learned step by step, alike parts are one, and values begin at a lower bound."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import inf
+
+import numpy as np
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, machine_places, stuck_cost
+from lab.sequencing.cell.schedule import LearnedSequence
+from lab.sequencing.cell.ways import TICKS_PER_S
+from lab.sequencing.methods.lower_bound import LowerBound
+from lab.sequencing.search import SAME, Log, Search
+from lab.sequencing.simulate.merged import Key, MergedCell, State
+
+SMALL_JOBS = (5, 6, 7)  # parts; what is learned with so few is tried with more
+PRACTICE, TRIES = 5, 20  # each small job is practised in a fifth of the episodes, and tried in a twentieth
+
+Action = tuple[int, int, int]  # position, choice, and the part where parts are told apart (else 0)
+Row = dict[Action, float]
+Table = dict[tuple[object, ...], Row]
+
+
+@dataclass(frozen=True)
+class SrlTimeResult(LearnedSequence):
+    """A sequencer's result, and what was learned: the cost still to come, by state and by what to move next.
+
+    A state is how many parts stand at each position, where the robot is, and how long is still to be waited for what is
+    processed or arrives [ticks of a nanosecond]. With many parts `final_cost` is that of the best policy learned with
+    few or with all.
+    """
+
+    q: Table
+
+
+def srl_time(cell: Cell, search: Search, rng: np.random.Generator) -> SrlTimeResult:
+    """Learn in simulated episodes which position to serve next; the best sequence found is the result.
+
+    Where alike parts are more than in SMALL_JOBS, these are learned first, each in a fifth of the episodes, and what was
+    learned is tried on the job in a twentieth: with many parts waiting and many done, it does not matter how many. In
+    what is left the job itself is learned. `episode_costs` are those of the job.
+    Q(s,a) begins at what the step costs and what has to come at least after it (`lower_bound`), never above the
+    truth, so that greedy choices explore by themselves; ties are drawn by `rng`. After an episode, from its last step to
+    its first, Q(s,a) = cost of the step + min Q(s',.): Q-learning with alpha 1, exact where nothing is left to chance. It
+    learns with the mean times; `srl_time_reacting` goes on learning where times are drawn. Raises BadInput for an
+    objective that the cell has no times for.
+    Source: Q-learning (Watkins 1989) with admissible start values, as learning real-time A* (Korf 1990).
+    """
+    search.check(cell)
+    log, final = Log(search), inf
+    learner, left = Learner(cell, search.objective, rng), search.episodes
+    for parts in SMALL_JOBS if _many_alike(cell) else ():
+        practice, tries = search.episodes // PRACTICE, search.episodes // TRIES
+        small = Learner(replace(cell, order=cell.order[:parts]), search.objective, rng)
+        for _ in range(practice):
+            small.episode()
+        for _ in range(tries):
+            sequence, cost, done = small.tried_on(learner)
+            log.note(sequence, cost, done)
+            final = min(final, cost)
+        left -= practice + tries
+    for _ in range(left):
+        log.note(*learner.episode())
+    final = min(final, learner.episode(learns=False)[1])
+    log.check(cell)
+    return SrlTimeResult(log.best, log.best_cost, tuple(log.costs), final, learner.q)
+
+
+def _many_alike(cell: Cell) -> bool:
+    alike = len(set(cell.order)) == 1 and cell.arrivals is None and cell.due_s is None
+    return alike and cell.parts > max(SMALL_JOBS)
+
+
+class Learner:
+    """The table, and how an episode goes. distinct: alike parts are told apart, which due times make necessary."""
+
+    def __init__(self, cell: Cell, objective: str, rng: np.random.Generator) -> None:
+        self.q: Table = {}
+        self.merged = MergedCell(cell)
+        self.distinct = objective in WITH_DUE_TIMES
+        self._cell, self._objective, self._rng = cell, objective, rng
+        self._bound = LowerBound(self.merged) if objective in (MAKESPAN, "machine-idle") else None
+        self.stuck_cost, self._machines = stuck_cost(cell, objective), machine_places(cell)
+        self._all_work_s = sum(place.processing_s or 0.0 for place in cell.positions)
+
+    def greedy(self, state: State) -> Action:
+        """The action of least cost to come."""
+        return self._best(self._row(state))
+
+    def episode(self, begin: State | None = None, *, learns: bool = True) -> tuple[tuple[int, ...], float, bool]:
+        """One greedy pass, from the start or from `begin`; the decisions, their cost, and whether it came to its end."""
+        state, sequence, total = begin or self.merged.start(named=True), list[int](), 0.0
+        steps: list[tuple[Row, Action, float, Row]] = []
+        row = self._row(state)
+        while row:
+            action = self._best(row)
+            state, cost = self.step(state, action)
+            sequence.append(self.merged.decision(state))
+            total += cost
+            following = self._row(state)
+            steps.append((row, action, cost, following))
+            row = following
+        done = self.merged.done(state)
+        rest = 0.0 if done else self.stuck_cost
+        for row, action, cost, following in reversed(steps) if learns else ():
+            row[action] = cost + min(following.values(), default=rest)
+        return tuple(sequence), total if done else self.stuck_cost, done
+
+    def step(self, state: State, action: Action) -> tuple[State, float]:
+        """The state after an action, and what that adds to the cost."""
+        place, choice, part = action
+        way = self.merged.choices(state)[place, choice]
+        ahead = self.merged.after(state, way, part)
+        if self._objective == MAKESPAN:
+            return ahead, (ahead.now - state.now) / TICKS_PER_S
+        if self.distinct:
+            return ahead, self._late(ahead) if way.option.to in self.merged.ends else 0.0
+        if self._objective == "robot-idle":
+            return ahead, self.merged.waited(state, ahead) / TICKS_PER_S
+        worked = self.merged.process[way.option.to] or 0
+        return ahead, (self._machines * (ahead.now - state.now) - worked) / TICKS_PER_S
+
+    def tried_on(self, job: "Learner") -> tuple[tuple[int, ...], float, bool]:
+        """One greedy pass through a larger job by what was learned in this one; what `episode` returns.
+
+        As how many the done parts count while others still wait is drawn. Where nothing is known it serves any part.
+        """
+        state, sequence, total = job.merged.start(named=True), list[int](), 0.0
+        done = int(self._rng.integers(1, self._cell.parts - 1))
+        while possible := list(job.actions(state)):
+            row = self.q.get(self._as_if_small(job.merged, state, done), {})
+            known = {action: row[action] for action in possible if action in row}
+            state, cost = job.step(state, self._best(known or dict.fromkeys(possible, 0.0)))
+            sequence.append(job.merged.decision(state))
+            total += cost
+        complete = job.merged.done(state)
+        return tuple(sequence), total if complete else job.stuck_cost, complete
+
+    def actions(self, state: State) -> Iterator[Action]:
+        """What may be done now: from which position, by which of its ways, and with which part where that matters."""
+        for place, choice in self.merged.choices(state):
+            if not self.distinct or state.who is None:
+                yield place, choice, 0
+                continue
+            in_order = self._cell.arrivals is not None and place in self.merged.starts
+            for part in state.who[place][:1] if in_order else state.who[place]:
+                yield place, choice, part
+
+    def _as_if_small(self, job: MergedCell, state: State, done: int) -> Key:
+        """The state of a larger job as it would be with this one's few: those that wait and those that are done are fewer."""
+        counts, first, ends = job.counted(state.counts), self._cell.starts[0], job.ends
+        finished = sum(counts[place] for place in ends)
+        here = self._cell.parts - (sum(counts) - counts[first] - finished)
+        counts[first] = max(0, min(counts[first], here - min(done, finished)))
+        for place in ends:
+            counts[place] = 0
+        counts[ends[0]] = here - counts[first]
+        _, robot, waits = job.key(state)
+        return job.code(counts), robot, waits
+
+    def _row(self, state: State) -> Row:
+        """The values of what may be done now; none when all is done, or nothing can move any more."""
+        key = (*self.merged.key(state), state.now, state.who) if self.distinct else self.merged.key(state)
+        if key not in self.q:
+            self.q[key] = {action: self._at_least(state, action) for action in self.actions(state)}
+        return self.q[key]
+
+    def _at_least(self, state: State, action: Action) -> float:
+        """What an action costs, and what has to come at least after it."""
+        ahead, cost = self.step(state, action)
+        if self._bound is None:
+            return cost
+        least_s = self._bound.left(ahead) / TICKS_PER_S
+        return cost + (least_s if self._objective == MAKESPAN else self._machines * least_s - self._work_left_s(ahead))
+
+    def _work_left_s(self, state: State) -> float:
+        """More than what machines still will be given to do [s]."""
+        return (self._cell.parts - self.merged.finished(state)) * self._all_work_s
+
+    def _late(self, state: State) -> float:
+        """What the part costs that was just finished."""
+        due_s = self._cell.due_s
+        if due_s is None:
+            return 0.0
+        late_s = max(0.0, state.now / TICKS_PER_S - due_s[state.part - 1])
+        return float(late_s > 0) if self._objective == "tardy-parts" else late_s / self._cell.parts
+
+    def _best(self, row: Row) -> Action:
+        least = min(row.values())
+        ties = [action for action, value in row.items() if value <= least + SAME]
+        return ties[int(self._rng.integers(len(ties)))]

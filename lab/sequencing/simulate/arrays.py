@@ -1,0 +1,224 @@
+"""A cell, a run of it and a table of values as plain arrays: what the compiled simulation and sessions work on."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.sequencing.cell.cell import ARRIVALS_AFTER, Cell
+from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance
+from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, machine_places, stuck_cost
+from lab.sequencing.cell.routes import from_the_ends
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+WIDTH = 2  # stations that a position holds, or an option needs: at most a machine and the place of its pallet
+ENDLESS = 2**40  # room of a station that is never full
+NO_ARRIVALS = 0
+ARRIVAL_CODES = {name: code for code, name in enumerate(ARRIVALS_AFTER, 1)}
+LAW_CODES = {name: code for code, name in enumerate(LAWS)}
+OBJECTIVE_CODES = {name: code for code, name in enumerate(OBJECTIVES)}
+LEARNER_CODES = {"random": 0, "srl": 1, "mc": 2}
+DENSE_KEYS = 2**18  # up to so many keys a table has a place for each, above it is a hash table
+
+
+class CellArrays(NamedTuple):
+    """A cell of K parts, S stations, P positions with O options, what it is judged by, and what chance does to it.
+
+    first_option (P + 1,): where the options of each position begin. holds (P, 2), needs (O, 2) and if_full (O,):
+    stations; where there are fewer, S stands for one with endless room and S + 1 for one that is always full.
+    begins (P,): whether a processing begins there. rooms (S + 2,): room for parts. empty_s, loaded_s (S, S) [s];
+    interval_s, due_s (K,) [s]. many: whether a part may have several choices. The codes are those of this module.
+    """
+
+    first_option: Ints
+    holds: Ints
+    begins: Flags
+    processing_s: Floats
+    choice: Ints
+    to: Ints
+    origin: Ints
+    target: Ints
+    needs: Ints
+    if_full: Ints
+    service_s: Floats
+    waits: Flags
+    rooms: Ints
+    empty_s: Floats
+    loaded_s: Floats
+    starts: Ints
+    interval_s: Floats
+    due_s: Floats
+    robot_start: int
+    many: bool
+    arrivals: int
+    machines: int
+    objective: int
+    stuck_cost: float
+    processing_law: int
+    arrivals_law: int
+    spread: float
+
+
+class RunArrays(NamedTuple):
+    """A run, as `lab.sequencing.simulate.run.Run`, and the decisions allowed now.
+
+    locations, ready_s, finished_s (K,). room (S + 2,): what is left. clock (3,): now, waited, processed [s]. whole (3,):
+    the robot's station, parts fetched, parts not yet finished. allowed: decisions, ascending; options: what each means.
+    """
+
+    locations: Ints
+    ready_s: Floats
+    finished_s: Floats
+    room: Ints
+    clock: Floats
+    whole: Ints
+    allowed: Ints
+    options: Ints
+
+
+class Memory(NamedTuple):
+    """Values by key. Rows are filled from 1; row 0 has the value of every key that is not in the table.
+
+    rows: the row by key where `dense`, else an open hash table of rows. visits: by row, for averages. used (1,): the
+    last row filled.
+    """
+
+    rows: NDArray[np.int32]
+    keys: Ints
+    values: Floats
+    visits: Ints
+    used: Ints
+    dense: bool
+
+
+class Rules(NamedTuple):
+    """What is learned by. learner: one of LEARNER_CODES; the logarithms are those of the step update's factors.
+
+    log_keep: 1 - alpha, log_take: alpha times discount. end_keep and end_add: what the last value of a finished episode
+    is multiplied by, and what is added. type_a: the reward factor. offset: see `gain`.
+    """
+
+    learner: int
+    log_keep: float
+    log_take: float
+    end_keep: float
+    end_add: float
+    type_a: bool
+    offset: float
+
+
+class Work(NamedTuple):
+    """What a session of sequences of up to L moves writes to.
+
+    values: those of the allowed decisions. trail, sequence (L,): rows and decisions of the episode under way. best (L,),
+    best_cost (1,): the best sequence so far, then zeros; inf: none. stream (1,): the state of the random numbers.
+    """
+
+    run: RunArrays
+    memory: Memory
+    values: Floats
+    trail: Ints
+    sequence: Ints
+    best: Ints
+    best_cost: Floats
+    stream: NDArray[np.uint64]
+
+
+def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANCE) -> CellArrays:
+    """The cell as arrays, to be judged by an objective that it has been checked for (`check_objective`)."""
+    size, places = len(cell.stations), cell.positions
+    options = [option for place in places for option in place.options]
+    return CellArrays(
+        first_option=np.cumsum([0, *(len(place.options) for place in places)]),
+        holds=_padded([place.holds for place in places], size),
+        begins=np.array([place.processing_s is not None for place in places]),
+        processing_s=np.array([place.processing_s or 0.0 for place in places]),
+        choice=np.array([option.choice for option in options]),
+        to=np.array([option.to for option in options]),
+        origin=np.array([option.origin for option in options]),
+        target=np.array([option.target for option in options]),
+        needs=_padded([option.needs for option in options], size),
+        if_full=np.array([size + 1 if option.if_full is None else option.if_full for option in options]),
+        service_s=np.array([float(option.service_s) for option in options]),
+        waits=np.array([option.waits for option in options]),
+        rooms=np.array([*cell.capacities, ENDLESS, 0]),
+        empty_s=_with_stays(cell.empty_s),
+        loaded_s=_with_stays(cell.loaded_s),
+        starts=np.array(cell.starts),
+        interval_s=np.array(cell.arrivals.interval_s if cell.arrivals else (0.0,) * cell.parts, np.float64),
+        due_s=np.array(cell.due_s or (0.0,) * cell.parts, np.float64),
+        robot_start=cell.index(cell.robot_start),
+        many=most_choices(cell) > 1,
+        arrivals=ARRIVAL_CODES[cell.arrivals.after] if cell.arrivals else NO_ARRIVALS,
+        machines=machine_places(cell),
+        objective=OBJECTIVE_CODES[objective],
+        stuck_cost=float(stuck_cost(cell, objective)),
+        processing_law=LAW_CODES[chance.processing],
+        arrivals_law=LAW_CODES[chance.arrivals],
+        spread=float(chance.spread),
+    )
+
+
+def run_arrays(cell: Cell) -> RunArrays:
+    """Room for a run of the cell; `kernels.reset` fills it."""
+    decisions = cell.parts * most_choices(cell)
+    return RunArrays(
+        locations=np.zeros(cell.parts, np.int64),
+        ready_s=np.zeros(cell.parts),
+        finished_s=np.zeros(cell.parts),
+        room=np.zeros(len(cell.stations) + 2, np.int64),
+        clock=np.zeros(3),
+        whole=np.zeros(3, np.int64),
+        allowed=np.zeros(decisions, np.int64),
+        options=np.zeros(decisions, np.int64),
+    )
+
+
+def memory_for(keys: int, rows: int, first: float) -> Memory:
+    """An empty table for so many keys and up to so many rows; `first`: the value of what was never visited."""
+    rows = min(rows, keys)
+    dense = keys <= DENSE_KEYS
+    values = np.zeros(rows + 1)
+    values[0] = first
+    return Memory(
+        rows=np.zeros(keys if dense else 1 << (2 * rows).bit_length(), np.int32),
+        keys=np.zeros(rows + 1, np.int64),
+        values=values,
+        visits=np.zeros(rows + 1, np.int64),
+        used=np.zeros(1, np.int64),
+        dense=dense,
+    )
+
+
+def work_for(cell: Cell, memory: Memory) -> Work:
+    """Room for a session; `episodes.advance` makes it ready."""
+    run, moves = run_arrays(cell), most_moves(cell)
+    trail, sequence, best = np.zeros((3, moves), np.int64)
+    return Work(run, memory, np.zeros(len(run.allowed)), trail, sequence, best, np.zeros(1), np.zeros(1, np.uint64))
+
+
+def most_choices(cell: Cell) -> int:
+    """How many decisions a part may stand for at the most."""
+    return 1 + max(option.choice for place in cell.positions for option in place.options)
+
+
+def most_moves(cell: Cell) -> int:
+    """How many moves the longest sequence has."""
+    longest = from_the_ends(cell.positions, lambda _, ahead: max((1 + moves for moves in ahead), default=0))
+    return sum(longest[start] for start in cell.starts)
+
+
+def _padded(stations: Sequence[Sequence[int]], spare: int) -> Ints:
+    """One row each, filled up to WIDTH with `spare`."""
+    return np.array([[*given, *(spare,) * (WIDTH - len(given))] for given in stations], np.int64)
+
+
+def _with_stays(table: Floats) -> Floats:
+    """A copy in which staying takes 0 s."""
+    table = table.copy()
+    np.fill_diagonal(table, 0.0)
+    return table

@@ -1,0 +1,227 @@
+"""Carrying work out in a cell where times are drawn by chance: a fixed list of decisions, or a policy that reacts.
+
+A policy sees an `Observed` run: what stands where and what is finished, but not how long anything will still take.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput, WorkFailed
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import Chance, Episode
+from lab.sequencing.cell.objectives import MAKESPAN, check_objective, cost
+from lab.sequencing.cell.routes import choice_of, part_of
+from lab.sequencing.cell.schedule import Move, Schedule
+from lab.sequencing.methods.rules import Rule, usable
+from lab.sequencing.search import kernel_seed
+from lab.sequencing.simulate.run import Run, branch, follow, take_over
+
+WAIT = 0  # the decision to stay where the robot is until something happens: a machine finishes, a part arrives
+
+
+class Observed(Run):
+    """What can be known of a run while it goes on; itself a run, by the mean times, so that it can be played on.
+
+    ready: whether each part may be picked now, part 1 first. busy_s: for how long the part's machine has been working
+    on it [s]; 0 where none is. ready_s: when it was ready or, as long as it is not, when it should be: by the mean time
+    since it began, and now when it is later than that. processed_s counts means for what is not finished.
+    """
+
+    def __init__(self, run: Run) -> None:
+        super().__init__(run.cell)
+        take_over(self, run)
+        self.ready: tuple[bool, ...] = ()
+        self.busy_s: tuple[float, ...] = ()
+
+
+Choose = Callable[[Observed, tuple[int, ...]], int]  # (what is known, allowed decisions) -> one of them, or WAIT
+Policy = Callable[[Cell], Choose]  # called once an episode: what it remembers is of that episode
+Plan = Callable[[Run], Sequence[int]]  # the decisions from a run on, by the run's own times
+
+
+class Execution:
+    """A run whose times nobody knows beforehand, carried out decision by decision. `sequence`: without the waiting."""
+
+    def __init__(self, cell: Cell, times: Episode | None = None) -> None:
+        self.run = Run(cell, times)
+        self.moves: list[Move] = []
+        self.sequence: list[int] = []
+        # For each part: when its latest process began, and how long that takes on average; when it came to its first
+        # station, and when it was picked there.
+        self._began_s, self._mean_s = [0.0] * cell.parts, [0.0] * cell.parts
+        self._came_s, self._left_s = [0.0] * cell.parts, [0.0] * cell.parts
+
+    def observe(self) -> Observed:
+        """What is known now; nothing of it changes when the run goes on."""
+        run, seen = self.run, Observed(self.run)
+        seen.ready = tuple(
+            ready_s <= run.now_s and not self._coming(index) for index, ready_s in enumerate(run.ready_s)
+        )
+        busy_s = [0.0] * run.cell.parts
+        for index, ready in enumerate(seen.ready):
+            if not ready and not self._at_start(index):
+                began_s, mean_s = self._began_s[index], self._mean_s[index]
+                busy_s[index] = run.now_s - began_s
+                seen.ready_s[index] = max(run.now_s, began_s + mean_s)
+                seen.processed_s += mean_s - (run.ready_s[index] - began_s)
+        self._expect_arrivals(seen)
+        seen.busy_s = tuple(busy_s)
+        return seen
+
+    def step(self, decision: int) -> None:
+        """Carry a decision out, or wait for the next event; BadInput for a decision that may not be taken."""
+        if decision == WAIT:
+            self._wait()
+            return
+        run, index = self.run, part_of(decision, self.run.cell.parts) - 1
+        at_start, came_s = self._at_start(index), run.ready_s[index]
+        move = run.move(decision)
+        self.moves.append(move)
+        self.sequence.append(decision)
+        if at_start:
+            self._came_s[index], self._left_s[index] = came_s, move.pick_s
+        place = run.cell.positions[run.locations[index]]
+        if place.processing_s is not None:
+            self._began_s[index], self._mean_s[index] = move.drop_s, place.processing_s
+
+    def schedule(self) -> Schedule:
+        """The schedule of what has been carried out."""
+        return Schedule.from_moves(self.run.cell, self.moves, self.sequence, self._came_s)
+
+    def _wait(self) -> None:
+        run = self.run
+        coming_s = [ready_s for ready_s in run.ready_s if ready_s > run.now_s]
+        if not coming_s:
+            raise WorkFailed(f"the robot waits at {run.now_s:g} s, but nothing is going to happen: every part is ready")
+        run.waited_s += min(coming_s) - run.now_s
+        run.now_s = min(coming_s)
+
+    def _coming(self, index: int) -> bool:
+        """Whether the part has not even set out: where each is brought after a pick, those behind the next one."""
+        arrivals = self.run.cell.arrivals
+        after_pick = arrivals is not None and arrivals.after == "pick"
+        return after_pick and self._at_start(index) and index > self.run.fetched
+
+    def _at_start(self, index: int) -> bool:
+        return self.run.locations[index] == self.run.cell.starts[index]
+
+    def _expect_arrivals(self, seen: Observed) -> None:
+        """Each part that has not come is expected its mean interval after the one before; after a pick, if picked now."""
+        arrivals, came_s = seen.cell.arrivals, 0.0
+        if arrivals is None:
+            return
+        for index, mean_s in enumerate(arrivals.interval_s):
+            if not self._at_start(index):
+                came_s = self._left_s[index] if arrivals.after == "pick" else self._came_s[index]
+            elif seen.ready[index]:
+                came_s = seen.now_s if arrivals.after == "pick" else self.run.ready_s[index]
+            else:
+                came_s = seen.ready_s[index] = max(seen.now_s, came_s + mean_s)
+
+
+def carry_out(cell: Cell, policy: Policy, times: Episode | None = None) -> Execution:
+    """What a policy makes of one episode, to the end or to a deadlock."""
+    execution, choose = Execution(cell, times), policy(cell)
+    while allowed := execution.run.allowed():
+        execution.step(choose(execution.observe(), allowed))
+    return execution
+
+
+def replicate(
+    cell: Cell,
+    how: Policy | Sequence[int],
+    chance: Chance,
+    episodes: int,
+    seed: int,
+    objective: str = MAKESPAN,
+) -> NDArray[np.float64]:
+    """The cost of a policy, or of a fixed list, in each of so many episodes (episodes,); in seconds, for most objectives.
+
+    Episode n meets the same times whatever is carried out, and however many episodes there are: common random numbers,
+    so compare two policies by their differences. A deadlock costs `stuck_cost`. Raises BadInput for fewer than 1
+    episode, a negative seed, an objective that the cell does not allow, and a list that is not one of the cell's.
+    Source: thesis App. III (50 replications).
+    """
+    check_objective(objective, cell)
+    for name, value, least in (("episodes", episodes, 1), ("seed", seed, 0)):
+        if value < least:
+            raise BadInput(f"{name} = {value}: allowed are whole numbers from {least}")
+    rng, costs = np.random.default_rng(seed), np.empty(episodes)
+    for number in range(episodes):
+        times = Episode(cell, chance, kernel_seed(rng))
+        run = carry_out(cell, how, times).run if callable(how) else follow(cell, how, times)
+        if not run.done and not callable(how) and run.allowed():
+            raise BadInput(f"the sequence ends after {len(how)} moves, but not every part is finished")
+        costs[number] = cost(run, objective)
+    return costs
+
+
+def by_rule(rule: Rule) -> Policy:
+    """A dispatching rule as a policy: it goes by what is known, and by the means for what is not."""
+    return lambda cell: rule
+
+
+def replan(plan: Plan | None = None, objective: str = MAKESPAN) -> Policy:
+    """A policy that plans the rest of the work anew at every decision, by mean times, and takes the first step of it.
+
+    plan: called with the observed run, to be branched, not moved; None: `rollout` for the objective. A run of the policy
+    raises BadInput for an objective that the cell does not allow and for a plan that begins with what may not be done,
+    WorkFailed for one of nothing.
+    """
+
+    def policy(cell: Cell) -> Choose:
+        check_objective(objective, cell)
+
+        def choose(seen: Observed, allowed: tuple[int, ...]) -> int:
+            decisions = rollout(seen, objective) if plan is None else plan(seen)
+            if not decisions:
+                raise WorkFailed(f"the planner found nothing to do at {seen.now_s:g} s; parts are left")
+            return decisions[0]
+
+        return choose
+
+    return policy
+
+
+def rollout(run: Run, objective: str = MAKESPAN, depth: int = 1) -> tuple[int, ...]:
+    """The best of: each allowed decision, `depth` of them in a row, then each of the dispatching rules to the end.
+
+    A bounded search: branching ** depth times as many simulations as there are rules. Of alike parts in one position,
+    which a swap does not change, only the first to be ready is tried. Ties to the decision tried first.
+    Source: Bertsekas, Tsitsiklis and Wu 1997, rollout algorithms for combinatorial optimization.
+    """
+    allowed = _distinct(run)
+    if depth == 0 or not allowed:
+        return min((_finish(run, rule, objective) for rule in usable(run.cell).values()), key=lambda tail: tail[0])[1]
+    best: tuple[float, tuple[int, ...]] | None = None
+    for decision in allowed:
+        ahead = branch(run)
+        ahead.move(decision)
+        tail = rollout(ahead, objective, depth - 1)
+        for move in tail:
+            ahead.move(move)
+        value = cost(ahead, objective)
+        if best is None or value < best[0]:
+            best = value, (decision, *tail)
+    assert best is not None  # there was an allowed decision
+    return best[1]
+
+
+def _distinct(run: Run) -> list[int]:
+    """Of the allowed decisions those that differ: by position, choice and due time."""
+    parts, due_s = run.cell.parts, run.cell.due_s
+    found: dict[tuple[int, int, float], int] = {}
+    for decision in sorted(run.allowed(), key=lambda decision: (run.ready_s[part_of(decision, parts) - 1], decision)):
+        index = part_of(decision, parts) - 1
+        found.setdefault((run.locations[index], choice_of(decision, parts), due_s[index] if due_s else 0.0), decision)
+    return list(found.values())
+
+
+def _finish(run: Run, rule: Rule, objective: str) -> tuple[float, tuple[int, ...]]:
+    ahead, tail = branch(run), []
+    while allowed := ahead.allowed():
+        tail.append(rule(ahead, allowed))
+        ahead.move(tail[-1])
+    return cost(ahead, objective), tuple(tail)

@@ -1,0 +1,211 @@
+"""A cell in which alike parts are one: what stands at each position, not who. What searches and learners walk through."""
+
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import accumulate
+from typing import NamedTuple
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import entry
+from lab.sequencing.cell.ways import TICKS_PER_S, Way, empty_ticks, ticks, ways_of
+from lab.sequencing.simulate.run import Run
+
+_BITS = 8  # a count in the code of all counts; MAX_PARTS fits
+_LOW = (1 << _BITS) - 1
+Choices = Mapping[tuple[int, int], Way]  # by position and choice, in their order
+Key = tuple[int, int, tuple[int, ...]]
+Who = tuple[tuple[int, ...], ...]
+
+
+class State(NamedTuple):
+    """Between two moves, in ticks: how many parts stand in each position, the robot's station, what is waited for.
+
+    Of the parts of one product in one position the first that is ready goes first. waits: by slot (see `MergedCell`),
+    when each part there is finished, ascending, never before `now`; where parts arrive, the last slot has when each
+    comes that has not been fetched. who: by position, the parts on their way, each in the order of its waits; None:
+    nobody asks. `way` and `part` (0: nobody asks) led here from `parent`.
+    """
+
+    now: int
+    counts: int
+    robot: int
+    waits: tuple[tuple[int, ...], ...]
+    who: Who | None = None
+    way: Way | None = None
+    part: int = 0
+    parent: "State | None" = None
+
+
+class MergedCell:
+    """The cell in ticks, and the states that follow one another.
+
+    slots: by position where something is waited for, where the states have it in `waits`. process: what begins in each
+    position [ticks]; None: nothing does. starts, ends: where parts begin and finish. one_by_one: each sets out when the
+    one before is picked.
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        self.cell, self._empty = cell, empty_ticks(cell)
+        self._loaded = [ticks(row) for row in cell.loaded_s.tolist()]
+        process = [place.processing_s for place in cell.positions]
+        self.process = [None if seconds is None else round(seconds * TICKS_PER_S) for seconds in process]
+        timed = [place for place, seconds in enumerate(process) if seconds is None or seconds > 0]
+        self.slots = {place: slot for slot, place in enumerate(timed)}
+        self._intervals = ticks(cell.arrivals.interval_s) if cell.arrivals is not None else []
+        self.one_by_one = cell.arrivals is not None and cell.arrivals.after == "pick"
+        self.starts = frozenset(cell.starts)
+        self.ends = [place for place, at in enumerate(cell.positions) if not at.options]
+        self._ways: list[list[Way]] = [[] for _ in cell.positions]
+        for way in ways_of(cell):
+            self._ways[way.place].append(way)
+        self._known: dict[int, Choices] = {}
+
+    def start(self, *, named: bool = False) -> State:
+        """Where all begins; `named`: parts are told from one another."""
+        cell, waits = self.cell, list[tuple[int, ...]]([()] * len(self.slots))
+        if self._intervals:
+            first = (self._intervals[0], *[0] * (cell.parts - 1))
+            waits.append(first if self.one_by_one else tuple(accumulate(self._intervals)))
+        who = [tuple(n for n, start in enumerate(cell.starts, 1) if start == at) for at in range(len(cell.positions))]
+        robot = cell.index(cell.robot_start)
+        return State(0, self._code_of(cell.starts), robot, tuple(waits), tuple(who) if named else None)
+
+    def of_run(self, run: Run) -> State:
+        """Where a run is, to go on from by the cell's own times; parts are told from one another."""
+        now, ready = round(run.now_s * TICKS_PER_S), [round(ready_s * TICKS_PER_S) for ready_s in run.ready_s]
+        who: list[list[int]] = [[] for _ in self._ways]
+        for part, place in enumerate(run.locations, 1):
+            if self._ways[place]:
+                who[place].append(part)
+        for place, parts in enumerate(who):
+            if not (self._intervals and place in self.starts):  # these come in their order
+                parts.sort(key=lambda part: ready[part - 1])
+        waits = [tuple([max(ready[part - 1], now) for part in who[place]]) for place in self.slots]
+        if self._intervals:
+            waits.append(tuple(ready[part - 1] for part in sorted(n for place in self.starts for n in who[place])))
+        return State(now, self._code_of(run.locations), run.robot, tuple(waits), tuple(map(tuple, who)))
+
+    def code(self, counts: Sequence[int]) -> int:
+        """The parts in each position as one number."""
+        return sum(count << _BITS * place for place, count in enumerate(counts))
+
+    def counted(self, counts: int) -> list[int]:
+        """The parts in each position, of such a number."""
+        return [counts >> _BITS * place & _LOW for place in range(len(self._ways))]
+
+    def finished(self, state: State) -> int:
+        """How many parts are at an end of their routes."""
+        return sum([state.counts >> _BITS * place & _LOW for place in self.ends])
+
+    def done(self, state: State) -> bool:
+        """Whether all parts are finished."""
+        return self.finished(state) == self.cell.parts
+
+    def fetched(self, state: State) -> int:
+        """How many parts have left their first station."""
+        return self.cell.parts - sum([state.counts >> _BITS * place & _LOW for place in self.starts])
+
+    def key(self, state: State) -> Key:
+        """All that the future depends on when parts are alike: counts, robot, how long there is still to wait."""
+        now = state.now
+        return state.counts, state.robot, tuple([max(at - now, 0) for row in state.waits for at in row])
+
+    def choices(self, state: State) -> Choices:
+        """The ways that may be taken now: one an option of a position, since its parts are alike."""
+        known = self._known.get(state.counts)
+        if known is None:
+            known = self._known[state.counts] = self._allowed(self.counted(state.counts))
+        return known
+
+    def successors(self, state: State) -> Iterator[State]:
+        """The states after each of them."""
+        for way in self.choices(state).values():
+            yield self.after(state, way)
+
+    def after(self, state: State, way: Way, part: int = 0) -> State:
+        """The state after a way that may be taken, by the first part that is ready or, where they are named, by `part`."""
+        place, option, work = way
+        waits, who, first = list(state.waits), state.who, 0
+        if who is not None:
+            first = who[place].index(part) if part else 0
+            part = who[place][first]
+        ready, slot, starts = 0, self.slots.get(place), bool(self._intervals) and place in self.starts
+        if slot is not None:
+            there = waits[slot]
+            ready, waits[slot] = there[first], there[:first] + there[first + 1 :]
+        elif starts:
+            ready = waits[-1][0]
+        now = state.now + self._empty[state.robot][option.origin]
+        now = (max(now, ready) if option.waits else now) + work
+        slot, behind = self.slots.get(option.to), None
+        if slot is not None:
+            process, there = self.process[option.to], waits[slot]
+            at = ready if process is None else now + process
+            behind = bisect_right(there, at)
+            waits[slot] = (*there[:behind], at, *there[behind:])
+        coming = waits.pop() if self._intervals else None
+        # A part that finished earlier is ready now: forgetting since when lets more states be equal.
+        rows = [tuple([max(tick, now) for tick in row]) if row else () for row in waits]
+        if coming is not None:
+            pick = now - self._loaded[option.origin][option.target]
+            rows.append(self._left_to_come(coming, self.fetched(state), pick) if starts else coming)
+        named = None if who is None else self._moved(who, way, first, behind)
+        counts = state.counts + (1 << _BITS * option.to) - (1 << _BITS * place)
+        return State(now, counts, option.target, tuple(rows), named, way, part, state)
+
+    def waited(self, state: State, ahead: State) -> int:
+        """How long the robot waited in the move from a state to the one ahead of it."""
+        assert ahead.way is not None
+        return ahead.now - state.now - ahead.way.work - self._empty[state.robot][ahead.way.option.origin]
+
+    def decision(self, state: State) -> int:
+        """The entry of a sequence that led to a state, where parts are named."""
+        assert state.way is not None
+        return entry(state.part, state.way.option.choice, self.cell.parts)
+
+    def decisions(self, state: State) -> tuple[int, ...]:
+        """All entries from the start to a state in which parts need not be named."""
+        ways, named = list[Way](), self.start(named=True)
+        while state.way is not None and state.parent is not None:
+            ways.append(state.way)
+            state = state.parent
+        found = []
+        for way in reversed(ways):
+            named = self.after(named, way)
+            found.append(self.decision(named))
+        return tuple(found)
+
+    def _code_of(self, locations: Sequence[int]) -> int:
+        return self.code([locations.count(place) for place in range(len(self._ways))])
+
+    def _allowed(self, counted: list[int]) -> Choices:
+        cell, occupied = self.cell, [0] * len(self.cell.stations)
+        for count, place in zip(counted, cell.positions, strict=True):
+            for station in place.holds:
+                occupied[station] += count
+        full = [taken >= most for taken, most in zip(occupied, cell.capacities, strict=True)]
+        waiting = sum(counted[place] for place in self.starts)
+        in_turn = cell.starts[cell.parts - waiting] if waiting and self._intervals else None
+        return {
+            (place, way.option.choice): way
+            for place, count in enumerate(counted)
+            if count and (in_turn in (None, place) or place not in self.starts)
+            for way in self._ways[place]
+            if way.option.possible(full)
+        }
+
+    def _left_to_come(self, coming: tuple[int, ...], fetched: int, pick: int) -> tuple[int, ...]:
+        """When parts come once the first of them is picked: then the next one sets out, where they are brought so."""
+        coming, following = coming[1:], fetched + 1
+        if not self.one_by_one or following == self.cell.parts:
+            return coming
+        return (pick + self._intervals[following], *coming[1:])
+
+    def _moved(self, who: Who, way: Way, first: int, behind: int | None) -> Who:
+        """Who is where after a move: the `first` of those in its position goes behind so many others, None: all."""
+        rows, (place, option, _) = list(who), way
+        part, rows[place] = who[place][first], who[place][:first] + who[place][first + 1 :]
+        if self._ways[option.to]:
+            there = rows[option.to]
+            rows[option.to] = (*there[:behind], part, *(() if behind is None else there[behind:]))
+        return tuple(rows)

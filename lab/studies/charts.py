@@ -1,0 +1,106 @@
+"""What the pictures of several studies share: bars by group, curves with intervals, and a legend below.
+
+What the thesis prints stands beside what was measured as a hollow diamond. The same data gives the same bytes.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lab.errors import BadInput
+from lab.studies.findings import Row
+from lab.view.canvas import BLUE, INK, ORANGE, PALE_GREY, RED, SKY, YELLOW, picture_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Look = tuple[str, str, str]  # of a curve: colour, marker, name
+# of the bars of a series: colour, hatch
+SERIES = ((BLUE, None), (ORANGE, "///"), (SKY, None), (RED, "\\\\\\"), (YELLOW, None), (PALE_GREY, "xxx"))
+GROUP_WIDTH = 0.8  # of the distance between two groups of bars
+LETTERS_AN_INCH = 13  # of a legend
+PRINTED: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "D",
+    "markersize": 5.5,
+    "markerfacecolor": "white",
+    "markeredgecolor": INK,
+}
+
+
+def bars(
+    groups: Sequence[str], lines: Mapping[str, Sequence[Row]], ylabel: str, *, xlabel: str = "", label: str = ""
+) -> bytes:
+    """Bars of several series side by side as SVG, group by group, such as settings by the advisor's tau.
+
+    lines: for each series a row for each group, whose value, interval and printed figure may be None; label: the name
+    of what is written on a bar, such as "rank". Raises BadInput for lines that do not fit the groups and for more than
+    six series. Source: thesis tables 9.2-9.5, figs. 9.7-9.13.
+    """
+    if not 1 <= len(lines) <= len(SERIES):
+        raise BadInput(f"picture of {len(lines)} series: allowed 1 to {len(SERIES)}")
+    if any(len(line) != len(groups) for line in lines.values()):
+        raise BadInput(f"bars: {[*map(len, lines.values())]} rows of the series; needed: {len(groups)} of each")
+
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        for number, (name, line) in enumerate(lines.items()):
+            middle = GROUP_WIDTH * ((number + 0.5) / len(lines) - 0.5)
+            for group, one in enumerate(line):
+                if one["value"] is not None:
+                    _draw_bar(axes, group + middle, one, number, GROUP_WIDTH / len(lines))
+                    _write(axes, group + middle, one, str(one.get(label, "")))
+            colour, hatch = SERIES[number]
+            axes.bar([0], [0], color=colour, hatch=hatch, edgecolor="white", label=name)
+        if any(one["thesis"] is not None for line in lines.values() for one in line):
+            axes.plot([], [], label="printed", **PRINTED)
+        axes.set_xticks(range(len(groups)), groups)
+        axes.tick_params(axis="x", length=0)
+        axes.set(xlabel=xlabel, ylabel=ylabel, xlim=(-0.55, len(groups) - 0.45))
+        axes.set_ylim(0, 1.1 * (max(_top(one) for line in lines.values() for one in line) or 1.0))
+        axes.grid(axis="y")
+        handles, names = axes.get_legend_handles_labels()
+        legend_below(figure, dict(sorted(zip(names, handles, strict=True), key=lambda item: item[0] == "printed")))
+
+    return picture_bytes(draw, max(5.0, 1.4 + 0.34 * len(groups) * (len(lines) + 1)), 3.8, "svg")
+
+
+def curve(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> None:
+    """The values of rows against one of their settings, and a band for their intervals."""
+    colour, marker, name = look
+    x, y = [one[by] for one in rows], [one["value"] for one in rows]
+    low, high = ([(one["ci95"] or [one["value"]] * 2)[end] for one in rows] for end in (0, 1))
+    axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0)
+    axes.plot(x, y, color=colour, marker=marker, markersize=4.5, linewidth=1.4, label=name, zorder=2.5)
+
+
+def legend_below(figure: "Figure", handles: Mapping[str, "Artist"] | None = None) -> None:
+    """One legend of all plots below them, name -> what is drawn, in as many columns as fit; None: whatever has a name."""
+    if handles is None:
+        found = [axes.get_legend_handles_labels() for axes in figure.axes]
+        handles = {name: handle for some, names in found for handle, name in zip(some, names, strict=True)}
+    fitting = int(LETTERS_AN_INCH * figure.get_figwidth() / (max(map(len, handles)) + 6))
+    columns = min(len(handles), max(1, fitting))
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)
+
+
+def _top(one: Row) -> float:
+    """The highest that is drawn of a row."""
+    heights = (one["value"], *(one["ci95"] or ()), one["thesis"])
+    return max((float(height) for height in heights if height is not None), default=0.0)
+
+
+def _draw_bar(axes: "Axes", x: float, one: Row, series: int, width: float) -> None:
+    colour, hatch = SERIES[series]
+    axes.bar(x, one["value"], width, color=colour, hatch=hatch, edgecolor="white", linewidth=0.6)
+    for line_colour, line_width in (("white", 3.0), (INK, 1.2)):  # a white rim, or it is lost on dark bars
+        axes.vlines(x, *(one["ci95"] or [np.nan] * 2), color=line_colour, linewidth=line_width, zorder=3)
+    axes.plot(x, np.nan if one["thesis"] is None else one["thesis"], zorder=4, **PRINTED)
+
+
+def _write(axes: "Axes", x: float, one: Row, text: str) -> None:
+    offset: dict[str, Any] = {"xytext": (0, 4), "textcoords": "offset points", "ha": "center"}
+    axes.annotate(text, (x, _top(one)), fontsize=8, color=INK, **offset)

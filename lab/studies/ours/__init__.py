@@ -1,0 +1,1 @@
+"""Comparisons of our own, which the thesis does not print."""

@@ -1,0 +1,115 @@
+"""Pictures of the comparison of sequencers: small plots side by side, one legend, the same colours everywhere."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from lab.studies.charts import Look, curve, legend_below
+from lab.studies.findings import Row, those
+from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, picture_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LOOKS: dict[tuple[str, str | None], Look] = {  # by method and reward factor
+    ("srl-time", None): (BLUE, "o", "srl-time"),
+    ("srl", "B"): (ORANGE, "s", "SRL, type B"),
+    ("srl", "A"): (RED, "D", "SRL, type A"),
+    ("mc", None): (GREEN, "^", "Monte Carlo"),
+    ("random", None): (GREY, "v", "random search"),
+    ("ga", None): (PURPLE, "X", "genetic"),
+}
+SINGLE: dict[str, Look] = {  # one sequence, no episodes
+    "fifo": (INK, "P", "FIFO"),
+    "nearest-ready": (SKY, "<", "nearest-ready"),
+    "shortest-move": (SKY, ">", "shortest-move"),
+    "longest-remaining-work": (SKY, "d", "longest-remaining-work"),
+    "most-urgent-machine": (SKY, "h", "most-urgent-machine"),
+    "exact": (INK, "*", "exact, proven"),
+}
+PANEL_INCH = 2.9, 2.5
+
+
+def by_episodes(rows: Sequence[Row], measure: str) -> bytes:
+    """A percentage by session length, a plot for each case and number of few toasts."""
+    of = [one for one in those(rows, measure=measure) if "episodes" in one and "case" in one]
+    counts = sorted({one["toasts"] for one in of if one["toasts"] <= 4})
+    cases = sorted({one["case"] for one in of})
+    panels = {f"{count} toasts, case {case}": those(of, toasts=count, case=case) for count in counts for case in cases}
+    ylabel = "sessions that find the optimum [%]" if measure == "SP_percent" else "sessions that end optimal [%]"
+
+    def draw(axes: "Axes", shown: Sequence[Row]) -> None:
+        _curves(axes, shown)
+        axes.set(ylim=(-3, 104))
+
+    return _grid(panels, len(cases), draw, ylabel)
+
+
+def of_orders(rows: Sequence[Row]) -> bytes:
+    """The gap by session length for each order and interval of the FMS; methods with one sequence as lines across."""
+    of = [one for one in those(rows, measure="gap_percent") if "order" in one]
+    means = sorted({one["interval_s"] for one in of})
+    orders = list(dict.fromkeys(one["order"] for one in of))
+    panels = {
+        f"{order}, every {mean:g} s": those(of, order=order, interval_s=mean) for mean in means for order in orders
+    }
+
+    def draw(axes: "Axes", shown: Sequence[Row]) -> None:
+        _curves(axes, shown)
+        fifo = those(shown, method="fifo")[0]["value"]
+        rule = min(one["value"] for one in shown if "episodes" not in one and one["method"] not in ("fifo", "exact"))
+        axes.axhline(fifo, color=INK, linestyle="--", linewidth=1.0, label="FIFO")
+        axes.axhline(rule, color=SKY, linestyle=":", linewidth=1.6, label="best dispatching rule")
+        axes.set_ylim(bottom=-0.04 * axes.get_ylim()[1])
+
+    return _grid(panels, len(orders), draw, "gap to the optimum [%]")
+
+
+def by_wall_time(rows: Sequence[Row]) -> bytes:
+    """The gap by the seconds of a session for many toasts: a line for each case and method, a mark for one sequence."""
+    of = [one for one in rows if one.get("toasts", 0) > 4]
+    counts = sorted({one["toasts"] for one in of})
+    panels = {f"{count} toasts": those(of, toasts=count) for count in counts}
+
+    def draw(axes: "Axes", shown: Sequence[Row]) -> None:
+        looks = LOOKS | {(method, None): look for method, look in SINGLE.items()}
+        for look, (colour, marker, name) in looks.items():
+            size = 9 if marker == "*" else 5
+            for case in sorted({one["case"] for one in shown}):
+                mine = those(shown, case=case, method=look[0], reward_factor=look[1])
+                walls, gaps = ([one["value"] for one in those(mine, measure=m)] for m in ("wall_s", "gap_percent"))
+                if walls:
+                    axes.plot(walls, gaps, color=colour, marker=marker, markersize=size, linewidth=0.9, label=name)
+        axes.set(xscale="log", xlabel="seconds of a session")
+        axes.set_ylim(bottom=-0.04 * axes.get_ylim()[1])
+
+    return _grid(panels, len(panels), draw, "gap to the optimum [%]", tall=1.3)
+
+
+def _grid(panels: Mapping[str, Sequence[Row]], columns: int, draw: Any, ylabel: str, tall: float = 1.0) -> bytes:
+    """A plot for each of the panels, title -> rows, row by row, and one legend below."""
+    lines = -(-len(panels) // columns)
+
+    def whole(figure: "Figure") -> None:
+        plots = figure.subplots(lines, columns, squeeze=False)
+        for axes, (title, shown) in zip(plots.flat, panels.items(), strict=True):
+            draw(axes, shown)
+            axes.set_title(title)
+            axes.grid()
+        figure.supylabel(ylabel, fontsize=9)
+        legend_below(figure)
+
+    size_inch = columns * PANEL_INCH[0], lines * PANEL_INCH[1] * tall + 0.5
+    return picture_bytes(whole, *size_inch, "svg")
+
+
+def _curves(axes: "Axes", rows: Sequence[Row]) -> None:
+    """The methods that learn by session length: the lengths themselves are the ticks of a logarithmic axis."""
+    tried = [one for one in rows if "episodes" in one]
+    for (method, factor), look in LOOKS.items():
+        if of := those(tried, method=method, reward_factor=factor):
+            curve(axes, of, "episodes", look)
+    lengths = sorted({one["episodes"] for one in tried})
+    axes.set(xscale="log", xlabel="episodes")
+    axes.set_xticks(lengths, [f"{length:g}" for length in lengths])
+    axes.set_xticks([], minor=True)

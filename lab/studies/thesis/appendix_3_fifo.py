@@ -1,0 +1,106 @@
+"""First in, first out in the flexible manufacturing system (thesis App. III), as the listing of App. VIII does it."""
+
+from math import inf
+from typing import NamedTuple
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import choice_of, part_of
+from lab.sequencing.simulate.execution import WAIT, Observed, Policy
+
+MACHINES = ("mill", "lathe-1", "lathe-2")  # of tasks that become possible together those of the mill go first
+MILL = 0
+FETCH, LOAD, PALLET, UNLOAD, SHIP = range(5)  # and of one machine's, in this order
+BY_EVENTS = (FETCH, UNLOAD)  # what an arrival, or the end of a process, makes possible; all else follows moves
+STARTS = ("listing", "idle-start")
+
+
+def queued_fifo(start: str) -> Policy:
+    """The policy of a robot with a queue of tasks, for the task `fms`; `start`, one of STARTS: when an idle robot begins.
+
+    After each move, arrival and end of a process every task that is possible by then joins the queue; the head is
+    served. Fetch: the part has come, and the in-buffer of its machine is free; lathes take turns, whether the other one
+    is free or not. Load: the machine is free; a lathe's out-buffer, too. Pallet: the out-buffer is free. Unload: the
+    machine has finished, and the pallet is there. Ship: the part is on its pallet.
+    A robot that finds the queue empty after a move is idle. By "listing" it then sleeps until no process goes on and no
+    part is on its way, whatever joins the queue; by "idle-start" only until something does.
+    """
+    return lambda cell: _Fifo(cell, sleeps=start == "listing")
+
+
+class _Task(NamedTuple):
+    """What the robot may be asked to do: in the order of the listing, the machine that it is for and what it is."""
+
+    machine: int
+    kind: int
+    decision: int
+    part: int  # from 0
+
+
+class _Fifo:
+    """The queue of one episode."""
+
+    def __init__(self, cell: Cell, *, sleeps: bool) -> None:
+        self._cell, self._sleeps = cell, sleeps
+        self._queue: list[_Task] = []
+        self._possible: set[_Task] = set()  # when it last looked, were it not for what has to finish or to come first
+        self._looked_s = 0.0
+        self._idle = self._fetched = True
+
+    def __call__(self, seen: Observed, allowed: tuple[int, ...]) -> int:
+        possible = {task for decision in allowed if self._is_possible(seen, task := self._task(seen, decision))}
+        ready = [task for task in possible if task.kind not in BY_EVENTS or seen.ready[task.part]]
+        joining = [task for task in ready if task not in self._queue]
+        self._queue += sorted(joining, key=lambda task: (self._joins_s(seen, task), task))
+        self._possible, self._looked_s = possible, seen.now_s
+        if not self._queue or (self._idle and self._sleeps and _something_comes(seen)):
+            self._idle = True
+            return WAIT
+        head = self._queue.pop(0)
+        self._idle, self._fetched = False, head.kind == FETCH
+        return head.decision
+
+    def _task(self, seen: Observed, decision: int) -> _Task:
+        """The task that an allowed decision is; stations are named after their machines."""
+        cell, option, part = self._cell, seen.option(decision), part_of(decision, self._cell.parts) - 1
+        assert option is not None
+        fetch = seen.locations[part] == cell.starts[part]
+        name = cell.names[option.target if fetch else option.origin]
+        machine = next(number for number, machine in enumerate(MACHINES) if name.startswith(machine))
+        if fetch:
+            kind = FETCH
+        elif option.carries == "pallet":
+            kind = PALLET
+        elif cell.stations[option.target].kind == "machine":
+            kind = LOAD
+        else:
+            kind = UNLOAD if cell.positions[option.to].options else SHIP
+        return _Task(machine, kind, decision, part)
+
+    def _is_possible(self, seen: Observed, task: _Task) -> bool:
+        """Whether the listing does it, apart from what has to finish or to come first."""
+        cell = self._cell
+        if task.kind == LOAD and task.machine != MILL:
+            return seen.occupied[cell.index(f"{MACHINES[task.machine]}-out")] == 0
+        if task.kind == FETCH:
+            product = cell.order[task.part]
+            routes = next(len(known.routes) for known in cell.products if known.name == product)
+            return choice_of(task.decision, cell.parts) == cell.order[: seen.fetched].count(product) % routes
+        return True
+
+    def _joins_s(self, seen: Observed, task: _Task) -> float:
+        """When it joins the queue: with the event that made it possible; inf: only now, after the robot's move.
+
+        An event during the move finds all as it was before; only a part that was fetched is on its way.
+        """
+        event_s = seen.ready_s[task.part]
+        before = task in self._possible or (task.kind == FETCH and self._fetched)
+        return event_s if task.kind in BY_EVENTS and before and event_s > self._looked_s else inf
+
+
+def _something_comes(seen: Observed) -> bool:
+    """Whether a process goes on, or a part is on its way."""
+    starts = seen.cell.starts
+    return any(
+        not ready and (location != start or part == seen.fetched)
+        for part, (ready, location, start) in enumerate(zip(seen.ready, seen.locations, starts, strict=True))
+    )

@@ -1,0 +1,214 @@
+"""The sessions of chapter 9: who advises in which world, when the learner asks, and what that comes to."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache, partial
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.gridworld import GridWorld
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.mdp import BoolArray, FloatArray, TabularMDP, optimal_values, shortest_steps
+from lab.studies.runner import Job, said, seeds_of
+
+if TYPE_CHECKING:
+    from lab.learning.batch import Batch
+
+FORMAT = 1  # of what is stored; another one is computed anew
+LEARNED_EPISODES, LEARNED_BETA, LEARNED_SEED = 1000, 0.7, 14
+EXAMPLES = 100  # sessions, of which the first that succeeds is shown
+
+Count = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One cell of a table: a world, who advises there, and when the learner asks.
+
+    tau None: nobody advises. lambda_threshold, omega and psi are those of the gates that have them. advisor_table:
+    "exact" optimal values, or "learned" (see `learned_table`). beta and learner None: the world's own. judge_unhelped:
+    see GateSettings. success: the "last" episode took the shortest way, or "any" did. table_seed: another learned table.
+    memory: advice is remembered, see GateSettings; wrong: the advisor takes the worst action for the best.
+    """
+
+    world: str
+    view: Literal["full", "limited"] = "full"
+    gate: str = "never"
+    tau: float | None = None
+    lambda_threshold: float | None = None
+    omega: int | None = None
+    psi: float | None = None
+    beta: float | None = None
+    advisor_table: Literal["exact", "learned"] = "learned"
+    learner: str | None = None
+    judge_unhelped: bool | None = None
+    success: Literal["last", "any"] = "last"
+    table_seed: int | None = None
+    memory: bool = False
+    wrong: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("tau", "lambda_threshold", "psi", "beta"):  # 1 and 1.0 are the same setting
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, float(getattr(self, name)))
+
+    def key(self, sessions: int, seed: int) -> str:
+        """What names this setting's results among all that are stored."""
+        place = world(self.world).model_dump(mode="json")
+        del place["gate"]["spare_best"]  # no result depends on it: see `gate_of`
+        learned = (LEARNED_EPISODES, LEARNED_BETA, LEARNED_SEED)
+        whole = [FORMAT, asdict(self, dict_factory=said), sessions, seed, place, *learned]
+        return sha256(json.dumps(whole).encode()).hexdigest()[:24]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What N sessions came to, one number each (N,): whether they succeeded (see `Setting`), and the advice in them."""
+
+    success: BoolArray
+    helped_steps: Count
+    requests: Count
+
+    def to_json(self) -> dict[str, list[int]]:
+        """Plain lists."""
+        return {name: np.asarray(value, np.int64).tolist() for name, value in vars(self).items()}
+
+    @classmethod
+    def from_json(cls, record: dict[str, list[int]]) -> "Outcome":
+        """What `to_json` wrote. Raises KeyError, TypeError, ValueError or OverflowError for anything else."""
+        success, helped, requests = (np.array(record[n], np.int64) for n in ("success", "helped_steps", "requests"))
+        if not success.shape == helped.shape == requests.shape == (len(success),):
+            raise ValueError("three lists of one length are wanted")
+        return cls(success.astype(bool), helped, requests)
+
+
+def measured(job: Job, settings: Sequence[Setting]) -> dict[Setting, Outcome]:
+    """The outcome of every setting; those that the job's folder holds are read, the others computed and kept there.
+
+    Raises WorkFailed when the folder cannot be written or the cluster cannot be reached. After Ctrl-C all that is
+    finished is kept.
+    """
+    wanted = list(dict.fromkeys(settings))
+    keys = {setting.key(job.sessions, job.seed): setting for setting in wanted}
+    done: dict[Setting, Outcome] = {}
+    for entry in job.kept():
+        try:
+            key, outcome = str(entry["key"]), Outcome.from_json(entry)
+        except (ValueError, KeyError, TypeError, OverflowError):
+            continue  # not ours: computed anew
+        if key in keys and len(outcome.success) == job.sessions:
+            done[keys[key]] = outcome
+    left = [setting for setting in wanted if setting not in done]
+    job.progress(len(done), len(wanted))
+    for setting, outcome in job.computed(partial(sessions_of, sessions=job.sessions, seed=job.seed), left):
+        done[setting] = outcome
+        job.keep({"key": setting.key(job.sessions, job.seed), "setting": asdict(setting), **outcome.to_json()})
+        job.progress(len(done), len(wanted))
+    return {setting: done[setting] for setting in wanted}
+
+
+def sessions_of(setting: Setting, sessions: int, seed: int) -> Outcome:
+    """Learns so many sessions of one setting."""
+    batch = _learned(setting, seeds_of(setting, sessions, seed))
+    return Outcome(succeeded(setting, batch.steps), batch.helped_steps, batch.requests)
+
+
+def example(setting: Setting, seed: int) -> tuple[NDArray[np.int32], BoolArray]:
+    """Steps and guided episodes (E,) of the first session of a setting that succeeds, of EXAMPLES."""
+    batch = _learned(setting, seeds_of(setting, EXAMPLES, seed))
+    n = int(np.argmax(succeeded(setting, batch.steps)))
+    return batch.steps[n], batch.guided[n]
+
+
+def succeeded(setting: Setting, steps: NDArray[np.integer[Any]]) -> BoolArray:
+    """Whether each session took the shortest way, (N,) bool, by the steps of its episodes (N, E)."""
+    shown = steps[:, -1] if setting.success == "last" else steps.min(axis=1)
+    return np.asarray(shown == shortest_steps(problem(setting.world)) + world(setting.world).learner.count_start)
+
+
+@lru_cache(maxsize=64)
+def world(name: str) -> GridWorld:
+    """The world of that name or file, read once."""
+    from lab.taskfile import load_world
+
+    return load_world(name)
+
+
+@lru_cache(maxsize=64)
+def problem(name: str) -> TabularMDP:
+    """The world of that name or file as a decision problem."""
+    return world(name).mdp()
+
+
+@lru_cache(maxsize=64)
+def known_values(name: str, seed: int | None) -> FloatArray:
+    """What an advisor in the world of that name knows, (S, A): the table learned with a seed, or None: the exact values."""
+    return (
+        optimal_values(problem(name), world(name).learner.discount)
+        if seed is None
+        else learned_table(world(name), seed)
+    )
+
+
+def learned_table(place: GridWorld, seed: int = LEARNED_SEED) -> FloatArray:
+    """The advisor's table as the thesis may have had it: learned alone, in 1000 episodes that begin in any free cell.
+
+    (S, A) float64. The thesis loads a table and does not say where it came from; this recipe came nearest to its
+    figures among those that the study `readings` compares.
+    """
+    from lab.learning.batch import run_sessions
+
+    mdp = place.mdp()
+    anywhere = replace(mdp, starts=tuple(np.flatnonzero(~mdp.terminal).tolist()))
+    learner = replace(place.learner, episodes=LEARNED_EPISODES, beta=LEARNED_BETA, count_start=False)
+    seeds = np.array([seed], np.uint64)
+    table: FloatArray = run_sessions(anywhere, learner, GateSettings("never"), None, seeds, keep_tables=True).q[0]
+    return table
+
+
+def walk_of_advisor(place: GridWorld, table: FloatArray, tau: float, walks: int = 1000) -> NDArray[np.int32]:
+    """The steps (walks,) of an advisor who walks by own advice alone; max_steps + 1 where it does not arrive (fig. 9.1)."""
+    from lab.advice.advisors import Advice, skill
+    from lab.learning.batch import run_sessions
+
+    learner = replace(place.learner, episodes=1)
+    advice = Advice.of(skill(table, tau))
+    seeds = np.arange(walks, dtype=np.uint64)
+    return run_sessions(place.mdp(), learner, GateSettings("always"), advice, seeds).steps[:, 0]
+
+
+def table_of(setting: Setting) -> FloatArray:
+    """What the advisor of a setting knows, (S, A)."""
+    learned = LEARNED_SEED if setting.table_seed is None else setting.table_seed
+    return known_values(setting.world, learned if setting.advisor_table == "learned" else None)
+
+
+def learner_of(setting: Setting) -> LearnerSettings:
+    """The world's learner with what the setting says."""
+    return replace(world(setting.world).learner, **_given(setting, "beta", "learner"))
+
+
+def gate_of(setting: Setting, gate: GateSettings) -> GateSettings:
+    """The world's gate with what the setting says, and its misleads as printed."""
+    names = ("gate", "lambda_threshold", "omega", "psi", "judge_unhelped", "memory")
+    return replace(gate, **{"spare_best": False} | _given(setting, *names))
+
+
+def _given(setting: Setting, *names: str) -> dict[str, Any]:
+    return {name: getattr(setting, name) for name in names if getattr(setting, name) is not None}
+
+
+def _learned(setting: Setting, seeds: NDArray[np.uint64]) -> "Batch":
+    from lab.advice.advisors import Advice, skill
+    from lab.learning.batch import run_sessions
+
+    place, advice = world(setting.world), None
+    if setting.tau is not None:
+        table = -table_of(setting) if setting.wrong else table_of(setting)
+        advice = Advice.of(skill(table, setting.tau), place.region() if setting.view == "limited" else None)
+    gate = gate_of(setting, place.gate)
+    return run_sessions(problem(setting.world), learner_of(setting), gate, advice, seeds)

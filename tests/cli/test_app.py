@@ -1,0 +1,212 @@
+"""Every command: exit codes, one document on stdout, one line for what is wrong, nothing written after bad input."""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lab import __version__
+from lab.advice import advisors, gates, panel
+from lab.cli.app import COMMANDS, Command
+from lab.cli.options import Json
+from lab.cli.output import show
+from lab.errors import WorkFailed
+from lab.learning.updates import UPDATES
+from lab.sequencing.cell.objectives import OBJECTIVES
+from lab.sequencing.methods.srl_advised import FITTING
+
+Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
+
+
+# ---- help ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("words", COMMANDS)
+def test_every_command_has_help_with_an_example(lab: Lab, words: str) -> None:
+    ran = lab(*words.split(), "--help")
+    assert (ran.code, ran.err) == (0, "")
+    assert COMMANDS[words].example.startswith(f"lab {words}")
+    assert f"Example: {COMMANDS[words].example}" in " ".join(ran.out.split())
+    assert "--json" in ran.out
+
+
+ORDER_ADVISORS = [*advisors.SKILLS, "tau=X", "wrong", *advisors.PEOPLE]
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "following", "members"),
+    [
+        ("teach", "--learner", "--gate", UPDATES),
+        ("teach", "--gate", "--advisor", gates.GATES),
+        ("teach", "--advisor", "--ask", [*advisors.ADVISORS, *advisors.FORMS]),
+        ("teach", "--ask", "--decide", panel.ASKED),
+        ("teach", "--decide", "--episodes", panel.DECISIONS),
+        ("run", "--advisor", "--ask", [*advisors.ADVISORS, *advisors.FORMS]),
+        ("sequence", "--objective", "--episodes", OBJECTIVES),
+        ("sequence", "--advisor", "--gate", ORDER_ADVISORS),
+        ("sequence", "--gate", "--plot", FITTING),
+    ],
+)
+def test_help_names_all_members(lab: Lab, command: str, option: str, following: str, members: Iterable[str]) -> None:
+    """It is written by hand, as help loads no table: each list stands in its option's help, and nothing else does."""
+    text = " ".join(lab(command, "--help").out.replace("│", " ").split())
+    told = re.sub(r" \([^)]*\)", "", text[text.index(f" {option} ") : text.index(f" {following} ")])
+    listed = re.search(r"(\S+, )+\S+", told)
+    assert listed is not None
+    assert {name.strip(";.") for name in listed[0].split(", ")} == {*members}
+
+
+def test_a_command_is_one_row(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With its row in the table a function is in the help, is called, and ends as all commands do."""
+
+    def greet(name: str, as_json: Json = False) -> None:
+        """Greets somebody."""
+        if name == "nobody":
+            raise WorkFailed("nobody to greet")
+        show({"greeted": name}, as_json, lambda document: f"hello {document['greeted']}")
+
+    monkeypatch.setitem(COMMANDS, "greet", Command(greet, "lab greet you"))
+    assert "Greets somebody." in lab("--help").out
+    assert "Example: lab greet you" in lab("greet", "--help").out
+    assert lab("greet", "you").out == "hello you\n"
+    assert lab("greet", "you", "--json").json == {"greeted": "you"}
+    assert (lab("greet", "nobody").code, lab("greet", "nobody").err) == (1, "lab: nobody to greet\n")
+
+
+def test_the_version_is_told(lab: Lab) -> None:
+    ran = lab("--version")
+    assert (ran.code, ran.out, ran.err) == (0, f"lab {__version__}\n", "")
+
+
+def test_the_shell_completes_commands(root: Path) -> None:
+    """As the script of `lab --show-completion` asks for it."""
+    code = "from lab.cli import main; main()"
+    asked = {"_LAB_COMPLETE": "complete_bash", "COMP_WORDS": "lab t", "COMP_CWORD": "1", "PYTHONPATH": str(root)}
+    env = {**os.environ, **asked}
+    ran = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout.split(), ran.stderr) == (0, ["teach", "toolbox", "task"], "")
+
+
+def test_a_page_is_answered_only_where_somebody_asks(lab: Lab) -> None:
+    for command, answered in (("run", True), ("teach", True), ("sequence", True), ("replay", False)):
+        text = " ".join(lab(command, "--help").out.replace("│", " ").split())
+        assert "Show it on a page on 127.0.0.1, too" in text
+        assert ("can be answered" in text) == answered
+
+
+def test_old_words_go_on_working_unseen(lab: Lab) -> None:
+    """--view was the page of a run and the sight of an advisor."""
+    for command, new in (("run", "--page"), ("teach", "--sight")):
+        text = lab(command, "--help").out
+        assert new in text
+        assert "--view" not in text
+    assert lab("run", "toas", "--view").err == lab("run", "toas", "--page").err
+    assert lab("run", "toas", "--no-view").err == lab("run", "toas").err
+    assert lab("teach", "world-1", "--view", "half").err.startswith("lab: unknown sight 'half' (--sight)")
+
+
+@pytest.mark.parametrize("command", ["run", "view", "sequence", "task check"])
+def test_toasts_have_one_short_name(lab: Lab, command: str) -> None:
+    assert lab(*command.split(), "toast", "-n", "0").err == "lab: 0 toasts (--toasts): allowed are 1 to 50\n"
+
+
+def test_no_words_give_help(lab: Lab) -> None:
+    for words in ([], ["toolbox"], ["task"]):
+        ran = lab(*words)
+        assert ran.code == 2
+        assert "Usage: lab" in ran.out + ran.err
+
+
+def test_help_loads_nothing_heavy(root: Path) -> None:
+    heavy = (
+        "numpy",
+        "scipy",
+        "pydantic",
+        "matplotlib",
+        "cv2",
+        "trimesh",
+        "meshcat",
+        "numba",
+        "pybullet",
+        "safetensors",
+        "ortools",
+        "pymoo",
+    )
+    code = f"""
+import sys
+from lab.cli import main
+sys.argv = ["lab", "--help"]
+try:
+    main()
+finally:
+    print([name for name in {heavy} if name in sys.modules], file=sys.stderr)
+"""
+    ran = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, "[]\n")
+
+
+# ---- exit codes 0, 1, 130 -----------------------------------------------------------------------------------------
+
+
+def test_a_failed_piece_of_work_ends_with_1(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise WorkFailed("the arm is stuck\nat the table")
+
+    monkeypatch.setattr("lab.production.prepared.prepare", fail)
+    ran = lab("run", "--json")
+    why = r"the arm is stuck\nat the table"
+    assert (ran.code, ran.json, ran.err) == (1, {"error": why, "exit_code": 1}, f"lab: {why}\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [("run", "; what was learned is kept"), ("teach insert", "; what was learned is kept"), ("view toast", "")],
+)
+def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: str, said: str) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lab.production.prepared.prepare", stop)
+    monkeypatch.setattr("lab.lesson.load", stop)
+    monkeypatch.setattr("lab.look.load", stop)
+    ran = lab(*words.split(), "--json")
+    why = f"stopped by Ctrl-C{said}"
+    assert (ran.code, ran.json, ran.err) == (130, {"error": why, "exit_code": 130}, f"lab: {why}\n")
+
+
+def test_what_the_system_refuses_is_one_line(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device", "x")
+
+    monkeypatch.setattr("lab.production.prepared.prepare", full)
+    ran = lab("run")
+    assert (ran.code, ran.out, ran.err) == (1, "", "lab: [Errno 28] No space left on device: 'x'\n")
+
+
+def test_what_was_told_is_the_only_document(lab: Lab, folder: Path) -> None:
+    """A lesson that fails to reach its goal has its own document, and no second one for the error."""
+    (folder / "w.txt").write_text("S" + "." * 30 + "G\n")
+    ran = lab("teach", "w.txt", "--advisor", "none", "--episodes", "1", "--json")
+    assert (ran.code, ran.out.count("\n"), ran.json["final_steps"]) == (1, 1, None)
+    assert "does not reach its goal after 1 episode:" in ran.err
+
+
+@pytest.mark.parametrize("words", ["teach world-1", "sequence fms --method fifo --gantt order.svg"])
+def test_what_is_not_simulated_loads_no_simulator(root: Path, folder: Path, words: str) -> None:
+    code = f"""
+import sys
+from lab.cli import main
+sys.argv = ["lab", *{words.split()}, "--json"]
+try:
+    main()
+finally:
+    print("pybullet" in sys.modules, file=sys.stderr)
+"""
+    env = {**os.environ, "PYTHONPATH": str(root)}
+    ran = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr.splitlines()[-1]) == (0, "False")

@@ -1,0 +1,70 @@
+"""Ctrl-C is heard wherever it is pressed."""
+
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
+
+CTRL_C = """
+import os
+import signal
+
+import gymnasium
+
+
+class Presses:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+
+
+{on_import}
+
+
+class Door(gymnasium.Env):
+    observation_space = action_space = gymnasium.spaces.Discrete(2)
+    steps = 0
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return 0, {{}}
+
+    def step(self, action):
+        self.steps += 1
+        if self.steps == 3:
+            {on_step}
+        return 1, 1.0, True, False, {{}}
+
+
+gymnasium.register("LabTestCtrlC-v0", Door)
+"""
+DROPPED = """
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+except BaseException:
+    pass
+"""
+
+
+@pytest.mark.parametrize(("on_import", "on_step"), [(DROPPED, "pass"), ("", "Presses()")], ids=["import", "callback"])
+def test_ctrl_c_that_a_library_drops_is_heard_all_the_same(
+    lab: Lab, folder: Path, on_import: str, on_step: str
+) -> None:
+    """While it is imported, where it catches everything; and in a callback, whose errors Python ignores."""
+    import gymnasium
+
+    text = CTRL_C.format(on_import=on_import, on_step=on_step)
+    (folder / "lab_test_ctrl_c.py").write_text(text, encoding="utf-8")
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it would be ignored
+    try:
+        ran = lab("teach", "gym:lab_test_ctrl_c:LabTestCtrlC-v0", "--episodes", "50000", "--gate", "never")
+    finally:
+        signal.signal(signal.SIGINT, before)
+        gymnasium.registry.pop("LabTestCtrlC-v0", None)
+        sys.modules.pop("lab_test_ctrl_c", None)
+    assert (ran.code, ran.out) == (130, "")
+    assert ran.err.startswith("lab: stopped by Ctrl-C")

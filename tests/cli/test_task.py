@@ -1,0 +1,94 @@
+"""`lab task`: lists, shows, draws and checks task files."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from lab.taskfile import load, load_world
+
+Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
+Tree = Callable[[Path], list[str]]
+TOML = load("toast")
+WALL = (0.55, 0.7, 0.85, 1.0, 1.08)  # x [m] of cubes across the insert task's grid
+
+
+def test_a_goal_that_no_way_reaches_names_what_encloses_it(lab: Lab, folder: Path, toml: str) -> None:
+    wall = [f'[[obstacles]]\nname = "wall {n}"\nposition_m = [{x}, 0.05]\n' for n, x in enumerate(WALL)]
+    before, after = toml[: toml.index("[[obstacles]]")], toml[toml.index("# ---- how each") :]
+    (folder / "t.toml").write_text(before + "\n".join(wall) + after)
+    ran = lab("task", "check", "t.toml", "--json")
+    assert ran.code == 2
+    assert ran.json["valid"] is False
+    (error,) = ran.json["errors"]
+    assert ran.err == f"lab: {error}\n"
+    assert error.startswith("insert at toaster: no path reaches the goal; the goal is enclosed by: wall ")
+
+
+def test_task_list_show_and_check(lab: Lab, folder: Path, toml: str) -> None:
+    rows = [line.split() for line in lab("task", "list").out.splitlines()]
+    assert rows[0] == ["name", "kind"]
+    assert [row for row in rows if row[0] in ("toast", "world-1")] == [["toast", "task"], ["world-1", "world"]]
+    assert lab("task", "list", "--json").json == {"tasks": [name for name, _ in rows[1:]], "kinds": dict(rows[1:])}
+    assert lab("task", "show", "toast").out == toml
+    shown = lab("task", "show", "toast", "--json").json
+    assert Path(shown["file"]).name == "toast.toml"
+    assert [station["name"] for station in shown["stations"]] == [s.name for s in TOML.stations]
+    (folder / "far").mkdir()
+    (folder / "far" / "mine.toml").write_text(toml)
+    ran = lab("task", "check", "far/mine.toml")
+    assert (ran.code, ran.out, ran.err) == (0, "far/mine.toml is sound\n", "")
+    assert lab("task", "check", "far/mine.toml", "--toasts", "1", "--json").json == {"valid": True, "errors": []}
+
+
+def test_a_world_is_shown_checked_and_learned(lab: Lab, folder: Path, root: Path) -> None:
+    assert lab("task", "show", "world-1").out == (root / "tasks" / "world-1.toml").read_text(encoding="utf-8")
+    shown = lab("task", "show", "world-1", "--json").json
+    assert (shown["kind"], shown["shape"], len(shown["obstacles"])) == ("world", [10, 10, 10], 59)
+    assert lab("task", "check", "world-1").out == "world-1 is sound\n"
+    ran = lab("teach", "world-1", "--sight", "limited", "--json")
+    assert (ran.code, ran.err) == (0, "")
+    assert (ran.json["subtask"], ran.json["view"], ran.json["optimal_steps"]) == ("world", "limited", 13)
+    (row,) = lab("toolbox", "list", "--json").json["policies"]
+    assert (row["name"], row["subtask"], row["task"]) == (ran.json["saved_as"], "world", "world-1")
+    assert (folder / "toolbox").is_dir()
+
+
+def test_a_random_world_is_written_checked_and_learned(lab: Lab, folder: Path, tree: Tree) -> None:
+    words = ("task", "random", "6x5", "--density", "0.3", "--seed", "2", "--out", "w.toml")
+    ran = lab(*words, "--json")
+    assert (ran.code, ran.json["file"], ran.json["obstacles"]) == (0, "w.toml", 9)
+    text = (folder / "w.toml").read_text(encoding="utf-8")
+    again = lab(*words)
+    assert (again.code, again.out) == (2, "")
+    assert "w.toml' (--out): there is one already: choose another name, or remove it" in again.err
+    assert lab(*words[:-1], "v.toml").out.startswith("v.toml: 9 obstacles, the shortest way takes ")
+    assert (folder / "v.toml").read_text(encoding="utf-8") == text
+    assert text.endswith(lab("task", "show", "random:6x5:0.3:2").out)
+    assert text.startswith("# Drawn at random. Cells are counted from 0; with two axes they are [row, column]")
+    assert load_world("w.toml") == load_world("random:6x5:0.3:2")
+    assert lab("task", "show", "random:6x5:0.3:2", "--json").json["file"] is None
+    assert lab("task", "check", "w.toml").out == "w.toml is sound\n"
+    ran = lab("teach", "w.toml", "--out", "pictures", "--json")
+    assert (ran.code, ran.json["solved"]) == (0, True)
+    assert tree(folder / "pictures") == ["events.jsonl", "learning-curve.png", "receipt.json", "value-map.png"]
+
+
+def test_a_world_without_a_way_is_not_sound(lab: Lab, folder: Path) -> None:
+    (folder / "w.txt").write_text("S#.\n##G\n")
+    for words in ("task check w.txt", "teach w.txt"):
+        ran = lab(*words.split())
+        assert (ran.code, ran.out) == (2, "")
+        assert ran.err == "lab: world 'w': no path from (0, 0) to (1, 2): the start is enclosed by (0, 1), (1, 0)\n"
+
+
+def test_a_task_with_room_for_one_toast_is_sound(lab: Lab, folder: Path, toml: str) -> None:
+    (folder / "one.toml").write_text(toml.replace("capacity = 50", "capacity = 1"))
+    assert lab("task", "check", "one.toml").code == 0
+
+
+def test_a_damaged_task_file_is_reported_by_check(lab: Lab, folder: Path) -> None:
+    (folder / "t.toml").write_text("name = 3\n")
+    ran = lab("task", "check", "t.toml")
+    assert (ran.code, ran.out) == (2, "")
+    ran = lab("task", "check", "t.toml", "--json")
+    assert (ran.code, ran.json) == (2, {"valid": False, "errors": [ran.err.removeprefix("lab: ").strip()]})

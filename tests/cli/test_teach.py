@@ -1,0 +1,72 @@
+"""`lab teach`: sessions are kept, gone on with, and refused in words."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
+Tree = Callable[[Path], list[str]]
+
+
+def test_a_session_goes_on_from_another_folder(lab: Lab, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "w.txt").write_text("S..\n.#.\n..G\n")
+    whole = lab("teach", "w.txt", "--advisor", "expert", "--gate", "always", "--out", "lesson", "--json").json
+    journal = folder / "lesson" / "events.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[:7]) + lines[7][:11])
+    (folder / "elsewhere").mkdir()
+    monkeypatch.chdir(folder / "elsewhere")
+    ran = lab("teach", "--resume", "../lesson", "--json")
+    assert ran.code == 0
+    assert "its last line was cut off and is left out" in ran.err
+    kept = ("steps_per_episode", "helped_steps", "solved", "saved_as")
+    assert [ran.json[name] for name in kept] == [whole[name] for name in kept]
+    assert journal.read_bytes() == b"".join(lines)
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ("teach", "nothing to learn (SUBTASK): name a sub-task, a world or gym:ID, or go on with --resume DIR"),
+        ("teach --resume nowhere", "journal 'nowhere' (--resume): cannot be read: No such file or directory"),
+        ("replay nowhere", "journal 'nowhere' (DIR): cannot be read: No such file or directory"),
+        (
+            "teach world-1 --resume lesson",
+            "SUBTASK beside --resume lesson: a session goes on as it was begun",
+        ),
+        ("teach world-1 --advisor recorded:lesson", "it is advice about another problem, 'w'"),
+        ("teach world-1 --ask all", "unknown way of asking 'all' (--ask): known: in-turn, together"),
+        ("teach world-1 --decide majorit", "unknown way of deciding 'majorit' (--decide): did you mean 'majority'?"),
+        ("teach --resume lesson --ask in-turn", "--ask beside --resume lesson: a session goes on as it was begun"),
+        (
+            "teach --resume lesson --out other",
+            "--out other beside --resume lesson: a session goes on in its own folder",
+        ),
+        ("teach world-1 --advisor none --advisor expert", "advisor 'none' (--advisor) beside 1 more"),
+        ("teach world-1 --advisor web --advisor web", "advisor 'web' (--advisor) is named 2 times: once is enough"),
+        ("teach world-1 --wait 0", "invalid value for '--wait'"),
+        ("teach gym:FrozenLak-v1", "FrozenLake-v1"),
+        ("teach gym:Pendulum-v1", "its observation space is Box"),
+        ("teach gym:Pendulum-v1", "supported are Discrete, MultiDiscrete, MultiBinary"),
+        (
+            "teach gym:FrozenLake-v1 --task toast",
+            "--task toast: a Gymnasium environment, 'gym:FrozenLake-v1', has none",
+        ),
+    ],
+)
+def test_bad_words_about_sessions(lab: Lab, folder: Path, words: str, reason: str, tree: Tree) -> None:
+    (folder / "w.txt").write_text("S.G\n")
+    lab("teach", "w.txt", "--out", "lesson", "--episodes", "2", "--gate", "always")
+    before = tree(folder)
+    ran = lab(*words.split())
+    assert (ran.code, ran.out) == (2, "")
+    assert reason in ran.err
+    assert ran.err.count("\n") == 1
+    assert tree(folder) == before
+
+
+def test_a_gymnasium_environment_is_taught(lab: Lab, folder: Path) -> None:
+    ran = lab("teach", "gym:FrozenLake-v1?is_slippery=false", "--advisor", "expert", "--json")
+    assert (ran.code, ran.json["solved"], ran.json["final_steps"]) == (0, True, 6)

@@ -1,0 +1,118 @@
+"""Times drawn by chance: their laws, and what a draw depends on."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lab.errors import BadInput
+from lab.learning.splitmix import uniform
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance, Episode
+
+CellMaker = Callable[..., Cell]
+SEEDS = st.integers(0, 2**64 - 1)
+OVEN = 1  # position of a part in the oven
+
+
+def draws(cell: Cell, chance: Chance, count: int = 4000) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """The first part's time in the oven, in so many episodes (count,)."""
+    return np.array([Episode(cell, chance, seed).processing_s(1, OVEN) for seed in range(count)])
+
+
+def test_without_chance_times_are_those_of_the_cell(fms_cell: CellMaker) -> None:
+    cell = fms_cell("RS", 150.0)
+    episode = Episode(cell, NO_CHANCE, 9)
+    assert [episode.interval_s(part) for part in (1, 2)] == [150.0, 150.0]
+    for position, place in enumerate(cell.positions):
+        assert episode.processing_s(1, position) == (place.processing_s or 0.0)
+
+
+def test_the_stream_is_the_published_one() -> None:
+    """The first outputs of SplitMix64 with seed 1234567 (Steele, Lea and Flood 2014), as fractions."""
+    published = (6457827717110365317, 3203168211198807973, 9817491932198370423)
+    assert [uniform(1234567, number) for number in range(3)] == [(z >> 11) / 2**53 for z in published]
+
+
+@given(seed=SEEDS, number=st.integers(0, 10**6))
+def test_numbers_are_below_one(seed: int, number: int) -> None:
+    assert 0.0 <= uniform(seed, number) < 1.0
+
+
+def test_a_normal_time_has_its_mean_and_its_spread(oven_cell: CellMaker) -> None:
+    """10 s, 10 %; the mean of 4000 is within 0.1 s (6 standard errors), about 68.3 % are within one deviation."""
+    times = draws(oven_cell(1), Chance("normal", spread=0.1))
+    assert times.mean() == pytest.approx(10.0, abs=0.1)
+    assert times.std() == pytest.approx(1.0, abs=0.07)
+    assert (abs(times - 10.0) < 1.0).mean() == pytest.approx(0.683, abs=0.04)
+
+
+def test_a_normal_time_is_never_negative(oven_cell: CellMaker) -> None:
+    """With a spread of 100 % 15.9 % would be."""
+    times = draws(oven_cell(1), Chance("normal", spread=1.0))
+    assert times.min() == 0.0
+    assert (times == 0.0).mean() == pytest.approx(0.159, abs=0.03)
+
+
+def test_an_exponential_time_has_its_mean(oven_cell: CellMaker) -> None:
+    """Mean and deviation 10 s; 63.2 % are below the mean."""
+    times = draws(oven_cell(1), Chance("exponential"))
+    assert times.mean() == pytest.approx(10.0, abs=0.8)
+    assert times.std() == pytest.approx(10.0, abs=1.2)
+    assert (times < 10.0).mean() == pytest.approx(0.632, abs=0.04)
+    assert times.min() >= 0.0
+
+
+def test_neighbouring_draws_have_nothing_in_common(toast_cell: CellMaker) -> None:
+    """Of parts, of positions and of episodes: |r| of 2000 pairs stays below 0.1 (4.5 standard errors)."""
+    cell, chance, count = toast_cell("I", 3), Chance("exponential"), 2000
+    first = [Episode(cell, chance, seed).processing_s(1, 1) for seed in range(count)]
+    part = [Episode(cell, chance, seed).processing_s(2, 1) for seed in range(count)]
+    position = [Episode(cell, chance, seed).processing_s(1, 3) for seed in range(count)]
+    for other in (part, position, first[1:] + first[:1]):
+        assert abs(np.corrcoef(first, other)[0, 1]) < 0.1
+
+
+@given(seed=SEEDS, law=st.sampled_from(sorted(LAWS)))
+def test_a_draw_depends_on_seed_part_and_position_only(fms_cell: CellMaker, seed: int, law: str) -> None:
+    """Asked twice, or in another order, an episode gives the same."""
+    cell = fms_cell("RSR")
+    keys = [(part, position) for part in (1, 2, 3) for position in range(len(cell.positions))]
+    one, other = Episode(cell, Chance(law, law), seed), Episode(cell, Chance(law, law), seed)
+    times = {key: one.processing_s(*key) for key in keys}
+    assert {key: other.processing_s(*key) for key in reversed(keys)} == times
+    assert [one.interval_s(part) for part in (1, 2, 3)] == [other.interval_s(part) for part in (3, 2, 1)][::-1]
+
+
+def test_processing_and_arrivals_have_laws_of_their_own(fms_cell: CellMaker) -> None:
+    cell = fms_cell("S")
+    mill = next(index for index, place in enumerate(cell.positions) if place.processing_s == 600.0)
+    processed = Episode(cell, Chance("constant", "exponential"), 4)
+    assert processed.processing_s(1, mill) == 600.0
+    assert processed.interval_s(1) != 200.0
+    arrived = Episode(cell, Chance("exponential", "constant"), 4)
+    assert arrived.processing_s(1, mill) != 600.0
+    assert arrived.interval_s(1) == 200.0
+
+
+def test_what_takes_no_time_is_not_drawn(oven_cell: CellMaker) -> None:
+    """At the end of the route, and where no arrivals are."""
+    episode = Episode(oven_cell(1), Chance("exponential", "exponential"), 1)
+    assert (episode.processing_s(1, 2), episode.interval_s(1)) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("given_", "says"),
+    [
+        ({"processing": "gauss"}, "unknown law 'gauss' .*processing.*known: constant, exponential, normal"),
+        ({"arrivals": "norml"}, "unknown law 'norml' .*did you mean 'normal'"),
+        ({"spread": 1.5}, "spread = 1.5: allowed are 0 to 1"),
+        ({"spread": -0.1}, "spread = -0.1"),
+        ({"spread": float("nan")}, "spread = nan"),
+    ],
+)
+def test_chances_that_cannot_be(given_: dict[str, object], says: str) -> None:
+    with pytest.raises(BadInput, match=says):
+        Chance(**given_)  # type: ignore[arg-type]

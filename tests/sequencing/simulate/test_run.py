@@ -1,0 +1,249 @@
+"""One pass through a cell: service, pallets, arrivals, routes to choose, free buffers, deadlocks, all by hand."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lab.errors import BadInput
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import Chance, Episode
+from lab.sequencing.cell.routes import part_of
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.cell.stations import Arrivals, Product, Route, Stage, Station
+from lab.sequencing.simulate.run import Run, simulate
+
+CellMaker = Callable[..., Cell]
+
+
+def build(stations: str, *routes: Route, parts: int = 2, **change: object) -> Cell:
+    """Loaded moves 2 s, empty ones 1 s; "m" and "n" are machines of 10 s, "p", "q" and "b" buffers; the robot at "in".
+
+    stations: names between "in" and "out", a letter each. All rooms are for one part. Each product has one route.
+    """
+    kinds = {"m": "machine", "n": "machine"}
+    inner = [Station(name, kinds.get(name, "buffer"), 1, 10.0 if name in kinds else 0.0) for name in stations]  # type: ignore[arg-type]
+    all_ = (Station("in", "storage", 9), *inner, Station("out", "storage", 9))
+    table = 1.0 - np.eye(len(all_))
+    described: dict[str, object] = {
+        "products": tuple(Product(f"type {number}", (route,)) for number, route in enumerate(routes, 1)),
+        "order": tuple(f"type {1 + number % len(routes)}" for number in range(parts)),
+    }
+    described |= {"empty_s": table, "loaded_s": 2.0 * table, "robot_start": "in"}
+    return Cell(all_, **(described | change))  # type: ignore[arg-type]
+
+
+def way(*stages: Stage | str) -> Route:
+    """A route from "in" to "out"; a name alone is a stage without more."""
+    named = [Stage(stage) if isinstance(stage, str) else stage for stage in stages]
+    return (Stage("in"), *named, Stage("out"))
+
+
+def moved(run: Run, *decisions: int) -> list[Move]:
+    return [run.move(decision) for decision in decisions]
+
+
+def test_the_robot_serves_a_machine_after_it_has_finished() -> None:
+    """In at 2 s, done at 12 s, vacuumed until 16 s, out at 18 s."""
+    run = Run(build("m", way(Stage("m", service_s=4.0)), parts=1))
+    move = moved(run, 1, 1)[1]
+    assert (move.reach_s, move.pick_s, move.drop_s, move.service_s) == (2.0, 16.0, 18.0, 4.0)
+    assert (run.waited_s, run.processed_s, run.finished_s) == (10.0, 10.0, [18.0])
+
+
+def test_service_takes_its_time_even_when_the_robot_comes_late() -> None:
+    """Part 1 is done at 12 s. Part 2 goes through n meanwhile: in at 5 s, out at 17 s; 1 s to m, 4 s there, 2 s out."""
+    cell = build("mn", way(Stage("m", service_s=4.0)), way("n"))
+    run = Run(cell)
+    assert [move.drop_s for move in moved(run, 1, 2, 2, 1)] == [2.0, 5.0, 17.0, 24.0]
+    assert run.waited_s == 10.0
+
+
+def test_a_stage_may_have_a_time_of_its_own() -> None:
+    """3 s instead of the machine's 10 s."""
+    assert simulate(build("m", way(Stage("m", processing_s=3.0)), parts=1), (1, 1)).makespan_s == 7.0
+
+
+def palletised(parts: int = 1) -> Cell:
+    """By p, its machine m, and q: the pallet stays in p, and has to be brought to q."""
+    return build("pmq", way("p", Stage("m", pallet=True), "q"), parts=parts)
+
+
+def test_a_pallet_is_brought_round_the_machine() -> None:
+    """To p 2, into m 4 (done 14), back 5 and the pallet to q 7, to m 8, wait for 14, to q 16, away 18."""
+    cell, run = palletised(), Run(palletised())
+    moves = moved(run, 1, 1, 1, 1, 1)
+    assert [move.drop_s for move in moves] == [2.0, 4.0, 7.0, 16.0, 18.0]
+    assert [(move.origin, move.target, move.carries) for move in moves][1:4] == [
+        ("p", "m", "part"),
+        ("p", "q", "pallet"),
+        ("m", "q", "part"),
+    ]
+    assert run.waited_s == 14.0 - 8.0
+    assert run.occupied == [0] * len(cell.stations)
+
+
+def test_a_pallet_takes_room_until_it_is_brought_on() -> None:
+    """p is taken by the pallet of part 1 while that is in m; then q is, until part 1 has left on it."""
+    run = Run(palletised(2))
+    moved(run, 1, 1)
+    assert run.allowed() == (1,)
+    assert run.refusal(2) == "type 1 2 at 'in' cannot move on: 'p' full"
+    moved(run, 1, 2)
+    assert run.refusal(2) == "type 1 2 at 'p' cannot move on: 'm' full"
+    moved(run, 1, 2)
+    assert run.refusal(2) == "type 1 2 at 'p' cannot move on: 'q' full"
+    moved(run, 1)
+    assert run.allowed() == (2,)
+
+
+def arriving(after: str, *interval_s: float) -> Cell:
+    arrivals = Arrivals(interval_s, after)  # type: ignore[arg-type]
+    return build("m", way("m"), parts=len(interval_s), arrivals=arrivals)
+
+
+def test_parts_arrive_by_the_clock() -> None:
+    """At 5 and at 9 s; the second has waited for 5 + 2 + 10 + 2 + 1 = 20 s."""
+    run = Run(arriving("clock", 5.0, 4.0))
+    assert run.ready_s == [5.0, 9.0]
+    assert [move.pick_s for move in moved(run, 1, 1, 2, 2)] == [5.0, 17.0, 20.0, 32.0]
+    assert run.waited_s == 5.0 + 10.0 + 10.0
+
+
+def test_parts_arrive_after_the_pick_of_the_one_before() -> None:
+    """At 5 s, and 30 s after it was taken: at 35 s; the robot is back at 20 s and waits."""
+    run = Run(arriving("pick", 5.0, 30.0))
+    assert [move.pick_s for move in moved(run, 1, 1, 2, 2)] == [5.0, 17.0, 35.0, 47.0]
+    assert run.waited_s == 5.0 + 10.0 + 15.0 + 10.0
+
+
+def test_the_next_part_sets_out_when_the_robot_picks_not_when_the_part_came() -> None:
+    """The robot starts at "out": it picks at 1 s what has waited since 0.5 s; the next one comes at 1 + 8 s."""
+    run = Run(build("m", way("m"), arrivals=Arrivals((0.5, 8.0), "pick"), robot_start="out"))
+    run.move(1)
+    assert run.ready_s[1] == 9.0
+
+
+@pytest.mark.parametrize("after", ["clock", "pick"])
+def test_parts_that_arrive_are_taken_in_their_order(after: str) -> None:
+    run = Run(arriving(after, 5.0, 4.0, 4.0))
+    assert run.allowed() == (1,)
+    assert run.refusal(3) == "type 1 3 has not come yet: type 1 1 is before it"
+    moved(run, 1, 1)
+    assert run.allowed() == (2,)
+
+
+def test_a_schedule_stores_a_part_from_when_it_came() -> None:
+    parts = simulate(arriving("clock", 5.0, 4.0), (1, 1, 2, 2)).parts
+    assert [(a.kind, a.start_s, a.end_s) for a in parts if a.part == 2][:2] == [
+        ("store", 9.0, 20.0),
+        ("carry", 20.0, 22.0),
+    ]
+
+
+def test_a_part_chooses_its_route_once() -> None:
+    """Two parts, m or n: entries 1 and 2 mean m, 3 and 4 mean n. After the choice there is one way on."""
+    product = Product("type 1", (way("m"), way("n")))
+    run = Run(build("mn", way("m"), products=(product,), order=("type 1",) * 2))
+    assert run.allowed() == (1, 2, 3, 4)
+    assert run.move(4).target == "n"
+    assert run.allowed() == (1, 2), "n is taken; 2 now means out of it"
+    assert run.refusal(4) == "type 1 2 at 'n' has no choice 2"
+    assert [move.drop_s for move in moved(run, 1, 2, 1)] == [5.0, 14.0, 17.0]
+    assert run.done
+
+
+def test_a_decision_that_no_part_has(oven_cell: CellMaker) -> None:
+    run = Run(oven_cell(2))
+    assert [run.refusal(decision) for decision in (0, 3, -2)] == [
+        "there is no part 0, only 1 to 2",
+        "there is no part 3, only 1 to 2",
+        "there is no part -2, only 1 to 2",
+    ]
+
+
+def test_a_busy_buffer_is_used_only_when_the_machine_is_full() -> None:
+    run = Run(build("bm", way(Stage("m", "b"))))
+    assert run.allowed() == (1, 2)
+    assert run.move(1).target == "m"
+    assert run.move(2).target == "b"
+    assert run.allowed() == (1,)
+
+
+def test_a_free_buffer_is_a_choice() -> None:
+    """Entry 1 means m, 1 + 2 = 3 the buffer, also while m is free; from the buffer there is only m."""
+    run = Run(build("bm", way(Stage("m", "b")), buffers="free"))
+    assert run.allowed() == (1, 2, 3, 4)
+    assert run.move(3).target == "b"
+    assert run.allowed() == (1, 2), "the buffer is taken; 2 means m"
+    assert run.move(2).target == "m"
+    assert run.allowed() == (2,), "part 1 waits for m"
+    assert [move.target for move in moved(run, 2, 1, 1)] == ["out", "m", "out"]
+
+
+def test_a_full_machine_leaves_only_the_free_buffer() -> None:
+    run = Run(build("bm", way(Stage("m", "b")), buffers="free"))
+    run.move(1)
+    assert run.allowed() == (1, 4)
+    assert run.refusal(2) == "type 1 2 at 'in' cannot move on: 'm' full"
+
+
+def test_opposite_routes_can_block_one_another() -> None:
+    """Part 1 by m to n, part 2 by n to m: once each is in its first machine, neither can leave it."""
+    cell = build("mn", way("m", "n"), way("n", "m"))
+    run = Run(cell)
+    moved(run, 1, 2)
+    assert run.allowed() == ()
+    assert not run.done
+    assert run.refusal(1) == "type 1 1 at 'm' cannot move on: 'n' full"
+    assert run.refusal(2) == "type 2 2 at 'n' cannot move on: 'm' full"
+    with pytest.raises(BadInput, match=r"position 3 of the sequence: .*'n' full; allowed here: none, it is a deadlock"):
+        simulate(cell, (1, 2, 1))
+    assert simulate(cell, (1, 1, 1, 2, 2, 2)).makespan_s == 2 * (2 + 10 + 2 + 10 + 2) + 1
+
+
+@given(data=st.data())
+def test_one_part_after_the_other_always_gets_through(
+    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject
+) -> None:
+    """So every cell can be finished, whatever deadlocks there are on the way."""
+    run = Run(data.draw(cells(max_parts=5, max_machines=3, many=True)))
+    for part in range(1, run.cell.parts + 1):
+        while run.finished_s[part - 1] is None:
+            run.move(next(decision for decision in run.allowed() if part_of(decision, run.cell.parts) == part))
+    assert run.done
+
+
+def test_drawn_times_are_the_episodes() -> None:
+    """Arrivals and processing come from the episode; travel does not change."""
+    cell = arriving("clock", 5.0, 4.0)
+    times = Episode(cell, Chance("exponential", "exponential"), 11)
+    run = Run(cell, times)
+    first_s, second_s = times.interval_s(1), times.interval_s(2)
+    assert run.ready_s == [first_s, first_s + second_s]
+    move = run.move(1)
+    assert move.drop_s == first_s + 2.0
+    assert (move.process_s, run.ready_s[0]) == (times.processing_s(1, 1), move.drop_s + times.processing_s(1, 1))
+    assert run.processed_s == times.processing_s(1, 1)
+
+
+@given(data=st.data())
+def test_the_run_and_its_schedule_agree(cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject) -> None:
+    """Waiting, processing and the ends, with pallets, arrivals and choices, by whatever times."""
+    cell = data.draw(cells(max_machines=2, max_parts=4, many=True))
+    times = Episode(cell, Chance("exponential", "exponential"), data.draw(st.integers(0, 2**64 - 1)))
+    run, sequence = Run(cell, times), []
+    while allowed := run.allowed():
+        sequence.append(data.draw(st.sampled_from(allowed)))
+        run.move(sequence[-1])
+    schedule = simulate(cell, sequence, times)
+
+    def total(rows: str, kind: str) -> float:
+        return float(sum(a.end_s - a.start_s for a in getattr(schedule, rows) if a.kind == kind))
+
+    assert schedule.makespan_s == run.now_s == max(end or 0.0 for end in run.finished_s)
+    assert total("robot", "wait") == pytest.approx(run.waited_s, abs=1e-6)
+    assert total("machines", "process") == pytest.approx(run.processed_s, abs=1e-6)
+    assert total("robot", "carry") == pytest.approx(total("parts", "carry"), abs=1e-6)
