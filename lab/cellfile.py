@@ -14,7 +14,7 @@ from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import MAX_PARTS, Cell
 from lab.sequencing.cell.chance import Chance
 from lab.sequencing.cell.stations import Arrivals
-from lab.tomltext import TomlText, explain
+from lab.tasks.toml_text import TomlText, explain
 
 TOAST_CASES = {"I": "toast-case-1", "II": "toast-case-2", "III": "toast-case-3"}
 

@@ -6,12 +6,12 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from lab.errors import BadInput, unknown
-from lab.record import Name, Record, as_tuple
 from lab.sequencing.cell.chance import LAWS, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES
 from lab.sequencing.cell.stations import STATION_KINDS, Product, Stage, Station
 from lab.sequencing.search import SrlSettings
-from lab.tomltext import Loc
+from lab.tasks.record import Name, Record, as_tuple
+from lab.tasks.toml_text import Loc
 
 Seconds = Annotated[float, Field(ge=0, le=1e6)]  # 1e6 s: eleven days
 Room = Annotated[int, Field(ge=1, le=1000)]

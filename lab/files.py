@@ -1,4 +1,4 @@
-"""Files are written whole or not at all, and folders are looked at before anything is made."""
+"""Files: where the shipped ones are; written whole or not at all; folders looked at before anything is made."""
 
 import fcntl
 import os
@@ -10,7 +10,36 @@ from secrets import token_hex
 from shutil import rmtree
 from tempfile import mkdtemp
 
-from lab.errors import BadInput
+from lab.errors import BadInput, WorkFailed
+
+PACKAGE = Path(__file__).resolve().parent
+
+
+def tasks_folder() -> Path:
+    """The folder of the task files that ship (`*.toml`); raises WorkFailed when the installation lost it."""
+    return find("tasks", PACKAGE)
+
+
+def assets_folder() -> Path:
+    """The folder of the shipped URDFs and meshes; raises WorkFailed when the installation lost it."""
+    return find("assets", PACKAGE)
+
+
+def find(name: str, package: Path) -> Path:
+    """The data folder `name` of the package folder `package`; raises WorkFailed naming the two places it looked in.
+
+    A folder beside the package counts only next to a `pyproject.toml`: beside an installed package any `tasks` folder
+    would be somebody else's.
+    """
+    wheel, checkout = package / "_data" / name, package.parent / name
+    if wheel.is_dir():
+        return wheel
+    if checkout.is_dir() and (package.parent / "pyproject.toml").is_file():
+        return checkout
+    raise WorkFailed(
+        f"the lab's own '{name}' folder is missing: looked for {wheel} and {checkout}; install the lab again"
+    )
+
 
 _DRAFT = ".run-"  # and eight characters: the folder of a draft
 

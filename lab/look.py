@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput
-from lab.taskfile import check_number, load
+from lab.tasks.task_file import check_number, load
 
 if TYPE_CHECKING:
     from lab.vision import View

@@ -10,9 +10,7 @@ import numpy as np
 from lab.cellfile import CellFile, order_from_word, toast_case
 from lab.cellparts import Sequencing
 from lab.errors import BadInput, unknown
-from lab.gridworld import GridWorld
 from lab.learning.settings import GateSettings
-from lab.listener import Listener
 from lab.planner import check_method, find_sequence, search_for
 from lab.sequence_drawn import stochastic
 from lab.sequencing import DRAWN
@@ -22,8 +20,10 @@ from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES,
 from lab.sequencing.cell.schedule import EpisodeSequenced, LearnedSequence, SequenceResult
 from lab.sequencing.search import SAME, Reference, Search
 from lab.sequencing.simulate.run import follow, simulate
-from lab.taskfile import Task, load_any
-from lab.teaching import Teacher
+from lab.tasks.grid_world import GridWorld
+from lab.tasks.task_file import Task, load_any
+from lab.teaching.listener import Listener
+from lab.teaching.teacher import Teacher
 
 if TYPE_CHECKING:
     from lab.sequencing.methods.srl_advised import AdvisedResult, SequenceRequest

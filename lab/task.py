@@ -7,12 +7,12 @@ from typing import Any
 from lab.cellfile import CellFile
 from lab.errors import BadInput, LabError
 from lab.files import check_out
-from lab.gridworld import RANDOM, GridWorld, parse_shape, random_world
-from lab.lesson import fitting
 from lab.mdp import shortest_steps
-from lab.record import read_text, write_whole
-from lab.taskfile import check_number, find, load_any
-from lab.teaching import world_problem
+from lab.tasks.grid_world import RANDOM, GridWorld, parse_shape, random_world
+from lab.tasks.record import read_text, write_whole
+from lab.tasks.task_file import check_number, find, load_any
+from lab.teaching.lesson import fitting
+from lab.teaching.teacher import world_problem
 
 AXES = """\
 Drawn at random. Cells are counted from 0; with two axes they are [row, column], row 0 on top, with three [x, y, z], y

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from lab.cellfaults import MAX_STAGES, SHOWN, loc_of
 from lab.cellfile import CellFile
-from lab.data import tasks_folder
 from lab.errors import BadInput
+from lab.files import tasks_folder
 from lab.sequencing.cell.cell import Cell
-from lab.tomltext import TomlText
+from lab.tasks.toml_text import TomlText
 
 FMS = (tasks_folder() / "fms.toml").read_text(encoding="utf-8")
 TOAST = (tasks_folder() / "toast-case-1.toml").read_text(encoding="utf-8")

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from lab.cellfile import TOAST_CASES, CellFile, order_from_word, toast_case
-from lab.data import tasks_folder
 from lab.errors import BadInput
+from lab.files import tasks_folder
 from lab.sequencing.cell.cell import MAX_PARTS
 from lab.sequencing.cell.chance import Chance
 from lab.sequencing.cell.stations import Arrivals
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import SrlSettings
 from lab.sequencing.simulate.run import simulate
-from lab.taskfile import load_cell, names_of
-from lab.tomltext import TomlText
+from lab.tasks.task_file import load_cell, names_of
+from lab.tasks.toml_text import TomlText
 
 FMS = (tasks_folder() / "fms.toml").read_text(encoding="utf-8")
 OVEN = (Path(__file__).parent / "cells" / "oven.toml").read_text(encoding="utf-8")

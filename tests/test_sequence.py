@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.listener import Listener
 from lab.planner import find_sequence, search_for
 from lab.sequence import (
     Wanted,
@@ -30,9 +29,10 @@ from lab.sequencing.cell.stations import Stage, Station
 from lab.sequencing.search import Reference, Search, SrlSettings
 from lab.sequencing.simulate.execution import replicate
 from lab.sequencing.simulate.run import simulate
-from lab.taskfile import load, load_cell
-from lab.teaching import Teacher
-from lab.toolbox import Toolbox
+from lab.tasks.task_file import load, load_cell
+from lab.teaching.listener import Listener
+from lab.teaching.teacher import Teacher
+from lab.toolbox.registry import Toolbox
 from lab.vision import read_picture
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran

@@ -8,7 +8,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.task import check_task, describe
-from lab.taskfile import names_of
+from lab.tasks.task_file import names_of
 
 
 def test_check_finds_what_is_wrong(tmp_path: Path, root: Path) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from lab.advice.entries import read_journal
-from lab.advice.requests import AdviceRequest, Advisor, Ask
 from lab.errors import BadInput, unknown
+from lab.learning.requests import AdviceRequest, Advisor, Ask
 from lab.learning.selection import Draw, uniforms
 from lab.mdp import BoolArray, FloatArray, TabularMDP, optimal_values
 
@@ -86,7 +86,7 @@ class RecordedAdvisor:
 
 
 class Person:
-    """A person, asked through a prompt or a page that a view brings (see lab/view/terminal.py and lab/view/seat.py)."""
+    """A person, asked through a prompt or a page that is brought along (see lab/seat)."""
 
     def __init__(self, ask: Ask):
         self._ask = ask

@@ -8,12 +8,12 @@ import numpy as np
 
 from lab.advice.advisors import PEOPLE, make_advisor, parse_advisor
 from lab.advice.entries import Read, read_journal
-from lab.advice.events import Event
 from lab.advice.journal import Journal
 from lab.advice.panel import ASKED, DECISIONS, panel_of
-from lab.advice.requests import AdviceRequest, Advisor, Ask, Walked
 from lab.errors import BadInput, unknown
 from lab.learning.environment import Environment
+from lab.learning.events import Event
+from lab.learning.requests import AdviceRequest, Advisor, Ask, Walked
 from lab.learning.selection import uniforms
 from lab.learning.settings import LearnerSettings
 from lab.mdp import BoolArray, TabularMDP

@@ -8,7 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from lab.advice.events import (
+from lab.errors import BadInput
+from lab.learning.events import (
     AdviceEnded,
     AdviceGiven,
     AdviceRejected,
@@ -20,7 +21,6 @@ from lab.advice.events import (
     EpisodeEnded,
     Event,
 )
-from lab.errors import BadInput
 
 SCHEMA = 1
 FILE = "events.jsonl"

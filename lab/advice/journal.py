@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lab.advice.entries import FILE, Answer, Closed, Entry, Read, Session, Undone, line_of, read_journal, undoable
-from lab.advice.events import EpisodeEnded
-from lab.advice.requests import AdviceRequest, AdvisorLeft, Ask
 from lab.errors import BadInput, WorkFailed
+from lab.learning.events import EpisodeEnded
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Ask
 
 
 class Undo(Exception):

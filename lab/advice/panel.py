@@ -5,10 +5,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import fsum, log
 
-from lab.advice.events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
-from lab.advice.requests import AdviceRequest, Advisor, AdvisorLeft, Walked
 from lab.advice.trust import Pair, Trail, Ways, bounds, circles, is_bad, is_good, trust, trust_there
 from lab.errors import BadInput, unknown
+from lab.learning.events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
+from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Walked
 from lab.learning.selection import Draw
 from lab.mdp import BoolArray
 

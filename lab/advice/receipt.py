@@ -7,7 +7,9 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from lab.advice.entries import Answer, Entry
-from lab.advice.events import (
+from lab.advice.trust import Difference, Pair, Skill, differences, skill_of, worse
+from lab.errors import counted
+from lab.learning.events import (
     AdviceEnded,
     AdviceGiven,
     AdviceRejected,
@@ -18,8 +20,6 @@ from lab.advice.events import (
     AdvisorsDisagreed,
     EpisodeEnded,
 )
-from lab.advice.trust import Difference, Pair, Skill, differences, skill_of, worse
-from lab.errors import counted
 from lab.learning.settings import GateSettings
 from lab.mdp import FloatArray, TabularMDP
 

@@ -9,9 +9,9 @@ from lab.cli.output import complain, console
 from lab.errors import LabError
 
 if TYPE_CHECKING:
-    from lab.classroom import Classroom
-    from lab.sessions import KeptSession
-    from lab.teaching import Teacher
+    from lab.seat.people import Classroom
+    from lab.teaching.kept_session import KeptSession
+    from lab.teaching.teacher import Teacher
 
 
 @contextmanager
@@ -21,15 +21,15 @@ def lesson_room(
     """Who sits in the lessons of a command: the progress lines, and, when they are wanted, the prompt and the page."""
     from contextlib import ExitStack
 
-    from lab.classroom import Classroom
+    from lab.seat.people import Classroom
+    from lab.seat.terminal.prompt import TeachingPrompt
     from lab.view.progress import RunProgress
-    from lab.view.terminal import TeachingPrompt
 
     progress = RunProgress(console())
     with ExitStack() as stack:
         shown = None
         if page or "web" in names:
-            from lab.view.seat import SeatPage
+            from lab.seat.page.teaching_page import SeatPage
 
             shown = stack.enter_context(SeatPage(port, wait_s=wait_s))
             progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
@@ -54,8 +54,8 @@ def teacher_of(
 ) -> "Teacher":
     """The teacher that the options describe; raises BadInput for options and folders that cannot be."""
     from lab.advice.counsel import Counsel
-    from lab.teaching import Teacher
-    from lab.toolbox import Toolbox
+    from lab.teaching.teacher import Teacher
+    from lab.toolbox.registry import Toolbox
 
     counsel = Counsel(tuple(names), room.people(), asked, decide, watch=room.passing)
     counsel.check()
@@ -70,7 +70,7 @@ def kept_session(
     folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] | None = None
 ) -> "KeptSession":
     """A session that was kept; what was cut off at its end is said."""
-    from lab.sessions import KeptSession
+    from lab.teaching.kept_session import KeptSession
 
     kept = KeptSession(folder, where, read_only=read_only, trusted=trusted or ())
     if kept.read.cut:
@@ -80,7 +80,7 @@ def kept_session(
 
 def say_outside(kept: "KeptSession") -> None:
     """Says which files the session has the lab read that are not its own."""
-    from lab.lesson import outside
+    from lab.teaching.lesson import outside
 
     if files := outside(kept):
         complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(files)}")

@@ -26,9 +26,9 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """Show a kept teaching session again: each question, what was answered, what came of it, and what it was worth."""
-    from lab.lesson import replay as replay_session
-    from lab.sessions import session_rows
-    from lab.toolbox import Toolbox
+    from lab.teaching.kept_session import session_rows
+    from lab.teaching.lesson import replay as replay_session
+    from lab.toolbox.registry import Toolbox
     from lab.view.summary import replay_summary, table_of
 
     if folder is None:

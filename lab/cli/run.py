@@ -31,13 +31,13 @@ def run(
     """Find or learn the skills, time them, find their best order, and carry them out in physics."""
     from dataclasses import replace
 
-    from lab import taskfile
     from lab.advice.advisors import PEOPLE
     from lab.advice.counsel import Counsel
     from lab.files import check_out
     from lab.production.prepared import prepare
     from lab.production.run import run as run_task
-    from lab.sessions import Words, kept_by
+    from lab.tasks import task_file as taskfile
+    from lab.teaching.kept_session import Words, kept_by
     from lab.view.summary import run_summary
 
     loaded = taskfile.load(task)

@@ -12,7 +12,7 @@ from lab.errors import counted
 
 def task_list(as_json: Json = False) -> None:
     """The tasks, the cells for lab sequence and the grid worlds that ship."""
-    from lab import taskfile
+    from lab.tasks import task_file as taskfile
     from lab.view.summary import table_of
 
     kinds = taskfile.shipped()

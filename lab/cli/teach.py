@@ -90,9 +90,9 @@ def teach(
     Each session keeps a journal: --resume goes on with one that was broken off, lab replay shows it again.
     """
     from lab.files import check_out
-    from lab.lesson import check
-    from lab.lesson import teach as teach_session
-    from lab.sessions import Words
+    from lab.teaching.kept_session import Words
+    from lab.teaching.lesson import check
+    from lab.teaching.lesson import teach as teach_session
     from lab.view.summary import lesson_summary
 
     advisors = tuple(advisor or ())

@@ -7,7 +7,7 @@ from lab.errors import counted
 
 def toolbox_list(toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
     """The policies in the toolbox."""
-    from lab.toolbox import Toolbox
+    from lab.toolbox.registry import Toolbox
     from lab.view.summary import toolbox_summary
 
     box = Toolbox(toolbox)
@@ -16,7 +16,7 @@ def toolbox_list(toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
 
 def toolbox_show(name: str, toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
     """All that is known of one policy."""
-    from lab.toolbox import Toolbox
+    from lab.toolbox.registry import Toolbox
     from lab.view.summary import policy_summary
 
     show(Toolbox(toolbox).show(name), as_json, policy_summary)
@@ -24,7 +24,7 @@ def toolbox_show(name: str, toolbox: ToolboxFolder = None, as_json: Json = False
 
 def toolbox_verify(toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
     """Check every file: whole, finite, of the right shape. Exit 1 when one is not."""
-    from lab.toolbox import Toolbox
+    from lab.toolbox.registry import Toolbox
     from lab.view.summary import verify_summary
 
     box = Toolbox(toolbox)
@@ -39,6 +39,6 @@ def toolbox_verify(toolbox: ToolboxFolder = None, as_json: Json = False) -> None
 
 def toolbox_remove(name: str, toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
     """Delete one policy."""
-    from lab.toolbox import Toolbox
+    from lab.toolbox.registry import Toolbox
 
     show({"removed": str(Toolbox(toolbox).remove(name))}, as_json, lambda d: f"removed {d['removed']}")

@@ -13,9 +13,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from lab.advice import gates, memory
-from lab.compiled import compiled
-from lab.learning import selection, splitmix, updates
+from lab.learning import advice_memory as memory
+from lab.learning import gates, selection, splitmix, updates
+from lab.learning.compiled import compiled
 from lab.mdp import FloatArray
 
 LANES = 24

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.advice.events import AdviceEnded, AdviceGiven, AdviceRejected, AdviceRequested, EpisodeEnded, Event
-from lab.advice.gates import GATES, Improvement, Surroundings, improvement
-from lab.advice.memory import Recall
-from lab.advice.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked
 from lab.errors import BadInput, unknown
+from lab.learning.advice_memory import Recall
 from lab.learning.environment import Environment, TableEnvironment, check_solvable
+from lab.learning.events import AdviceEnded, AdviceGiven, AdviceRejected, AdviceRequested, EpisodeEnded, Event
+from lab.learning.gates import GATES, Improvement, Surroundings, improvement
+from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked
 from lab.learning.selection import SELECTIONS, Draw, temperature, uniforms
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES, Update
@@ -29,7 +29,7 @@ class SessionResult:
 
     q (S, A) float64, visits (S, A) int64; steps (episodes,) int64, a failed episode as max_steps + 1; guided
     (episodes,) bool: at least one advised step; requests: episodes in which the learner asked; helped_steps:
-    advised steps that were carried out; misleads and rejected_at_episode: see lab/advice/gates.py; final_steps:
+    advised steps that were carried out; misleads and rejected_at_episode: see lab/learning/gates.py; final_steps:
     those of the greedy path from the start, None if it does not reach the goal, optimal_steps: the fewest, None where
     nobody knows them, both counted as in `steps`; solved: see `Environment.judge`; interrupted: stopped by Ctrl-C, only
     finished episodes count.

@@ -10,11 +10,11 @@ from lab.production.recorder import Viewer
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Move, Schedule
 from lab.sequencing.simulate.run import Run
+from lab.sim.frames import Recording
 from lab.sim.scene import Spot, spots
 from lab.sim.world import World
 from lab.skills import Skill
 from lab.skills.skill import UPRIGHT, Status
-from lab.view.frames import Recording
 
 MAX_TRIES = 3  # a failed step is tried again from the state reached, at most twice
 ASTRAY_M = 0.15  # a slice this near to a spot of a station can be taken up again from there

@@ -10,21 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from lab.data import assets_folder
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.policy import Policy
+from lab.files import assets_folder
 from lab.production.floor import Floor
 from lab.production.prepared import Prepared
 from lab.production.skillset import route, stations
+from lab.production.sources import sources
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Moves
 from lab.sim.scene import Layout
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
 from lab.skills.skill import TRIED_WITH, Status
-from lab.sources import sources
-from lab.taskfile import Task
-from lab.toolbox import Toolbox
+from lab.tasks.task_file import Task
+from lab.toolbox.policy import Policy
+from lab.toolbox.registry import Toolbox
 
 RECORDS = "durations"  # the kind of record in the toolbox
 LONGEST_S = 86_400.0  # of a move or a process

@@ -9,7 +9,7 @@ from lab.production.skillset import SkillSet
 from lab.sim.scene import Layout, check_apart, draw_layout
 from lab.skills.skill import Problem
 from lab.skills.surveys import Surveys
-from lab.taskfile import Task, check_toasts
+from lab.tasks.task_file import Task, check_toasts
 
 
 @dataclass

@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from lab.sim import assets
+from lab.sim.frames import Body, Frame, Recording, Shape
 from lab.sim.scene import Layout, Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills import SKILLS
-from lab.taskfile import Task
-from lab.view.frames import Body, Frame, Recording, Shape
+from lab.tasks.task_file import Task
 
 FRAME_EVERY = 24  # physics steps: ten frames a simulated second
 TOASTED = (0.70, 0.42, 0.16, 1.0)

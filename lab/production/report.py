@@ -10,7 +10,6 @@ from typing import Any
 from lab.errors import WorkFailed, counted
 from lab.files import draft
 from lab.mdp import TabularMDP, greedy_path
-from lab.policy import Policy
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
 from lab.production.prepared import Prepared
@@ -18,10 +17,11 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.simulate.run import simulate
+from lab.sim.frames import Recording
 from lab.skills import Skill
 from lab.skills.skill import Photo
-from lab.teaching import Lesson
-from lab.view.frames import Recording
+from lab.teaching.teacher import Lesson
+from lab.toolbox.policy import Policy
 
 FILES = {
     "gantt": "gantt.png",

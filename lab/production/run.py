@@ -5,9 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from lab.errors import LabError
-from lab.listener import Listener
 from lab.planner import find_sequence, search_for
-from lab.policy import Policy
 from lab.production.composer import carry_out
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
 from lab.production.floor import try_out
@@ -17,7 +15,9 @@ from lab.production.report import Report, Taught, write_files
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Reference
 from lab.skills.skill import Problem
-from lab.teaching import Teacher, Trial
+from lab.teaching.listener import Listener
+from lab.teaching.teacher import Teacher, Trial
+from lab.toolbox.policy import Policy
 
 
 def trial_of(prepared: Prepared) -> Trial:

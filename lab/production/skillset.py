@@ -4,12 +4,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from lab.errors import BadInput, unknown
-from lab.policy import Policy
 from lab.sequencing.cell.cell import needed_moves
 from lab.sequencing.cell.routes import Moves
 from lab.sequencing.cell.stations import Product, Route, Stage, Station
 from lab.skills import SKILLS, Skill
-from lab.taskfile import Task
+from lab.tasks.task_file import Task
+from lab.toolbox.policy import Policy
 
 Pair = tuple[str, str]  # origin and target, by name
 Skills = tuple[Skill, ...]

@@ -8,8 +8,8 @@ from math import atan2, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.data import assets_folder
 from lab.errors import WorkFailed
+from lab.files import assets_folder
 from lab.sim import kinematics
 from lab.sim.assets import FINGER_OPEN
 from lab.sim.kinematics import ToolPose

@@ -7,13 +7,13 @@ from math import ceil, cos, hypot, pi, sin
 
 import numpy as np
 
-from lab.data import assets_folder
 from lab.errors import BadInput
+from lab.files import assets_folder
 from lab.sim import assets, kinematics
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import Robot
 from lab.sim.world import World
-from lab.taskfile import NEAREST_STATIONS_M, Obstacle, Station, Task
+from lab.tasks.task_file import NEAREST_STATIONS_M, Obstacle, Station, Task
 
 SLAB = 0.012  # [m] plates and buffers are slabs this thick
 GRASP_DEPTH = 0.03  # [m] how far the fingers reach below a slice's top

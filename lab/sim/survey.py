@@ -7,7 +7,7 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.data import assets_folder
+from lab.files import assets_folder
 from lab.sim import assets
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME

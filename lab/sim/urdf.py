@@ -6,7 +6,7 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from lab.errors import BadInput
-from lab.view.frames import Shape
+from lab.sim.frames import Shape
 
 _MAX_BYTES = 20_000_000
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lab.errors import WorkFailed
 from lab.sim import urdf
-from lab.view.frames import Body, Frame, Pose, Rgba, Shape
+from lab.sim.frames import Body, Frame, Pose, Rgba, Shape
 
 TIME_STEP = 1.0 / 240.0  # [s]
 

@@ -7,15 +7,15 @@ import numpy as np
 
 from lab.mdp import coverage
 from lab.sim import assets
+from lab.sim.frames import Body, Shape
 from lab.sim.kinematics import ToolPose
 from lab.sim.world import TIME_STEP, Array
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path
 from lab.skills.surveys import Surveys
-from lab.taskfile import Task
-from lab.view.frames import Body, Shape
+from lab.tasks.task_file import Task
 
 if TYPE_CHECKING:
-    from lab.policy import Policy
+    from lab.toolbox.policy import Policy
 
 SHAPE = (3, 3)  # rows from the top, columns along the slice's width
 CELL_M = assets.SLICE[0] / 3

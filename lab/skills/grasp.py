@@ -13,10 +13,10 @@ from lab.sim.scene import spots
 from lab.sim.survey import Survey
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
-from lab.taskfile import Task
+from lab.tasks.task_file import Task
 
 if TYPE_CHECKING:
-    from lab.policy import Policy
+    from lab.toolbox.policy import Policy
 
 ACTIONS = ("left", "right", "backward", "forward", "down", "up", "turn right", "turn left")  # of the slice's axes
 GOAL = (2, 2, 0, 2)

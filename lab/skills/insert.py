@@ -16,11 +16,11 @@ from lab.sim.scene import GRASP_DEPTH, Spot, is_toaster, spots
 from lab.skills.place import let_go, release_pose
 from lab.skills.skill import Bench, Photo, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import INSERT_START, Surveys, camera_view, overhead_camera
-from lab.taskfile import Obstacle, Task
+from lab.tasks.task_file import Obstacle, Task
 from lab.vision import Marker, find_markers, locate, see
 
 if TYPE_CHECKING:
-    from lab.policy import Policy
+    from lab.toolbox.policy import Policy
 
 ACTIONS = ("left", "right", "backward", "forward")  # -x, +x, -y, +y: as the camera's picture shows them
 CLEARANCE_M = 0.006  # between a carried slice and a cube in its way

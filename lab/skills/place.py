@@ -11,10 +11,10 @@ from lab.sim.scene import Spot, is_toaster, spots
 from lab.skills.grasp import entry_cell, free_above, from_above
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
 from lab.skills.surveys import RELEASE_ABOVE, Surveys, near_pose
-from lab.taskfile import Task
+from lab.tasks.task_file import Task
 
 if TYPE_CHECKING:
-    from lab.policy import Policy
+    from lab.toolbox.policy import Policy
 
 ACTIONS = ("left", "right", "backward", "forward", "down", "up")  # of the spot's axes
 GOAL = (2, 2, 0)

@@ -13,16 +13,16 @@ from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import Environment
 from lab.mdp import NoPath, TabularMDP, greedy_path
 from lab.sim import assets
+from lab.sim.frames import Body
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME as ROBOT
 from lab.sim.scene import GRASP_DEPTH, Scene, Spot, spots
-from lab.taskfile import Task
-from lab.view.frames import Body
+from lab.tasks.task_file import Task
 from lab.vision import GridView
 
 if TYPE_CHECKING:
-    from lab.policy import Policy
     from lab.skills.surveys import Surveys
+    from lab.toolbox.policy import Policy
 
 LOST_M = 0.03  # [m] a slice farther than this from where the fingers hold it is not held
 UPRIGHT = 0.97  # cosine of the largest tilt of a slice that stands

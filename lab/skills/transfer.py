@@ -9,10 +9,10 @@ from lab.sim.kinematics import ToolPose
 from lab.sim.scene import is_toaster
 from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
 from lab.skills.surveys import INSERT_START, Surveys
-from lab.taskfile import Task
+from lab.tasks.task_file import Task
 
 if TYPE_CHECKING:
-    from lab.policy import Policy
+    from lab.toolbox.policy import Policy
 
 ACTIONS = ("left", "right", "backward", "forward", "down", "up")  # -x, +x, -y, +y, -z, +z, as seen from above
 _BLEND_M = 0.10

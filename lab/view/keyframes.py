@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.view.frames import IDENTITY, Recording, Rgba
+from lab.sim.frames import IDENTITY, Recording, Rgba
 
 POSITION_TOLERANCE_M = 0.0002
 ANGLE_TOLERANCE_RAD = np.deg2rad(0.2)

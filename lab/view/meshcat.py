@@ -19,7 +19,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.view.frames import Body, Camera, Frame, Recording
+from lab.sim.frames import Body, Camera, Frame, Recording
 
 if TYPE_CHECKING:
     from lab.view.keyframes import Motion, Track
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from lab.view.server_page import Panel
 
 HERE = Path(__file__).parent
+TEACHING = HERE.parent / "seat" / "page"  # the panel's own files
 # meshcat's viewer, and dat.gui in it, bring their styles as elements of their own: nothing else may be inline when served
 SERVED = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "
@@ -77,18 +78,20 @@ class LiveView:
         panel = self._panel is not None
         scripts = [
             "main.min.js",
-            *(["seat_draw.js", "seat_side.js", "seat_map.js", "seat.js"] if panel else []),
+            *(["teaching_draw.js", "teaching_side.js", "teaching_map.js", "teaching.js"] if panel else []),
             "page.js",
         ]
-        styles = ["page.css", *(["seat.css"] if panel else [])]
+        styles = ["page.css", *(["teaching.css"] if panel else [])]
         ask = f"?token={self._token}"
         viewer = "\n".join(f'<script src="{name}{ask}"></script>' for name in scripts)
         looks = "\n".join(f'<link rel="stylesheet" href="{name}{ask}">' for name in styles)
-        seat = (HERE / "seat.html").read_text(encoding="utf-8") if panel else ""
+        seat = (TEACHING / "teaching.html").read_text(encoding="utf-8") if panel else ""
         page = _page(self._title, {}, styles=looks, scripts=viewer, panel=seat)
         files = {"": File(page.encode(), "text/html", SERVED)}
-        files |= {name: File((HERE / name).read_bytes(), "text/css") for name in styles}
-        files |= {name: File((HERE / name).read_bytes(), "text/javascript") for name in scripts[1:]}
+        for kind, names in (("text/css", styles), ("text/javascript", scripts[1:])):
+            for name in names:
+                folder = TEACHING if name.startswith("teaching") else HERE
+                files[name] = File((folder / name).read_bytes(), kind)
         return files | {"main.min.js": File(viewer_script().read_bytes(), "text/javascript")}
 
     @property
@@ -115,7 +118,7 @@ class LiveView:
 
         Raises BadInput for a mesh that cannot be read and for two bodies of one name.
         """
-        from lab.view.scene import describe
+        from lab.view.scene_data import describe
         from lab.view.server_page import News
 
         scene = describe(bodies, camera or Camera())
@@ -165,7 +168,7 @@ def replay_html(recording: Recording, path: Path, speed: float = 8.0, title: str
     unreadable mesh and a path that cannot be written.
     """
     from lab.view.keyframes import motions
-    from lab.view.scene import describe
+    from lab.view.scene_data import describe
 
     if not (math.isfinite(speed) and speed > 0):
         raise BadInput(f"replay speed {speed}: must be finite and above 0 (1 is real time)")
@@ -188,7 +191,7 @@ def replay_html(recording: Recording, path: Path, speed: float = 8.0, title: str
 
 
 def _motion(motion: "Motion") -> dict[str, Any]:
-    from lab.view.scene import pack
+    from lab.view.scene_data import pack
 
     def packed(track: "Track | None") -> dict[str, str] | None:
         return None if track is None else {"times": pack(track.times_s), "values": pack(track.values)}

@@ -10,12 +10,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from lab.advice.events import AdviceRejected, AdviceRequested, Event
 from lab.errors import counted
-from lab.listener import Listener
+from lab.learning.events import AdviceRejected, AdviceRequested, Event
 from lab.sequencing.cell.schedule import Move, SequenceResult
 from lab.sequencing.search import Reference
-from lab.teaching import Lesson
+from lab.teaching.listener import Listener
+from lab.teaching.teacher import Lesson
 from lab.view.figures import beside, gap_of
 
 BARS = "▁▂▃▄▅▆▇█"

@@ -17,10 +17,10 @@ from lab.advice.advisors import (
     skill,
 )
 from lab.advice.entries import FILE, Session
-from lab.advice.events import AdviceGiven
 from lab.advice.journal import Journal
-from lab.advice.requests import AdviceRequest, Advisor, AdvisorLeft
 from lab.errors import BadInput
+from lab.learning.events import AdviceGiven
+from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft
 from lab.learning.selection import softmax
 from lab.mdp import FloatArray, TabularMDP, grid, optimal_values, shortest_steps
 

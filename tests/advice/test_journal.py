@@ -27,11 +27,11 @@ from lab.advice.entries import (
     read_journal,
     undoable,
 )
-from lab.advice.events import AdviceGiven, EpisodeEnded, Event, Verdict
 from lab.advice.journal import Again, Journal, Undo
-from lab.advice.requests import AdviceRequest, AdvisorLeft, Ask
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment
+from lab.learning.events import AdviceGiven, EpisodeEnded, Event, Verdict
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Ask
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid

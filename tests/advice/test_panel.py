@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from lab.advice.advisors import make_advisor
-from lab.advice.events import AdviceGiven, AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.advice.panel import ASKED, DECISIONS, Panel, decided, panel_of
-from lab.advice.requests import AdviceRequest, Advisor, AdvisorLeft, Walked
 from lab.errors import BadInput
+from lab.learning.events import AdviceGiven, AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
+from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Walked
 from lab.learning.selection import uniforms
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings

@@ -11,7 +11,10 @@ from hypothesis import strategies as st
 
 from lab.advice.advisors import Person, make_advisor
 from lab.advice.entries import Answer, Closed, Entry
-from lab.advice.events import (
+from lab.advice.journal import Journal
+from lab.advice.panel import panel_of
+from lab.advice.receipt import OVERRULED, SILENT, UNHEARD, WIDTH, Receipt, receipt
+from lab.learning.events import (
     AdviceEnded,
     AdviceGiven,
     AdviceRejected,
@@ -24,10 +27,7 @@ from lab.advice.events import (
     Event,
     Verdict,
 )
-from lab.advice.journal import Journal
-from lab.advice.panel import panel_of
-from lab.advice.receipt import OVERRULED, SILENT, UNHEARD, WIDTH, Receipt, receipt
-from lab.advice.requests import AdviceRequest, AdvisorLeft
+from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.session import run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid, optimal_values

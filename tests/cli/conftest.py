@@ -9,7 +9,7 @@ import pytest
 from lab.learning.session import run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import grid
-from lab.policy import Policy
+from lab.toolbox.policy import Policy
 
 
 @pytest.fixture(autouse=True)

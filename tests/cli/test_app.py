@@ -11,11 +11,12 @@ from typing import Any
 import pytest
 
 from lab import __version__
-from lab.advice import advisors, gates, panel
+from lab.advice import advisors, panel
 from lab.cli.app import COMMANDS, Command
 from lab.cli.options import Json
 from lab.cli.output import show
 from lab.errors import WorkFailed
+from lab.learning import gates
 from lab.learning.updates import UPDATES
 from lab.sequencing.cell.objectives import OBJECTIVES
 from lab.sequencing.methods.srl_advised import FITTING
@@ -172,7 +173,7 @@ def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: 
         raise KeyboardInterrupt
 
     monkeypatch.setattr("lab.production.prepared.prepare", stop)
-    monkeypatch.setattr("lab.lesson.load", stop)
+    monkeypatch.setattr("lab.teaching.lesson.load", stop)
     monkeypatch.setattr("lab.look.load", stop)
     ran = lab(*words.split(), "--json")
     why = f"stopped by Ctrl-C{said}"

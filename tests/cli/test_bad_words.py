@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 
-from lab.advice import advisors, gates
+from lab.advice import advisors
+from lab.learning import gates
 from lab.learning.updates import UPDATES
 from lab.sequencing import SEQUENCERS
-from lab.taskfile import shipped
+from lab.tasks.task_file import shipped
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 Tree = Callable[[Path], list[str]]

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from lab.advice.gates import GATES
 from lab.cli import glossary
+from lab.learning.gates import GATES
 from lab.learning.updates import UPDATES
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from lab.policy import Policy
-from lab.toolbox import Toolbox
+from lab.toolbox.policy import Policy
+from lab.toolbox.registry import Toolbox
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 MakePolicy = Callable[..., Policy]

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from lab.taskfile import load, load_world
+from lab.tasks.task_file import load, load_world
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 Tree = Callable[[Path], list[str]]

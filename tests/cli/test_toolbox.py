@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from lab.policy import Policy
-from lab.toolbox import Toolbox
+from lab.toolbox.policy import Policy
+from lab.toolbox.registry import Toolbox
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 Tree = Callable[[Path], list[str]]

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from lab.advice.advisors import Advice, TableAdvisor, skill
-from lab.advice.gates import GATES, Gate, Steps
 from lab.errors import BadInput
 from lab.learning.batch import Batch, run_sessions
+from lab.learning.gates import GATES, Gate, Steps
 from lab.learning.kernels import LANES, LEARNERS
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from lab.advice.advisors import ADVISORS, PEOPLE, make_advisor
-from lab.advice.events import AdviceEnded, AdviceRejected, AdviceRemembered, AdviceRequested, EpisodeEnded, Event
-from lab.advice.gates import GATES
-from lab.advice.requests import AdviceRequest, AdvisorLeft
 from lab.errors import BadInput
 from lab.learning.environment import Judged, Step, TableEnvironment
+from lab.learning.events import AdviceEnded, AdviceRejected, AdviceRemembered, AdviceRequested, EpisodeEnded, Event
+from lab.learning.gates import GATES
+from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.selection import SELECTIONS, Draw
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings

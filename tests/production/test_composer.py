@@ -15,15 +15,15 @@ from lab.production.skillset import SkillSet
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.simulate.run import simulate
+from lab.sim.frames import Body, Frame
 from lab.sim.scene import Layout, spots
 from lab.sim.world import World
 from lab.skills import Butter
 from lab.skills.skill import Status
 from lab.skills.surveys import Surveys
-from lab.taskfile import Stage, Task, load
-from lab.teaching import Teacher
-from lab.toolbox import Toolbox
-from lab.view.frames import Body, Frame
+from lab.tasks.task_file import Stage, Task, load
+from lab.teaching.teacher import Teacher
+from lab.toolbox.registry import Toolbox
 
 
 @pytest.fixture(scope="module")

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import lab.data
+import lab.files
 from lab.errors import BadInput, WorkFailed
-from lab.policy import Policy
 from lab.production.durations import Durations, durations_key
 from lab.sequencing.cell.routes import Moves
 from lab.sim.scene import Layout
-from lab.taskfile import Task, load
+from lab.tasks.task_file import Task, load
+from lab.toolbox.policy import Policy
 
 MOVES = Moves((("b", "a"),), (("a", "b"), ("b", "c")))
 MEASURED = Durations({("b", "a"): 2.0}, {("a", "b"): 20.5, ("b", "c"): 21.0}, {"b": 30.0}, 99.0)
@@ -73,9 +73,9 @@ def task() -> Task:
 @pytest.fixture
 def own_assets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A checkout whose assets are copies, so that they can be changed."""
-    shutil.copytree(lab.data.assets_folder(), tmp_path / "assets", ignore=shutil.ignore_patterns("pictures"))
+    shutil.copytree(lab.files.assets_folder(), tmp_path / "assets", ignore=shutil.ignore_patterns("pictures"))
     (tmp_path / "pyproject.toml").touch()
-    monkeypatch.setattr(lab.data, "PACKAGE", tmp_path / "lab")
+    monkeypatch.setattr(lab.files, "PACKAGE", tmp_path / "lab")
     return tmp_path / "assets"
 
 
@@ -174,7 +174,7 @@ def test_a_key_that_cannot_be_made_is_an_error(task: Task, motion: Path) -> None
 
 def test_all_that_moves_the_arm_is_in_the_key() -> None:
     from lab.production.durations import DECIDED_BY_RESULT, MEASURED_BY
-    from lab.sources import sources
+    from lab.production.sources import sources
 
     package = Path(lab.__file__).parent
     rooms = [*package.glob("sim/*.py"), *package.glob("skills/*.py")]
@@ -185,7 +185,7 @@ def test_all_that_moves_the_arm_is_in_the_key() -> None:
     assert here <= found.texts.keys()
     assert {
         "lab.mdp",
-        "lab.vision",
+        "lab.vision.markers",
         "lab.vision.grid_view",
         "lab.production.skillset",
         "lab.production.floor",

@@ -4,11 +4,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from lab.data import assets_folder
+from lab.files import assets_folder
 from lab.production.recorder import FRAME_EVERY, Recorder
 from lab.sim.assets import SLICE
+from lab.sim.frames import Body, Frame
 from lab.sim.world import TIME_STEP, World
-from lab.view.frames import Body, Frame
 
 
 class Watcher:

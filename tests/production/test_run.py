@@ -14,9 +14,7 @@ import pytest
 
 import lab.production.run
 from lab.errors import WorkFailed
-from lab.listener import Listener
 from lab.planner import find_sequence, search_for
-from lab.policy import Policy
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
 from lab.production.prepared import Prepared, prepare
@@ -25,10 +23,12 @@ from lab.production.run import teach_all
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import optimum
-from lab.taskfile import Task, load
-from lab.teaching import Teacher
-from lab.toolbox import Toolbox
-from lab.view.frames import Recording
+from lab.sim.frames import Recording
+from lab.tasks.task_file import Task, load
+from lab.teaching.listener import Listener
+from lab.teaching.teacher import Teacher
+from lab.toolbox.policy import Policy
+from lab.toolbox.registry import Toolbox
 from lab.vision import read_picture
 
 Lab = Callable[..., Any]

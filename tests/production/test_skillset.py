@@ -9,7 +9,7 @@ from lab.production.skillset import SkillSet, route, stations
 from lab.sim.scene import is_toaster
 from lab.skills import SKILLS, Insert, Place, Transfer
 from lab.skills.surveys import INSERT_START
-from lab.taskfile import Stage, Task, load
+from lab.tasks.task_file import Stage, Task, load
 
 
 @pytest.fixture(scope="module")

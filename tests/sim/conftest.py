@@ -6,7 +6,7 @@ import pytest
 
 from lab.sim.robot import Robot
 from lab.sim.world import World
-from lab.taskfile import Task, load
+from lab.tasks.task_file import Task, load
 
 
 @pytest.fixture(scope="session")

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lab.data import assets_folder
+from lab.files import assets_folder
 from lab.sim import assets, parts
 from lab.sim.urdf import validate
 from lab.sim.world import World

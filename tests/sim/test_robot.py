@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.data import assets_folder
 from lab.errors import WorkFailed
+from lab.files import assets_folder
 from lab.sim import kinematics
 from lab.sim.assets import FINGER_OPEN, SLICE
 from lab.sim.kinematics import ToolPose, forward, inverse

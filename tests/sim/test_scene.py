@@ -26,7 +26,7 @@ from lab.sim.scene import (
     spots,
 )
 from lab.sim.world import World
-from lab.taskfile import Obstacle, Station, Task
+from lab.tasks.task_file import Obstacle, Station, Task
 
 seeds = st.integers(0, 2**63)
 

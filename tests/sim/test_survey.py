@@ -8,7 +8,7 @@ from lab.sim.robot import NAME
 from lab.sim.scene import Layout, Scene
 from lab.sim.survey import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.world import World
-from lab.taskfile import Obstacle, Task
+from lab.tasks.task_file import Obstacle, Task
 
 Cell = tuple[int, ...]
 CUBE = (0.70, 0.0)

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lab.data import assets_folder
 from lab.errors import BadInput, WorkFailed
+from lab.files import assets_folder
+from lab.sim.frames import Frame
 from lab.sim.world import TIME_STEP, World
-from lab.view.frames import Frame
 
 SLICE = assets_folder() / "slice.urdf"
 TOASTER = assets_folder() / "toaster.urdf"
@@ -35,7 +35,7 @@ def tumble(world: World, steps: int = 120) -> Frame:
 def test_nothing_is_said_on_the_terminal(root: Path) -> None:
     talk = (
         "from lab.sim.world import World\n"
-        "from lab.data import assets_folder\n"
+        "from lab.files import assets_folder\n"
         "with World() as world:\n"
         "    world.load('toaster', assets_folder() / 'toaster.urdf')\n"
         "    world.load('robot', assets_folder() / 'robot.urdf', (1, 0, 0))\n"

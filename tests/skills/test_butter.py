@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from lab.mdp import shortest_steps
-from lab.policy import Policy
 from lab.sim.world import TIME_STEP
 from lab.skills import Butter
 from lab.skills.butter import REST, SHAPE
 from lab.skills.skill import Bench, Problem, Skill, Status
 from lab.skills.surveys import Surveys
-from lab.taskfile import Task
+from lab.tasks.task_file import Task
+from lab.toolbox.policy import Policy
 
 PolicyOf = Callable[[Problem], Policy]
 Run = Callable[[Skill, Bench, Policy], Status]

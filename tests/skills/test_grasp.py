@@ -7,14 +7,14 @@ import pytest
 
 from lab.errors import BadInput
 from lab.mdp import grid
-from lab.policy import Policy
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Layout, Spot, spots
 from lab.skills import Grasp, Place
 from lab.skills.grasp import ACTIONS, GOAL, entry_cell, from_above
 from lab.skills.skill import Bench, Problem, Skill, Status
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, Surveys, near_pose
-from lab.taskfile import Obstacle, Task
+from lab.tasks.task_file import Obstacle, Task
+from lab.toolbox.policy import Policy
 
 PolicyOf = Callable[[Problem], Policy]
 Run = Callable[[Skill, Bench, Policy], Status]

@@ -7,14 +7,14 @@ import pytest
 
 from lab.errors import BadInput
 from lab.mdp import greedy_path
-from lab.policy import Policy
 from lab.sim.assets import SLICE as SIZE
 from lab.sim.scene import Layout, spots
 from lab.skills import Insert, Place
 from lab.skills.insert import ACTIONS, IN_SLOT_M, SEEN_WITHIN_M
 from lab.skills.skill import Bench, Problem, Skill, Status
 from lab.skills.surveys import Surveys
-from lab.taskfile import Obstacle, Task
+from lab.tasks.task_file import Obstacle, Task
+from lab.toolbox.policy import Policy
 
 PolicyOf = Callable[[Problem], Policy]
 Run = Callable[[Skill, Bench, Policy], Status]

@@ -5,13 +5,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from lab.policy import Policy
 from lab.sim.scene import spots
 from lab.skills import Place
 from lab.skills.place import ACTIONS, GOAL, release_pose
 from lab.skills.skill import Bench, Problem, Skill, Status
 from lab.skills.surveys import RELEASE_ABOVE, Surveys
-from lab.taskfile import Task
+from lab.tasks.task_file import Task
+from lab.toolbox.policy import Policy
 
 PolicyOf = Callable[[Problem], Policy]
 Run = Callable[[Skill, Bench, Policy], Status]

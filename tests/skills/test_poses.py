@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from lab.mdp import greedy_path
-from lab.policy import Policy
 from lab.sim import assets
 from lab.sim.kinematics import ToolPose, inverse
 from lab.sim.robot import NAME as ROBOT
@@ -14,6 +13,7 @@ from lab.skills import SKILLS, Skill, Transfer
 from lab.skills.butter import SHAPE
 from lab.skills.skill import Bench, Problem, Status
 from lab.skills.surveys import Surveys
+from lab.toolbox.policy import Policy
 
 Make = Callable[[str], Skill]
 Stage = Callable[..., Bench]

@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 
 from lab.errors import WorkFailed
-from lab.lesson import teach_one
 from lab.mdp import NoPath, greedy_path, grid, shortest_steps
-from lab.policy import Policy
 from lab.production.durations import measure
 from lab.production.prepared import Prepared
 from lab.production.skillset import SkillSet
+from lab.seat.stage import SkillStage
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Layout
 from lab.skills import SKILLS, Skill
 from lab.skills.skill import Bench, Problem, SkillFailed, Status, learned_path, no_way
 from lab.skills.surveys import Surveys
-from lab.stage import SkillStage
-from lab.taskfile import Stage, Subtask, Task
-from lab.teaching import Teacher
-from lab.toolbox import Toolbox
+from lab.tasks.task_file import Stage, Subtask, Task
+from lab.teaching.lesson import teach_one
+from lab.teaching.teacher import Teacher
+from lab.toolbox.policy import Policy
+from lab.toolbox.registry import Toolbox
 
 Make = Callable[[str], Skill]
 PolicyOf = Callable[[Problem], Policy]

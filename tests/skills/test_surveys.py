@@ -10,7 +10,7 @@ from lab.sim.assets import SLICE as SIZE
 from lab.sim.scene import GRASP_DEPTH, Layout, spots
 from lab.skills import Insert
 from lab.skills.surveys import INSERT_START, NEAR_SHAPE, NEAR_YAWS, Surveys, camera_view, overhead_camera
-from lab.taskfile import Obstacle, Task
+from lab.tasks.task_file import Obstacle, Task
 from lab.vision import see
 
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.policy import Policy
 from lab.sim.scene import Layout
 from lab.skills import Transfer
 from lab.skills.skill import Bench, Problem, Skill, Status
 from lab.skills.surveys import INSERT_START, Surveys
 from lab.skills.transfer import ACTIONS
-from lab.taskfile import Obstacle, Task
+from lab.tasks.task_file import Obstacle, Task
+from lab.toolbox.policy import Policy
 
 PolicyOf = Callable[[Problem], Policy]
 Run = Callable[[Skill, Bench, Policy], Status]

@@ -14,7 +14,7 @@ from lab.studies import STUDIES, run_study
 from lab.studies.runner import STORE, Job
 from lab.studies.thesis import chapter_9_cells, chapter_9_sessions
 from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, sessions_of
-from lab.taskfile import load_world
+from lab.tasks.task_file import load_world
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 KNOWN = ", ".join(sorted(STUDIES)[:5])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import trimesh
 
-from lab.view.frames import Body, Frame, Recording, Shape
+from lab.sim.frames import Body, Frame, Recording, Shape
 from lab.view.meshcat import LiveView, replay_html
 
 if TYPE_CHECKING:

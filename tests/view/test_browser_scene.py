@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from lab import taskfile
 from lab.production.recorder import Recorder
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Scene, draw_layout
 from lab.sim.world import World
+from lab.tasks import task_file as taskfile
 from lab.view.meshcat import LiveView, replay_html
 
 if TYPE_CHECKING:

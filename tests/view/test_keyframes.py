@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.view.frames import IDENTITY, Body, Frame, Pose, Recording, Shape
+from lab.sim.frames import IDENTITY, Body, Frame, Pose, Recording, Shape
 from lab.view.keyframes import (
     ANGLE_TOLERANCE_RAD,
     POSITION_TOLERANCE_M,

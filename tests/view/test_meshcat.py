@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput, WorkFailed
-from lab.view.frames import IDENTITY, Body, Frame, Recording, Shape
+from lab.sim.frames import IDENTITY, Body, Frame, Recording, Shape
 from lab.view.meshcat import LiveView, replay_html, viewer_script
 
 BODIES = tuple(Body(name, (Shape("box", (0.1, 0.1, 0.1)),)) for name in ("table", "slice 1"))

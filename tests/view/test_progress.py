@@ -10,14 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from lab.advice.events import AdviceRejected, AdviceRequested
+from lab.learning.events import AdviceRejected, AdviceRequested
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
-from lab.policy import Policy
 from lab.sequencing.cell.schedule import Move, SequenceResult
 from lab.sequencing.search import Reference
-from lab.teaching import Lesson
+from lab.teaching.teacher import Lesson
+from lab.toolbox.policy import Policy
 from lab.view.progress import BARS, PLAIN_BARS, RunProgress, sparkline
 
 LONG = "transfer butter_applier to finished_plate with slice"

@@ -16,7 +16,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from lab.errors import BadInput
-from lab.view.frames import IDENTITY, Body, Frame, Shape
+from lab.sim.frames import IDENTITY, Body, Frame, Shape
 from lab.view.meshcat import LiveView, viewer_script
 from lab.view.server import File, Server
 from lab.view.server_page import News

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from lab.compiled import inner, lean
 from lab.learning import splitmix
+from lab.learning.compiled import inner, lean
 from lab.sequencing.methods import updates
 from lab.sequencing.simulate.arrays import LEARNER_CODES
 from lab.sequencing.simulate.kernels import cost, fraction, list_allowed, mixed, move, reset, uniform

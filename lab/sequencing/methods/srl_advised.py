@@ -7,10 +7,10 @@ from typing import Protocol
 import numpy as np
 
 from lab.advice.advisors import PEOPLE, SKILLS
-from lab.advice.gates import GATES, Gate, improvement
-from lab.advice.reasons import Reason
-from lab.advice.requests import AdvisorLeft
 from lab.errors import BadInput, unknown
+from lab.learning.gates import GATES, Gate, improvement
+from lab.learning.reasons import Reason
+from lab.learning.requests import AdvisorLeft
 from lab.learning.selection import softmax
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.cell import Cell

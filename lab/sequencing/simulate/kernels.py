@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from lab.compiled import inner, lean
 from lab.learning import splitmix
+from lab.learning.compiled import inner, lean
 from lab.sequencing.simulate.arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES
 
 CLOCK, PICK = ARRIVAL_CODES["clock"], ARRIVAL_CODES["pick"]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lab.advice.advisors import SKILLS
-from lab.advice.gates import GATES
+from lab.learning.gates import GATES
 from lab.studies.findings import Findings, Row, mean_row, row, share_row, those
 from lab.studies.ours.advice_budget_figures import of_ccrl, of_gates
 from lab.studies.runner import Job

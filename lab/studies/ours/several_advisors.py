@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.advice.advisors import SKILLS, Advice, TableAdvisor, skill
-from lab.advice.events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.advice.panel import DECISIONS, panel_of
-from lab.advice.requests import Advisor
+from lab.learning.events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
+from lab.learning.requests import Advisor
 from lab.learning.selection import uniforms
 from lab.learning.session import run_session
 from lab.studies.charts import bars

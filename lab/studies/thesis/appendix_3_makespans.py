@@ -56,7 +56,7 @@ class Made:
 def fms(order: str, mean_s: float) -> Cell:
     """The system with an order to make, parts arriving one at a time, after the pick of the one before."""
     from lab.cellfile import order_from_word
-    from lab.taskfile import load_cell
+    from lab.tasks.task_file import load_cell
 
     file = load_cell("fms")
     cell = file.cell(order_from_word(file, order))

@@ -4,7 +4,7 @@ from lab.sequencing.methods.branch_and_bound import branch_and_bound
 from lab.sequencing.simulate.run import simulate
 from lab.studies.thesis.chapter_7_cells import robot_cell
 from lab.view.gantt import gantt_picture
-from lab.view.tree import branch_picture, branches_of
+from lab.view.search_tree import branch_picture, branches_of
 
 CASE, TOASTS = "II", 3
 

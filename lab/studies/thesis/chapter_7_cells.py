@@ -124,7 +124,7 @@ def optimum_s(case: str, toasts: int) -> float:
 @lru_cache(maxsize=16)
 def robot_cell(case: str, toasts: int) -> RobotCell:
     """The thesis's toast cell with the times of a case."""
-    from lab.taskfile import load_cell
+    from lab.tasks.task_file import load_cell
 
     return load_cell(TASKS[case]).cell(toasts)
 

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.compiled import lean
 from lab.learning import splitmix
+from lab.learning.compiled import lean
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

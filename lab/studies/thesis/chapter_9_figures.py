@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.advice.advisors import SKILLS
-from lab.advice.gates import improvement
 from lab.errors import BadInput
+from lab.learning.gates import improvement
 from lab.studies.charts import PRINTED, bars, curve, legend_below
 from lab.studies.findings import Row, mean_row, share_row, those
 from lab.studies.runner import Job

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.gridworld import GridWorld
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import BoolArray, FloatArray, TabularMDP, optimal_values, shortest_steps
 from lab.studies.runner import Job, said, seeds_of
+from lab.tasks.grid_world import GridWorld
 
 if TYPE_CHECKING:
     from lab.learning.batch import Batch
@@ -133,7 +133,7 @@ def succeeded(setting: Setting, steps: NDArray[np.integer[Any]]) -> BoolArray:
 @lru_cache(maxsize=64)
 def world(name: str) -> GridWorld:
     """The world of that name or file, read once."""
-    from lab.taskfile import load_world
+    from lab.tasks.task_file import load_world
 
     return load_world(name)
 

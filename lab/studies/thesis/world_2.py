@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import WorkFailed
-from lab.gridworld import GridWorld, View
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import BoolArray, FloatArray, NoPath, TabularMDP, grid, shortest_steps
 from lab.studies.statistics import PERCENT_POINTS, RELATIVE
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, Cell, printed
 from lab.studies.thesis.chapter_9_sessions import gate_of, learned_table
+from lab.tasks.grid_world import GridWorld, View
 
 COMMENT = """\
 World II of the thesis (ch. 9, fig. 9.2 b), RECONSTRUCTED: the thesis prints only a picture of it. Like the printed one

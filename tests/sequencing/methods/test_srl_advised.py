@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from lab.advice.reasons import TooSlow
-from lab.advice.requests import AdvisorLeft
 from lab.errors import BadInput
+from lab.learning.reasons import TooSlow
+from lab.learning.requests import AdvisorLeft
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.methods.exact import optimum

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from lab.errors import BadInput
-from lab.gridworld import GridWorld
 from lab.learning.settings import LearnerSettings
 from lab.mdp import TabularMDP, coverage, grid
 from lab.studies.ours.learning_speed_rivals import RIVALS
 from lab.studies.ours.learning_speed_session import Measured, Missing
-from lab.taskfile import load_world
+from lab.tasks.grid_world import GridWorld
+from lab.tasks.task_file import load_world
 
 SESSIONS = 60
 

@@ -18,7 +18,7 @@ from lab.sequencing.simulate.run import simulate
 from lab.studies.thesis import chapter_7_listing_kernels as kernels
 from lab.studies.thesis.chapter_7_listing import LISTING, Listed, Reading, banned_states, run_sessions, work_of
 from lab.studies.thesis.chapter_7_listing_kernels import LATEST_S, STATE, Rules, Toasts
-from lab.taskfile import load_cell
+from lab.tasks.task_file import load_cell
 
 CASES = ("toast-case-1", "toast-case-2", "toast-case-3")
 OPTIMA = {3: (513, 700, 995), 4: (663, 900, 1290)}

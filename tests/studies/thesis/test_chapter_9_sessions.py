@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput, WorkFailed
-from lab.gridworld import GridWorld
 from lab.learning import batch as compiled
 from lab.learning.batch import Batch
 from lab.learning.settings import GateSettings
@@ -20,6 +19,7 @@ from lab.mdp import optimal_values
 from lab.studies.runner import STORE, Job, seeds_of
 from lab.studies.thesis import chapter_9_sessions as chapter
 from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, measured, sessions_of
+from lab.tasks.grid_world import GridWorld
 
 # 3 x 3 x 2 cells, one of them an obstacle, which is also all that an advisor with a limited view sees of it. From one
 # corner to the opposite one on the same floor: 4 moves, 5 steps with the start.

@@ -10,7 +10,6 @@ import pytest
 
 from lab.advice.advisors import Advice
 from lab.errors import WorkFailed
-from lab.gridworld import GridWorld
 from lab.learning import batch as compiled
 from lab.learning.batch import Batch
 from lab.learning.settings import GateSettings
@@ -19,7 +18,8 @@ from lab.studies.thesis import world_2 as module
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, Cell, printed
 from lab.studies.thesis.chapter_9_sessions import Setting, sessions_of
 from lab.studies.thesis.world_2 import COMMENT, reconstruct
-from lab.taskfile import load_world
+from lab.tasks.grid_world import GridWorld
+from lab.tasks.task_file import load_world
 
 
 def holds_what_is_known(world: GridWorld) -> None:

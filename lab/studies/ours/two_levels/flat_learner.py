@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.compiled import compiled
+from lab.learning.compiled import compiled
 from lab.mdp import BoolArray, FloatArray, IntArray
 from lab.studies.ours.two_levels.kitchen import FlatWorld
 

@@ -1,0 +1,77 @@
+"""What `lab teach gym:...` teaches: the problem that a Gymnasium environment sets, and how it is learned by default."""
+
+from dataclasses import replace
+from typing import Literal, Self
+
+from pydantic import PrivateAttr
+
+from lab.errors import BadInput, counted
+from lab.gym.gym_environment import ALONE, GymEnvironment
+from lab.gym.live import Live
+from lab.gym.made import parse_name
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.skills.skill import Problem
+from lab.tasks.record import Learned
+
+CERTAIN_EPISODES = (1000, 5000)  # eight for each entry of the table, but at least and at most so many
+CHANCE_EPISODES = (5000, 20_000)  # twenty for each entry
+
+
+class GymWorld(Learned):
+    """A Gymnasium environment, by its id and keywords, and how it is learned; made by `gym_world`."""
+
+    kind: Literal["gym"] = "gym"
+    name: str
+    title: str = ""
+    _environment: GymEnvironment = PrivateAttr()
+
+    @classmethod
+    def of(cls, environment: GymEnvironment) -> Self:
+        """The environment with the settings that fit it."""
+        learner, gate = fitting(environment)
+        mdp, model = environment.mdp, environment.model
+        steps = "steps learned from" if model is None else "certain steps" if model.certain else "steps left to chance"
+        title = (
+            f"{environment.live.name.id}: {counted(mdp.n_states, 'state')}, {counted(mdp.n_actions, 'action')}, {steps}"
+        )
+        made = cls(name=str(environment.live.name), title=title, learner=learner, gate=gate)
+        made._environment = environment
+        return made
+
+    def problem(self) -> Problem:
+        """What it sets to learn."""
+        return Problem(self.name, "gym", self._environment.mdp, self._environment)
+
+    def check_members(self, where: str = "") -> None:
+        """As `Learned.check_members`; BadInput also for a learner that needs to know where each action leads."""
+        super().check_members(where)
+        model = self._environment.model
+        if self.learner.learner == "afterstate" and not (model is not None and model.certain):
+            why = f"where the steps of '{self.name}' lead is not certain, and it looks at the states after them"
+            raise BadInput(f"learner 'afterstate' ({where}learner): {why}: wanted another one, such as q")
+
+
+def gym_world(word: str, where: str = "SUBTASK") -> GymWorld:
+    """The environment that "gym:ID?KEYWORD=VALUE&..." means. Raises BadInput in one line for whatever it cannot be."""
+    return GymWorld.of(GymEnvironment(Live(parse_name(word, where), where)))
+
+
+def fitting(environment: GymEnvironment) -> tuple[LearnerSettings, GateSettings]:
+    """A learner that mostly finds the best policy alone, and a gate; the numbers come from sessions in the toy texts.
+
+    With several starts every state matters, not only those on the way from one: it explores for longer. Where chance has
+    a hand in steps, what an episode takes says little about the advice in it: step counts are averaged over more
+    episodes, and more misleads tolerated.
+    """
+    mdp, model = environment.mdp, environment.model
+    entries, most = mdp.n_states * mdp.n_actions, environment.max_steps
+    if model is None or not model.certain:
+        gate = GateSettings(window=20, first_episode=40, omega=30, spare_best=True)
+        return replace(ALONE, episodes=_within(20 * entries, CHANCE_EPISODES), max_steps=most), gate
+    beta = 0.2 if mdp.starts else 0.7
+    learner = replace(ALONE, alpha=1.0, beta=beta, episodes=_within(8 * entries, CERTAIN_EPISODES), max_steps=most)
+    return learner, GateSettings(spare_best=True)
+
+
+def _within(number: int, limits: tuple[int, int]) -> int:
+    return min(max(number, limits[0]), limits[1])

@@ -1,0 +1,235 @@
+"""The lab's problems as registered Gymnasium environments: import this module, or make "lab.gym:TeachingLab/World1-v0"."""
+
+from functools import cached_property
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from lab.cellfile import order_from_word, toast_case
+from lab.mdp import FloatArray, TabularMDP
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
+from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
+from lab.sequencing.cell.routes import entry
+from lab.sequencing.simulate.run import Run
+from lab.tasks.task_file import load, load_cell, load_world
+
+ROOM = 10  # an episode in a cell may take so many times the decisions that its parts need at most
+METADATA: dict[str, Any] = {"render_modes": ["ansi"], "render_fps": 4}
+
+Info = dict[str, Any]
+Places = NDArray[np.int64]
+
+
+class TableEnv(gymnasium.Env[Any, Any]):
+    """A problem in a table: the state's number is observed, info["is_success"] says whether a goal was reached.
+
+    P and initial_state_distrib, as in Gymnasium's own toy texts, hold the whole problem. Episodes are truncated after
+    `max_episode_steps` moves; None: never.
+    """
+
+    metadata = METADATA
+
+    def __init__(self, mdp: TabularMDP, max_episode_steps: int | None = None, render_mode: str | None = None):
+        self.mdp, self.max_episode_steps, self.render_mode = mdp, max_episode_steps, render_mode
+        self.action_labels, self.shape = mdp.action_labels, mdp.shape
+        self.observation_space = spaces.Discrete(mdp.n_states)
+        self.action_space = spaces.Discrete(mdp.n_actions)
+        self.s, self._moves = mdp.start, 0
+
+    @cached_property
+    def P(self) -> dict[int, dict[int, list[tuple[float, int, float, bool]]]]:
+        """What each action in each state leads to: chance, state, reward, whether the episode ends."""
+        mdp = self.mdp
+        ends = mdp.terminal[mdp.successor] | mdp.terminal[:, None]
+        rows = zip(mdp.successor.tolist(), mdp.reward.tolist(), ends.tolist(), strict=True)
+        return {
+            state: {action: [(1.0, *outcome)] for action, outcome in enumerate(zip(*row, strict=True))}
+            for state, row in enumerate(rows)
+        }
+
+    @property
+    def initial_state_distrib(self) -> FloatArray:
+        """The chance (S,) of beginning in each state."""
+        starts = list(self.mdp.starts or (self.mdp.start,))
+        chances = np.zeros(self.mdp.n_states)
+        chances[starts] = 1.0 / len(starts)
+        return chances
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[int, Info]:
+        """The start, or one of several."""
+        super().reset(seed=seed)
+        starts = self.mdp.starts or (self.mdp.start,)
+        self.s, self._moves = starts[int(self.np_random.integers(len(starts)))], 0
+        return self.s, {"is_success": False}
+
+    def step(self, action: int) -> tuple[int, float, bool, bool, Info]:
+        """The table's row."""
+        mdp, left = self.mdp, self.s
+        self.s, self._moves = int(mdp.successor[left, action]), self._moves + 1
+        terminated = bool(mdp.terminal[self.s])
+        truncated = not terminated and self.max_episode_steps is not None and self._moves >= self.max_episode_steps
+        return self.s, float(mdp.reward[left, action]), terminated, truncated, {"is_success": bool(mdp.goal[self.s])}
+
+    def render(self) -> str | None:
+        """The plane of a grid that the robot is in: R robot, G goal, # obstacle; x to the right and y up on a map."""
+        if self.render_mode != "ansi":
+            return None
+        mdp, cell = self.mdp, self.mdp.state_cell(self.s)
+        if len(cell) < 2 or mdp.coverage_shape:
+            return f"state {mdp.state_label(self.s)}\n"
+        marks = np.where(mdp.goal, "G", np.where(mdp.terminal, "#", ".")).reshape(mdp.shape)
+        marks[cell] = "R"
+        plane = marks.reshape(*mdp.shape[:2], -1)[:, :, cell[2] if len(cell) == 3 else 0]
+        if mdp.action_labels[:2] == ("left", "right"):
+            plane = plane.T[::-1]
+        below = "" if len(cell) == 2 else f"level {cell[2]} of 0..{mdp.shape[2] - 1}\n"
+        return "".join(f"{' '.join(row)}\n" for row in plane) + below
+
+
+class WorldEnv(TableEnv):
+    """A grid world: one that ships, a .toml file, a .txt grid, or "random:SHAPE:DENSITY:SEED". Raises BadInput."""
+
+    def __init__(self, world: str, render_mode: str | None = None):
+        found = load_world(world)
+        super().__init__(found.check(), found.learner.max_steps - found.learner.count_start, render_mode)
+
+
+class InsertEnv(TableEnv):
+    """The camera's grid around a task's toaster, surveyed in simulation in the scene that a seed lays out. Raises BadInput."""
+
+    def __init__(self, task: str = "toast", layout_seed: int = 0, render_mode: str | None = None):
+        from lab.sim.scene import draw_layout, is_toaster
+        from lab.skills.insert import Insert
+        from lab.skills.surveys import Surveys
+
+        found = load(task)
+        station = next(stage.station for stage in found.route if is_toaster(found.station(stage.station)))
+        slices = min(2, *(found.station(stage.station).capacity for stage in (found.route[0], found.route[-1])))
+        layout = draw_layout(found, slices, np.random.default_rng([layout_seed, 1]))  # as for a lesson of this seed
+        problem = Insert(station).setup(Surveys(found, layout))
+        super().__init__(problem.mdp, found.subtask(Insert.subtask).learner.max_steps, render_mode)
+
+
+class CellEnv(gymnasium.Env[Any, Any]):
+    """Which part the one robot of a cell moves next, so that all are finished early.
+
+    An action is a decision of a sequence (see `lab.sequencing.simulate.run.Run`), counted from 0: the part, + the number of parts
+    for the second way it has. Observed: the position of each part on its route, part 1 first, and the robot's station;
+    what a machine still needs is not (info["ready_s"] says when each part may be picked). The reward is minus the
+    seconds that passed, so that the return is minus the makespan. info["action_mask"]: what is allowed now; anything
+    else changes nothing and costs as much as the slowest decision can (`penalty_s`), so that it never pays. A deadlock
+    ends the episode: its return, penalties aside, is then minus `stuck_cost`. chance: processing times and arrivals are
+    drawn anew in each episode.
+    """
+
+    metadata = METADATA
+
+    def __init__(self, cell: Cell, chance: Chance | None = None, render_mode: str | None = None):
+        self.cell, self.chance, self.render_mode = cell, chance or NO_CHANCE, render_mode
+        self.penalty_s = _slowest_s(cell)
+        ways = 1 + max(option.choice for place in cell.positions for option in place.options)
+        self._decisions = [entry(part, way, cell.parts) for way in range(ways) for part in range(1, cell.parts + 1)]
+        self.action_labels = tuple(
+            cell.part_name(part) if way == 0 else f"{cell.part_name(part)} by way {way + 1}"
+            for way in range(ways)
+            for part in range(1, cell.parts + 1)
+        )
+        self.max_episode_steps = ROOM * cell.parts * len(cell.positions)
+        self.observation_space = spaces.MultiDiscrete([len(cell.positions)] * cell.parts + [len(cell.stations)])
+        self.action_space = spaces.Discrete(len(self._decisions))
+        self._begin(Episode(cell, self.chance))
+
+    def _begin(self, times: Episode) -> None:
+        self._run, self._steps = Run(self.cell, times), 0
+        self._allowed = self._run.allowed()
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Places, Info]:
+        """All parts before their first station, the robot where it starts."""
+        super().reset(seed=seed)
+        self._begin(Episode(self.cell, self.chance, int(self.np_random.integers(1 << 63))))
+        return self._observed(), self._info()
+
+    def step(self, action: int) -> tuple[Places, float, bool, bool, Info]:
+        """The decision, carried out until the robot has set the part down."""
+        run, decision = self._run, self._decisions[action]
+        before_s, self._steps = run.now_s, self._steps + 1
+        if decision in self._allowed:
+            run.move(decision)
+            self._allowed = run.allowed()
+            stuck = not (run.done or self._allowed)
+            reward = before_s - (stuck_cost(self.cell, MAKESPAN) if stuck else run.now_s)
+        else:
+            reward = -self.penalty_s
+        terminated = not self._allowed
+        truncated = not terminated and self._steps >= self.max_episode_steps
+        return self._observed(), reward, terminated, truncated, self._info()
+
+    def action_masks(self) -> NDArray[np.int8]:
+        """Which actions are allowed now, (A,) of 0 and 1; under the name that learners with masks ask for."""
+        return np.array([decision in self._allowed for decision in self._decisions], np.int8)
+
+    def render(self) -> str | None:
+        """Where the robot and each part are, and when parts may be picked."""
+        if self.render_mode != "ansi":
+            return None
+        run, cell = self._run, self.cell
+        lines = [f"{run.now_s:.0f} s: the robot is at '{cell.names[run.robot]}'"]
+        for part, (place, ready_s) in enumerate(zip(run.locations, run.ready_s, strict=True), 1):
+            waits = f", ready in {ready_s - run.now_s:.0f} s" if ready_s > run.now_s else ""
+            finished = ", finished" if run.finished_s[part - 1] is not None else waits
+            lines.append(f"{cell.part_name(part)}: '{cell.names[cell.positions[place].station]}'{finished}")
+        return "".join(f"{line}\n" for line in lines)
+
+    def _observed(self) -> Places:
+        return np.array([*self._run.locations, self._run.robot], np.int64)
+
+    def _info(self) -> Info:
+        run = self._run
+        times = {"now_s": run.now_s, "ready_s": list(run.ready_s)}
+        return {"action_mask": self.action_masks(), "is_success": run.done, **times}
+
+
+def _slowest_s(cell: Cell) -> float:
+    """What no decision exceeds unless times are drawn: the longest of all that a robot may do or wait for [s]."""
+    travel_s = sum(float(np.nanmax(table, initial=0.0)) for table in (cell.empty_s, cell.loaded_s))
+    service_s = max((option.service_s for place in cell.positions for option in place.options), default=0.0)
+    process_s = max(place.processing_s or 0.0 for place in cell.positions)
+    return travel_s + service_s + process_s + max(cell.arrivals.interval_s if cell.arrivals else (), default=0.0)
+
+
+class ToastCellEnv(CellEnv):
+    """The thesis's toast cell with the times of its cases I, II and III. Raises BadInput for others."""
+
+    def __init__(self, case: str = "I", toasts: int = 3, stochastic: bool = False, render_mode: str | None = None):
+        file = load_cell(toast_case(case))
+        super().__init__(file.cell(toasts), file.chance() if stochastic else None, render_mode=render_mode)
+
+
+class FmsEnv(CellEnv):
+    """The thesis's flexible manufacturing system, for an order by the products' initials. Raises BadInput for others."""
+
+    def __init__(self, order: str = "RSR", stochastic: bool = False, render_mode: str | None = None):
+        file = load_cell("fms")
+        cell = file.cell(order_from_word(file, order))
+        super().__init__(cell, file.chance() if stochastic else None, render_mode=render_mode)
+
+
+ENVIRONMENTS: dict[str, tuple[type[TableEnv] | type[CellEnv], dict[str, Any]]] = {
+    "TeachingLab/World1-v0": (WorldEnv, {"world": "world-1"}),
+    "TeachingLab/World2-v0": (WorldEnv, {"world": "world-2"}),
+    "TeachingLab/World-v0": (WorldEnv, {"world": "random:8x8:0.2:0"}),
+    "TeachingLab/Insert-v0": (InsertEnv, {}),
+    "TeachingLab/ToastCell-v0": (ToastCellEnv, {}),
+    "TeachingLab/FMS-v0": (FmsEnv, {}),
+}
+
+
+def register() -> None:
+    """Registers every environment of ENVIRONMENTS that is not registered yet."""
+    for name, (made, keywords) in ENVIRONMENTS.items():
+        if name not in gymnasium.registry:
+            gymnasium.register(name, f"{__name__}:{made.__name__}", kwargs=keywords)

@@ -1,0 +1,1 @@
+"""Where a person answers: a terminal, a page, and the stage that shows where the learner asks."""

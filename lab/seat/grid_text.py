@@ -1,0 +1,286 @@
+"""The picture of where a learner is: a grid, slices of a space, or an environment's own drawing, cut to what fits."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.text import Text
+
+from lab.learning.requests import AdviceRequest
+from lab.mdp import TabularMDP
+
+Plane = NDArray[np.str_]
+DIRECTIONS = ("up", "down", "left", "right")
+ARROWS = "↑↓←→"
+ASCII_ARROWS = "^v<>"
+NAMES = {"up": 0, "north": 0, "down": 1, "south": 1, "left": 2, "west": 2, "right": 3, "east": 3}
+LEGEND = {"R": "R robot", "r": "r its shadow", "G": "G goal", "g": "g the goal's shadow", "#": "# obstacle"}
+COVERING = {"R": "R head", "x": "x covered"}
+GAP = 3  # columns between two slices
+FEWEST_COLUMNS = 9  # cells of a slice that is cut so that its neighbours can be seen beside it
+UNLIMITED = 10**6
+_SGR = re.compile(r"\x1b\[[0-9;]*m")
+_ESCAPE = re.compile(  # a colour; another sequence, a string up to its end or to that of the text; a lone escape
+    r"(\x1b\[[0-9;]*m)|(?:\x1b\[|\x9b)[0-?]*[ -/]*[@-~]?|(?:\x1b[]P^_X]|[\x90\x98\x9d-\x9f]).*?(?:\x1b\\|[\x07\x9c]|\Z)"
+    r"|\x1b[ -/]*[0-~]?",
+    re.DOTALL,
+)
+
+
+@dataclass(frozen=True)
+class Marks:
+    """The characters of a picture, for a console that can or cannot show Unicode; and whether it shows colours."""
+
+    arrows: str = ARROWS
+    free: str = "·"
+    chosen: str = "▸"
+    bars: str = "▏▎▍▌▋▊▉█"  # the parts of a bar's last character
+    coloured: bool = True
+
+    @classmethod
+    def of(cls, console: Console) -> "Marks":
+        """Those that the console's encoding holds."""
+        marks = cls() if console.encoding.lower().startswith("utf") else cls(ASCII_ARROWS, ".", ">", "=")
+        return replace(marks, coloured=console.color_system is not None and not console.no_color)
+
+    def named(self, mdp: TabularMDP, action: int) -> str:
+        """An action by its label, with the arrow that it follows in the picture."""
+        direction = direction_of(mdp, action)
+        arrow = "" if direction is None else f"{self.arrows[direction]} "
+        return f"{arrow}{mdp.action_labels[action]}"
+
+
+def direction_of(mdp: TabularMDP, action: int) -> int | None:
+    """Where an action points in the picture, an index into DIRECTIONS; None when it leaves the picture's plane.
+
+    Axis 0 runs down and axis 1 to the right (a grid of one axis runs to the right); on a map, axis 0 runs to the right
+    and axis 1 up. Actions that bear the names of all four directions point where they say.
+    """
+    axes = len(mdp.coverage_shape or mdp.shape)
+    if points_by_name(mdp):
+        return NAMES.get(mdp.action_labels[action].lower())
+    if mdp.n_actions != 2 * axes or action >= 4:
+        return None
+    if is_map(mdp):
+        return (2, 3, 1, 0)[action]
+    return action + 2 if axes == 1 else action
+
+
+def points_by_name(mdp: TabularMDP) -> bool:
+    """Whether the actions are called after the four directions of a picture, or of the sky, in whatever order."""
+    known = {NAMES.get(label.lower()) for label in mdp.action_labels}
+    return len(mdp.coverage_shape or mdp.shape) <= 2 and known >= {0, 1, 2, 3}
+
+
+def is_map(mdp: TabularMDP) -> bool:
+    """Whether axes 0 and 1 are the x and y of a map seen from above: the moves along axis 0 are called left and right."""
+    return len(mdp.shape) >= 2 and mdp.action_labels[:2] == ("left", "right")
+
+
+def nearest_goal(mdp: TabularMDP, cell: tuple[int, ...]) -> tuple[int, ...] | None:
+    """The goal's cell with the fewest steps along the axes from a cell; None when there is no goal."""
+    goals = [mdp.state_cell(int(state)) for state in np.flatnonzero(mdp.goal)]
+    return min(goals, key=lambda goal: sum(abs(a - b) for a, b in zip(goal, cell, strict=True)), default=None)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Lines of text, what the marks in them mean, and the ranges of cells shown where not all are: (axis, low, high).
+
+    is_fixed: an environment's own drawing, which comes in one height.
+    """
+
+    lines: list[Text]
+    legend: str = ""
+    shown: tuple[tuple[int, int, int], ...] = ()
+    hides_goal: bool = False
+    is_fixed: bool = False
+
+    @property
+    def width(self) -> int:
+        """The columns of a terminal that it takes."""
+        return max((line.cell_len for line in self.lines), default=0)
+
+
+def picture_of(request: AdviceRequest, marks: Marks, width: int, height: int) -> Picture | None:
+    """The environment's own drawing, or the grid around the robot, in so many columns and lines; None without either.
+
+    A drawing of its own is cut in width only. Slices of a space run along axis 2, the robot's own between its neighbours.
+    """
+    own = request.picture
+    if own.strip():
+        drawn = safe_ansi(own) if marks.coloured else bracketed(safe_ansi(own))
+        lines = list(drawn.split("\n", allow_blank=True))
+        for line in lines:
+            line.truncate(width)
+        return Picture(lines, is_fixed=True)
+    return _Slices(request, marks).fitting(width, height) if request.mdp.shape or request.mdp.coverage_shape else None
+
+
+def safe_ansi(drawing: str) -> Text:
+    """Text with the colours of an ANSI drawing; every other escape sequence and control character is left out."""
+    kept = _ESCAPE.sub(lambda found: found[1] or "", drawing.replace("\r\n", "\n").expandtabs().strip("\n"))
+    parts = zip(_SGR.split(kept), [*_SGR.findall(kept), ""], strict=True)
+    return Text.from_ansi("".join(_printable(part) + code for part, code in parts))
+
+
+def bracketed(drawing: Text) -> Text:
+    """A drawing whose coloured backgrounds, such as an agent's place, are brackets instead."""
+    plain, ends = drawing.plain, dict[int, str]()
+    for span in drawing.spans:
+        if not isinstance(span.style, str) and span.style.bgcolor is not None:
+            ends[span.start], ends[span.end] = ends.get(span.start, "") + "[", "]" + ends.get(span.end, "")
+    return Text("".join(ends.get(n, "") + c for n, c in enumerate(f"{plain}\0")).removesuffix("\0"))
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() or c == "\n" else " " if c.isspace() else "" for c in text)
+
+
+def window(at: int, size: int, room: int) -> range:
+    """So many of `size` places as there is room for, with `at` in their middle where the ends allow it."""
+    room = max(1, min(room, size))
+    low = min(max(at - room // 2, 0), size - room)
+    return range(low, low + room)
+
+
+def draw(request: AdviceRequest, arrows: str = ARROWS, free: str = "·") -> Text | None:
+    """The whole plane of axes 0 and 1 through the robot: R robot, G goal, # obstacle, x covered, an arrow.
+
+    A goal in another plane casts a small g into this one. The arrow stands in the cell that the learner itself would
+    enter. None when the states are no grid. Rows run down and columns to the right, but a map is shown as from above: x
+    to the right, y up.
+    """
+    if not (request.mdp.shape or request.mdp.coverage_shape):
+        return None
+    drawn = _Slices(request, Marks(arrows, free)).fitting(UNLIMITED, UNLIMITED, most=1)
+    return Text("\n").join([*drawn.lines, Text(drawn.legend)])
+
+
+class _Slices:
+    """The grid of one request as planes of axes 0 and 1, layer by layer of axis 2."""
+
+    def __init__(self, request: AdviceRequest, marks: Marks):
+        self.request, self.mdp, self.marks = request, request.mdp, marks
+        mdp = self.mdp
+        self.shape = mdp.coverage_shape or mdp.shape
+        self.cell = mdp.state_cell(request.state)
+        self.entered = mdp.state_cell(int(mdp.successor[request.state, request.learner_action]))
+        self.goal = None if mdp.coverage_shape else nearest_goal(mdp, self.cell)
+        self.layers, self.layer = (self.shape[2], self.cell[2]) if len(self.shape) > 2 else (1, 0)
+        self.flips = is_map(mdp)
+        rows, columns = (1, self.shape[0]) if len(self.shape) == 1 else self.shape[:2]
+        self.rows, self.columns = (columns, rows) if self.flips else (rows, columns)
+
+    def _place(self, cell: tuple[int, ...]) -> tuple[int, int]:
+        """Row and column of a cell in the picture."""
+        if len(cell) == 1:
+            return 0, cell[0]
+        return (self.rows - 1 - cell[1], cell[0]) if self.flips else (cell[0], cell[1])
+
+    def plane(self, layer: int) -> Plane:
+        """The marks of one layer, row by row as they are shown."""
+        mdp, free, here = self.mdp, self.marks.free, self._place(self.cell)
+        if mdp.coverage_shape:
+            plane = np.where(mdp.covered(self.request.state), "x", free)
+        else:
+            index = (slice(None),) * min(2, len(self.shape)) + (layer, *self.cell[3:])[: len(self.shape) - 2]
+            goals, ends = (a.reshape(self.shape)[index] for a in (mdp.goal, mdp.terminal))
+            plane = np.atleast_2d(np.where(goals, "G", np.where(ends, "#", free)))
+            plane = plane.T[::-1].copy() if self.flips else plane
+        own = layer == self.layer
+        if own and self.goal is not None and plane[self._place(self.goal)] == free:
+            plane[self._place(self.goal)] = "g"
+        self._mark_choice(plane, layer)
+        if own:
+            plane[here] = "R"
+        elif plane[here] == free:
+            plane[here] = "r"
+        return plane
+
+    def _mark_choice(self, plane: Plane, layer: int) -> None:
+        """An arrow in the cell that the learner itself would enter, a star where it comes from another layer."""
+        request, entered = self.request, self.entered
+        if entered == self.cell or entered[3:] != self.cell[3:] or entered[2:3] not in ((), (layer,)):
+            return
+        there = self._place(entered)
+        direction = direction_of(self.mdp, request.learner_action) if entered[2:] == self.cell[2:] else None
+        if plane[there] in (self.marks.free, "x", "g"):
+            plane[there] = "*" if direction is None else self.marks.arrows[direction]
+
+    def _room(self, width: int, most: int) -> tuple[range, int]:
+        """Which layers are shown, and how many columns of each: many whole ones, or else three that are cut."""
+        title = len(f" [level {self.layers}]") if self.layers > 1 and most > 1 else 0
+        whole = min((width + GAP) // (max(2 * self.columns, title) + GAP), self.layers, most)
+        third = (width - 2 * GAP) // 3
+        fewest = max(title, 2 * min(self.columns, FEWEST_COLUMNS))
+        if self.layers > 1 and whole < min(3, self.layers, most) and third >= fewest:
+            return window(self.layer, self.layers, 3), third // 2
+        if whole % 2 == 0 and whole < self.layers:
+            whole -= 1  # as many below as above
+        return window(self.layer, self.layers, whole), min(self.columns, width // 2)
+
+    def fitting(self, width: int, height: int, most: int = UNLIMITED) -> Picture:
+        """The slices that so many columns and lines hold; with `most` 1 only the robot's own, without a title."""
+        layers, room = self._room(width, most)
+        titled = self.layers > 1 and most > 1
+        row, column = self._place(self.cell)
+        rows, columns = window(row, self.rows, height - titled), window(column, self.columns, room)
+        planes = {k: self.plane(k)[rows.start : rows.stop, columns.start : columns.stop] for k in layers}
+        blocks = [self._block(plane, layer if titled else None) for layer, plane in planes.items()]
+        widest = max(line.cell_len for block in blocks for line in block)
+        lines = [Text(" " * GAP).join(line for line in side) for side in zip(*_padded(blocks, widest), strict=True)]
+        seen = {str(mark) for plane in planes.values() for mark in plane.ravel()}
+        hides_goal = self.goal is not None and not seen & {"G"}
+        return Picture(lines, self._legend(seen), self._shown(rows, columns, layers if titled else None), hides_goal)
+
+    def _title(self, layer: int) -> str:
+        return f"[level {layer}]" if layer == self.layer else f"level {layer}"
+
+    def _block(self, plane: Plane, layer: int | None) -> list[Text]:
+        styles = _styles(self.marks)
+        title = [] if layer is None else [Text(f" {self._title(layer)}", "bold" if layer == self.layer else "dim")]
+        rows = [Text.assemble(*((f" {mark}", styles.get(str(mark), "dim")) for mark in row)) for row in plane]
+        return title + rows
+
+    def _legend(self, seen: set[str]) -> str:
+        words = COVERING if self.mdp.coverage_shape else LEGEND
+        named = [word for mark, word in words.items() if mark in seen]
+        if "r" in seen:
+            named = [word.replace("goal's shadow", "goal's") for word in named]
+        own = "arrow" if seen & set(self.marks.arrows) else "*" if "*" in seen else ""
+        return ", ".join([*named, f"{own}: the learner's own choice"] if own else named)
+
+    def _shown(self, rows: range, columns: range, layers: range | None) -> tuple[tuple[int, int, int], ...]:
+        """The axes of which a part is shown, with the first and the last cell."""
+        if self.flips:
+            ranges = {0: columns, 1: range(self.rows - rows.stop, self.rows - rows.start)}
+        else:
+            ranges = {0: columns} if len(self.shape) == 1 else {0: rows, 1: columns}
+        if layers is not None:
+            ranges[2] = layers
+        return tuple((a, r.start, r.stop - 1) for a, r in ranges.items() if len(r) < self.shape[a])
+
+
+def _padded(blocks: Sequence[list[Text]], width: int) -> list[list[Text]]:
+    """Blocks of lines, all but the last one filled up to a width."""
+    for block in blocks[:-1]:
+        for line in block:
+            line.pad_right(width - line.cell_len)
+    return list(blocks)
+
+
+def _styles(marks: Marks) -> dict[str, str]:
+    return {
+        "R": "bold cyan",
+        "r": "cyan",
+        "G": "bold green",
+        "g": "green",
+        "#": "red",
+        "x": "green",
+        "*": "bold magenta",
+        **dict.fromkeys(marks.arrows, "bold magenta"),
+    }

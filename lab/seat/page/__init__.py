@@ -1,0 +1,1 @@
+"""A person at a page in the browser: scene, grid, answers and receipt."""

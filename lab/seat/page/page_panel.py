@@ -1,0 +1,223 @@
+"""The panel of the teaching page between two threads: the session's, which asks, and the server's, which shows and hears."""
+
+import json
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from typing import Any
+
+from lab.learning.requests import AdviceRequest
+from lab.seat.page.page_messages import Answer, Chair, Layer, Refused, Seat, understood
+from lab.seat.page.page_state import PARTS, Known, Pending, Request, layer_of
+
+SLICE_EVERY_S = 0.1  # a layer's values are sent at most ten times a second,
+SLICE_SHARE = 30  # and working them out takes at most this part of the time
+CLOSED = Answer(0, None, "closed")
+LISTEN_S = 0.2  # the longest stretch of waiting, so that Ctrl-C is heard
+
+
+@dataclass
+class _Seen:
+    """What one page knows: versions of the parts, its seat, its layer; and what it has to be told beside."""
+
+    versions: dict[str, int] = field(default_factory=dict)
+    you: str = ""
+    layer: int | None = None
+    layer_version: int = 0
+    layer_due_s: float = 0.0
+    refusal: str = ""
+
+
+class SeatPanel:
+    """What is known, who has the seat, the question that waits, and its answer; `lock` guards all of it.
+
+    on_word: told, in the server's thread, in a word of the terminal what was answered to a question that nobody waits
+    for here.
+    """
+
+    def __init__(self, title: str) -> None:
+        self.guard = threading.RLock()
+        self.lock = threading.Condition(self.guard)  # the same lock, to wait with
+        self.known = Known(title)
+        self.chair = Chair()
+        self.on_word: Callable[[str], None] | None = None
+        self._answer: Answer | None = None
+        self._ended = False
+        self._pages: dict[int, _Seen] = {}
+        self._texts: dict[str, tuple[int, str]] = {}  # part, or layer -> its version and its JSON
+        self._stirred = 0
+        self._late = False  # a layer was held back
+
+    # ---- called by the session's thread
+
+    def pose(self, pending: Pending) -> Pending:
+        """A new question, with a number of its own; nobody answers the one before any more."""
+        with self.lock:
+            self.known.questions += 1
+            self._answer = None
+            self.known.pending = replace(pending, number=self.known.questions)
+            self.known.changed("question", "robot", "standing", "notices", "slice")
+            return self.known.pending
+
+    def close(self) -> bool:
+        """The question waits no more; whether one did."""
+        with self.lock:
+            waited = self.known.pending is not None
+            if waited:
+                self.known.pending = None
+                self.known.changed("question")
+            return waited
+
+    def wait(self, pending: Pending) -> Answer | None:
+        """The answer, CLOSED when no page can come any more; None when the time is over."""
+        with self.lock:
+            while self._answer is None:
+                if self._ended:
+                    return CLOSED
+                left_s = LISTEN_S if pending.until_s is None else pending.until_s - time.monotonic()
+                if left_s <= 0:
+                    return None
+                self.lock.wait(min(left_s, LISTEN_S))
+            return self._answer
+
+    def end(self) -> None:
+        """No page can come any more."""
+        with self.lock:
+            self._ended = True
+            self.lock.notify_all()
+
+    # ---- called by the server's thread
+
+    def joined(self, page: int) -> None:
+        """A browser has opened the page."""
+        with self.lock:
+            self._pages[page] = _Seen()
+            self.chair.joined(page)
+
+    def left(self, page: int) -> None:
+        """A browser has left; what waits goes on waiting."""
+        with self.lock:
+            self._pages.pop(page, None)
+            self.chair.left(page)
+
+    def stirred(self) -> bool:
+        """Whether there is something new since this was asked last."""
+        with self.lock:
+            version = self.known.settle()
+            new = version != self._stirred or self._late
+            self._stirred, self._late = version, False
+            return new
+
+    def said(self, page: int, message: str | bytes) -> None:
+        """Do what a page says, or refuse it in a line on that page."""
+        word = ""
+        with self.lock:
+            try:
+                word = self._do(page, understood(message))
+            except Refused as reason:
+                self._pages[page].refusal = str(reason)
+        if word and self.on_word is not None:
+            self.on_word(word)
+
+    def _do(self, page: int, meant: Answer | Seat | Layer) -> str:
+        """The terminal's word for the answer to a question that was only offered, "" for everything else."""
+        if isinstance(meant, Layer):
+            self._pages[page].layer, self._pages[page].layer_version = meant.layer, 0
+            return ""
+        if isinstance(meant, Seat):
+            self.chair.wish(page, meant)
+            return ""
+        pending = self._checked(page, meant)
+        self._answer = meant
+        self.known.pending = None
+        self.known.changed("question")
+        self.lock.notify_all()
+        return word_of(pending.request, meant) if pending.offered else ""
+
+    def _checked(self, page: int, answer: Answer) -> Pending:
+        """The question that is answered. Raises Refused when it may not be answered so, or not by this page."""
+        pending = self.known.pending
+        if self.chair.holder != page:
+            raise Refused(
+                "No page answers yet: press 'Answer here' first."
+                if self.chair.holder is None
+                else "This page only watches."
+            )
+        if pending is None or answer.question != pending.number:
+            raise Refused("This question waits no more: the answer came too late.")
+        if pending.offered and self.on_word is None:
+            raise Refused("This session is only shown: it takes no answers.")
+        if answer.word == "undo" and "undo" not in pending.words:
+            raise Refused("Nothing of this episode can be taken back.")
+        if not answer.word and answer.action not in pending.moves:
+            raise Refused("There is no such move here.")
+        return pending
+
+    def news(self, page: int) -> str:
+        """The JSON members "seat" and "refusal" with what this page does not know yet; "" when it knows all."""
+        with self.lock:
+            seen, now_s = self._pages.get(page), time.monotonic()
+            if seen is None:
+                return ""
+            version = self.known.settle()
+            parts = {part: self._text(part, now_s) for part in self.known.since(seen.versions)}
+            seen.versions |= dict.fromkeys(parts, version)
+            you = json.dumps(self.chair.view(page))
+            if you != seen.you:
+                parts["you"] = seen.you = you
+            if (layer := self._layer(seen, now_s)) is not None:
+                parts["slice"] = layer
+            refusal, seen.refusal = seen.refusal, ""
+        members = [f'"seat": {{{", ".join(f"{json.dumps(name)}: {text}" for name, text in parts.items())}}}'] * bool(
+            parts
+        )
+        return ", ".join(members + [f'"refusal": {json.dumps(refusal)}'] * bool(refusal))
+
+    def _text(self, part: str, now_s: float) -> str:
+        version, text = self._texts.get(part, (-1, ""))
+        if version != self.known.versions.get(part, 1) or part == "question":  # the time left runs
+            text = plain_json(PARTS[part](self.known, now_s))
+            self._texts[part] = (self.known.versions.get(part, 1), text)
+        return text
+
+    def _layer(self, seen: _Seen, now_s: float) -> str | None:
+        """The layer that a page looks at, when it has changed and it is time to work it out."""
+        version = self.known.versions.get("slice", 1)
+        if seen.layer_version == version:
+            return None
+        if now_s < seen.layer_due_s:
+            self._late = True
+            return None
+        key = f"layer {seen.layer}"
+        if self._texts.get(key, (-1, ""))[0] != version:
+            self._texts[key] = (version, plain_json(layer_of(self.known, seen.layer)))
+        seen.layer_version = version
+        text = self._texts[key][1]
+        if text != "null":  # to find out that there is no grid takes no time, and soon there may be one
+            seen.layer_due_s = now_s + max(SLICE_EVERY_S, SLICE_SHARE * (time.monotonic() - now_s))
+        return text
+
+
+def plain_json(value: Any) -> str:
+    """JSON that a browser reads: null where a number is not finite."""
+    try:
+        return json.dumps(value, allow_nan=False)
+    except ValueError:
+        return json.dumps(_finite(value), allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def word_of(request: Request, answer: Answer) -> str:
+    """An answer as a terminal understands it: the label of an action, the number of a move, or the word itself."""
+    if answer.word or answer.action is None:
+        return answer.word
+    return request.mdp.action_labels[answer.action] if isinstance(request, AdviceRequest) else str(answer.action)

@@ -1,0 +1,93 @@
+"""What the learner asks, as the teaching page shows it: plain data of one step of a lesson."""
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+from lab.learning.requests import AdviceRequest
+from lab.mdp import TabularMDP
+from lab.seat.grid_text import safe_ansi
+from lab.seat.page.page_grid import directions, spot
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+Json = dict[str, Any]
+
+
+def question_of(request: AdviceRequest) -> Json:
+    """Where the learner is, what it may do and would do, how sure it is, and why it asks."""
+    mdp, state = request.mdp, request.state
+    return {
+        "kind": "step",
+        "title": f"Episode {request.episode}, step {request.step}: at {mdp.state_label(state)}",
+        "at": spot(mdp, state),
+        "own": request.learner_action,
+        "moves": moves_of(request),
+        "why": str(request.why or ""),
+        "temperature": request.temperature,
+        "selection": request.selection,
+        "undoable": request.undoable,
+        "picture": picture_of(request.picture),
+        **progress_of(request.improvement_rate, request.current_mean, request.previous_mean),
+    }
+
+
+def moves_of(request: AdviceRequest) -> list[Json]:
+    """Each action: its label, where it points, the learner's chance and value of it, where it leads to."""
+    mdp, state = request.mdp, request.state
+    rows = zip(mdp.action_labels, directions(mdp), request.chances, request.q[state], strict=True)
+    return [
+        {
+            "action": action,
+            "label": label,
+            "direction": direction,
+            "chance": round(chance, 3),
+            "value": float(f"{value:.4g}"),
+            "leads": "" if request.picture else leads_to(mdp, state, action),
+        }
+        for action, (label, direction, chance, value) in enumerate(rows)
+    ]
+
+
+def leads_to(mdp: TabularMDP, state: int, action: int) -> str:
+    """What an action leads to, in a word: "nowhere", "goal", "obstacle", "" for a free cell."""
+    entered = int(mdp.successor[state, action])
+    if entered == state:
+        return "nowhere"
+    if mdp.goal[entered]:
+        return "goal"
+    return "obstacle" if mdp.terminal[entered] else ""
+
+
+def progress_of(rate: float | None, current: float | None, previous: float | None) -> Json:
+    """The improvement rate and the moving averages that it comes from."""
+    return {"rate": rate, "current": current, "previous": previous}
+
+
+def picture_of(drawing: str) -> list[list[list[str]]]:
+    """An environment's own drawing: lines of [text, classes], such as "bg-1 bold"; [] for none.
+
+    Colours are those of a terminal: 1 red, 2 green, 3 yellow, 4 blue, 5 magenta, 6 cyan, 7 white.
+    """
+    if not drawing.strip():
+        return []
+    return [_runs(line) for line in safe_ansi(drawing).split("\n", allow_blank=True)]
+
+
+def _runs(line: "Text") -> list[list[str]]:
+    """A line of text as stretches of one style."""
+    edges = {0, len(line.plain)} | {edge for span in line.spans for edge in (span.start, span.end)}
+    return [[line.plain[start:end], _classes(line, start)] for start, end in pairwise(sorted(edges))]
+
+
+def _classes(line: "Text", at: int) -> str:
+    found: dict[str, str] = {}
+    for span in line.spans:
+        style = span.style
+        if isinstance(style, str) or not span.start <= at < span.end:
+            continue
+        found |= {"bold": "bold"} if style.bold else {}
+        for kind, color in (("fg", style.color), ("bg", style.bgcolor)):
+            if color is not None and color.number is not None and color.number < 16:
+                found[kind] = f"{kind}-{color.number % 8}"
+    return " ".join(sorted(found.values()))

@@ -1,0 +1,270 @@
+"""All that the teaching page shows, as one plain document: what is known, and the functions that write it down.
+
+Nothing here waits, sends or draws. `document` says all; `Known.since` finds what has changed.
+"""
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from lab.errors import counted
+from lab.learning.events import EpisodeEnded
+from lab.learning.gates import improvement
+from lab.learning.requests import AdviceRequest, Standing
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.updates import Table
+from lab.mdp import TabularMDP
+from lab.seat.page.page_curve import Curve
+from lab.seat.page.page_grid import place_of, slice_of, spot
+from lab.seat.page.page_order import order_of
+from lab.seat.page.page_question import question_of
+from lab.seat.request_text import VERDICTS
+from lab.sequencing.methods.srl_advised import SequenceRequest
+
+Json = dict[str, Any]
+Request = AdviceRequest | SequenceRequest
+UNLIMITED = 1_000_000_000  # a budget of this many steps is none
+MOST_NOTICES = 60
+MOST_LINES = 80
+
+
+@dataclass(frozen=True)
+class Pending:
+    """A question that waits: what is asked, and until when [s of the clock], None: for ever; its number.
+
+    offered: the answer is told to somebody else who waits for it, if anybody does.
+    """
+
+    request: Request
+    wait_s: float | None = None
+    until_s: float | None = None
+    offered: bool = False
+    number: int = 0
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What may be said beside the moves."""
+        return ("skip", "auto", "quit", *["undo"] * getattr(self.request, "undoable", False))
+
+    @property
+    def moves(self) -> Sequence[int]:
+        """The moves that may be said."""
+        request = self.request
+        return range(request.mdp.n_actions) if isinstance(request, AdviceRequest) else request.allowed
+
+
+@dataclass
+class Notice:
+    """What a learner says; tone: "good", "bad" or ""."""
+
+    text: str
+    tone: str = ""
+    times: int = 1
+
+    @classmethod
+    def of(cls, told: "Notice | EpisodeEnded") -> "Notice":
+        """What is said of a guided episode, in words."""
+        if isinstance(told, Notice):
+            return told
+        outcome = f"I reached the goal in {counted(told.steps, 'step')}" if told.reached else "I did not reach the goal"
+        verdict = f", {VERDICTS[told.verdict]}" if told.verdict else ""
+        tone = "bad" if told.verdict == "misled" else "good" * told.reached
+        return cls(f"Episode {told.episode}: {outcome}{verdict}; moves advised: {told.helped_steps}.", tone)
+
+
+@dataclass
+class Learning:
+    """One lesson, or the sessions of a sequencer: how it goes, and what the learner has said about it."""
+
+    title: str = ""
+    kind: str = "steps"  # or "order"
+    unit: str = "steps"
+    mdp: TabularMDP | None = None
+    learner: LearnerSettings | None = None
+    gate: GateSettings | None = None
+    episodes: int = 0
+    optimal: float | None = None
+    curve: Curve = field(default_factory=Curve)
+    notices: deque[Notice | EpisodeEnded] = field(default_factory=lambda: deque(maxlen=MOST_NOTICES))
+    requests: int = 0  # episodes in which it asked
+    taken: int = 0
+    skipped: int = 0
+    helped_steps: int = 0
+    remembered: int = 0  # steps made from memory
+    misleads: int = 0
+    rate: float | None = None
+    means: tuple[float | None, float | None] = (None, None)  # as it was told when it asked last
+    lately: deque[float] = field(default_factory=deque)  # what the last episodes cost, as many as two windows hold
+    verdict: str = ""  # "rejected", "converged" or "left": it asks no more
+    q: Table | None = None
+    selection: str = "softmax"
+    temperature: float = 1.0
+    state: int | None = None  # where it was seen last
+
+    def __post_init__(self) -> None:
+        self.lately = deque(maxlen=2 * self.gate.window if self.gate is not None else 0)
+
+    def notice(self, text: str, tone: str = "") -> None:
+        """Something that the advisor should read; tone: "good", "bad" or "". What is said again at once is counted."""
+        last = self.notices[-1] if self.notices else None
+        if isinstance(last, Notice) and last.text == text:
+            last.times += 1
+        else:
+            self.notices.append(Notice(text, tone))
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How a whole run goes: the phase under way, how many of its parts are done, and what has been told."""
+
+    phase: str = ""
+    parts: int = 0
+    done: int = 0
+    lines: tuple[str, ...] = ()
+
+
+@dataclass
+class Known:
+    """All that the page may have to show. `changed` says what is new; versions are counted, so that nothing is sent twice."""
+
+    title: str
+    learning: Learning = field(default_factory=Learning)
+    progress: Progress | None = None
+    pending: Pending | None = None
+    work: Json | None = None  # bars of the order
+    members: list[Json] = field(default_factory=list)
+    receipt: Json | None = None
+    ended: str = ""
+    questions: int = 0
+    version: int = 1
+    versions: dict[str, int] = field(default_factory=dict)
+    touched: set[str] = field(default_factory=set)
+
+    def changed(self, *parts: str) -> None:
+        """These parts of the document are not what they were."""
+        self.touched.update(parts)
+
+    def settle(self) -> int:
+        """Give what has changed a new version; the version of the whole."""
+        if self.touched:
+            self.version += 1
+            self.versions |= dict.fromkeys(self.touched, self.version)
+            self.touched.clear()
+        return self.version
+
+    def since(self, seen: Mapping[str, int]) -> list[str]:
+        """The parts that have changed since these versions of them."""
+        return [part for part in PARTS if self.versions.get(part, 1) > seen.get(part, 0)]
+
+
+def _lesson(known: Known, now_s: float) -> Json:
+    learning, gate = known.learning, known.learning.gate
+    return {
+        "title": learning.title,
+        "page": known.title,
+        "kind": learning.kind,
+        "unit": learning.unit,
+        "episodes": learning.episodes,
+        "optimal": learning.optimal,
+        "learner": None if learning.learner is None else learning.learner.learner,
+        "gate": None if gate is None else gate.gate,
+        "threshold": None if gate is None else gate.lambda_threshold,
+        "window": None if gate is None else gate.window,
+        "first_episode": None if gate is None else gate.first_episode,
+    }
+
+
+def _place(known: Known, now_s: float) -> Json | None:
+    return None if known.learning.mdp is None else place_of(known.learning.mdp)
+
+
+def _robot(known: Known, now_s: float) -> list[int] | None:
+    mdp, state = known.learning.mdp, known.learning.state
+    return None if mdp is None or state is None else spot(mdp, state)
+
+
+def _question(known: Known, now_s: float) -> Json | None:
+    pending = known.pending
+    if pending is None:
+        return None
+    made = question_of(pending.request) if isinstance(pending.request, AdviceRequest) else order_of(pending.request)
+    left_s = None if pending.until_s is None else round(max(0.0, pending.until_s - now_s), 1)
+    return made | {
+        "number": pending.number,
+        "wait_s": pending.wait_s,
+        "left_s": left_s,
+        "words": list(pending.words),
+        "offered": pending.offered,
+    }
+
+
+def _standing(known: Known, now_s: float) -> Json:
+    learning = known.learning
+    gate = learning.gate
+    means = improvement([*learning.lately], gate.window) if gate is not None else None
+    current, previous = learning.means if means is None else (means.current_mean, means.previous_mean)
+    budget = None if gate is None or gate.budget >= UNLIMITED else gate.budget
+    return {
+        "rate": learning.rate,
+        "current": current,
+        "previous": previous,
+        "requests": learning.requests,
+        "taken": learning.taken,
+        "skipped": learning.skipped,
+        "helped_steps": learning.helped_steps,
+        "remembered": learning.remembered,
+        "budget": budget,
+        "misleads": learning.misleads,
+        "omega": None if gate is None else gate.omega,
+        "verdict": learning.verdict,
+    }
+
+
+def _progress(known: Known, now_s: float) -> Json | None:
+    progress = known.progress
+    if progress is None:
+        return None
+    return {"phase": progress.phase, "parts": progress.parts, "done": progress.done, "lines": list(progress.lines)}
+
+
+PARTS: dict[str, Callable[[Known, float], Any]] = {
+    "lesson": _lesson,
+    "place": _place,
+    "robot": _robot,
+    "question": _question,
+    "curve": lambda known, now_s: known.learning.curve.document(),
+    "standing": _standing,
+    "notices": lambda known, now_s: [vars(Notice.of(told)) for told in known.learning.notices],
+    "progress": _progress,
+    "work": lambda known, now_s: known.work,
+    "members": lambda known, now_s: known.members,
+    "receipt": lambda known, now_s: known.receipt,
+    "ended": lambda known, now_s: known.ended,
+}
+
+
+def document(known: Known, now_s: float = 0.0, layer: int | None = None) -> Json:
+    """The whole document, with the slice of one layer, by default the robot's. now_s: the clock of `Pending.until_s`."""
+    return {name: part(known, now_s) for name, part in PARTS.items()} | {"slice": layer_of(known, layer)}
+
+
+def layer_of(known: Known, layer: int | None = None) -> Json | None:
+    """What stands in a layer's cells and what they are worth, by default the robot's; None when there is no grid."""
+    learning, mdp = known.learning, known.learning.mdp
+    place = None if mdp is None else place_of(mdp)
+    if mdp is None or place is None:
+        return None
+    state = mdp.start if learning.state is None else learning.state
+    wanted = spot(mdp, state)[2] if layer is None else layer
+    wanted = min(max(wanted, 0), place["layers"] - 1)
+    return slice_of(mdp, state, wanted, learning.q, learning.selection, learning.temperature)
+
+
+def standing_of(learning: Learning, standing: Standing) -> None:
+    """Take over how advice stands with the learner; what has become worse is said."""
+    if standing.misleads > learning.misleads:
+        learning.notice(
+            f"The last lesson did not help: {standing.misleads} so far, {standing.omega} are tolerated.", "bad"
+        )
+    learning.misleads, learning.helped_steps = standing.misleads, standing.helped_steps

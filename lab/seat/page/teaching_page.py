@@ -1,0 +1,259 @@
+"""The teaching seat: a page on which a person watches a learner, is asked by it, and answers by keys and buttons.
+
+The session's thread asks and waits; the server's thread shows and hears. A page may come, go and come again meanwhile:
+the question waits. Several pages may watch, one of them has the seat.
+"""
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, is_dataclass
+from math import inf
+from typing import Any, Protocol
+
+from lab.advice.journal import Undo
+from lab.errors import BadInput
+from lab.learning.events import Event
+from lab.learning.requests import AdviceRequest, AdvisorLeft
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.mdp import NoPath, TabularMDP, shortest_steps
+from lab.seat.page.page_events import hear
+from lab.seat.page.page_messages import Answer
+from lab.seat.page.page_order import Follower, bars_of
+from lab.seat.page.page_panel import CLOSED, SeatPanel
+from lab.seat.page.page_state import Learning, Pending, Progress, standing_of
+from lab.sequencing.cell.schedule import EpisodeSequenced, Move
+from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.teaching.listener import Listener
+from lab.view.meshcat import LiveView
+
+TITLE = "Teaching lab"
+MOST_STATES = 50_000  # of problems whose shortest way is looked for
+
+
+class Subject(Protocol):
+    """What a lesson is about, such as a `lab.skills.skill.Problem`."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+
+    @property
+    def mdp(self) -> TabularMDP:
+        """The problem's table."""
+
+
+class SeatPage(LiveView):
+    """The live page with a seat for one advisor; a context manager, like every live view.
+
+    wait_s: how long a question waits for an answer [s], counted anew for each; None: for ever. All methods are called by
+    the session's thread. Entering raises BadInput for a port that it cannot have, and for a `wait_s` that is no time.
+    """
+
+    def __init__(self, port: int = 0, *, title: str = TITLE, wait_s: float | None = None) -> None:
+        if wait_s is not None and not 0 < wait_s < inf:
+            raise BadInput(f"time to wait for an answer, {wait_s} s: must be finite and above 0")
+        super().__init__(port, title=title)
+        self._wait_s = wait_s
+        self._panel: SeatPanel = SeatPanel(title)
+        self._follower = Follower()
+        self._advised_episodes: set[int] = set()
+
+    @property
+    def on_word(self) -> Callable[[str], None] | None:
+        """Called from the server's thread with the answer to an offered question, as a word that the terminal knows."""
+        return self._panel.on_word
+
+    @on_word.setter
+    def on_word(self, callback: Callable[[str], None] | None) -> None:
+        self._panel.on_word = callback
+
+    def close(self) -> None:
+        """Stop serving; who waits for an answer learns that there is nobody any more. Safe to call again."""
+        self._panel.end()
+        super().close()
+
+    # ---- questions
+
+    def ask(self, request: AdviceRequest) -> int | None:
+        """What the page's advisor says: an action, None for "skip". Waits until somebody answers, or the time is over.
+
+        Raises AdvisorLeft for "auto", after the time and when the page is closed, Undo when an answer is taken back, and
+        KeyboardInterrupt for "quit".
+        """
+        return self._heard(self._pose(request))
+
+    def ask_order(self, request: SequenceRequest) -> int | None:
+        """Which part to move next, asked in the same way: one of the allowed decisions, None for "skip"."""
+        self._follow(request)
+        said = self._heard(self._pose(request))
+        if said is not None:
+            self._advised_episodes.add(request.episode)
+        self._follower.take(request.own if said is None else said)
+        return said
+
+    def offer(self, request: AdviceRequest | SequenceRequest) -> None:
+        """Show a question that is answered elsewhere, too; an answer on the page goes to `on_word`. Returns at once."""
+        if isinstance(request, SequenceRequest):
+            self._follow(request)
+        self._pose(request, offered=True)
+
+    def look(self, request: AdviceRequest) -> None:
+        """Show where the learner is and what it thinks, without a question: somebody else is asked."""
+        with self._panel.lock:
+            self._see(request)
+        self._wake()
+
+    def withdraw(self) -> None:
+        """The question was answered elsewhere."""
+        if self._panel.close():  # an answer on the page has closed it already, and what comes of it is told next
+            self._wake()
+
+    def _pose(self, request: AdviceRequest | SequenceRequest, offered: bool = False) -> Pending:
+        self._running()
+        wait_s = None if offered else self._wait_s
+        until_s = None if wait_s is None else time.monotonic() + wait_s
+        with self._panel.lock:
+            if isinstance(request, AdviceRequest):
+                self._see(request)
+            pending = self._panel.pose(Pending(request, wait_s, until_s, offered))
+        self._wake()
+        return pending
+
+    def _see(self, request: AdviceRequest) -> None:
+        """What a request shows of the learner beside the question."""
+        known = self._panel.known
+        if known.learning.mdp not in (None, request.mdp):
+            self._new(Learning())
+        learning = known.learning
+        if learning.mdp is None:
+            learning.mdp = request.mdp
+            known.changed("place")
+        learning.q, learning.selection, learning.temperature = request.q, request.selection, request.temperature
+        learning.state, learning.rate = request.state, request.improvement_rate
+        learning.means = (request.current_mean, request.previous_mean)
+        standing_of(learning, request.standing)
+
+    def _follow(self, request: SequenceRequest) -> None:
+        self._follower.follow(request)
+        with self._panel.lock:
+            known = self._panel.known
+            if known.learning.kind != "order":
+                self._new(Learning("The order of the transfers", "order", "s"))
+            learning = known.learning
+            learning.rate, learning.means = request.improvement_rate, (request.current_mean, request.previous_mean)
+            known.work = bars_of(self._follower.moves, request.run.now_s)
+            known.changed("work", "standing")
+
+    def _heard(self, pending: Pending) -> int | None:
+        try:
+            answer = self._panel.wait(pending)
+        finally:
+            self.withdraw()
+        return _said(pending, answer)
+
+    # ---- lessons
+
+    def begin(self, problem: Subject, learner: LearnerSettings, gate: GateSettings) -> None:
+        """A lesson begins, or begins again because an answer was taken back: curve and notices begin anew."""
+        made = Learning(problem.name, mdp=problem.mdp, learner=learner, gate=gate, episodes=learner.episodes)
+        made.optimal = _fewest(problem.mdp, learner)
+        with self._panel.lock:
+            self._panel.known.receipt, self._panel.known.ended = None, ""
+            self._new(made)
+
+    def begin_order(
+        self, title: str, episodes: int, gate: GateSettings | None = None, optimal: float | None = None, unit: str = "s"
+    ) -> None:
+        """A session of a sequencer begins; optimal: what no order can beat."""
+        with self._panel.lock:
+            self._panel.known.work, self._advised_episodes = None, set()
+            self._new(Learning(title, "order", unit, gate=gate, episodes=episodes, optimal=optimal))
+
+    def on_event(self, event: Event, skill: str = "") -> None:
+        """Something happened in a lesson; one of another skill begins a new curve."""
+        known = self._panel.known
+        with self._panel.guard:  # quicker than the condition's own way
+            if skill and known.learning.title != skill:
+                self._new(Learning(skill))
+            known.touched.update(hear(known.learning, event))
+
+    def on_order_episode(self, event: EpisodeSequenced) -> None:
+        """An order was tried; it is guided when somebody here said something in it."""
+        known = self._panel.known
+        with self._panel.lock:
+            known.learning.curve.add(event.cost, event.episode in self._advised_episodes)
+            known.changed("curve")
+
+    def _new(self, learning: Learning) -> Learning:
+        known = self._panel.known
+        known.learning = learning
+        known.changed("lesson", "place", "robot", "curve", "standing", "notices", "slice")
+        return learning
+
+    # ---- what is shown beside
+
+    def receipt(self, document: Mapping[str, Any]) -> None:
+        """What the advice was worth so far."""
+        self._show("receipt", dict(document))
+
+    def members(self, members: Iterable[Any]) -> None:
+        """Several advisors: records or dicts with `name`, `trust`, `low`, `high` and `dropped`."""
+        self._show("members", [_member(member) for member in members])
+
+    def work(self, moves: Iterable[Move]) -> None:
+        """The work so far, as bars of robot and machines."""
+        self._show("work", bars_of(list(moves)))
+
+    def progress(self, progress: Progress) -> None:
+        """How a whole run goes."""
+        self._show("progress", progress)
+
+    def finished(self, text: str) -> None:
+        """The lesson is over: nothing is asked any more."""
+        self._panel.close()
+        self._show("ended", text)
+        self._wake()
+
+    def listener(self) -> Listener:
+        """Who shows a whole run, or the sessions of a sequencer, in the panel."""
+        from lab.seat.page.page_run import SeatListener
+
+        return SeatListener(self)
+
+    def _show(self, part: str, value: Any) -> None:
+        with self._panel.lock:
+            setattr(self._panel.known, part, value)
+            self._panel.known.changed(part)
+
+    def _wake(self) -> None:
+        if self._server is not None:
+            self._server.wake()
+
+
+def _said(pending: Pending, answer: Answer | None) -> int | None:
+    """What an answer means to who asked; see `SeatPage.ask`."""
+    if answer is None:
+        raise AdvisorLeft(f"no answer within {pending.wait_s:g} s")
+    if answer.word == "auto":
+        raise AdvisorLeft("auto")
+    if answer == CLOSED:
+        raise AdvisorLeft("the page was closed")
+    if answer.word == "undo":
+        raise Undo
+    if answer.word == "quit":
+        raise KeyboardInterrupt
+    return answer.action
+
+
+def _fewest(mdp: TabularMDP, learner: LearnerSettings) -> float | None:
+    """The fewest steps of a certain problem, counted as the learner counts; None where nobody knows them."""
+    if mdp.n_states > MOST_STATES or not (mdp.shape or mdp.coverage_shape):
+        return None
+    try:
+        return shortest_steps(mdp) + learner.count_start
+    except NoPath:
+        return None
+
+
+def _member(member: Any) -> dict[str, Any]:
+    return asdict(member) if is_dataclass(member) and not isinstance(member, type) else dict(member)

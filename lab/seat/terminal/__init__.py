@@ -1,0 +1,1 @@
+"""A person at a terminal: questions as text, answers as typed."""

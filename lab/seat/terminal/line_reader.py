@@ -1,0 +1,233 @@
+"""How a line is read from a person: at a terminal with arrow keys, from plain lines, or from outside while one waits."""
+
+import os
+import select
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from threading import Lock
+from typing import TYPE_CHECKING, Protocol, TextIO, cast
+
+from rich.console import Console
+from rich.text import Text
+
+from lab.seat.grid_text import ARROWS, DIRECTIONS
+
+if TYPE_CHECKING:
+    from prompt_toolkit.application import Application
+    from prompt_toolkit.input import Input
+    from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
+    from prompt_toolkit.output import Output
+
+ReadLine = Callable[[str], str]
+OTHER_KEYS = ("tab", "pageup", "pagedown", "insert", *(f"f{n}" for n in range(1, 13)))
+
+
+class Outside:
+    """Words that come from another thread, such as a page's, for the question that waits; safe to use from any thread."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._open = False
+        self._words: list[str] = []
+        self._wake: Callable[[], None] | None = None
+
+    @contextmanager
+    def question(self) -> Iterator[None]:
+        """While a question waits; what comes before it or after it has no effect."""
+        with self._lock:
+            self._open = True
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._open = False
+                self._words.clear()
+
+    @contextmanager
+    def waking(self, wake: Callable[[], None]) -> Iterator[None]:
+        """While somebody reads: `wake` is called, from any thread, when there is a word."""
+        with self._lock:
+            self._wake = wake
+            if self._words:
+                wake()
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._wake = None
+
+    def answer(self, word: str) -> None:
+        """A word for the question that waits, as if it were typed."""
+        with self._lock:
+            if not self._open:
+                return
+            self._words.append(word)
+            if self._wake is not None:
+                self._wake()
+
+    def taken(self) -> str | None:
+        """The next word, once."""
+        with self._lock:
+            return self._words.pop(0) if self._words else None
+
+
+def default_reader(
+    console: Console, stdin: TextIO | None = None, *, plain: bool = False, outside: Outside | None = None
+) -> "Reader":
+    """Reads with arrow keys at a terminal that can do it, else plain lines; `plain`: plain lines in any case."""
+    stream = stdin or sys.stdin
+    if plain or not stream.isatty():
+        return PlainReader(console, stream, outside)
+    from prompt_toolkit.utils import is_dumb_terminal
+
+    if is_dumb_terminal():
+        return PlainReader(console, stream, outside)
+    return TerminalReader(console, outside=outside)
+
+
+class Reader(Protocol):
+    """Shows a prompt and returns one line, or a word from outside; raises EOFError at the end of the input."""
+
+    outside: Outside
+
+    def __call__(self, prompt: str) -> str:
+        """One line, with or without its end."""
+
+
+class PlainReader:
+    """Reads lines of a stream, which are shown when nobody has typed them on the screen."""
+
+    def __init__(self, console: Console, stream: TextIO, outside: Outside | None = None) -> None:
+        self.outside = outside or Outside()
+        self._console = console
+        self._stream, self._left = stream, b""
+        self._typed = stream.isatty()
+        try:
+            self._fd = stream.fileno()
+        except OSError:  # text in memory
+            self._fd = -1
+
+    def __call__(self, prompt: str) -> str:
+        """One line with its end."""
+        try:
+            self._console.print(Text(prompt), end="")
+            line, typed = self._next()
+        except KeyboardInterrupt:
+            self._console.print()  # what comes next begins a line
+            raise
+        if not typed or not line:
+            shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line.rstrip("\r\n"))
+            self._console.print(Text(shown), soft_wrap=True)
+        if not line:
+            raise EOFError
+        return line
+
+    def _next(self) -> tuple[str, bool]:
+        """A line, and whether it stands on the screen already."""
+        if self._fd < 0:
+            return self.outside.taken() or self._stream.readline(), False
+        while b"\n" not in self._left:
+            word = self._wait()
+            if word is not None:
+                return f"{word}\n", False
+            more = os.read(self._fd, 65536)
+            self._left += more
+            if not more:
+                line, self._left = self._left, b""
+                return line.decode(self._stream.encoding, "replace"), False
+        line, _, self._left = self._left.partition(b"\n")
+        return f"{line.decode(self._stream.encoding, 'replace')}\n", self._typed
+
+    def _wait(self) -> str | None:
+        """Until there is something to read, or a word from outside, which is returned."""
+        hears, tells = os.pipe()
+        try:
+            with self.outside.waking(lambda: _poke(tells)):
+                select.select([self._fd, hears], [], [])
+                return self.outside.taken()
+        finally:
+            os.close(hears)
+            os.close(tells)
+
+
+def _poke(fd: int) -> None:
+    os.write(fd, b".")
+
+
+class TerminalReader:
+    """Line editing with history; an arrow key on an empty line answers at once, and draws an arrow after "path"."""
+
+    def __init__(
+        self,
+        console: Console,
+        keys: "Input | None" = None,
+        screen: "Output | None" = None,
+        outside: Outside | None = None,
+    ) -> None:
+        from prompt_toolkit import PromptSession
+        from prompt_toolkit.output import create_output
+        from prompt_toolkit.output.vt100 import Vt100_Output
+
+        self.outside = outside or Outside()
+        output = screen or create_output(stdout=cast(TextIO, console.file))
+        if isinstance(output, Vt100_Output):
+            output.enable_cpr = False  # one line needs no cursor position, and a slow link would answer too late
+        self._session: PromptSession[str] = PromptSession(input=keys, output=output, key_bindings=_keys())
+
+    def __call__(self, prompt: str) -> str:
+        """One line without its end."""
+        with ExitStack() as stack:
+            return self._session.prompt(prompt, pre_run=lambda: self._listen(stack))
+
+    def _listen(self, stack: ExitStack) -> None:
+        """From now on until the prompt ends, a word from outside ends it."""
+        from asyncio import get_running_loop
+
+        loop, app = get_running_loop(), self._session.app
+
+        def wake() -> None:
+            with suppress(RuntimeError):  # the loop has ended: the word stays for the next line, if there is one
+                loop.call_soon_threadsafe(self._deliver, app)
+
+        stack.enter_context(self.outside.waking(wake))
+
+    def _deliver(self, app: "Application[str]") -> None:
+        if app.is_done:
+            return  # it is answered already
+        word = self.outside.taken()
+        if word is not None:
+            _enter(app, word)
+
+
+def _enter(app: "Application[str]", word: str) -> None:
+    """As if the word stood on the line, and enter were pressed."""
+    app.current_buffer.text = word
+    app.current_buffer.validate_and_handle()
+
+
+def _keys() -> "KeyBindings":
+    from prompt_toolkit.application import get_app
+    from prompt_toolkit.filters import Condition
+    from prompt_toolkit.key_binding import KeyBindings
+
+    bindings = KeyBindings()
+    is_empty = Condition(lambda: not get_app().current_buffer.text)
+    is_path = Condition(lambda: get_app().current_buffer.text.startswith("path "))
+
+    def bind(key: str, word: str) -> None:
+        @bindings.add(key, filter=is_empty)
+        def _answer(event: "KeyPressEvent") -> None:
+            _enter(event.app, word)
+
+    def insert(key: str, arrow: str) -> None:
+        @bindings.add(key, filter=is_path)
+        def _insert(event: "KeyPressEvent") -> None:
+            event.current_buffer.insert_text(arrow)
+
+    for key, arrow in zip(DIRECTIONS, ARROWS, strict=True):
+        bind(key, arrow)
+        insert(key, arrow)
+    for key in OTHER_KEYS:
+        bind(key, f"the key {key}")
+    return bindings

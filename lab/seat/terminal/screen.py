@@ -1,0 +1,131 @@
+"""One question on a screen of any size: the picture, with the numbers beside it or below it."""
+
+import os
+from collections.abc import Iterable, Sequence
+from itertools import zip_longest
+from textwrap import wrap
+
+from rich.console import Console
+from rich.text import Text
+
+from lab.learning.requests import AdviceRequest
+from lab.seat import request_text as facts
+from lab.seat.grid_text import GAP, Marks, Picture, picture_of
+
+Parts = dict[str, list[Text]]
+BRIEF = 60  # columns; below, numbers come in fewer words
+PANEL = 38  # columns that the numbers take at least when they stand beside a picture
+FEWEST_ROWS = 6  # of a picture; to have as many, the least important lines are left away
+ROWS_WITH_LEGEND = 12
+DROPPED = ("legend", "choice", "standing", "progress", "moves")  # in this order, when there is too little room
+
+
+def room(console: Console) -> tuple[int, int]:
+    """The columns and lines of a console; rich takes every dumb terminal for one of 80 x 25."""
+    if console.is_dumb_terminal:
+        try:
+            return os.get_terminal_size(console.file.fileno())
+        except (OSError, ValueError):  # it is none
+            pass
+    return console.size
+
+
+def folded(lines: Iterable[str], width: int, style: str = "") -> list[Text]:
+    """Lines of text, broken between words where they are too long."""
+    return [Text(part, style) for line in lines for part in wrap(line, max(width, 8)) or [""]]
+
+
+def packed(parts: Sequence[Text], width: int, gap: str = "  ") -> list[Text]:
+    """Parts side by side; one that does not fit begins another line."""
+    lines = [parts[0]]
+    for part in parts[1:]:
+        if lines[-1].cell_len + len(gap) + part.cell_len > width:
+            lines.append(part)
+        else:
+            lines[-1] = Text.assemble(lines[-1], gap, part)
+    return lines
+
+
+def question(request: AdviceRequest, marks: Marks, width: int) -> str:
+    """The words before the cursor, as many as leave room to type."""
+    own = marks.named(request.mdp, request.learner_action)
+    forms = (f"Which way? [enter = {own}, ? explains] ", f"Which way? [enter = {own}] ", f"Which way? [{own}] ")
+    return next((form for form in forms if len(form) + 12 <= width), "Which way? ")
+
+
+def screen(request: AdviceRequest, marks: Marks, width: int, height: int) -> list[Text]:
+    """What the learner shows, in so many columns, and lines unless the picture is the environment's own."""
+    step, at = f"step {request.step}: at", request.mdp.state_label(request.state)
+    title = f"Episode {request.episode}, {step} {at}"
+    head = folded([title if len(title) <= width else f"{step.capitalize()} {at}"], width, "bold")
+    left = height - len(head)
+    whole = picture_of(request, marks, width, left)
+    if whole is None:
+        return head + _below(request, marks, None, width, left)
+    if whole.width + GAP + PANEL <= width:
+        beside = _beside(request, marks, whole, width, left)
+        if len(beside) <= left:
+            return head + beside
+    return head + _below(request, marks, whole, width, left)
+
+
+def _beside(request: AdviceRequest, marks: Marks, whole: Picture, width: int, height: int) -> list[Text]:
+    """The numbers to the right of the picture, what the picture means below it."""
+    panel = width - whole.width - GAP
+    texts = [facts.choice(request, marks), "", *facts.progress(request), facts.standing(request)]
+    numbers = [*facts.bars(request, marks), Text(), *folded(texts, panel)]
+    notes = folded([whole.legend] * bool(whole.legend), width, "dim")
+    picture = picture_of(request, marks, width, height - len(notes) - 1) or whole
+    note = facts.beyond(request, picture)
+    lines = []
+    for drawn, number in zip_longest(picture.lines, numbers):
+        left = drawn.copy() if drawn is not None else Text()
+        if number is not None:
+            left.pad_right(whole.width + GAP - left.cell_len)
+            left.append_text(number)
+        lines.append(left)
+    return lines + notes + folded([note] * bool(note), width)
+
+
+def _below(request: AdviceRequest, marks: Marks, whole: Picture | None, width: int, height: int) -> list[Text]:
+    """The numbers under the picture, fewer of them where the picture would have too few rows."""
+    brief = width < BRIEF
+    parts: Parts = {
+        "legend": folded([whole.legend] if whole and whole.legend else [], width, "dim"),
+        "note": [],
+        "moves": packed(facts.moves(request, marks), width),
+        "choice": folded(filter(None, [facts.choice(request, marks, brief)]), width),
+        "progress": folded(facts.progress(request, brief), width, "dim"),
+        "standing": folded([facts.standing(request, brief)], width, "dim"),
+    }
+    whole = whole or Picture([])
+    if whole.is_fixed and len(whole.lines) + len(parts["moves"]) > height:
+        return [*whole.lines, *_all(parts)]  # it scrolls in any case
+    picture = whole
+    for dropped in (None, *DROPPED):
+        if dropped is not None:
+            parts[dropped] = []
+        picture = _under_its_note(request, marks, whole, parts, width, height)
+        fits = len(picture.lines) + len(_all(parts)) <= height
+        enough = ROWS_WITH_LEGEND if dropped is None else FEWEST_ROWS
+        if fits and len(picture.lines) >= min(enough, len(whole.lines)):
+            break
+    return [*picture.lines, *_all(parts)]
+
+
+def _all(parts: Parts) -> list[Text]:
+    return [line for lines in parts.values() for line in lines]
+
+
+def _under_its_note(
+    request: AdviceRequest, marks: Marks, whole: Picture, parts: Parts, width: int, height: int
+) -> Picture:
+    """The picture in the room that the numbers leave, and its note among them: the less it shows, the longer that is."""
+    picture, parts["note"] = whole, []
+    for _ in range(4):
+        picture = picture_of(request, marks, width, height - len(_all(parts))) or whole
+        note = facts.beyond(request, picture, width < BRIEF)
+        parts["note"] = folded([note] * bool(note), width)
+        if len(picture.lines) + len(_all(parts)) <= height:
+            break
+    return picture

@@ -1,0 +1,137 @@
+"""What a person types at the teaching prompt: a move, a whole path, or a word of the prompt's own."""
+
+import re
+from difflib import get_close_matches
+
+from lab.mdp import TabularMDP
+from lab.seat.grid_text import ARROWS, ASCII_ARROWS, DIRECTIONS, direction_of
+
+Understood = int | tuple[int, ...] | str
+COMMANDS = {  # what is typed -> what it is called, what it does; "path" begins with the word and goes on
+    "": ("own", "agree with the learner: take the move it would make itself"),
+    "path": (
+        "path",
+        "a whole path at once, letters or arrows: path {example}, or 3{letter} for {letter}{letter}{letter}",
+    ),
+    "why": ("why", "why it asks, with the numbers: what it knows here, how advice stands"),
+    "undo": ("undo", "take back the last answer of this episode"),
+    "skip": ("skip", "leave this step to the learner"),
+    "auto": ("auto", "no more advice for this skill: the learner goes on alone"),
+    "done": ("done", "no more advice in this whole run, whatever is learned"),
+    "quit": ("quit", "or q: stop the session, as Ctrl-C does; what has been learned is kept"),
+    "q": ("quit", ""),
+    "?": ("help", "this list"),
+    "help": ("help", ""),
+}
+ANSWERS = frozenset(called for called, _ in COMMANDS.values()) - {"path"}
+MOST_MOVES = 1000  # of one path
+_TYPED_ARROWS = {f"\x1b{bracket}{key}": arrow for bracket in "[O" for key, arrow in zip("ABDC", ARROWS, strict=True)}
+_PIECE = re.compile(r"([0-9]*)\s*([^\W\d_]+|[^\s\d,;])|([0-9]+)")
+
+
+def understand(line: str, mdp: TabularMDP) -> Understood:
+    """The action that a typed line names, the actions of a path, one of ANSWERS, or else a hint of one line.
+
+    An exact label comes first, then the beginning of exactly one label, then an arrow or the (beginning of the) word
+    for a direction in the picture, and then a path: each of its letters is a move that it would be alone.
+    """
+    word = line.strip(" \t\r\n").lower()
+    for keys, arrow in _TYPED_ARROWS.items():
+        word = word.replace(keys.lower(), arrow)
+    head, _, rest = word.partition(" ")
+    if head == "path":
+        return _path(rest, mdp, asked=True)
+    if word in COMMANDS:
+        return COMMANDS[word][0]
+    action, begun = _move(word, mdp)
+    if action is not None:
+        return action
+    if begun:
+        return f"'{word[:20]}' could be {' or '.join(mdp.action_labels[a] for a in begun)}: type more of it"
+    return _path(word, mdp) or _unknown(word, mdp)
+
+
+def _move(word: str, mdp: TabularMDP) -> tuple[int | None, list[int]]:
+    """The action that a word names, or else None and the actions whose labels begin with it."""
+    labels = [label.lower() for label in mdp.action_labels]
+    if word in labels:
+        return labels.index(word), []
+    begun = [action for action, label in enumerate(labels) if label.startswith(word)]
+    if len(begun) == 1:
+        return begun[0], []
+    pointing = {direction_of(mdp, action): action for action in range(mdp.n_actions)}
+    for direction, name in enumerate(DIRECTIONS):
+        meant = name.startswith(word) or word in (ARROWS[direction], ASCII_ARROWS[direction])
+        if meant and direction in pointing:
+            return pointing[direction], []
+    return None, begun
+
+
+def letters(mdp: TabularMDP) -> dict[str, int]:
+    """A letter for each move that has one, in their order: the first of its label, or else of its direction."""
+    firsts = [*(label[:1].lower() for label in mdp.action_labels), *(name[0] for name in DIRECTIONS)]
+    known: dict[int, str] = {}
+    for letter in firsts:
+        action = _move(letter, mdp)[0] if letter.isalpha() else None
+        if action is not None:
+            known.setdefault(action, letter)
+    return {known[action]: action for action in sorted(known)}
+
+
+def _path(text: str, mdp: TabularMDP, asked: bool = False) -> tuple[int, ...] | str:
+    """The moves of a path; a hint when it is none, "" where nobody asked for one and the text does not look like it."""
+    known = letters(mdp)
+    moves: list[int] = []
+    for count, run, lonely in _PIECE.findall(text):
+        whole = None if lonely or (asked and set(run) <= set(known)) else _move(run, mdp)[0]
+        part = [whole] if whole is not None else [known.get(letter, _move(letter, mdp)[0]) for letter in run]
+        found = [action for action in part if action is not None]
+        if lonely or len(found) < len(part):
+            wrong = lonely or next(letter for letter, action in zip(run, part, strict=True) if action is None)
+            return _no_path(text, wrong, known, mdp) if asked or _looks_like_one(text, known) else ""
+        times = int(count[:6]) if count else 1
+        moves += found[:1] * times + found[1:]
+        if len(moves) > MOST_MOVES:
+            return f"'{text[:20]}' has more than {MOST_MOVES} moves: a path may have {MOST_MOVES}"
+    if not moves:
+        return f"path what? {_known_letters(known, mdp)}, such as path {example(mdp)}" if asked or not text else ""
+    return tuple(moves)
+
+
+def _looks_like_one(text: str, known: dict[str, int]) -> bool:
+    """Whether more than half of a word that nobody understands are letters of a path."""
+    return 2 * sum(c in known or c in ARROWS or c.isdigit() or c.isspace() for c in text) > len(text)
+
+
+def _no_path(text: str, wrong: str, known: dict[str, int], mdp: TabularMDP) -> str:
+    return f"'{text[:20]}' is no path: '{wrong[:8]}' is no move; {_known_letters(known, mdp)}"
+
+
+def _known_letters(known: dict[str, int], mdp: TabularMDP) -> str:
+    if not known:
+        return "arrows and whole words are moves here, with spaces between them"
+    return "letters: " + ", ".join(f"{letter} {mdp.action_labels[action]}" for letter, action in known.items())
+
+
+def example(mdp: TabularMDP) -> str:
+    """A path as it may be typed."""
+    known = list(letters(mdp))
+    return "".join((known[-1], known[-1], known[0])) if known else f"{ARROWS[3] * 2}{ARROWS[0]}"
+
+
+def _unknown(word: str, mdp: TabularMDP) -> str:
+    near = get_close_matches(word, [*COMMANDS, *mdp.action_labels], n=1, cutoff=0.7)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    known = ", ".join([*mdp.action_labels, *(name for name in COMMANDS if name not in ("", "?", "help", "q"))])
+    return f"'{word[:20]}' is no direction: {hint}type {known} or ?"
+
+
+def explained(mdp: TabularMDP) -> list[tuple[str, str]]:
+    """What can be typed, and what it does, one row each."""
+    known = letters(mdp)
+    words = {"example": example(mdp), "letter": next(iter(known), ARROWS[0])}
+    rows = [("enter" if typed == "" else typed, text.format(**words)) for typed, (_, text) in COMMANDS.items() if text]
+    move = "a word from the list of moves, or its beginning; arrow keys follow the picture"
+    if known:
+        move += f"; {_known_letters(known, mdp)}"
+    return [("a move", move), *rows]

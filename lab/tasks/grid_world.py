@@ -1,0 +1,306 @@
+"""Grid worlds to cross from a start to a goal (thesis ch. 9): from task files, from text grids, or drawn at random."""
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
+from math import prod
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, model_validator
+
+from lab.errors import BadInput, counted
+from lab.mdp import BoolArray, NoPath, TabularMDP, grid, shortest_steps
+from lab.tasks.record import Count, Learned, Name, Record, as_tuple, read_text
+
+MAX_AXIS = 100  # cells; with 3 axes at most a million
+MAX_DENSITY = 0.6
+RANDOM = "random:"
+ACTIONS = {  # of worlds with 2 and 3 axes, as `lab.mdp.grid` orders them: -axis 0, +axis 0, -axis 1, ...
+    2: ("up", "down", "left", "right"),  # rows run down, columns to the right
+    3: ("left", "right", "backward", "forward", "down", "up"),  # x, y, z as seen from above
+}
+_TRIES = 10  # at scattering obstacles that leave a way
+_ALONE: dict[str, Any] = {"learner": "afterstate", "beta": 1.0, "episodes": 500}
+_ROOM = 4  # an episode of a drawn world may take so many times the shortest way
+_WANTED = "wanted random:SHAPE:DENSITY:SEED, such as random:10x10x10:0.06:7"
+
+Ints = NDArray[np.int_]
+Coordinates = tuple[int, ...]
+Cell = Annotated[Coordinates, BeforeValidator(as_tuple)]
+Shape = Annotated[tuple[Count, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=3)]
+
+
+class View(Record):
+    """The block of cells in which an advisor with a limited view sees the robot, from corner to corner, both inside."""
+
+    lower: Cell
+    upper: Cell
+
+
+class GridWorld(Learned):
+    """A world of cells, counted from 0, with obstacles, and how it is learned.
+
+    Two axes: rows running down and columns to the right, as in a text grid. Three axes: x to the right, y forward, z
+    up. An advisor with a limited view sees the robot in `view` only.
+    """
+
+    kind: Literal["world"] = "world"
+    name: Name
+    title: str = ""
+    shape: Shape
+    start: Cell
+    goal: Cell
+    obstacles: Annotated[tuple[Cell, ...], BeforeValidator(as_tuple)] = ()
+    view: View | None = None
+
+    @model_validator(mode="after")
+    def _cells_fit(self) -> Self:
+        for what, cell in self._cells():
+            _require_inside(what, cell, self.shape)
+        closed = set[Coordinates]()
+        for cell in self.obstacles:
+            if cell in closed:
+                raise ValueError(f"obstacle {cell} stands twice in the file")
+            closed.add(cell)
+        for what, cell in (("start", self.start), ("goal", self.goal)):
+            if cell in closed:
+                raise ValueError(f"{what} {cell} is blocked by an obstacle: a free cell is wanted")
+        if self.start == self.goal:
+            raise ValueError(f"start and goal are the same cell {self.start}: two cells are wanted")
+        return self
+
+    @model_validator(mode="after")
+    def _view_holds_a_cell(self) -> Self:
+        if self.view is not None:
+            for axis, (low, high) in enumerate(zip(self.view.lower, self.view.upper, strict=True)):
+                if low > high:
+                    raise ValueError(f"view.lower {low} on axis {axis} is above view.upper: allowed are 0..{high}")
+        return self
+
+    @model_validator(mode="after")
+    def _members_known(self) -> Self:
+        self.check_members()
+        return self
+
+    def _cells(self) -> Iterator[tuple[str, Coordinates]]:
+        yield from (("start", self.start), ("goal", self.goal))
+        yield from (("obstacle", cell) for cell in self.obstacles)
+        if self.view is not None:
+            yield from (("view.lower", self.view.lower), ("view.upper", self.view.upper))
+
+    def blocked(self) -> BoolArray:
+        """Where obstacles are; bool of `shape`."""
+        return _marked(self.obstacles, self.shape)
+
+    def region(self) -> BoolArray:
+        """The states (S,) bool in which an advisor with a limited view sees the robot; all where there is no `view`."""
+        seen = np.ones(self.shape, bool)
+        if self.view is not None:
+            seen[:] = False
+            seen[tuple(slice(a, b + 1) for a, b in zip(self.view.lower, self.view.upper, strict=True))] = True
+        return seen.ravel()
+
+    def mdp(self) -> TabularMDP:
+        """The decision problem of the world, `lab.mdp.grid`; raises NoPath when obstacles part start and goal."""
+        try:
+            return grid(self.shape, self.blocked(), self.start, self.goal, self.rewards, ACTIONS[len(self.shape)])
+        except NoPath as error:
+            raise NoPath(f"world '{self.name}': {error}", error.enclosing, error.around) from None
+
+    def worth(self, moves: int, end: float) -> float:
+        """What so many moves are worth at their start when the last one gives `end` and the others cost a step each."""
+        discount = self.learner.discount
+        last = discount ** (moves - 1)
+        before = moves - 1 if discount == 1.0 else (1.0 - last) / (1.0 - discount)
+        return self.rewards.step * before + last * end
+
+    def check(self) -> TabularMDP:
+        """The decision problem, when it can be learned: raises NoPath, and BadInput when the best a learner can do is no way.
+
+        That is so when the shortest way takes more steps than an episode has, and when the rewards make it better to
+        run into the nearest obstacle.
+        """
+        mdp, collision, most = self.mdp(), self.rewards.collision, self.learner.max_steps
+        moves = shortest_steps(mdp)
+        steps = moves + self.learner.count_start
+        if steps > most:
+            need = f"the shortest way has {counted(moves, 'move')} and needs {counted(steps, 'step')}"
+            raise BadInput(f"world '{self.name}': learner.max_steps = {most}: {need}")
+        if not self.obstacles:
+            return mdp
+        near = int(np.abs(np.subtract(self.obstacles, self.start)).sum(axis=1).min())
+        crash, way = self.worth(near, collision), self.worth(moves, self.rewards.goal)
+        if crash >= way:
+            worth = (
+                f"running into an obstacle is worth {crash:.2f} and the way of {counted(moves, 'move')} only {way:.2f}"
+            )
+            raise BadInput(
+                f"world '{self.name}': rewards.collision = {collision}: at the start, {worth}: "
+                "wanted a lower one, or more for the goal"
+            )
+        return mdp
+
+    def to_toml(self, comment: str = "") -> str:
+        """The text of a task file that holds this world, after a comment of any lines."""
+        head = ("name", "kind", "title", "shape", "start", "goal")
+        lines = [f"# {line}" for line in comment.splitlines()]
+        lines += [f"{key} = {json.dumps(getattr(self, key))}" for key in head]
+        lines += ["obstacles = [", *(f"  {json.dumps(cell)}," for cell in self.obstacles), "]"]
+        tables = {"view": self.view.model_dump()} if self.view is not None else {}
+        tables |= {"rewards": asdict(self.rewards), "learner": asdict(self.learner), "gate": asdict(self.gate)}
+        for name, table in tables.items():
+            lines += ["", f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in table.items())]
+        return "\n".join(lines) + "\n"
+
+
+def _require_inside(what: str, cell: Coordinates, shape: Coordinates) -> None:
+    if len(cell) != len(shape):
+        raise ValueError(f"{what} {cell} has {len(cell)} coordinates: {len(shape)} are wanted")
+    if not all(0 <= i < n for i, n in zip(cell, shape, strict=True)):
+        allowed = " x ".join(f"0..{n - 1}" for n in shape)
+        raise ValueError(f"{what} {cell} is outside the world: allowed are {allowed}")
+
+
+def _marked(cells: Sequence[Coordinates], shape: Coordinates) -> BoolArray:
+    marked = np.zeros(shape, bool)
+    if cells:
+        marked[tuple(np.transpose(cells))] = True
+    return marked
+
+
+def _check_shape(shape: Coordinates, where: str) -> None:
+    if not (2 <= len(shape) <= 3 and all(1 <= n <= MAX_AXIS for n in shape)):
+        raise BadInput(f"{where}: shape {_words(shape)}: allowed are 2 or 3 axes of 1 to {MAX_AXIS} cells")
+
+
+def _words(shape: Coordinates) -> str:
+    return "x".join(map(str, shape))
+
+
+def parse_shape(text: str, where: str) -> Coordinates:
+    """The numbers of "10x10x10"; raises BadInput for what is no shape of a world."""
+    if not re.fullmatch(r"[0-9]{1,9}(x[0-9]{1,9})*", text):
+        raise BadInput(f"{where}: shape '{text}': wanted 2 or 3 axes of 1 to {MAX_AXIS} cells, such as 10x10x10")
+    shape = tuple(map(int, text.split("x")))
+    _check_shape(shape, where)
+    return shape
+
+
+def from_text(path: Path) -> GridWorld:
+    """The world of a text grid: rows of one length of '.' free, '#' obstacle, one 'S' start and one 'G' goal.
+
+    These are the rows that `lab see --json` calls "grid". Raises BadInput with file, line and column, and NoPath.
+    """
+    rows = [row.removesuffix("\r") for row in read_text(path).rstrip("\r\n").split("\n")]
+    if rows == [""]:
+        raise BadInput(f"{path}: it is empty: wanted rows of . # S G")
+    cells: dict[str, list[Coordinates]] = {"#": [], "S": [], "G": []}
+    for i, row in enumerate(rows):
+        for j, mark in enumerate(row):
+            if mark != "." and mark not in cells:
+                raise BadInput(f"{path}: line {i + 1}, column {j + 1}: {mark!r}: allowed are . # S G")
+            if mark in ("S", "G") and cells[mark]:
+                (first,) = cells[mark]
+                place = f"line {first[0] + 1}, column {first[1] + 1}"
+                raise BadInput(f"{path}: line {i + 1}, column {j + 1}: a second '{mark}', the first is in {place}")
+            if mark != ".":
+                cells[mark].append((i, j))
+        if len(row) != len(rows[0]):
+            raise BadInput(f"{path}: line {i + 1}: {len(row)} cells, line 1 has {len(rows[0])}: wanted the same number")
+    _check_shape((len(rows), len(rows[0])), str(path))
+    for mark, what in (("S", "start"), ("G", "goal")):
+        if not cells[mark]:
+            raise BadInput(f"{path}: no '{mark}' ({what}) in {len(rows)} lines: exactly one is wanted")
+    name = re.sub(r"[^A-Za-z0-9 _-]", "-", path.stem).lstrip(" _-")[:40] or "world"
+    shape, (start,), (goal,) = (len(rows), len(rows[0])), cells["S"], cells["G"]
+    return _fitted(GridWorld(name=name, shape=shape, start=start, goal=goal, obstacles=tuple(cells["#"])))
+
+
+def from_words(word: str) -> GridWorld:
+    """The random world that "random:10x10x10:0.06:7" means: shape, density, seed. Raises BadInput."""
+    match = re.fullmatch(r"random:([^:]*):([0-9.eE+-]{1,20}):([0-9]{1,18})", word)
+    try:
+        density = float(match[2]) if match else None
+    except ValueError:
+        density = None
+    if match is None or density is None:
+        raise BadInput(f"world '{word}': {_WANTED}")
+    return random_world(parse_shape(match[1], f"world '{word}'"), density, int(match[3]))
+
+
+def random_world(shape: Sequence[int], density: float, seed: int) -> GridWorld:
+    """A world whose share `density` of cells, 0 to 0.6, are obstacles; a way always leads from start to goal.
+
+    Start and goal are at least half as many moves apart as opposite corners. Obstacles lie anywhere, as long as they
+    leave a way; if several draws do not, one way is kept free. Raises BadInput for values outside their range, and
+    when fewer cells are left free than the way needs.
+    """
+    shape = tuple(int(n) for n in shape)
+    where = f"random world {_words(shape)}"
+    _check_shape(shape, where)
+    if not 0.0 <= density <= MAX_DENSITY:
+        raise BadInput(f"{where}: density {density}: allowed are 0 to {MAX_DENSITY}")
+    if seed < 0:
+        raise BadInput(f"{where}: seed {seed}: allowed is 0 or more")
+    count = round(density * prod(shape))
+    free = prod(shape) - count
+    far = max(1, (sum(n - 1 for n in shape) + 1) // 2)
+    if free <= far:
+        raise BadInput(f"{where}: density {density} leaves {free} cells free, start and goal far apart need {far + 1}")
+    rng = np.random.default_rng(seed)
+    cells = np.indices(shape).reshape(len(shape), -1).T  # (cells, axes)
+    start = cells[rng.integers(len(cells))]
+    apart = np.abs(cells - start).sum(axis=1)
+    goal = cells[rng.choice(np.flatnonzero((apart >= far) & (apart < free)))]
+    wall = _obstacles(shape, count, start, goal, rng)
+    return _fitted(
+        GridWorld(
+            name=f"random-{_words(shape)}-{density:g}-{seed}".replace(".", "_").replace("+", "")[:40],
+            title=f"Random world of {_words(shape)} cells, density {density:g}, seed {seed}",
+            shape=shape,
+            start=tuple(start.tolist()),
+            goal=tuple(goal.tolist()),
+            obstacles=tuple(map(tuple, np.argwhere(wall).tolist())),
+        )
+    )
+
+
+def _obstacles(shape: Coordinates, count: int, start: Ints, goal: Ints, rng: np.random.Generator) -> BoolArray:
+    """So many obstacles anywhere that leave a way from start to goal; bool of `shape`."""
+    from scipy.ndimage import label
+
+    def scattered(kept: Ints) -> BoolArray:
+        """Obstacles outside the kept cells (n, axes)."""
+        wall = np.zeros(prod(shape), bool)
+        others = np.setdiff1d(np.arange(wall.size), np.ravel_multi_index(tuple(kept.T), shape))
+        wall[rng.choice(others, count, replace=False)] = True
+        return wall.reshape(shape)
+
+    for _ in range(_TRIES):
+        wall = scattered(np.stack([start, goal]))
+        rooms, _ = label(~wall)
+        if rooms[tuple(start)] == rooms[tuple(goal)]:
+            return wall
+    return scattered(_staircase(start, goal, rng))
+
+
+def _staircase(start: Ints, goal: Ints, rng: np.random.Generator) -> Ints:
+    """The cells (n, axes) of a shortest way from start to goal, its moves in any order."""
+    order = rng.permutation(np.repeat(np.arange(len(start)), np.abs(goal - start)))
+    moves = (np.eye(len(start), dtype=np.int_) * np.sign(goal - start))[order]
+    way: Ints = start + np.vstack([np.zeros_like(start), np.cumsum(moves, axis=0)])
+    return way
+
+
+def _fitted(world: GridWorld) -> GridWorld:
+    """The world with a learner that mostly finds a way alone and, where ways are long, collisions that cost more than they."""
+    moves, rewards, learner = shortest_steps(world.mdp()), world.rewards, world.learner
+    if world.worth(moves, rewards.goal) <= rewards.collision:
+        endless = rewards.step / (1.0 - learner.discount)
+        rewards = replace(rewards, collision=round(endless - 1.0, 6))
+    learner = replace(learner, **_ALONE, max_steps=max(learner.max_steps, _ROOM * moves))
+    return world.model_copy(update={"rewards": rewards, "learner": learner})

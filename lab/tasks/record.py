@@ -1,0 +1,105 @@
+"""What task files are made of: frozen records of checked fields, names, and how a problem is learned."""
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Annotated, Any, Self, cast
+
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, field_validator
+from pydantic_core import CoreSchema
+
+from lab import files
+from lab.errors import BadInput, unknown
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.mdp import Rewards
+
+MAX_FILE_BYTES = 10_000_000  # of a text file: a world of 100 x 100 x 100 cells has its obstacles in it
+MAX_SHORT_BYTES = 1_000_000  # of one that holds no world: reading a longer one takes seconds
+MAX_REWARD = 1_000_000  # sums of larger ones lose the small ones, and of much larger ones overflow
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$")]
+Count = Annotated[int, Field(ge=1, le=100)]
+
+
+def as_tuple(value: object) -> object:
+    """A list as a tuple, for a strict field; anything else as it is."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+class Record(BaseModel):
+    """A frozen record that knows its fields and takes no others."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class _FromTable:
+    """Lets a dataclass in a strict record be written as a table; its own fields stay strict."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        schema = handler(source)
+        cast(dict[str, Any], handler.resolve_ref_schema(schema))["strict"] = False
+        return schema
+
+
+FROM_TABLE = _FromTable()
+
+
+class Learned(Record):
+    """How something is learned: rewards, learner and gate, which spares the best episodes unless a file says otherwise."""
+
+    rewards: Annotated[Rewards, FROM_TABLE] = Rewards()
+    learner: Annotated[LearnerSettings, FROM_TABLE] = LearnerSettings()
+    gate: Annotated[GateSettings, FROM_TABLE] = GateSettings(spare_best=True)
+
+    @field_validator("gate", mode="before")
+    @classmethod
+    def _best_is_spared(cls, gate: Any) -> Any:
+        return {"spare_best": True} | gate if isinstance(gate, dict) else gate
+
+    @field_validator("rewards")
+    @classmethod
+    def _sums_are_finite(cls, rewards: Rewards) -> Rewards:
+        for field, value in asdict(rewards).items():
+            if abs(value) > MAX_REWARD:
+                raise ValueError(f"{field} = {value}: allowed are -{MAX_REWARD} to {MAX_REWARD}")
+        return rewards
+
+    def check_members(self, where: str = "") -> None:
+        """Raises BadInput for an unknown learner, selection or gate; `where` comes before the names of the tables."""
+        from lab.learning.gates import GATES
+        from lab.learning.selection import SELECTIONS
+        from lab.learning.updates import UPDATES
+
+        if self.learner.learner not in UPDATES:
+            raise unknown("learner", self.learner.learner, UPDATES, f"{where}learner")
+        if self.learner.selection not in SELECTIONS:
+            raise unknown("selection", self.learner.selection, SELECTIONS, f"{where}learner")
+        if self.gate.gate not in GATES:
+            raise unknown("gate", self.gate.gate, GATES, f"{where}gate")
+
+    def changed(self, learner: str | None, gate: str | None, episodes: int | None, memory: bool | None = None) -> Self:
+        """With what the options of a command say, None for what they leave; BadInput for an unknown learner or gate."""
+        own, when = self.learner, self.gate
+        own = replace(own, learner=own.learner if learner is None else learner, episodes=episodes or own.episodes)
+        when = replace(when, gate=gate or when.gate, memory=when.memory if memory is None else memory)
+        other = self.model_copy(update={"learner": own, "gate": when})
+        other.check_members("--")
+        return other
+
+
+def read_text(path: Path) -> str:
+    """A file's text; raises BadInput when it cannot be read, is no UTF-8 or is longer than MAX_FILE_BYTES."""
+    try:
+        size = path.stat().st_size
+        if size > MAX_FILE_BYTES:
+            raise BadInput(f"{path}: {size} bytes: files up to {MAX_FILE_BYTES} bytes are read")
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInput(f"{path}: cannot be read: {error}") from None
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Writes a text file whole or not at all, replacing one that is there; raises BadInput when it cannot be written."""
+    try:
+        files.write_whole(path, text.encode())
+    except OSError as error:
+        raise BadInput(f"{path}: cannot be written: {error.strerror or error}") from error

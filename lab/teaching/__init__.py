@@ -1,0 +1,1 @@
+"""Find a fitting skill in the toolbox, or learn it: the teacher, its sessions, and what they tell."""

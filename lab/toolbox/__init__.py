@@ -1,0 +1,1 @@
+"""What was learned, kept: policies and measured records in a folder, never loaded damaged."""

@@ -1,0 +1,90 @@
+"""Bodies as the page wants them: plain JSON data, each geometry once, meshes read and shaded."""
+
+import base64
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput
+from lab.sim.frames import Body, Camera, Shape, unique_names
+
+CREASE_RAD = 0.6  # faces that meet at a larger angle keep a sharp edge
+
+Json = dict[str, Any]
+
+
+def describe(bodies: Sequence[Body], camera: Camera) -> Json:
+    """The scene of `page.js`: {"camera", "geometries": [...], "bodies": [{"name", "shapes": [...]}]}.
+
+    Shapes name their geometry by its place in the list. Raises BadInput for a mesh file that is missing or unreadable
+    and for two bodies of one name.
+    """
+    unique_names(bodies)
+    geometries: dict[tuple[object, ...], int] = {}
+    contents: list[Json] = []
+    described = []
+    for body in bodies:
+        shapes = []
+        for shape in body.shapes:
+            key = (shape.kind, shape.mesh if shape.kind == "mesh" else shape.size)
+            if key not in geometries:
+                geometries[key] = len(contents)
+                contents.append(_geometry(shape))
+            shapes.append(_shape(shape, geometries[key]))
+        described.append({"name": body.name, "shapes": shapes})
+    look = {"eye": list(camera.eye), "target": list(camera.target)}
+    return {"camera": look, "geometries": contents, "bodies": described}
+
+
+def _shape(shape: Shape, geometry: int) -> Json:
+    pose = [round(float(value), 6) for value in (*shape.position, *shape.quaternion)]
+    scale = list(shape.size) if shape.kind == "mesh" and shape.size else [1, 1, 1]
+    return {"geometry": geometry, "rgba": [float(part) for part in shape.rgba], "pose": pose, "scale": scale}
+
+
+def _geometry(shape: Shape) -> Json:
+    if shape.kind != "mesh":
+        return {"kind": shape.kind, "size": list(shape.size)}
+    path = Path(shape.mesh or "")
+    try:
+        changed = path.stat().st_mtime_ns
+    except OSError as reason:
+        raise BadInput(f"mesh file '{path}': {reason.strerror or reason}") from None
+    return read_mesh(path, changed)
+
+
+@lru_cache(maxsize=256)
+def read_mesh(path: Path, changed_ns: int) -> Json:
+    """The triangles of an OBJ or STL file, edges sharper than 34 degrees kept sharp; read again only when it changed.
+
+    Returns base64 of "positions" and "normals" (n * 3, float32) and "faces" (m * 3, uint32). Raises BadInput when the
+    file holds no mesh.
+    """
+    import trimesh
+
+    try:
+        mesh = trimesh.load(path, force="mesh")
+        assert isinstance(mesh, trimesh.Trimesh)
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)  # files split vertices; what is sharp is decided here
+        shaded = trimesh.graph.smooth_shade(mesh, angle=CREASE_RAD)
+        if not len(shaded.faces) or not np.isfinite(shaded.vertices).all():
+            raise ValueError("no triangles in it, or coordinates that are not finite")
+    except Exception as reason:  # whatever a broken file does to the reader
+        raise BadInput(
+            f"mesh file '{path}': {str(reason) or type(reason).__name__}: an OBJ or STL mesh is wanted"
+        ) from None
+    return {
+        "kind": "mesh",
+        "positions": pack(shaded.vertices),
+        "normals": pack(shaded.vertex_normals),
+        "faces": pack(shaded.faces, "<u4"),
+    }
+
+
+def pack(array: NDArray[Any], kind: str = "<f4") -> str:
+    """An array's values in C order as base64, as `kind` (little-endian: what browsers run on)."""
+    return base64.b64encode(np.ascontiguousarray(array, dtype=kind).tobytes()).decode("ascii")

@@ -1,0 +1,105 @@
+"""What is compiled is kept, and compiled anew as soon as anything that is compiled in has changed."""
+
+import importlib
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numba
+import pytest
+
+from lab.learning import compiled
+
+DOUBLED = (
+    "from lab.learning.compiled import inner, lean\nfrom kitchen import recipe\n\nslices = inner(recipe.slices)\n\n\n"
+)
+DOUBLED += "@lean\ndef doubled(toasts):\n    return 2 * slices(toasts)\n"
+SLICES = "from kitchen.bread import PER_TOAST\n\n\ndef slices(toasts):\n    return PER_TOAST * toasts\n"
+
+
+@pytest.fixture
+def kitchen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A package whose kernel has a function of another file compiled in, and that one a number of a third."""
+    folder = tmp_path / "installed" / "kitchen"
+    folder.mkdir(parents=True)
+    for name, text in (("__init__", ""), ("kernel", DOUBLED), ("recipe", SLICES), ("bread", "PER_TOAST = 1\n")):
+        (folder / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(str(folder.parent))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "kept"))
+    yield folder
+    _forget()
+
+
+def _forget() -> None:
+    for name in [name for name in sys.modules if name.partition(".")[0] == "kitchen"]:
+        del sys.modules[name]
+    compiled.key.cache_clear()
+
+
+def started() -> Any:
+    """The kernel as the next run of a program has it."""
+    _forget()
+    importlib.invalidate_caches()
+    return importlib.import_module("kitchen.kernel")
+
+
+def loaded(function: Any) -> int:
+    """How many times a compiled function was found instead of compiled."""
+    return sum(function.stats.cache_hits.values())
+
+
+def test_what_has_not_changed_is_compiled_once(kitchen: Path) -> None:
+    first = started()
+    assert (first.doubled(3), loaded(first.doubled)) == (6, 0)
+    second = started()
+    assert (second.doubled(3), loaded(second.doubled)) == (6, 1)
+
+
+@pytest.mark.parametrize(("file", "text"), [("recipe", SLICES + "    #\n"), ("bread", "PER_TOAST = 1  # slice\n")])
+def test_any_change_of_what_is_compiled_in_compiles_anew(kitchen: Path, file: str, text: str) -> None:
+    assert started().doubled(3) == 6
+    (kitchen / f"{file}.py").write_text(text)
+    changed = started()
+    assert (changed.doubled(3), loaded(changed.doubled)) == (6, 0)
+
+
+def test_a_changed_number_two_files_away_counts_at_once(kitchen: Path) -> None:
+    assert started().doubled(3) == 6
+    (kitchen / "bread.py").write_text("PER_TOAST = 5\n")
+    assert started().doubled(3) == 30
+
+
+def test_nothing_is_written_beside_the_sources(kitchen: Path) -> None:
+    started().doubled(3)
+    assert sorted(path.name for path in kitchen.iterdir()) == ["__init__.py", "bread.py", "kernel.py", "recipe.py"]
+    assert list(compiled.cache_folder().glob("kitchen.kernel-*/*/*.nbc"))
+
+
+def test_where_nothing_can_be_kept_it_still_runs(kitchen: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(kitchen / "recipe.py"))  # a file
+    assert started().doubled(3) == 6
+    assert loaded(started().doubled) == 0
+
+
+def test_what_was_not_used_for_longest_goes(kitchen: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "MOST_FOLDERS", 3)
+    older = [compiled.cache_folder() / name for name in ("oldest", "older", "old")]
+    for second, folder in enumerate(older):
+        folder.mkdir(parents=True)
+        os.utime(folder, (second, second))
+    started().doubled(3)
+    left = sorted(folder.name.partition("-")[0] for folder in compiled.cache_folder().iterdir())
+    assert left == ["kitchen.kernel", "kitchen.recipe", "old"]
+
+
+def test_the_kernels_know_all_that_they_are_made_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A change of a rule in any of these files is a change of the kernel."""
+    importlib.import_module("lab.learning.kernels")
+    before = compiled.key.__wrapped__("lab.learning.kernels")
+    for name in ("lab.learning.gates", "lab.learning.advice_memory", "lab.learning.selection", "lab.learning.updates"):
+        with monkeypatch.context() as patch:
+            patch.setattr(sys.modules[name], "__file__", __file__)
+            assert compiled.key.__wrapped__("lab.learning.kernels") != before

@@ -1,0 +1,104 @@
+"""The order of the transfers on the teaching page: what may be moved, and how the work so far is made out."""
+
+import numpy as np
+import pytest
+
+from lab.learning.reasons import Reason, TooSlow
+from lab.learning.settings import GateSettings
+from lab.seat.page.page_order import Follower, bars_of, order_of
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.methods.srl_advised import AskedAdvisor, SequenceRequest, advised_srl
+from lab.sequencing.search import Search
+from lab.sequencing.simulate.run import Run, follow, simulate
+from lab.tasks.task_file import load_cell
+
+
+def request_after(*decisions: int, episode: int = 30) -> SequenceRequest:
+    """Where the thesis's case I with 3 toasts stands after these decisions."""
+    run = follow(load_cell("toast-case-1").cell(3), decisions)
+    return SequenceRequest(run, run.allowed(), run.allowed()[0], episode, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
+
+
+def test_a_question_lists_the_allowed_moves() -> None:
+    asked = order_of(request_after(1))
+    assert asked["title"] == "Episode 30, 57 s: the robot is at toaster"
+    assert (asked["kind"], asked["own"], asked["why"], asked["rate"]) == ("order", 1, str(TooSlow(0.012, 0.05)), 0.012)
+    assert asked["moves"][0] == {
+        "action": 1,
+        "label": "toast 1",
+        "from": "toaster",
+        "to": "butter_applier",
+        "ready_s": 60.0,
+        "direction": None,
+    }
+    assert [(move["label"], move["ready_s"]) for move in asked["moves"][1:]] == [("toast 2", 0.0), ("toast 3", 0.0)]
+
+
+def moves_of(*decisions: int) -> list[Move]:
+    run = Run(load_cell("toast-case-1").cell(3))
+    return [run.move(decision) for decision in decisions]
+
+
+def test_the_moves_that_nobody_was_asked_about_are_made_out() -> None:
+    """One part only: there is never a choice, so the whole way is found from where it stands."""
+    run = Run(load_cell("toast-case-1").cell(1))
+    made = [run.move(1), run.move(1)]
+    follower = Follower()
+    follower.follow(SequenceRequest(run, run.allowed(), 1, 1, None, None, None, Reason()))
+    assert follower.moves == made
+
+
+def test_the_decisions_since_the_last_question_are_remembered() -> None:
+    follower = Follower()
+    for asked in range(3):
+        follower.follow(request_after(*[1, 2, 3][:asked]))
+        follower.take([1, 2, 3][asked])
+    follower.follow(request_after(1, 2, 3))
+    assert follower.moves == moves_of(1, 2, 3)
+    follower.follow(request_after(2, episode=31))  # another episode, and a decision that this page did not hear of
+    assert follower.moves == []
+
+
+def test_a_whole_session_is_followed_move_by_move() -> None:
+    """In every question of a real session, the moves made out lead to exactly where the request is."""
+    cell = load_cell("toast-case-2").cell(3)
+    follower, asked = Follower(), []
+
+    def ask(request: SequenceRequest) -> int | None:
+        follower.follow(request)
+        assert (follower.moves[-1].drop_s if follower.moves else 0.0) == request.run.now_s
+        asked.append(len(follower.moves))
+        said = None if len(asked) % 3 == 0 else request.allowed[-1]
+        follower.take(request.own if said is None else said)
+        return said
+
+    gate = GateSettings("always", first_episode=1)
+    advised_srl(cell, Search(6), np.random.default_rng(0), gate, AskedAdvisor(ask))
+    assert len(asked) > 20
+    assert max(asked) > 5
+
+
+@pytest.mark.parametrize(("name", "order"), [("toast-case-1", 3), ("fms", ("rook", "rook"))])
+def test_bars_are_those_of_the_schedule(name: str, order: int | tuple[str, ...]) -> None:
+    """Robot and machines, beside the schedule that the sequencers make: always the last part that may be moved."""
+    cell = load_cell(name).cell(order)
+    run, decisions = Run(cell), list[int]()
+    while allowed := run.allowed():
+        decisions.append(allowed[-1])
+        run.move(allowed[-1])
+    schedule = simulate(cell, decisions)
+    run = Run(cell)
+    shown = bars_of([run.move(decision) for decision in decisions])
+    robot = [tuple(bar[1:2] + bar[3:]) for bar in shown["bars"] if bar[0] == "robot"]
+    assert robot == [(a.kind, a.start_s, a.end_s) for a in schedule.robot]
+    assert ("pallet" in {bar[1] for bar in shown["bars"]}) == (name == "fms")
+    machines = sorted(tuple(bar) for bar in shown["bars"] if bar[0] != "robot")
+    assert machines == sorted((a.resource, a.kind, a.part, a.start_s, a.end_s) for a in schedule.machines)
+    assert shown["end_s"] == schedule.makespan_s == shown["now_s"]
+
+
+def test_work_under_way_reaches_beyond_now() -> None:
+    shown = bars_of(moves_of(1))
+    assert (shown["now_s"], shown["end_s"]) == (57.0, 117.0)  # 60 s in the toaster
+    assert shown["rows"] == ["robot", "toaster"]
+    assert bars_of([]) == {"rows": ["robot"], "bars": [], "now_s": 0.0, "end_s": 0.0}

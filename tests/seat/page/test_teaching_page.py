@@ -1,0 +1,433 @@
+"""The teaching seat between a session and its pages, without a browser: who is asked, who may answer, what is lost: nothing."""
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from lab.advice.advisors import Person
+from lab.advice.journal import Undo
+from lab.errors import BadInput, WorkFailed
+from lab.learning.events import EpisodeEnded, Event
+from lab.learning.reasons import Reason, TooSlow
+from lab.learning.requests import AdviceRequest, AdvisorLeft
+from lab.learning.session import SessionResult, run_session
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.mdp import TabularMDP, grid
+from lab.seat.page.teaching_page import SeatPage
+from lab.sequencing.cell.schedule import EpisodeSequenced, Move, SequenceResult
+from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.simulate.run import follow
+from lab.skills.skill import Problem
+from lab.tasks.task_file import load_cell
+
+if TYPE_CHECKING:
+    Opens = Callable[..., AbstractContextManager[Any]]
+
+RIGHT = 3
+LEARNER = LearnerSettings("q", episodes=3, max_steps=20)
+ALWAYS = GateSettings("always", first_episode=1)
+
+
+@pytest.fixture
+def mdp() -> TabularMDP:
+    """Three cells in a row, the goal on the right."""
+    return grid((1, 3), np.zeros((1, 3), bool), (0, 0), (0, 2), action_labels=("up", "down", "left", "right"))
+
+
+@pytest.fixture
+def page() -> Iterator[SeatPage]:
+    with SeatPage() as running:
+        yield running
+
+
+@pytest.fixture
+def request_1(mdp: TabularMDP) -> AdviceRequest:
+    return AdviceRequest(mdp, [[0.0] * 4 for _ in range(3)], 0, 1, 1, 2, None, None, None, Reason())
+
+
+def meanwhile(function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+    """The session's thread: what it returns or raises."""
+    return ThreadPoolExecutor(1).submit(function, *arguments)
+
+
+def question(seat: dict[str, Any]) -> Any:
+    return seat.get("question")
+
+
+def asked_again(before: int) -> Callable[[dict[str, Any]], Any]:
+    return lambda seat: seat.get("question") and seat["question"]["number"] > before
+
+
+def answer(page: Any, number: int | None = None, **what: Any) -> None:
+    """Answer the question that the page knows."""
+    page.say({"answer": {"question": number or page.hear_until(question)["question"]["number"], **what}})
+
+
+# ---- questions and answers
+
+
+def test_a_whole_session_is_advised_from_the_page(page: SeatPage, mdp: TabularMDP, opens: "Opens") -> None:
+    problem = Problem("row", "world", mdp)
+    page.begin(problem, LEARNER, ALWAYS)
+
+    def session() -> SessionResult:
+        rng = np.random.default_rng(0)
+        return run_session(mdp, LEARNER, ALWAYS, Person(page.ask), rng, on_event=lambda e: page.on_event(e, "row"))
+
+    with opens(page) as browser:
+        result = meanwhile(session)
+        number = 0
+        for _ in range(6):  # three episodes of two moves
+            number = browser.hear_until(asked_again(number))["question"]["number"]
+            answer(browser, number, action=RIGHT)
+        assert result.result(20).steps.tolist() == [2, 2, 2]
+        assert result.result(20).helped_steps == 6
+        seat = browser.hear_until(lambda seat: seat["curve"]["count"] == 3 and not seat["question"])
+        assert seat["curve"]["guided"] == [1, 1, 1]
+        assert seat["lesson"]["optimal"] == 2
+        assert seat["standing"]["taken"] == 6
+        assert seat["slice"]["prefers"][0][:2] == [0, RIGHT]
+
+
+@pytest.mark.parametrize(
+    ("word", "outcome"), [("skip", None), ("auto", AdvisorLeft), ("quit", KeyboardInterrupt), ("undo", Undo)]
+)
+def test_words(
+    page: SeatPage, request_1: AdviceRequest, opens: "Opens", word: str, outcome: type[BaseException] | None
+) -> None:
+    with opens(page) as browser:
+        asked = meanwhile(page.ask, replace(request_1, undoable=True))
+        answer(browser, word=word)
+        if outcome is None:
+            assert asked.result(20) is None
+        else:
+            assert isinstance(asked.exception(20), outcome)
+        assert browser.hear_until(lambda seat: not seat["question"])["question"] is None
+
+
+def test_auto_says_so(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
+    with opens(page) as browser:
+        asked = meanwhile(page.ask, request_1)
+        answer(browser, word="auto")
+        assert str(asked.exception(20)) == "auto"
+
+
+def test_a_question_waits_for_a_page_to_come(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
+    asked = meanwhile(page.ask, request_1)
+    with opens(page) as browser:
+        answer(browser, action=1)
+        assert asked.result(20) == 1
+
+
+def test_a_lost_connection_loses_nothing(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
+    page.on_event(EpisodeEnded(1, 20, False, 0, None, False), "row")
+    asked = meanwhile(page.ask, request_1)
+    with opens(page) as browser:
+        before = dict(browser.hear_until(question))
+    with opens(page) as browser:
+        after = browser.hear_until(question)
+        assert after["question"] == before["question"]
+        assert after["curve"]["means"] == [20]
+        assert after["you"]["seat"]
+        answer(browser, action=1)
+        assert asked.result(20) == 1
+
+
+def test_nobody_answers_in_time(mdp: TabularMDP, request_1: AdviceRequest, opens: "Opens") -> None:
+    with SeatPage(wait_s=0.05) as page:
+        for _ in range(2):  # counted anew
+            with pytest.raises(AdvisorLeft, match=r"^no answer within 0\.05 s$"):
+                page.ask(request_1)
+        with opens(page) as browser:
+            assert browser.hear_until(lambda seat: "question" in seat)["question"] is None
+
+
+def test_the_time_that_is_left_is_told(request_1: AdviceRequest, opens: "Opens") -> None:
+    with SeatPage(wait_s=1000.0) as page:
+        asked = meanwhile(page.ask, request_1)
+        with opens(page) as browser:
+            shown = browser.hear_until(question)["question"]
+            assert shown["wait_s"] == 1000.0
+            assert 900.0 < shown["left_s"] <= 1000.0
+            answer(browser, action=0)
+        assert asked.result(20) == 0
+
+
+@pytest.mark.parametrize("wait_s", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_time_that_is_none_is_refused(wait_s: float) -> None:
+    with pytest.raises(BadInput, match="time to wait for an answer"):
+        SeatPage(wait_s=wait_s)
+
+
+def test_ctrl_c_is_heard_while_it_waits(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
+    """The question has come to the page, so the main thread waits: then Ctrl-C."""
+
+    def interrupt() -> None:
+        with opens(page) as browser:
+            browser.hear_until(question)
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background ignore Ctrl-C
+    try:
+        other = meanwhile(interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            page.ask(request_1)
+        other.result(20)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    with opens(page) as browser:
+        assert browser.hear_until(lambda seat: "question" in seat)["question"] is None
+
+
+def test_a_closed_page_lets_nobody_wait(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
+    with opens(page) as browser:
+        asked = meanwhile(page.ask, request_1)
+        browser.hear_until(question)
+        page.close()
+        assert str(asked.exception(20)) == "the page was closed"
+
+
+def test_outside_its_context_nothing_is_asked(request_1: AdviceRequest) -> None:
+    with pytest.raises(WorkFailed, match="not running"):
+        SeatPage().ask(request_1)
+
+
+# ---- who may answer
+
+
+def test_one_page_advises_and_the_others_watch(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
+    with opens(page) as first:
+        first.hear_until(lambda seat: "you" in seat)
+        with opens(page) as second:
+            asked = meanwhile(page.ask, request_1)
+            shown = second.hear_until(question)
+            assert shown["you"] == {"seat": False, "free": False, "pages": 2}
+            assert second.refused({"answer": {"question": shown["question"]["number"], "action": 0}}) == (
+                "This page only watches."
+            )
+            assert "has to hand over first" in second.refused({"seat": "take"})
+            answer(first, action=1)
+            assert asked.result(20) == 1
+
+
+def test_another_page_takes_over_when_the_advisors_has_gone(
+    page: SeatPage, request_1: AdviceRequest, opens: "Opens"
+) -> None:
+    with opens(page) as second:
+        pass
+    with opens(page) as first, opens(page) as second:
+        first.hear_until(lambda seat: "you" in seat)
+        asked = meanwhile(page.ask, request_1)
+        first.socket.close()
+        number = second.hear_until(lambda seat: seat.get("you", {}).get("free") and seat["question"])["question"][
+            "number"
+        ]
+        assert "No page answers yet" in second.refused({"answer": {"question": number, "action": 0}})
+        second.say({"seat": "take"})
+        second.hear_until(lambda seat: seat["you"]["seat"])
+        answer(second, action=2)
+        assert asked.result(20) == 2
+
+
+def test_the_seat_is_handed_over(page: SeatPage, opens: "Opens") -> None:
+    with opens(page) as first:
+        first.hear_until(lambda seat: seat.get("you", {}).get("seat"))
+        with opens(page) as second:
+            first.say({"seat": "give"})
+            second.hear_until(lambda seat: seat.get("you", {}).get("free"))
+            second.say({"seat": "take"})
+            second.hear_until(lambda seat: seat["you"]["seat"])
+            assert first.hear_until(lambda seat: not seat["you"]["free"] and not seat["you"]["seat"])
+
+
+def test_advice_outside_a_request_is_ignored(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
+    late = "This question waits no more: the answer came too late."
+    with opens(page) as browser:
+        assert browser.refused({"answer": {"question": 1, "action": 0}}) == late
+        asked = meanwhile(page.ask, request_1)
+        number = browser.hear_until(question)["question"]["number"]
+        for wrong in (number - 1, number + 1, -1):
+            assert browser.refused({"answer": {"question": wrong, "action": 0}}) == late
+        assert not asked.done()
+        answer(browser, number, action=1)
+        assert browser.refused({"answer": {"question": number, "action": 0}}) == late  # a second press
+        assert asked.result(20) == 1
+
+
+def test_answers_that_are_none_are_ignored(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
+    with opens(page) as browser:
+        asked = meanwhile(page.ask, request_1)
+        number = browser.hear_until(question)["question"]["number"]
+        for action in (-1, 4, 10**30):
+            assert browser.refused({"answer": {"question": number, "action": action}}) == "There is no such move here."
+        assert "taken back" in browser.refused({"answer": {"question": number, "word": "undo"}})
+        for message in ("", "no json", b"\x00", '{"answer": 1}', "x" * 5000, "[" * 1000):
+            assert browser.refused(message).startswith("That was no message of this page")
+        assert not asked.done()
+        answer(browser, number, action=3)
+        assert asked.result(20) == 3
+
+
+# ---- page and terminal together
+
+
+def test_an_offered_question_is_answered_in_a_word(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
+    words: list[str] = []
+    heard = threading.Event()
+
+    def told(word: str) -> None:
+        words.append(word)
+        heard.set()
+
+    page.on_word = told
+    with opens(page) as browser:
+        number = 0
+        for what, word in (({"action": RIGHT}, "right"), ({"word": "skip"}, "skip"), ({"word": "auto"}, "auto")):
+            page.offer(request_1)
+            number = browser.hear_until(asked_again(number))["question"]["number"]
+            assert browser.seat["question"]["offered"]
+            answer(browser, number, **what)
+            assert heard.wait(20)
+            heard.clear()
+            assert words[-1] == word
+            page.withdraw()  # the terminal does, once it has the answer
+        page.offer(request_1)
+        browser.hear_until(asked_again(number))
+        page.withdraw()
+        assert browser.hear_until(lambda seat: not seat["question"])["question"] is None
+
+
+def test_a_session_that_is_only_shown_takes_no_answers(
+    page: SeatPage, request_1: AdviceRequest, opens: "Opens"
+) -> None:
+    with opens(page) as browser:
+        page.offer(request_1)
+        number = browser.hear_until(question)["question"]["number"]
+        assert "only shown" in browser.refused({"answer": {"question": number, "action": 1}})
+
+
+# ---- the high level
+
+
+def order_request(*decisions: int) -> SequenceRequest:
+    run = follow(load_cell("toast-case-1").cell(3), decisions)
+    return SequenceRequest(run, run.allowed(), 1, 30, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
+
+
+def test_the_order_is_asked_and_the_work_shown(page: SeatPage, opens: "Opens") -> None:
+    with opens(page) as browser:
+        page.begin_order("toast", 100, GateSettings(window=4, first_episode=8), 213.0)
+        number = 0
+        for decisions, said in (((), 1), ((1,), 2)):
+            asked = meanwhile(page.ask_order, order_request(*decisions))
+            number = browser.hear_until(asked_again(number))["question"]["number"]
+            assert "no such move" in browser.refused({"answer": {"question": number, "action": 9}})
+            answer(browser, number, action=said)
+            assert asked.result(20) == said
+        assert browser.seat["work"]["rows"] == ["robot", "toaster"]
+        assert browser.seat["work"]["now_s"] == 57.0
+        page.on_order_episode(EpisodeSequenced(30, 250.0, 250.0, (1, 2)))
+        page.on_order_episode(EpisodeSequenced(31, 240.0, 240.0, (2, 1)))
+        seat = browser.hear_until(lambda seat: seat["curve"]["count"] == 2)
+        assert seat["curve"]["guided"] == [1, 0]
+        assert (seat["lesson"]["optimal"], seat["lesson"]["kind"]) == (213.0, "order")
+
+
+def test_an_order_may_be_left_to_the_learner(page: SeatPage, opens: "Opens") -> None:
+    with opens(page) as browser:
+        asked = meanwhile(page.ask_order, order_request())
+        answer(browser, word="skip")
+        assert asked.result(20) is None
+
+
+# ---- lessons, and what is shown beside
+
+
+def test_a_lesson_that_begins_again_begins_anew(page: SeatPage, mdp: TabularMDP, opens: "Opens") -> None:
+    page.begin(Problem("row", "world", mdp), LEARNER, ALWAYS)
+    ended: Event = EpisodeEnded(1, 7, True, 1, None, True)
+    page.on_event(ended, "row")
+    with opens(page) as browser:
+        browser.hear_until(lambda seat: seat.get("curve", {}).get("count") == 1 and seat["notices"])
+        page.begin(Problem("row", "world", mdp), LEARNER, ALWAYS)
+        seat = browser.hear_until(lambda seat: seat["curve"]["count"] == 0)
+        assert seat["notices"] == []
+        assert seat["lesson"]["title"] == "row"
+        assert seat["place"]["columns"] == 3
+        page.on_event(ended, "another")
+        seat = browser.hear_until(lambda seat: seat["lesson"]["title"] == "another")
+        assert seat["place"] is None
+
+
+def test_a_question_of_another_problem_brings_its_map(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
+    page.offer(request_1)
+    other = grid((2, 2), np.zeros((2, 2), bool), (0, 0), (1, 1))
+    page.offer(AdviceRequest(other, [[0.0] * 4] * 4, 0, 1, 1, 0, None, None, None))
+    with opens(page) as browser:
+        assert browser.hear_until(question)["place"]["rows"] == 2
+
+
+def test_pages_look_at_different_layers(page: SeatPage, opens: "Opens") -> None:
+    labels = ("left", "right", "backward", "forward", "down", "up")
+    space = grid((2, 2, 3), np.zeros((2, 2, 3), bool), (0, 0, 1), (1, 1, 2), action_labels=labels)
+    page.begin(Problem("space", "world", space), LEARNER, ALWAYS)
+    with opens(page) as first, opens(page) as second:
+        assert first.hear_until(lambda seat: seat.get("slice"))["slice"]["layer"] == 1
+        second.say({"layer": 2})
+        assert second.hear_until(lambda seat: seat.get("slice", {"layer": 1})["layer"] == 2)["slice"]["marks"] == ".G.."
+        second.say({"layer": 99})
+        second.say({"layer": None})
+        second.hear_until(lambda seat: seat["slice"]["layer"] == 1)
+        assert first.seat["slice"]["layer"] == 1
+
+
+@dataclass(frozen=True)
+class Trusted:
+    name: str
+    trust: float
+    low: float
+    high: float
+    dropped: bool
+
+
+def test_receipt_advisors_and_the_end_are_shown(page: SeatPage, opens: "Opens") -> None:
+    with opens(page) as browser:
+        page.receipt({"requests": 3, "own_tau": float("inf"), "next_time": ["less"]})
+        page.members([Trusted("ann", 0.5, 0.25, 0.75, False), {"name": "bob"}])
+        page.finished("The lesson is over.")
+        seat = browser.hear_until(lambda seat: seat.get("ended"))
+        assert seat["receipt"] == {"requests": 3, "own_tau": None, "next_time": ["less"]}
+        assert seat["members"] == [
+            {"name": "ann", "trust": 0.5, "low": 0.25, "high": 0.75, "dropped": False},
+            {"name": "bob"},
+        ]
+
+
+def test_a_whole_run_is_told_in_the_panel(page: SeatPage, opens: "Opens") -> None:
+    listener = page.listener()
+    with opens(page) as browser:
+        listener.phase("measure", 2)
+        listener.measured("grasp at plate", 1.5)
+        listener.skipped("a damaged file")
+        listener.sequenced(SequenceResult((1, 2), 213.0, (250.0, 213.0)), None)
+        listener.retried("a slice was dropped")
+        seat = browser.hear_until(lambda seat: seat.get("progress") and len(seat["progress"]["lines"]) == 5)
+        assert seat["progress"]["lines"] == [
+            "Time every move in simulation",
+            "grasp at plate: 1.50 s",
+            "skipped: a damaged file",
+            "order 1 2: 213.0 s",
+            "failed, trying again: a slice was dropped",
+        ]
+        assert (seat["progress"]["done"], seat["progress"]["parts"]) == (2, 2)
+        listener.phase("carry out", 1)
+        listener.moved(Move(1, "plate", "plate", "toaster", 0.0, 0.0, 1.0, 4.0, 60.0))
+        seat = browser.hear_until(lambda seat: seat["work"])
+        assert seat["work"]["bars"][-1] == ["toaster", "process", 1, 4.0, 64.0]

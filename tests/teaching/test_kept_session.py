@@ -1,0 +1,273 @@
+"""Sessions in folders: begun, killed at any moment, gone on with, shown again; what a person said is never lost."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lab.advice.counsel import Counsel
+from lab.advice.entries import FILE, Answer, Session, read_journal
+from lab.advice.journal import Journal
+from lab.advice.receipt import SILENT
+from lab.errors import BadInput
+from lab.learning.events import AdviceGiven
+from lab.learning.requests import AdviceRequest, Ask
+from lab.tasks.task_file import load_world
+from lab.teaching.kept_session import SESSIONS, KeptSession, Words, session_rows
+from lab.teaching.lesson import check, replay, teach
+from lab.teaching.teacher import Audience, Interrupted, Teacher
+from lab.toolbox.registry import Toolbox
+
+MAZE = """
+S.....
+.##.#.
+.#..#.
+...##.
+.#...G
+"""
+KILLS = 12  # in each test run; 200 were done by hand (see the test below)
+
+
+@pytest.fixture
+def maze(tmp_path: Path) -> Path:
+    path = tmp_path / "maze.txt"
+    path.write_text(MAZE.strip())
+    return path
+
+
+def person(request: AdviceRequest) -> int:
+    """Somebody who is often right, decided by state and episode alone."""
+    towards = (1, 3)[(request.state + request.episode) % 2]
+    return towards if (request.state * 7 + request.episode) % 5 else 2
+
+
+def teacher(folder: Path, ask: Ask = person, *names: str) -> Teacher:
+    return Teacher(Toolbox(folder / "toolbox"), Counsel(names or ("terminal",), {"terminal": ask}), seed=3)
+
+
+def words(maze: Path, *names: str, **changes: Any) -> Words:
+    return replace(Words(str(maze), advisors=names or ("terminal",), seed=3, episodes=60), **changes)
+
+
+def result(folder: Path, document: dict[str, Any]) -> tuple[Any, ...]:
+    """All that a session comes to, wherever it was held."""
+    (row,) = Toolbox(folder / "toolbox").list()
+    policy = Toolbox(folder / "toolbox").find("world", row["signature"])
+    assert policy is not None
+    kept = {k: v for k, v in document.items() if k not in ("session", "files")}
+    return policy.q.tobytes(), policy.visits.tobytes(), policy.curve, policy.guided, kept
+
+
+def held(folder: Path, maze: Path) -> tuple[Any, ...]:
+    """The session without a break."""
+    return result(folder, teach(words(maze), teacher(folder), folder / "lesson"))
+
+
+def gone_on(folder: Path, maze: Path) -> tuple[Any, ...]:
+    """The session gone on with until it is over, without pictures."""
+    kept = KeptSession(folder / "lesson", "--resume")
+    return result(folder, teach(kept.words, teacher(folder), None, kept))
+
+
+def test_killed_at_any_moment_and_gone_on_with_it_is_the_same_session(tmp_path: Path, maze: Path, root: Path) -> None:
+    """In a process of its own, which has one thread only and may be forked."""
+    kills = os.environ.get("LAB_KILLS", str(KILLS))
+    command = [sys.executable, str(root / "tests" / "teaching" / "killing.py"), str(maze), str(tmp_path), kills]
+    ran = subprocess.run(
+        command, env={**os.environ, "PYTHONPATH": str(root)}, capture_output=True, text=True, check=False
+    )
+    assert (ran.returncode, ran.stderr) == (0, "")
+    counts = json.loads(ran.stdout)
+    assert counts["same"] == int(kills)
+    assert counts["broken off"] > int(kills) // 2
+
+
+def test_ctrl_c_says_how_to_go_on(tmp_path: Path, maze: Path) -> None:
+    whole = held(tmp_path / "whole", maze)
+    asked = 0
+
+    def stops(request: AdviceRequest) -> int:
+        nonlocal asked
+        asked += 1
+        if asked == 7:
+            raise KeyboardInterrupt
+        return person(request)
+
+    with pytest.raises(Interrupted, match=r"what was learned is kept; go on with: lab teach --resume .*lesson"):
+        teach(words(maze), teacher(tmp_path, stops), tmp_path / "lesson")
+    assert len(Toolbox(tmp_path / "toolbox").list()) == 1
+    assert gone_on(tmp_path, maze) == whole
+
+
+def test_what_a_session_went_on_from_is_kept_with_it(tmp_path: Path, maze: Path) -> None:
+    """An unfinished policy is learned on; broken off and gone on with, it begins from the same table."""
+
+    def half(folder: Path) -> None:
+        teach(words(maze, "none", episodes=2, gate="never"), teacher(folder, person, "none"), None)
+
+    again = {"gate": "never", "episodes": 30}
+    half(tmp_path / "whole")
+    document = teach(
+        words(maze, "none", **again), teacher(tmp_path / "whole", person, "none"), tmp_path / "whole" / "lesson"
+    )
+    assert document["source"] == "continued"
+    half(tmp_path / "cut")
+    folder = tmp_path / "cut" / "lesson"
+    teach(words(maze, "none", **again), teacher(tmp_path / "cut", person, "none"), folder)
+    lines = (folder / FILE).read_bytes().splitlines(keepends=True)
+    (folder / FILE).write_bytes(b"".join(lines[:9]))
+    kept = KeptSession(folder, "--resume")
+    document = teach(kept.words, teacher(tmp_path / "cut", person, "none"), folder, kept)
+    assert result(tmp_path / "cut", document) == result(tmp_path / "whole", document)
+    for policy in (folder / "begun").iterdir():
+        policy.unlink()
+    (folder / FILE).write_bytes(b"".join(lines[:9]))
+    kept = KeptSession(folder, "--resume")
+    with pytest.raises(BadInput, match="the policy that it went on from is not in 'begun' any more"):
+        teach(kept.words, teacher(tmp_path / "cut", person, "none"), folder, kept)
+
+
+def test_a_session_without_a_folder_is_kept_in_the_toolbox(tmp_path: Path, maze: Path) -> None:
+    for number in (1, 2):
+        document = teach(words(maze, "novice", episodes=12), teacher(tmp_path, person, "novice"), None)
+        assert document["session"] == str(tmp_path / "toolbox" / SESSIONS / f"maze-{number}")
+        assert (Path(document["session"]) / "receipt.json").is_file()
+    rows = session_rows(Toolbox(tmp_path / "toolbox"))
+    assert {Path(row["session"]).name for row in rows} == {"maze-1", "maze-2"}
+    assert {(row["problem"], row["advisor"]) for row in rows} == {("maze", "novice")}
+    (tmp_path / "toolbox" / SESSIONS / "maze-1" / FILE).write_text("nonsense\n")
+    assert sorted(row["state"] for row in session_rows(Toolbox(tmp_path / "toolbox")))[0] == "damaged"
+
+
+def test_a_folder_that_holds_a_session(tmp_path: Path, maze: Path) -> None:
+    """What it holds goes on meaning the same: it is refused, whatever it is, and nothing in it changes."""
+    held(tmp_path, maze)
+    journal = tmp_path / "lesson" / FILE
+    whole = journal.read_bytes()
+    for content, reason in (
+        (whole, r"holds a session that is over: look at it again \(lab replay .*lesson\), or choose another folder"),
+        (
+            b"".join(whole.splitlines(keepends=True)[:5]),
+            r"that is not over: go on with it \(lab teach --resume .*lesson",
+        ),
+        (b"nonsense", "that is not over"),
+    ):
+        journal.write_bytes(content)
+        before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+        with pytest.raises(BadInput, match=reason):
+            check(words(maze), tmp_path / "lesson")
+        with pytest.raises(BadInput, match=reason):
+            held(tmp_path, maze)
+        assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_sessions_kept_elsewhere_are_listed(tmp_path: Path, maze: Path) -> None:
+    held(tmp_path, maze)
+    teach(words(maze, "novice", episodes=12), teacher(tmp_path, person, "novice"), None)
+    places = {tmp_path / "lesson", tmp_path / "toolbox" / SESSIONS / "maze-2"}
+    assert {Path(row["session"]) for row in session_rows(Toolbox(tmp_path / "toolbox"))} == places
+    (tmp_path / "lesson").rename(tmp_path / "gone")
+    (row,) = session_rows(Toolbox(tmp_path / "toolbox"))
+    assert row["session"] == str(tmp_path / "toolbox" / SESSIONS / "maze-2")
+
+
+def test_another_world_in_the_file_is_noticed(tmp_path: Path, maze: Path) -> None:
+    held(tmp_path, maze)
+    journal = tmp_path / "lesson" / FILE
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:-1]))
+    maze.write_text(MAZE.strip().replace("###", "#.#").replace("S.....", "S....#"))
+    with pytest.raises(BadInput, match=r"is about 'maze' .* its file or the lab has changed"):
+        gone_on(tmp_path, maze)
+
+
+def test_a_journal_of_an_older_version_knows_fewer_settings_and_verdicts(tmp_path: Path, maze: Path) -> None:
+    held(tmp_path, maze)
+    journal = tmp_path / "lesson" / FILE
+    lines = [json.loads(line) for line in journal.read_text().splitlines()]
+    assert lines[0]["gate"].pop("spare_best")
+    for line in lines:
+        line.pop("verdict", None)
+    journal.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    kept = KeptSession(tmp_path / "lesson", "DIR", read_only=True)
+    assert replay(kept, Audience(), lambda request, action: None)["closed"]
+
+
+def test_words_are_the_same_in_another_folder(tmp_path: Path, maze: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = Words("maze.txt", advisors=("recorded:lesson", "tau=0.2"), memory=True)
+    assert Words.from_json(said.to_json(), "here") == replace(
+        said, subtask=str(maze), advisors=(f"recorded:{tmp_path / 'lesson'}", "tau=0.2")
+    )
+    with pytest.raises(BadInput, match=r"here: its options are none of lab teach: .*seed"):
+        Words.from_json(said.to_json() | {"seed": "x"}, "here")
+    with pytest.raises(BadInput, match="nothing to learn"):
+        Words().complete()
+    assert Words("insert").complete().advisors == ("expert",)
+
+
+def test_a_session_goes_on_as_it_was_begun(tmp_path: Path, maze: Path) -> None:
+    held(tmp_path, maze)
+    journal = tmp_path / "lesson" / FILE
+    whole = journal.read_bytes()
+    journal.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))
+    kept = KeptSession(tmp_path / "lesson", "--resume")
+    assert kept.same(Words()) == kept.words == words(maze)
+    with pytest.raises(BadInput, match="--seed beside --resume"):
+        kept.same(Words(seed=4))
+    journal.write_bytes(whole)
+    with pytest.raises(BadInput, match="is over: look at it again with lab replay"):
+        KeptSession(tmp_path / "lesson", "--resume").same(Words())
+
+
+class Heard(Audience):
+    def __init__(self) -> None:
+        self.events: list[Any] = []
+
+    def hears(self, name: str, event: Any, is_new: bool) -> None:
+        self.events.append(event)
+
+
+def test_a_replay_shows_every_answer_and_changes_nothing(tmp_path: Path, maze: Path) -> None:
+    held(tmp_path, maze)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    shown: list[tuple[int, int, int, int | None]] = []
+    audience = Heard()
+    kept = KeptSession(tmp_path / "lesson", "DIR", read_only=True)
+    document = replay(
+        kept, audience, lambda request, action: shown.append((request.episode, request.step, request.state, action))
+    )
+    read = read_journal(tmp_path / "lesson", "DIR")
+    given = [entry for entry in read.entries if isinstance(entry, AdviceGiven)]
+    assert shown == [(one.episode, one.step, one.state, one.action) for one in given] != []
+    assert [one for one in read.entries if not isinstance(one, Answer)][:-1] == audience.events
+    assert document["closed"]["episodes"] == 60
+    assert document["receipt"]["helped_steps"] == sum(one.action is not None for one in given)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_a_replay_of_what_was_broken_off_ends_there(tmp_path: Path, maze: Path) -> None:
+    held(tmp_path, maze)
+    journal = tmp_path / "lesson" / FILE
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[:60]) + lines[60][:9])
+    audience = Heard()
+    document = replay(KeptSession(tmp_path / "lesson", "DIR", read_only=True), audience, lambda request, action: None)
+    assert (document["closed"], document["cut"].encode()) == (None, lines[60][:9])
+    assert len(audience.events) <= 59
+
+
+def test_a_kept_evening_is_given_to_another_gate(tmp_path: Path, maze: Path) -> None:
+    """What was said once is said again where it was said; elsewhere the learner hears nothing, and holds it against nobody."""
+    signature = load_world(str(maze)).mdp().signature
+    journal = Journal.begin(tmp_path / "lesson", Session({}, "maze", signature, "test"))
+    journal.tell(AdviceGiven(1, 1, 0, 3, 0))  # from the start to the right
+    journal.close()
+    name = f"recorded:{tmp_path / 'lesson'}"
+    document = teach(words(maze, name, gate="always"), teacher(tmp_path / "other", person, name), None)
+    assert document["helped_steps"] >= 60  # at least once an episode
+    assert document["receipt"]["refused"][SILENT] > 0

@@ -1,0 +1,298 @@
+"""Teaching a skill: found, learned, continued; what was learned is kept whatever happens."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lab.advice.counsel import Counsel
+from lab.errors import WorkFailed
+from lab.learning.events import AdviceRejected, EpisodeEnded, Event
+from lab.learning.requests import AdviceRequest, AdvisorLeft
+from lab.learning.session import SessionResult, run_session
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.mdp import TabularMDP, greedy_path, grid
+from lab.skills.skill import Problem
+from lab.tasks.task_file import Subtask
+from lab.teaching.teacher import MAX_SESSIONS, MORE_SESSIONS, Audience, Interrupted, Teacher, fits
+from lab.toolbox.policy import Policy
+from lab.toolbox.registry import Toolbox
+
+QUICK = LearnerSettings(episodes=60, max_steps=40)
+HOPELESS = LearnerSettings(episodes=1, max_steps=1)
+GATE = GateSettings(first_episode=12)
+
+
+def problem(name: str = "insert at toaster", columns: int = 4) -> Problem:
+    """From one corner of a small board to the other, 1 + columns moves."""
+    blocked = np.zeros((3, columns), bool)
+    blocked[1, 1] = True
+    return Problem(name, "insert", grid(blocked.shape, blocked, (0, 0), (2, columns - 1)))
+
+
+@pytest.fixture
+def teacher(tmp_path: Path) -> Teacher:
+    return Teacher(Toolbox(tmp_path / "toolbox"))
+
+
+def settings(learner: LearnerSettings = QUICK) -> Subtask:
+    return Subtask(learner=learner, gate=GATE)
+
+
+def known(policy: Policy) -> dict[tuple[str, str], Policy]:
+    return {(policy.subtask, policy.signature): policy}
+
+
+def test_a_new_problem_is_learned_kept_and_then_found(teacher: Teacher) -> None:
+    lesson = teacher.find_or_teach(problem(), settings(), "toast", {})
+    assert (lesson.source, lesson.policy.solved, lesson.policy.final_steps) == ("learned", True, 5)
+    assert lesson.policy.name == f"insert at toaster {problem().mdp.signature[:8]}"
+    index, damaged = teacher.toolbox.index()
+    assert (len(index), damaged) == (1, [])
+    again = teacher.find_or_teach(problem("insert elsewhere"), settings(HOPELESS), "toast", index)
+    assert (again.source, again.result, again.policy.name) == ("reused", None, lesson.policy.name)
+    assert np.array_equal(again.policy.q, lesson.policy.q)
+
+
+def test_another_scene_is_learned_anew(teacher: Teacher) -> None:
+    first = teacher.find_or_teach(problem(), settings(), "toast", {})
+    other = teacher.find_or_teach(problem(columns=5), settings(), "toast", known(first.policy))
+    assert other.source == "learned"
+    assert len(teacher.toolbox.index()[0]) == 2
+
+
+def test_an_unfinished_policy_is_learned_on(teacher: Teacher) -> None:
+    why = f"'insert at toaster' was not learned in {MAX_SESSIONS} episodes.*what was learned is kept"
+    with pytest.raises(WorkFailed, match=why):
+        teacher.find_or_teach(problem(), settings(HOPELESS), "toast", {})
+    index, _ = teacher.toolbox.index()
+    (unfinished,) = index.values()
+    assert (unfinished.solved, len(unfinished.curve), unfinished.visits.sum()) == (False, MAX_SESSIONS, MAX_SESSIONS)
+    lesson = teacher.find_or_teach(problem(), settings(), "toast", index)
+    assert (lesson.source, lesson.policy.solved) == ("continued", True)
+    assert teacher.toolbox.index()[0].keys() == index.keys()
+
+
+def test_a_policy_of_another_size_or_with_other_actions_is_not_taken(teacher: Teacher) -> None:
+    sound = teacher.find_or_teach(problem(), settings(), "toast", {}).policy
+    q, visits = np.zeros((7, 4)), np.zeros((7, 4), np.int64)
+    for wrong in (
+        replace(sound, q=q, visits=visits, shape=(7,), start=0),
+        replace(sound, action_labels=("n", "s", "w", "e")),
+    ):
+        assert teacher.find_or_teach(problem(), settings(), "toast", known(wrong)).source == "learned"
+
+
+def detour(teacher: Teacher) -> Policy:
+    """A policy that reaches the goal, in 7 moves instead of 5."""
+    board = problem().mdp
+    q = np.zeros((board.n_states, board.n_actions))
+    state = board.start
+    for action in (3, 3, 3, 1, 2, 1, 3):
+        q[state, action] = 1.0
+        state = int(board.successor[state, action])
+    assert board.goal[state]
+    half = teacher.teach(problem(), HOPELESS, GATE, "toast", sessions=1).policy
+    longer = replace(half, q=q, final_steps=7)
+    teacher.toolbox.save(longer)
+    return longer
+
+
+def test_a_way_that_is_not_the_shortest_is_learned_on_until_it_is(teacher: Teacher) -> None:
+    longer = detour(teacher)
+    lesson = teacher.find_or_teach(problem(), settings(), "toast", known(longer))
+    assert (lesson.source, lesson.policy.solved, lesson.policy.final_steps) == ("continued", True, 5)
+    index, _ = teacher.toolbox.index()
+    assert teacher.find_or_teach(problem(), settings(), "toast", index).source == "reused"
+
+
+def test_the_longer_way_is_followed_when_no_shorter_one_is_found(teacher: Teacher) -> None:
+    longer = detour(teacher)
+    for tries in (1, 2):
+        (kept,) = teacher.toolbox.index()[0].values()
+        lesson = teacher.find_or_teach(problem(), settings(HOPELESS), "toast", known(kept))
+        assert lesson.result is not None
+        assert (lesson.source, len(lesson.result.steps), lesson.policy.final_steps) == ("continued", MORE_SESSIONS, 7)
+        assert (lesson.policy.solved, len(lesson.policy.curve)) == (False, 1 + tries * MORE_SESSIONS)
+        assert np.array_equal(lesson.policy.q, longer.q)  # what was measured with it still holds
+
+
+def scripted(monkeypatch: pytest.MonkeyPatch, tables: "list[np.ndarray[Any, Any]]", solved: bool = False) -> list[Any]:
+    """Sessions that end with these tables; returns the start tables that they were given."""
+    began: list[Any] = []
+
+    def run(mdp: TabularMDP, *args: Any, q0: Any, **more: Any) -> SessionResult:
+        began.append(q0)
+        result = run_session(mdp, HOPELESS, GATE, None, np.random.default_rng(0))
+        q = tables[len(began) - 1]
+        moves = greedy_path(q, mdp, 40)
+        return replace(result, q=q, final_steps=len(moves[1]) if moves[2] else None, solved=solved)
+
+    monkeypatch.setattr("lab.teaching.teacher.run_session", run)
+    return began
+
+
+def test_a_worse_table_never_replaces_a_better_one(teacher: Teacher, monkeypatch: pytest.MonkeyPatch) -> None:
+    longer = detour(teacher)
+    lost = np.zeros_like(longer.q)
+    began = scripted(monkeypatch, [lost, longer.q, lost, lost, lost])
+    policy = teacher.teach(problem(), QUICK, GATE, "toast").policy
+    assert [q is longer.q for q in began] == [False, False, True, True, True]  # MORE_SESSIONS after it fits
+    assert (policy.final_steps, policy.solved, policy.q is longer.q) == (7, False, True)
+    scripted(monkeypatch, [lost])
+    policy = teacher.teach(problem(), QUICK, GATE, "toast", unfinished=longer, sessions=1).policy
+    assert (policy.final_steps, policy.q is longer.q) == (7, True)
+
+
+def test_going_on_keeps_the_history(teacher: Teacher) -> None:
+    half = teacher.teach(problem(), HOPELESS, GateSettings("always"), "toast", sessions=1).policy
+    assert (half.curve, half.guided, half.helped_steps, half.requests) == ([2], [True], 1, 1)
+    lesson = teacher.teach(problem(), QUICK, GateSettings("always"), "toast", unfinished=half, sessions=1)
+    policy, now = lesson.policy, lesson.result
+    assert now is not None
+    assert policy.curve == [2, *now.steps.tolist()]
+    assert policy.guided == [True, *now.guided.tolist()]
+    assert (policy.helped_steps, policy.requests) == (1 + now.helped_steps, 1 + now.requests)
+    assert np.array_equal(policy.visits, half.visits + now.visits)
+    assert lesson.source == "continued"
+
+
+def test_the_unfinished_one_is_found_also_beside_a_finished_one(teacher: Teacher) -> None:
+    assert teacher.unfinished(problem()) is None
+    half = teacher.teach(problem(), HOPELESS, GATE, "toast", sessions=1).policy
+    found = teacher.unfinished(problem())
+    assert found is not None
+    assert found.name == half.name
+    teacher.teach(problem(), QUICK, GATE, "toast")
+    assert teacher.unfinished(problem()) is None
+    beside = teacher.teach(problem(), HOPELESS, GATE, "toast", sessions=1).policy
+    found = teacher.unfinished(problem())
+    assert found is not None
+    assert found.name == beside.name == f"{half.name} unfinished"
+    done = teacher.teach(problem(), QUICK, GATE, "toast", unfinished=found).policy
+    assert (done.solved, done.curve[0]) == (True, 2)
+    assert [row["name"] for row in teacher.toolbox.list()] == [half.name]
+
+
+def test_who_left_or_was_rejected_is_not_asked_in_further_sessions(tmp_path: Path) -> None:
+    asked: list[AdviceRequest] = []
+
+    def leave(request: AdviceRequest) -> int:
+        asked.append(request)
+        raise AdvisorLeft
+
+    teacher = Teacher(Toolbox(tmp_path), Counsel(("terminal",), {"terminal": leave}))
+    slow = Subtask(learner=HOPELESS, gate=GateSettings("always"))
+    for times in (1, 2):  # each skill asks once
+        with pytest.raises(WorkFailed):
+            teacher.find_or_teach(problem(columns=3 + times), slow, "toast", {})
+        assert len(asked) == times
+
+    def stay(request: AdviceRequest) -> int:
+        asked.append(request)
+        return 0  # into the wall
+
+    events: list[tuple[str, Event]] = []
+    wary = GateSettings(first_episode=5, window=2, omega=0, lambda_threshold=1.0)
+    short = LearnerSettings(episodes=8, max_steps=2)
+    asked.clear()
+    teacher = Teacher(Toolbox(tmp_path), Counsel(("terminal",), {"terminal": stay}), audience=Hearing(events))
+    with pytest.raises(WorkFailed):
+        teacher.find_or_teach(problem(columns=6), Subtask(learner=short, gate=wary), "toast", {})
+    assert sum(isinstance(event, AdviceRejected) for _, event in events) == 1
+    assert {request.episode for request in asked} == {5}
+
+
+class Hearing(Audience):
+    """Keeps what it hears, and from which lesson."""
+
+    def __init__(self, heard: list[tuple[str, Event]]) -> None:
+        self.heard = heard
+
+    def hears(self, name: str, event: Event, is_new: bool) -> None:
+        self.heard.append((name, event))
+
+
+class Person:
+    """Answers like the learner itself and presses Ctrl-C at the given question."""
+
+    def __init__(self, patience: int) -> None:
+        self.left = patience
+
+    def __call__(self, request: AdviceRequest) -> int:
+        self.left -= 1
+        if self.left < 0:
+            raise KeyboardInterrupt
+        return request.learner_action
+
+
+def test_ctrl_c_keeps_what_was_learned_and_the_next_run_goes_on(tmp_path: Path) -> None:
+    toolbox = Toolbox(tmp_path)
+    with pytest.raises(Interrupted) as stopped:
+        Teacher(toolbox, Counsel(("terminal",), {"terminal": Person(50)})).teach(
+            problem(), QUICK, GateSettings("always"), "toast"
+        )
+    assert isinstance(stopped.value, KeyboardInterrupt)
+    index, _ = toolbox.index()
+    (kept,) = index.values()
+    assert 0 < len(kept.curve) < 50
+    # advice counts once its episode is over; what was learned is all kept
+    assert (0 < kept.helped_steps < 50, kept.requests) == (True, len(kept.curve))
+    assert (kept.visits.sum(), kept.advisor) == (50, "terminal")
+    after = f"after {len(kept.curve)} episodes of 'insert at toaster'"
+    assert str(stopped.value) == f"stopped by Ctrl-C {after}; what was learned is kept"
+    on = Teacher(toolbox).find_or_teach(problem(), settings(), "toast", index)
+    assert on.source in ("continued", "reused")
+    assert fits(on.policy.q, problem(), QUICK)
+
+
+def test_the_unfinished_never_replaces_the_finished(teacher: Teacher) -> None:
+    done = teacher.teach(problem(), QUICK, GATE, "toast").policy
+    half = teacher.teach(problem(), HOPELESS, GATE, "toast", sessions=1).policy
+    assert (done.solved, half.solved, half.name) == (True, False, f"{done.name} unfinished")
+    assert [row["name"] for row in teacher.toolbox.list()] == [done.name, half.name]
+    found = teacher.toolbox.find("insert", done.signature)
+    assert found is not None
+    assert found.name == done.name
+    again = teacher.teach(problem(), QUICK, GATE, "toast").policy
+    assert again.name == done.name
+
+
+def test_a_name_of_ones_own_is_used_as_it_is(teacher: Teacher) -> None:
+    assert teacher.teach(problem(), HOPELESS, GATE, "toast", name="mine", sessions=1).policy.name == "mine"
+    assert teacher.teach(problem(), QUICK, GATE, "toast", name="mine").policy.name == "mine"
+    assert [row["solved"] for row in teacher.toolbox.list()] == [True]
+
+
+def test_a_long_skill_name_fits(teacher: Teacher) -> None:
+    long = problem(f"transfer {'a' * 40} to {'b' * 40} with slice")
+    teacher.teach(long, QUICK, GATE, "toast")
+    name = teacher.teach(long, HOPELESS, GATE, "toast", sessions=1).policy.name
+    assert name.endswith(f"{long.mdp.signature[:8]} unfinished")
+
+
+def test_several_sessions_are_one_lesson(teacher: Teacher) -> None:
+    slow = LearnerSettings(episodes=2, max_steps=8)
+    events: list[tuple[str, Event]] = []
+    lesson = replace(teacher, audience=Hearing(events)).teach(problem(), slow, GATE, "toast")
+    assert lesson.result is not None
+    episodes = len(lesson.result.steps)
+    assert episodes in (4, 6, 8, 10, 12)
+    assert lesson.policy.curve == lesson.result.steps.tolist()
+    assert len(lesson.policy.guided) == episodes
+    ended = [(name, event.episode) for name, event in events if isinstance(event, EpisodeEnded)]
+    assert ended == [("insert at toaster", n % 2 + 1) for n in range(episodes)]
+    assert lesson.policy.visits.sum() >= episodes
+
+
+def test_the_seed_and_the_skill_decide_what_is_learned(tmp_path: Path) -> None:
+    def table(seed: int, name: str = "insert at toaster") -> list[float]:
+        teacher = Teacher(Toolbox(tmp_path), seed=seed)
+        q: list[float] = teacher.teach(problem(name), QUICK, GATE, "toast").policy.q.ravel().tolist()
+        return q
+
+    assert table(1) == table(1)
+    assert table(1) != table(2)
+    assert table(1) != table(1, "insert at oven")
