@@ -174,7 +174,7 @@ def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: 
 
     monkeypatch.setattr("lab.production.prepared.prepare", stop)
     monkeypatch.setattr("lab.teaching.lesson.load", stop)
-    monkeypatch.setattr("lab.look.load", stop)
+    monkeypatch.setattr("lab.tasks.task_file.load", stop)
     ran = lab(*words.split(), "--json")
     why = f"stopped by Ctrl-C{said}"
     assert (ran.code, ran.json, ran.err) == (130, {"error": why, "exit_code": 130}, f"lab: {why}\n")
