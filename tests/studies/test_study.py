@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -10,7 +10,8 @@ from xml.etree import ElementTree
 import pytest
 
 from lab.errors import BadInput
-from lab.studies import STUDIES, run_study
+from lab.studies import STUDIES, Study, run_study
+from lab.studies.findings import Findings, row
 from lab.studies.runner import STORE, Job
 from lab.studies.thesis import chapter_9_cells, chapter_9_sessions
 from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, sessions_of
@@ -97,6 +98,20 @@ def test_what_is_refused_writes_nothing(
         study(**changes)
     assert tree(folder) == ["taken"]
     assert (folder / "taken").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_row_is_all_that_a_new_study_needs(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is listed, run and reported as the others are."""
+
+    def dummy(job: Job, reading: Mapping[str, Any]) -> Findings:
+        return Findings([row({"seed": job.seed}, "answer_steps", 42.0)], {"read": dict(reading)})
+
+    monkeypatch.setitem(STUDIES, "dummy", Study("A dummy", dummy, has_advisors=True))
+    assert {"name": "dummy", "title": "A dummy"} in lab("study", "list", "--json").json["studies"]
+    document = lab("study", "run", "dummy", "--advisor-table", "exact", "--seed", "7", "--json").json
+    assert [(one["seed"], one["value"]) for one in document["rows"]] == [(7, 42.0)]
+    assert document["summary"]["read"] == {"advisor_table": "exact"}
+    assert "<h1>A dummy</h1>" in Path(document["files"]["report"]).read_text(encoding="utf-8")
 
 
 # ---- Ctrl-C -------------------------------------------------------------------------------------------------------

@@ -25,7 +25,6 @@ class Measured:
     moves: int
     seconds: float
     success_percent: float
-    compile_seconds: float = 0.0
 
 
 Rival = Callable[[TabularMDP, LearnerSettings, int, int], Measured]  # (problem, settings, sessions, seed)

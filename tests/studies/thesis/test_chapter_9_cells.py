@@ -128,11 +128,13 @@ def replicated(grid: Grid, outcome: Outcome) -> list[float]:
     """Eq. 9.4 in each of five parts of two sessions."""
     parts = [slice(2 * n, 2 * n + 2) for n in range(5)]
     return [
-        score(
-            100 * float(outcome.success[part].mean()),
-            float(outcome.helped_steps[part].mean()),
-            grid.sp_range,
-            grid.hs_range,
+        float(
+            score(
+                100 * float(outcome.success[part].mean()),
+                float(outcome.helped_steps[part].mean()),
+                grid.sp_range,
+                grid.hs_range,
+            )
         )
         for part in parts
     ]
