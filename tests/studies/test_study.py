@@ -14,7 +14,7 @@ from lab.studies import STUDIES, Study, run_study
 from lab.studies.findings import Findings, row
 from lab.studies.runner import STORE, Job
 from lab.studies.thesis import chapter_9_cells, chapter_9_sessions
-from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, sessions_of
+from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, sessions_of
 from lab.taskfile import load_world
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
@@ -62,7 +62,7 @@ def test_a_study_writes_its_folder(folder: Path) -> None:
     assert (document["study"], document["seed"], document["sessions"]) == ("figure-9.4", 0, 10)
     assert {"sessions": 10, "seed": 0, "cells": 2}.items() <= document["summary"].items()
     keys = [json.loads(line)["key"] for line in Path(files["sessions"]).read_text(encoding="utf-8").splitlines()]
-    assert keys == [Setting(w, beta=b).key(10, 0) for w in ("world-1", "world-2") for b in (0.7, 1.3)]
+    assert keys == [AdviceSetting(w, beta=b).key(10, 0) for w in ("world-1", "world-2") for b in (0.7, 1.3)]
 
 
 def test_the_seed_decides(folder: Path) -> None:
@@ -117,11 +117,11 @@ def test_a_row_is_all_that_a_new_study_needs(lab: Lab, monkeypatch: pytest.Monke
 # ---- Ctrl-C -------------------------------------------------------------------------------------------------------
 
 
-def stop_after(count: int, monkeypatch: pytest.MonkeyPatch) -> list[Setting]:
+def stop_after(count: int, monkeypatch: pytest.MonkeyPatch) -> list[AdviceSetting]:
     """The settings that are done; the one after `count` is stopped."""
-    done: list[Setting] = []
+    done: list[AdviceSetting] = []
 
-    def stopped(setting: Setting, sessions: int, seed: int) -> Outcome:
+    def stopped(setting: AdviceSetting, sessions: int, seed: int) -> AdviceOutcome:
         if len(done) == count:
             raise KeyboardInterrupt
         done.append(setting)
