@@ -102,6 +102,11 @@ def ranges(sp: ArrayLike, hs: ArrayLike) -> tuple[Range, Range]:
     return (float(percents.min()), float(percents.max())), (float(steps.min()), float(steps.max()))
 
 
+def part_means(values: ArrayLike, parts: int) -> FloatArray:
+    """The mean of each of so many replications that sessions are split into, (parts,)."""
+    return np.array([part.mean() for part in np.array_split(np.asarray(values), parts)])
+
+
 def compare(groups: Mapping[str, ArrayLike], lowest_is_best: bool = False) -> Comparison:
     """One-way ANOVA, Tukey's HSD, the tests of their assumptions, and ranks; groups name -> values (n,).
 

@@ -2,7 +2,7 @@
 
 All learn as the thesis's listing does (App. VII), alone: a value for each state, zero at first; at s the softmax over
 loss + gamma V(s') of the six neighbours, temperature n**-beta in episode n; then V(s) += alpha (loss + gamma V(s') -
-V(s)), and a terminal state gets its own value when it is entered. Each runs on one core; compiling is timed apart.
+V(s)), and a terminal state gets its own value when it is entered. Each runs on one core; compiling is not counted.
 """
 
 import ctypes
@@ -172,7 +172,7 @@ def _numpy_batch(job: Session, n: int, rng: np.random.Generator) -> tuple[int, i
 
 
 def c_scalar(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
-    """One session after another in C (rival.c), compiled for this very processor."""
+    """One session after another in C (learning_speed_rival.c), compiled for this very processor."""
     job, rng = session_of(mdp, settings, sessions), np.random.default_rng(seed)
     learn = _compiled_c()
     near = np.pad(job.successor, ((0, 0), (0, 2)), "edge").astype(np.uint16)

@@ -19,12 +19,11 @@ from lab.sequencing.rules import usable
 from lab.sequencing.search import Search, SrlSettings
 from lab.studies.runner import seeds_of
 from lab.studies.thesis.appendix_3_makespans import fms, settings
-from lab.studies.thesis.chapter_7_cells import robot_cell
+from lab.studies.thesis.chapter_7_cells import beta_of, robot_cell
 
 Floats = NDArray[np.float64]
 
 FEW_TOASTS = 4  # up to so many success can be counted; above, and in the orders of the FMS, gaps are
-BETAS = {3: 1.0}  # by number of toasts, section 7.6; .5 for more
 COMPILED, READABLE = "compiled", "readable"
 CAPS = {  # sessions at the most, by size of the job and method: the others would take too long
     "few": {"srl-time": 100, "ga": 40},
@@ -140,7 +139,7 @@ def _settings(setting: MethodSetting) -> SrlSettings:
     factor: Literal["A", "B"] = "A" if setting.reward_factor == "A" else "B"
     if work.order is not None:
         return replace(settings(len(work.order)), factor=factor)
-    return SrlSettings(beta=BETAS.get(work.toasts or 0, 0.5), factor=factor)
+    return SrlSettings(beta=beta_of(work.toasts or 0), factor=factor)
 
 
 @lru_cache(maxsize=64)

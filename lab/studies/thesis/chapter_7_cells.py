@@ -15,7 +15,7 @@ from lab.sequencing.chance import NO_CHANCE, Chance
 from lab.sequencing.search import SAME, Search, SrlSettings
 from lab.studies.findings import Row, mean_row, share_row
 from lab.studies.runner import Job, seeds_of
-from lab.studies.statistics import Comparison, compare
+from lab.studies.statistics import Comparison, compare, part_means
 from lab.studies.thesis import chapter_7_listing as listing
 from lab.studies.thesis import printed_lines
 from lab.studies.thesis.chapter_7_listing import LISTING, Reading
@@ -26,7 +26,6 @@ Factor = Literal["A", "B"]
 
 SESSION_LENGTHS, DECAY_FACTORS = "tables-7.4-7.6-iv.2.csv", "table-iv.1.csv"
 TASKS = {"I": "toast-case-1", "II": "toast-case-2", "III": "toast-case-3"}
-BETAS = {3: 1.0, 4: 0.5}  # section 7.6, by number of toasts
 SPREAD = 0.1  # section 7.6: the standard deviation of processing times as a share of their mean
 REPLICATIONS = 10  # section 7.6
 DECAY_EPISODES = 200  # section 7.6, the test of beta
@@ -103,9 +102,14 @@ def _length_cells(line: dict[str, str]) -> list[PrintedFigure]:
         int(line["session_episodes"]),
         cast(Environment, line["environment"]),
         cast("Factor | None", line["reward_factor"] or None),
-        None if method == "random" else BETAS[toasts],
+        None if method == "random" else beta_of(toasts),
     )
     return [PrintedFigure(setting, line["measure"].replace("_seconds", "_s"), float(line["value"]))]
+
+
+def beta_of(parts: int) -> float:
+    """How fast exploration ends where the thesis does not compare that. Source: section 7.6, App. III."""
+    return 1.0 if parts == 3 else 0.5
 
 
 def _decay_cells(line: dict[str, str]) -> list[PrintedFigure]:
@@ -184,7 +188,7 @@ class Measured:
         values = self.outcomes[setting].best_s
         if setting.environment == "deterministic":
             values = np.where(self.succeeds(setting, values), 100.0, 0.0)
-        return np.array([part.mean() for part in np.array_split(values, REPLICATIONS)])
+        return part_means(values, REPLICATIONS)
 
     def compared(self, settings: Sequence[SequencingSetting]) -> Comparison:
         """Several methods, or reward factors, at one session length (Appendix II)."""

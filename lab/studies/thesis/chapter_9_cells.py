@@ -11,7 +11,7 @@ from lab.advice.advisors import SKILLS
 from lab.mdp import FloatArray
 from lab.studies.findings import Row, mean_row, row, share_row
 from lab.studies.runner import Job
-from lab.studies.statistics import Comparison, Range, compare, ranges, score
+from lab.studies.statistics import Comparison, Range, compare, part_means, ranges, score
 from lab.studies.thesis import printed_lines
 from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, learner_of, measured
 
@@ -78,7 +78,7 @@ class Grid:
     def __init__(self, job: Job, place: str, view: View, reading: Mapping[str, Any]):
         self.reading = reading
         self.cells, self.best = ([c for c in printed(file) if _is_at(c, place, view)] for file in FILES)
-        settings = [setting for cell in (*self.cells, *self.best) for setting in self._settings(cell)]
+        settings = [setting for cell in (*self.cells, *self.best) for setting in self.settings_of(cell)]
         self.outcomes = measured(job, settings)  # one combination of table 9.3 is not in Appendix V
         sp = [100.0 * float(outcome.success.mean()) for outcome in self.outcomes.values()]
         hs = [float(outcome.helped_steps.mean()) for outcome in self.outcomes.values()]
@@ -87,13 +87,14 @@ class Grid:
     def _asked(self, setting: AdviceSetting) -> AdviceSetting:
         return replace(setting, **self.reading)
 
-    def _settings(self, cell: PrintedLine) -> list[AdviceSetting]:
+    def settings_of(self, cell: PrintedLine) -> list[AdviceSetting]:
+        """The settings of a cell, those of its four advisors where it is their mean."""
         taus = TAUS if cell.average else [cell.setting.tau]
         return [self._asked(replace(cell.setting, tau=tau)) for tau in taus]
 
     def of(self, cell: PrintedLine) -> list[AdviceOutcome]:
         """The outcome of a cell, or those of its four advisors (some of which the scan of the thesis does not show)."""
-        return [self.outcomes[setting] for setting in self._settings(cell)]
+        return [self.outcomes[setting] for setting in self.settings_of(cell)]
 
     def scores(self, cell: PrintedLine) -> FloatArray:
         """The score of each of five replications, averaged over the cell's advisors; eq. 9.4."""
@@ -123,9 +124,8 @@ class Grid:
 
 
 def _replicated_scores(outcome: AdviceOutcome, sp_range: Range, hs_range: Range) -> FloatArray:
-    sp = np.array([100.0 * part.mean() for part in np.array_split(outcome.success, REPLICATIONS)])
-    hs = np.array([part.mean() for part in np.array_split(outcome.helped_steps, REPLICATIONS)])
-    return score(sp, hs, sp_range, hs_range)
+    sp, hs = part_means(outcome.success, REPLICATIONS), part_means(outcome.helped_steps, REPLICATIONS)
+    return score(100.0 * sp, hs, sp_range, hs_range)
 
 
 def describe(setting: AdviceSetting, tau: float | str | None = None) -> Row:

@@ -16,6 +16,7 @@ from lab.errors import WorkFailed
 from lab.gridworld import GridWorld, View
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import BoolArray, FloatArray, NoPath, TabularMDP, grid, shortest_steps
+from lab.studies.runner import Progress
 from lab.studies.statistics import PERCENT_POINTS, RELATIVE
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, PrintedLine, printed
 from lab.studies.thesis.chapter_9_sessions import gate_of, learned_table
@@ -39,7 +40,6 @@ MAX_TRIES = 20_000
 LEARNER = LearnerSettings("afterstate", beta=BETA, count_start=True)
 
 Ints = NDArray[np.int_]
-Progress = Callable[[int, int], None]
 
 
 def reconstruct(seed: int, progress: Progress = lambda done, total: None) -> GridWorld:

@@ -123,7 +123,7 @@ def test_printed_figures(file: str, number: int, expected: PrintedLine) -> None:
 
 def test_every_setting_is_measured_once(grid: Grid) -> None:
     assert (len(grid.cells), len(grid.best)) == (73, 15)
-    asked = {setting for cell in (*grid.cells, *grid.best) for setting in grid._settings(cell)}
+    asked = {setting for cell in (*grid.cells, *grid.best) for setting in grid.settings_of(cell)}
     assert grid.outcomes.keys() == asked
     assert {len(outcome.success) for outcome in grid.outcomes.values()} == {10}
     assert {(s.world, s.view, s.advisor_table) for s in asked} == {("world-1", "full", "learned")}
@@ -154,7 +154,7 @@ def replicated(grid: Grid, outcome: AdviceOutcome) -> list[float]:
 
 def test_the_rows_of_a_cell(grid: Grid) -> None:
     cell = cell_of(grid, "combined", 0.1, lambda_threshold=0.3, psi=1.0)
-    (setting,) = grid._settings(cell)
+    (setting,) = grid.settings_of(cell)
     outcome = grid.outcomes[setting]
     sp, hs, points = grid.rows(cell)
     named = {"world": "world-1", "view": "full", "gate": "combined", "tau": 0.1}
@@ -212,7 +212,7 @@ def test_scores_of_made_up_sessions() -> None:
 
 def test_requests_of_ccrl_come_beside(grid: Grid) -> None:
     cell = cell_of(grid, "ccrl", 0.01, lambda_threshold=0.05)
-    (setting,) = grid._settings(cell)
+    (setting,) = grid.settings_of(cell)
     *_, asked = grid.rows(cell)
     assert (asked["measure"], asked["thesis"], asked["within"]) == ("AR_requests", None, None)
     assert asked["value"] == pytest.approx(grid.outcomes[setting].requests.mean())
