@@ -16,11 +16,11 @@ from lab.sequencing.methods.srl_time_reacting import reacting
 from lab.sequencing.search import Search, SrlSettings, kernel_seed
 from lab.sequencing.simulate.execution import Policy, replan, replicate
 from lab.studies.thesis.appendix_3_fifo import STARTS, queued_fifo
+from lab.studies.thesis.chapter_7_cells import beta_of
 
 Floats = NDArray[np.float64]
 
 EPISODES, REPLICATIONS, SPREAD = 200, 50, 0.1  # App. III
-BETAS = {3: 1.0}  # by number of parts; .5 for the larger orders
 LEARNED_BY = 10  # of the sessions asked for, one in so many is learned for each order,
 SLOW_BY = 250  # and one in so many by what is not compiled
 REACTIONS = {3: 6, 5: 2, 8: 1}  # replications of a policy that reacts, for 500 sessions: it takes its time
@@ -93,7 +93,7 @@ def times_seeds(seed: int, episodes: int) -> list[int]:
 
 def settings(parts: int) -> SrlSettings:
     """Those of App. III and its listing: values per next state of the stations, type B."""
-    return SrlSettings(beta=BETAS.get(parts, 0.5), factor="B", values="states", state="stations")
+    return SrlSettings(beta=beta_of(parts), factor="B", values="states", state="stations")
 
 
 def _lists(cell: Cell, sessions: int, rng: np.random.Generator) -> tuple[dict[str, list[tuple[int, ...]]], Floats]:
