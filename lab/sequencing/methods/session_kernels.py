@@ -12,7 +12,7 @@ from lab.sequencing.simulate.kernels import cost, fraction, list_allowed, mixed,
 
 RANDOM, SRL, MONTE_CARLO = (LEARNER_CODES[name] for name in ("random", "srl", "mc"))
 _explore, _best_of, _log_sum = inner(updates.explore), inner(updates.best_of), inner(updates.log_sum)
-_following = inner(splitmix.following)
+_following = inner(splitmix.following, inline="always")
 _gain, _log_factor, _average = inner(updates.gain), inner(updates.log_factor), inner(updates.average)
 
 

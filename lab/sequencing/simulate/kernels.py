@@ -15,9 +15,9 @@ MAKESPAN, TARDINESS, ROBOT_IDLE, MACHINE_IDLE = (
     OBJECTIVE_CODES[name] for name in ("makespan", "mean-tardiness", "robot-idle", "machine-idle")
 )
 
-mixed: Any = inner(splitmix.mixed)
-fraction: Any = inner(splitmix.fraction)
-_state_at: Any = inner(splitmix.state_at)
+mixed: Any = inner(splitmix.mixed, inline="always")
+fraction: Any = inner(splitmix.fraction, inline="always")
+_state_at: Any = inner(splitmix.state_at, inline="always")
 
 
 @lean
