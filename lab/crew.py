@@ -7,7 +7,7 @@ import numpy as np
 
 from lab.policy import Policy
 from lab.sequencing.cell.cell import Cell, needed_moves
-from lab.sequencing.cell.routes import Moves
+from lab.sequencing.cell.routes import NeededMoves
 from lab.sequencing.cell.stations import Product, Route, Stage, Station
 from lab.skills import Butter, Grasp, Insert, Place, Skill, Transfer
 from lab.skills.surveys import INSERT_START
@@ -48,7 +48,7 @@ class Crew:
     """All skills that a task needs, by name, and the policies they carry out."""
 
     task: Task
-    moves: Moves
+    moves: NeededMoves
     skills: dict[str, Skill]
     policies: dict[str, Policy] = field(default_factory=dict)
 

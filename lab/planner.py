@@ -9,8 +9,7 @@ from lab.errors import unknown
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
-from lab.sequencing.cell.schedule import EpisodeSequenced, SequenceResult
-from lab.sequencing.search import Search
+from lab.sequencing.search import EpisodeSequenced, Search, SequenceResult
 
 
 def search_for(

@@ -14,8 +14,8 @@ from lab.errors import BadInput, WorkFailed
 from lab.files import nearest
 from lab.policy import Policy
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.methods.exact import Optimum
+from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
 from lab.sim.scene import Layout
 from lab.skills import Insert

@@ -19,8 +19,7 @@ from lab.sequencing import DRAWN
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective, cost
-from lab.sequencing.cell.schedule import EpisodeSequenced, LearnedSequence, SequenceResult
-from lab.sequencing.search import SAME, Reference, Search
+from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import follow, simulate
 from lab.taskfile import Task, load_any
 from lab.teaching import Teacher

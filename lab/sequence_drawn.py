@@ -9,8 +9,7 @@ import numpy as np
 from lab.planner import find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
-from lab.sequencing.cell.schedule import SequenceResult
-from lab.sequencing.search import Search
+from lab.sequencing.search import Search, SequenceResult
 
 if TYPE_CHECKING:
     from lab.sequencing.simulate.execution import Policy
@@ -47,9 +46,9 @@ def stochastic(
 def _policy(cell: Cell, method: str, search: Search, seed: int) -> "tuple[Policy, str]":
     """What reacts in the manner of the method, and what that is."""
     from lab.sequencing.methods.fifo import first_in_first_out
+    from lab.sequencing.methods.rollout import by_rule, replan
     from lab.sequencing.methods.rules import RULES
     from lab.sequencing.methods.srl_time_reacting import reacting
-    from lab.sequencing.simulate.execution import by_rule, replan
 
     if method == "srl-time":
         return reacting(cell, search.objective, seed), "it goes on learning before every decision"

@@ -25,9 +25,8 @@ from lab.sequencing import DRAWN, SEQUENCERS
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES
-from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.cell.stations import Stage, Station
-from lab.sequencing.search import Reference, Search, SrlSettings
+from lab.sequencing.search import Reference, Search, SequenceResult, SrlSettings
 from lab.sequencing.simulate.execution import replicate
 from lab.sequencing.simulate.run import simulate
 from lab.taskfile import load, load_cell

@@ -16,7 +16,10 @@ ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors",),
     ("lab.data", "lab.files", "lab.tomltext", "lab.compiled", "lab.learning.splitmix"),
-    ("lab.overhead", "lab.view.frames", "lab.mdp", "lab.sequencing", "lab.learning.settings"),
+    ("lab.overhead", "lab.view.frames", "lab.mdp", "lab.sequencing.cell", "lab.learning.settings"),
+    ("lab.sequencing.simulate",),
+    ("lab.sequencing.search",),
+    ("lab.sequencing",),  # its table of methods, and these
     ("lab.vision",),
     ("lab.learning.selection",),
     ("lab.learning.updates", "lab.learning.environment"),

@@ -8,8 +8,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from lab.sequencing.cell.cell import Cell
-    from lab.sequencing.cell.schedule import SequenceResult
-    from lab.sequencing.search import Search
+    from lab.sequencing.search import Search, SequenceResult
 
 Sequencer = Callable[["Cell", "Search", "np.random.Generator"], "SequenceResult"]
 
@@ -35,7 +34,7 @@ def _monte_carlo(cell: "Cell", search: "Search", rng: "np.random.Generator") -> 
 
 
 def _random(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    from lab.sequencing.methods.fifo import random_search
+    from lab.sequencing.methods.random_search import random_search
 
     return random_search(cell, search, rng)
 

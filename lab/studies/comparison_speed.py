@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from lab.sequencing import SEQUENCERS
-from lab.sequencing.cell.schedule import EpisodeSequenced
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.many_sessions import run_sessions
 from lab.sequencing.methods.sessions import learn_readably
 from lab.sequencing.methods.srl import Srl
-from lab.sequencing.search import Search, SrlSettings
+from lab.sequencing.search import EpisodeSequenced, Search, SrlSettings
 from lab.studies.chapter7 import robot_cell
 from lab.studies.chapter9 import Row, agreement, row
 from lab.studies.findings import Findings

@@ -12,8 +12,8 @@ from rich.text import Text
 
 from lab.advice.events import AdviceRejected, AdviceRequested, Event
 from lab.listener import Listener
-from lab.sequencing.cell.schedule import Move, SequenceResult
-from lab.sequencing.search import Reference
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.search import Reference, SequenceResult
 from lab.teaching import Lesson
 
 BARS = "▁▂▃▄▅▆▇█"

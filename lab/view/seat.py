@@ -17,8 +17,9 @@ from lab.errors import BadInput
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.listener import Listener
 from lab.mdp import NoPath, TabularMDP, shortest_steps
-from lab.sequencing.cell.schedule import EpisodeSequenced, Move
+from lab.sequencing.cell.schedule import Move
 from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.search import EpisodeSequenced
 from lab.view.meshcat import LiveView
 from lab.view.seat_events import hear
 from lab.view.seat_order import Follower, bars_of

@@ -6,8 +6,8 @@ from typing import Protocol
 
 from lab.learning.settings import GateSettings
 from lab.listener import Listener
-from lab.sequencing.cell.schedule import EpisodeSequenced, Move, SequenceResult
-from lab.sequencing.search import Reference
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
 from lab.teaching import Lesson
 from lab.view.progress import PHASES
 from lab.view.seat_state import MOST_LINES, Progress

@@ -7,7 +7,7 @@ import numpy as np
 
 from lab.compiled import inner, lean
 from lab.learning import splitmix
-from lab.sequencing.simulate.arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES
+from lab.sequencing.simulate.cell_arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES
 
 CLOCK, PICK = ARRIVAL_CODES["clock"], ARRIVAL_CODES["pick"]
 CONSTANT, NORMAL = LAW_CODES["constant"], LAW_CODES["normal"]
