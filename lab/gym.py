@@ -8,7 +8,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from lab.cellfile import order_from_word, toast_case
 from lab.mdp import FloatArray, TabularMDP
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
@@ -16,6 +15,7 @@ from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.cell.routes import entry
 from lab.sequencing.simulate.run import Run
 from lab.taskfile import load, load_cell, load_world
+from lab.tasks.cell import order_from_word, toast_case
 
 ROOM = 10  # an episode in a cell may take so many times the decisions that its parts need at most
 METADATA: dict[str, Any] = {"render_modes": ["ansi"], "render_fps": 4}

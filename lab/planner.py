@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from lab.cellparts import Sequencing
 from lab.errors import unknown
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.search import EpisodeSequenced, Search, SequenceResult
+from lab.tasks.cell_fields import Sequencing
 
 
 def search_for(

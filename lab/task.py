@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from lab.cellfile import CellFile
 from lab.errors import BadInput, LabError
 from lab.gridworld import RANDOM, GridWorld, parse_shape, random_world
 from lab.lesson import fitting
@@ -12,6 +11,7 @@ from lab.mdp import shortest_steps
 from lab.record import read_text, write_whole
 from lab.report import check_out
 from lab.taskfile import check_number, find, load_any
+from lab.tasks.cell import CellFile
 from lab.teaching import world_problem
 
 AXES = """\

@@ -7,12 +7,12 @@ from typing import Annotated, Literal, Self, TypeVar, cast, get_args
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from lab.cellfile import CellFile
-from lab.cellparts import Sequencing
 from lab.data import tasks_folder
 from lab.errors import BadInput, unknown
 from lab.gridworld import RANDOM, GridWorld, from_text, from_words
 from lab.record import Count, Learned, Name, Record, as_tuple, read_text
+from lab.tasks.cell import CellFile
+from lab.tasks.cell_fields import Sequencing
 from lab.tomltext import TomlText, explain
 
 MAX_TOASTS = 50

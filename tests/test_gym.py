@@ -10,7 +10,6 @@ from gymnasium.utils.env_checker import check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lab.cellfile import CellFile
 from lab.errors import BadInput
 from lab.gridworld import GridWorld
 from lab.gym import ENVIRONMENTS, CellEnv, FmsEnv, TableEnv, ToastCellEnv, WorldEnv, register
@@ -20,6 +19,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.methods.exact import optimum
 from lab.taskfile import load, load_cell, load_world
+from lab.tasks.cell import CellFile
 from lab.tomltext import TomlText
 
 Trace = list[tuple[Any, ...]]

@@ -56,8 +56,8 @@ class Made:
 @lru_cache(maxsize=64)
 def fms(order: str, mean_s: float) -> Cell:
     """The system with an order to make, parts arriving one at a time, after the pick of the one before."""
-    from lab.cellfile import order_from_word
     from lab.taskfile import load_cell
+    from lab.tasks.cell import order_from_word
 
     file = load_cell("fms")
     cell = file.cell(order_from_word(file, order))

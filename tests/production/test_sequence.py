@@ -15,7 +15,7 @@ import pytest
 from lab.errors import BadInput
 from lab.listener import Listener
 from lab.planner import find_sequence, search_for
-from lab.sequence import (
+from lab.production.sequence import (
     Wanted,
     reference,
     sequence_cell,
@@ -321,7 +321,7 @@ def test_what_cannot_be_beaten_comes_from_whom_it_can() -> None:
 
 def test_an_optimum_that_is_not_proven_is_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     cell = load_cell("oven.toml").cell()
-    monkeypatch.setattr("lab.sequence.reference", lambda *_: Reference(20.0, False, "A*"))
+    monkeypatch.setattr("lab.production.sequence.reference", lambda *_: Reference(20.0, False, "A*"))
     document, _ = sequence_cell(cell, load_cell("oven.toml").sequencing, Wanted("fifo"), NO_CHANCE)
     assert (document["optimal_s"], document["optimal_cost"], document["optimum_proven"]) == (None, None, False)
     assert (document["bound_s"], document["gap"]) == (20.0, pytest.approx(0.45))
@@ -342,7 +342,7 @@ REACTING = {
 def few(monkeypatch: pytest.MonkeyPatch, episodes: int) -> None:
     """Draw so many episodes, whatever the method and however many parts."""
     for name in ("REPLICATIONS", "FEWEST"):
-        monkeypatch.setattr(f"lab.sequence_drawn.{name}", episodes)
+        monkeypatch.setattr(f"lab.production.drawn_times.{name}", episodes)
 
 
 @pytest.mark.parametrize("method", REACTING)
@@ -390,7 +390,7 @@ def test_who_plans_at_every_decision_is_given_fewer_episodes(
 ) -> None:
     """Here 24 by parts squared, from 2 to 30."""
     for name, number in (("REPLICATIONS", 30), ("PLANNED", 24), ("FEWEST", 2)):
-        monkeypatch.setattr(f"lab.sequence_drawn.{name}", number)
+        monkeypatch.setattr(f"lab.production.drawn_times.{name}", number)
     drawn = asked(lab, f"oven.toml --toasts {toasts} --method {method} --stochastic")["stochastic"]
     assert drawn["replications"] == episodes
 

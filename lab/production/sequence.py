@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lab.cellfile import CellFile, order_from_word, toast_case
-from lab.cellparts import Sequencing
 from lab.errors import BadInput, unknown
 from lab.gridworld import GridWorld
 from lab.learning.settings import GateSettings
 from lab.listener import Listener
 from lab.planner import check_method, find_sequence, search_for
-from lab.sequence_drawn import stochastic
+from lab.production.drawn_times import stochastic
 from lab.sequencing import DRAWN
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
@@ -22,6 +20,8 @@ from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES,
 from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import follow, simulate
 from lab.taskfile import Task, load_any
+from lab.tasks.cell import CellFile, order_from_word, toast_case
+from lab.tasks.cell_fields import Sequencing
 from lab.teaching import Teacher
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lab.cellfile import TOAST_CASES, CellFile, order_from_word, toast_case
 from lab.data import tasks_folder
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import MAX_PARTS
@@ -18,6 +17,7 @@ from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import SrlSettings
 from lab.sequencing.simulate.run import simulate
 from lab.taskfile import load_cell, names_of
+from lab.tasks.cell import TOAST_CASES, CellFile, order_from_word, toast_case
 from lab.tomltext import TomlText
 
 FMS = (tasks_folder() / "fms.toml").read_text(encoding="utf-8")

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lab.cellfaults import MAX_STAGES, SHOWN, loc_of
-from lab.cellfile import CellFile
 from lab.data import tasks_folder
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
+from lab.tasks.cell import CellFile
+from lab.tasks.cell_faults import MAX_STAGES, SHOWN, loc_of
 from lab.tomltext import TomlText
 
 FMS = (tasks_folder() / "fms.toml").read_text(encoding="utf-8")
