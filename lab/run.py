@@ -11,15 +11,16 @@ from lab.composer import carry_out
 from lab.crew import Crew, Durations, cell_of
 from lab.line import measure
 from lab.listener import Listener
-from lab.planner import find_sequence, search_for
 from lab.policy import Policy
 from lab.recorder import Viewer, show_scene
 from lab.report import Prepared, Report, Taught, write_files
+from lab.sequencing import find_sequence
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Reference
 from lab.sim.scene import Layout, check_apart, draw_layout
 from lab.skills.surveys import Surveys
 from lab.taskfile import Task, check_toasts
+from lab.tasks.sequencing import search_for
 from lab.teaching import Teacher
 
 _LAB = Path(__file__).resolve().parent  # whose code the kept durations depend on

@@ -12,7 +12,7 @@ from lab.errors import BadInput, unknown
 from lab.gridworld import RANDOM, GridWorld, from_text, from_words
 from lab.record import Count, Learned, Name, Record, as_tuple, read_text
 from lab.tasks.cell import CellFile
-from lab.tasks.cell_fields import Sequencing
+from lab.tasks.sequencing import Sequencing
 from lab.tomltext import TomlText, explain
 
 MAX_TOASTS = 50

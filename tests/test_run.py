@@ -18,13 +18,13 @@ from lab.composer import Outcome
 from lab.crew import Crew, Durations
 from lab.errors import BadInput, WorkFailed
 from lab.listener import Listener
-from lab.planner import find_sequence, search_for
 from lab.report import FILES, Prepared, Report, Taught, check_out, write_files
 from lab.run import prepare, teach_all
-from lab.sequencing import SEQUENCERS
+from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import optimum
 from lab.taskfile import Task, load
+from lab.tasks.sequencing import search_for
 from lab.teaching import Teacher
 from lab.toolbox import Toolbox
 from lab.view.frames import Recording

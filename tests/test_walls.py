@@ -34,7 +34,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.sim",),
     ("lab.skills", "lab.recorder"),
     ("lab.teaching", "lab.crew"),
-    ("lab.line", "lab.listener", "lab.planner"),
+    ("lab.line", "lab.listener"),
     ("lab.composer",),
     ("lab.view",),
     ("lab.report",),

@@ -11,9 +11,8 @@ from lab.errors import BadInput, unknown
 from lab.gridworld import GridWorld
 from lab.learning.settings import GateSettings
 from lab.listener import Listener
-from lab.planner import check_method, find_sequence, search_for
 from lab.production.drawn_times import stochastic
-from lab.sequencing import DRAWN
+from lab.sequencing import SEQUENCERS, check_method, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective, cost
@@ -21,7 +20,7 @@ from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Refer
 from lab.sequencing.simulate.run import follow, simulate
 from lab.taskfile import Task, load_any
 from lab.tasks.cell import CellFile, order_from_word, toast_case
-from lab.tasks.cell_fields import Sequencing
+from lab.tasks.sequencing import Sequencing, search_for
 from lab.teaching import Teacher
 
 if TYPE_CHECKING:
@@ -138,7 +137,7 @@ def sequence_cell(
         settings,
         episodes=wanted.episodes,
         objective=wanted.objective,
-        chance=chance if wanted.stochastic and method in DRAWN else NO_CHANCE,
+        chance=chance if wanted.stochastic and SEQUENCERS[method].drawn else NO_CHANCE,
     )
     check_method(method)
     check_objective(search.objective, cell)

@@ -14,14 +14,13 @@ import pytest
 
 from lab.errors import BadInput
 from lab.listener import Listener
-from lab.planner import find_sequence, search_for
 from lab.production.sequence import (
     Wanted,
     reference,
     sequence_cell,
     sequence_named,
 )
-from lab.sequencing import DRAWN, SEQUENCERS
+from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES
@@ -30,6 +29,7 @@ from lab.sequencing.search import Reference, Search, SequenceResult, SrlSettings
 from lab.sequencing.simulate.execution import replicate
 from lab.sequencing.simulate.run import simulate
 from lab.taskfile import load, load_cell
+from lab.tasks.sequencing import search_for
 from lab.teaching import Teacher
 from lab.toolbox import Toolbox
 from lab.vision import read_picture
@@ -370,7 +370,7 @@ def test_drawn_times(lab: Lab, monkeypatch: pytest.MonkeyPatch, method: str) -> 
     assert len(set(costs)) == 5
     assert plain["stochastic"] is None
     judged = {name: document[name] for name in ("gap", "success_percent")}
-    if method in DRAWN:  # it looked in drawn times, where the shortest is luck
+    if SEQUENCERS[method].drawn:  # it looked in drawn times, where the shortest is luck
         assert judged["success_percent"] is None
         assert document["gap"] == pytest.approx(document["cost"] / 513 - 1, abs=1e-9)
         assert document["cost"] >= 513 - 1e-6  # by the mean times
