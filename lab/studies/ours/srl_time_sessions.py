@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import LearnedSequence, SequenceResult
 from lab.sequencing.methods.exact import Optimum, optimum
 from lab.sequencing.methods.many_sessions import METHODS, run_sessions
 from lab.sequencing.methods.rules import usable
 from lab.sequencing.methods.state_keys import keys_of
-from lab.sequencing.search import Search, SrlSettings
+from lab.sequencing.search import LearnedSequence, Search, SequenceResult, SrlSettings
 from lab.studies.runner import seeds_of
 from lab.studies.thesis.appendix_3_makespans import fms, settings
 from lab.studies.thesis.chapter_7_cells import beta_of, robot_cell
