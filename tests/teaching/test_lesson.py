@@ -155,7 +155,7 @@ def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lab.production.run.try_grasp", stop)
+    monkeypatch.setattr("lab.production.run.try_out", stop)
     with pytest.raises(KeyboardInterrupt):
         teach_one(task, "grasp", teacher)
     (row,) = teacher.toolbox.list()
