@@ -4,10 +4,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from lab.cellfile import CellFile
 from lab.errors import BadInput, LabError
 from lab.files import check_out
 from lab.mdp import shortest_steps
+from lab.tasks.cell import CellFile
 from lab.tasks.grid_world import RANDOM, GridWorld, parse_shape, random_world
 from lab.tasks.record import read_text, write_whole
 from lab.tasks.task_file import check_number, find, load_any
