@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 
-from lab.production.prepared import Prepared
 from lab.production.recorder import Recorder, Viewer
-from lab.production.skillset import SkillSet
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Layout, Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import STAND_STEPS, Bench, Status
+from lab.skills.skillset import SkillSet
 
 _SETTLE_STEPS = 60
 

@@ -12,13 +12,13 @@ from lab.files import draft
 from lab.mdp import TabularMDP, greedy_path
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
-from lab.production.prepared import Prepared
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Recording
 from lab.skills import Skill
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Photo
 from lab.teaching.teacher import Lesson
 from lab.toolbox.policy import Policy

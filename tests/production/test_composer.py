@@ -10,8 +10,6 @@ from lab.errors import WorkFailed
 from lab.production.composer import MAX_TRIES, Outcome, Production, carry_out
 from lab.production.durations import Durations, cell_of, measure
 from lab.production.floor import Floor, try_out
-from lab.production.prepared import Prepared
-from lab.production.skillset import SkillSet
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.simulate.run import simulate
@@ -19,7 +17,9 @@ from lab.sim.frames import Body, Frame
 from lab.sim.scene import Layout, spots
 from lab.sim.world import World
 from lab.skills import Butter
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Status
+from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Stage, Task, load
 from lab.teaching.teacher import Teacher

@@ -187,7 +187,7 @@ def test_all_that_moves_the_arm_is_in_the_key() -> None:
         "lab.mdp",
         "lab.vision.markers",
         "lab.vision.grid_view",
-        "lab.production.skillset",
+        "lab.skills.skillset",
         "lab.production.floor",
     } <= found.texts.keys()
     assert {"pybullet", "numpy", "cv2"} <= found.libraries

@@ -11,13 +11,13 @@ import pytest
 from lab.errors import WorkFailed
 from lab.mdp import NoPath, greedy_path, grid, shortest_steps
 from lab.production.durations import measure
-from lab.production.prepared import Prepared
-from lab.production.skillset import SkillSet
 from lab.seat.stage import SkillStage
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Layout
 from lab.skills import SKILLS, Skill
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Bench, Problem, SkillFailed, Status, learned_path, no_way
+from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Stage, Subtask, Task
 from lab.teaching.lesson import teach_one
