@@ -34,6 +34,7 @@ class Hover(Skill):
     """A new skill, all of it: before it travels, the empty gripper rises from a station's approach, level by level."""
 
     subtask: ClassVar[str] = "hover"
+    help: ClassVar[str] = "the empty gripper rises before it travels"
 
     def __init__(self, station: str) -> None:
         super().__init__(f"hover at {station}")
@@ -81,6 +82,8 @@ def poses(bench: Bench) -> dict[str, tuple[float, ...]]:
 @every_skill
 def test_it_stands_in_the_table_under_its_own_name_and_the_shipped_task_needs_it(name: str, make: Make) -> None:
     assert SKILLS[name].subtask == make(name).subtask == name
+    assert SKILLS[name].help
+    assert not SKILLS[name].help.endswith(".")
     assert f" {make(name).station}" in f" {make(name).name}"
 
 
