@@ -40,7 +40,7 @@ def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
         elif isinstance(task, CellFile):
             task.cell(toasts)
         else:
-            from lab.production.prepared import prepare
+            from lab.skills.prepared_scene import prepare
 
             prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
     except LabError as error:

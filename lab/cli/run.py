@@ -34,8 +34,8 @@ def run(
     from lab.advice.advisors import PEOPLE
     from lab.advice.counsel import Counsel
     from lab.files import check_out
-    from lab.production.prepared import prepare
     from lab.production.run import run as run_task
+    from lab.skills.prepared_scene import prepare
     from lab.tasks import task_file as taskfile
     from lab.teaching.kept_session import Words, kept_by
     from lab.view.summary import run_summary

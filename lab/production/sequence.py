@@ -112,8 +112,8 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
 
 def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher, listener: Listener) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
-    from lab.production.prepared import prepare
     from lab.production.run import teach_all
+    from lab.skills.prepared_scene import prepare
 
     objective = wanted.objective or task.sequencing.objective
     if objective in WITH_DUE_TIMES:

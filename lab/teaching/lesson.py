@@ -193,10 +193,10 @@ def teach_one(
     solved when that succeeds, too; `failure` says why it did not. `toasts` and `sessions`: those of the run that the lesson
     belongs to. BadInput when the policy called `name` is of another problem.
     """
-    from lab.production.prepared import prepare
-    from lab.production.report import draw_value_map
-    from lab.production.run import trial_of
-    from lab.production.skillset import SkillSet
+    from lab.skills.prepared_scene import prepare
+    from lab.skills.skillset import SkillSet
+    from lab.skills.trial import trial_of
+    from lab.view.plots import values_seen
 
     toasts = fitting(task, 2) if toasts is None else toasts
     check_toasts(toasts, task)
@@ -213,7 +213,7 @@ def teach_one(
         document["files"] = _draw_curve(problem.name, lesson.policy, out)
         photo, map_path = skill.photo(), out / f"{skill.subtask}-value-map.png"
         if photo is not None:
-            draw_value_map(problem.mdp, photo, lesson.policy, map_path)
+            values_seen(lesson.policy.q, problem.mdp, photo.picture, photo.seen, map_path)
             document["files"]["value_map"] = str(map_path)
     return document
 

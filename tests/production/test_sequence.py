@@ -644,7 +644,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int, int]]:
         route = (Stage("in"), Stage("hot"), Stage("out"))
         return SimpleNamespace(cell=Cell.alike(stations, route, step, 2 * step, "in", toasts))
 
-    monkeypatch.setattr("lab.production.prepared.prepare", prepare)
+    monkeypatch.setattr("lab.skills.prepared_scene.prepare", prepare)
     monkeypatch.setattr("lab.production.run.teach_all", cell)
     return prepared
 

@@ -118,14 +118,14 @@ def test_a_name_of_another_problem_is_refused(task: Task, teacher: Teacher) -> N
 def test_a_grasp_that_lifts_nothing_is_not_kept_as_solved(
     task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lab.production.run.try_out", lambda *_: "slice 1 is not in the gripper")
+    monkeypatch.setattr("lab.skills.trial.try_out", lambda *_: "slice 1 is not in the gripper")
     bad = teach_one(task, "grasp", teacher)
     assert (bad["solved"], bad["failure"]) == (False, "slice 1 is not in the gripper")
     assert [(row["name"], row["solved"]) for row in teacher.toolbox.list()] == [(bad["saved_as"], False)]
     monkeypatch.undo()
     good = teach_one(task, "grasp", teacher)
     assert [(row["name"], row["solved"]) for row in teacher.toolbox.list()] == [(good["saved_as"], True)]
-    monkeypatch.setattr("lab.production.run.try_out", lambda *_: "slice 1 is not in the gripper")
+    monkeypatch.setattr("lab.skills.trial.try_out", lambda *_: "slice 1 is not in the gripper")
     worse = teach_one(task, "grasp", teacher)
     assert worse["saved_as"] == f"{good['saved_as']} unfinished"
     assert {row["name"]: row["solved"] for row in teacher.toolbox.list()} == {
@@ -155,7 +155,7 @@ def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lab.production.run.try_grasp", stop)
+    monkeypatch.setattr("lab.skills.trial.try_out", stop)
     with pytest.raises(KeyboardInterrupt):
         teach_one(task, "grasp", teacher)
     (row,) = teacher.toolbox.list()
@@ -180,7 +180,7 @@ def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
 def test_bad_words_are_refused_before_the_scene_is_surveyed(
     task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch, subtask: str, options: dict[str, Any], reason: str
 ) -> None:
-    monkeypatch.setattr("lab.production.prepared.prepare", lambda *_: pytest.fail("surveyed"))
+    monkeypatch.setattr("lab.skills.prepared_scene.prepare", lambda *_: pytest.fail("surveyed"))
     with pytest.raises(BadInput, match=reason):
         teach_one(task, subtask, teacher, **options)
     assert not teacher.toolbox.folder.exists()

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lab.production.skillset import SkillSet
 from lab.sim.scene import Layout, check_apart, draw_layout
 from lab.skills.skill import Problem
+from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Task, check_toasts
 
