@@ -14,7 +14,7 @@ from lab.sequencing.search import LearnedSequence, Search
 
 @dataclass(frozen=True)
 class MonteCarloResult(LearnedSequence):
-    """A sequencer's result, and what was learned: `q` by state and decision (see `keys.key_of`), where visited."""
+    """A sequencer's result, and what was learned: `q` by state and decision (see `state_keys.key_of`), where visited."""
 
     q: Table
 

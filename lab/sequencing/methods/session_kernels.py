@@ -88,7 +88,7 @@ def _state_number(keys: Any, run: Any) -> int:
 
 @inner
 def _key(cell: Any, keys: Any, run: Any, state: int, i: int) -> Any:
-    """`keys.key_of`: of the i-th allowed decision in a state of this number."""
+    """`state_keys.key_of`: of the i-th allowed decision in a state of this number."""
     part, o = (run.allowed[i] - 1) % len(run.locations), run.options[i]
     here, there = run.locations[part], cell.to[o]
     if keys.pairs:

@@ -18,7 +18,7 @@ class SrlResult(LearnedSequence):
     """A sequencer's result, and what SRL learned.
 
     `cost` and `sequence` are the best found in any episode; `final_cost` is the greedy policy's at the end, with the
-    cell's own times. `log_q`: natural logarithm of Q by state and decision (see `keys.key_of`; decision 0: of the
+    cell's own times. `log_q`: natural logarithm of Q by state and decision (see `state_keys.key_of`; decision 0: of the
     state itself), for what was visited.
     """
 

@@ -1,4 +1,4 @@
-"""The simulation of a cell, compiled with numba; held equal to `run`, `chance` and `objectives`. `episodes` learns in it."""
+"""The simulation of a cell, compiled with numba; held equal to `run`, `chance` and `objectives`. Sessions learn in it."""
 
 from math import cos, log, pi, sqrt
 from typing import Any
