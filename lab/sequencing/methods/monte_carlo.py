@@ -6,9 +6,9 @@ import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
-from lab.sequencing.methods.sessions import GreedyLearner, Table, Values, learn
+from lab.sequencing.methods.session_readable import GreedyLearner, Table, Values, learn
+from lab.sequencing.methods.session_updates import average, gain
 from lab.sequencing.methods.state_keys import Key
-from lab.sequencing.methods.updates import average, gain
 from lab.sequencing.search import LearnedSequence, Search
 
 
