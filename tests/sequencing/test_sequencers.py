@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.sequencing import SEQUENCERS, find_sequence
+from lab.sequencing import SEQUENCERS, Sequencer, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, cost
 from lab.sequencing.methods.exact import optimum
@@ -101,3 +101,16 @@ def test_an_unknown_method_lists_the_known_ones(oven_cell: CellMaker) -> None:
         BadInput, match=rf"^unknown method 'srrl' .--method.: did you mean 'srl'. known: {', '.join(NAMES)}$"
     ):
         find_sequence(oven_cell(), "srrl", Search(5), 0)
+
+
+def test_a_method_is_one_row(oven_cell: CellMaker, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A method of somebody else's, with its row: it is found, and named among the known ones."""
+
+    def one_by_one(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
+        sequence = tuple(part for part in range(1, cell.parts + 1) for _ in range(2))
+        return SequenceResult(sequence, simulate(cell, sequence).makespan_s, ())
+
+    monkeypatch.setattr("lab.sequencing.SEQUENCERS", {**SEQUENCERS, "one-by-one": Sequencer(lambda: one_by_one)})
+    assert find_sequence(oven_cell(2), "one-by-one", Search(1), 0).cost == 29.0
+    with pytest.raises(BadInput, match="did you mean 'one-by-one'"):
+        find_sequence(oven_cell(2), "one-by-on", Search(1), 0)
