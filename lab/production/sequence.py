@@ -134,13 +134,13 @@ def sequence_cell(
     BadInput for an unknown method or objective, and for an objective that the cell has no times for.
     """
     method = wanted.method or settings.method
+    check_method(method)
     search = search_for(
         settings,
         episodes=wanted.episodes,
         objective=wanted.objective,
         chance=chance if wanted.stochastic and SEQUENCERS[method].drawn else NO_CHANCE,
     )
-    check_method(method)
     check_objective(search.objective, cell)
     known = reference(cell, search.objective)
     found = []

@@ -17,7 +17,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.exact_values import ExactValues
-from lab.sequencing.methods.sessions import Guide, learn_readably
+from lab.sequencing.methods.session_readable import Guide, learn_readably
 from lab.sequencing.methods.srl import Srl
 from lab.sequencing.search import LearnedSequence, Search
 from lab.sequencing.simulate.run import Run

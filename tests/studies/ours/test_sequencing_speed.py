@@ -5,7 +5,7 @@ from math import inf
 
 import pytest
 
-from lab.sequencing.exact import optimum
+from lab.sequencing.methods.exact import optimum
 from lab.studies.ours import sequencing_speed as speed_study
 from lab.studies.ours.sequencing_speed import RATE, SECONDS, sequencing_speed
 from lab.studies.runner import Job
