@@ -82,14 +82,17 @@ def run_session(
     return session.result(interrupted)
 
 
-def check_members(learner: LearnerSettings, gate: GateSettings) -> None:
-    """Raises BadInput for an unknown learner, selection or gate."""
-    if learner.learner not in UPDATES:
-        raise unknown("learner", learner.learner, UPDATES, "learner settings")
-    if learner.selection not in SELECTIONS:
-        raise unknown("selection", learner.selection, SELECTIONS, "learner settings")
-    if gate.gate not in GATES:
-        raise unknown("gate", gate.gate, GATES, "gate settings")
+def check_members(
+    learner: LearnerSettings, gate: GateSettings, where: tuple[str, str] = ("learner settings", "gate settings")
+) -> None:
+    """Raises BadInput for an unknown learner, selection or gate; `where`: where the learner and the gate came from."""
+    for kind, name, table, source in (
+        ("learner", learner.learner, UPDATES, where[0]),
+        ("selection", learner.selection, SELECTIONS, where[0]),
+        ("gate", gate.gate, GATES, where[1]),
+    ):
+        if name not in table:
+            raise unknown(kind, name, table, source)
 
 
 class _Session:
