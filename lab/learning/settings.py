@@ -21,11 +21,12 @@ def _checked(kind: type) -> Any:
     return create_model(kind.__name__, __config__=ConfigDict(strict=True), **fields)
 
 
-def _require_allowed(settings: object) -> None:
+def _require_allowed(settings: Any) -> None:
     """Raises BadInput for the first field that has the wrong type or lies outside its annotated range; numbers become plain."""
     from pydantic import ValidationError
 
-    model = _checked(type(settings))
+    kind: Any = type(settings)
+    model = _checked(kind)
     try:
         vars(settings).update(vars(model.model_validate(vars(settings))))
     except ValidationError as error:
