@@ -101,7 +101,7 @@ def _one_by_one(
     for n, seed in enumerate(seeds):
         draw = splitmix.stream(int(seed))
         advisor = None if advice is None else TableAdvisor(advice, draw)
-        one = run_session(mdp, learner, gate, advisor, np.random.default_rng(0), draw=draw)
+        one = run_session(mdp, learner, gate, advisor, draw)
         if one.interrupted:
             raise KeyboardInterrupt
         found.steps[n], found.guided[n], found.moves[n] = one.steps, one.guided, one.visits.sum()
