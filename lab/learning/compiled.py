@@ -56,6 +56,11 @@ def inner(function: Function, **options: Any) -> Function:
     return jitted
 
 
+def inlined(function: Function) -> Function:
+    """For what lean functions call in every step: becomes part of its callers, so that handing records on costs nothing."""
+    return inner(function, forceinline=True)
+
+
 def cache_folder() -> Path:
     """The folder "compiled" in the user's cache folder, or "teaching-lab" in NUMBA_CACHE_DIR where that is set."""
     if _CONFIG.CACHE_DIR:
