@@ -10,10 +10,10 @@ import typer
 
 from lab import __version__
 from lab.cli import glossary, replay, run, see, sequence, study, task, teach, toolbox, view
-from lab.cli.interrupt import ctrl_c_is_heard
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError
 
+INTERRUPTED = 130
 STOPPED = "stopped by Ctrl-C; what was learned is kept"
 GROUPS = {
     "toolbox": "The policies that were learned.",
@@ -61,7 +61,7 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
         except LabError as error:
             end(str(error), error.exit_code)
         except KeyboardInterrupt as stopped:
-            end(str(stopped) or STOPPED, 130)
+            end(str(stopped) or STOPPED, INTERRUPTED)
         except BrokenPipeError:
             silence()
             end("", 1)
@@ -99,20 +99,18 @@ def made() -> typer.Typer:
     return app
 
 
-def main() -> None:
-    """The `lab` command; typer's own complaints come in one line, too."""
+def run() -> int:
+    """Runs the command that `sys.argv` holds; its exit code. typer's own complaints come in one line, too."""
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: a name must not end a command
     begin()
     try:
-        with ctrl_c_is_heard():
-            code = made()(prog_name="lab", standalone_mode=False)
-    except (KeyboardInterrupt, typer.Abort):  # before any command had begun
-        fail("stopped by Ctrl-C", 130)
-        code = 130
+        code = made()(prog_name="lab", standalone_mode=False) or 0
     except Exception as error:
         code = _usage(error)
-    sys.exit(code if isinstance(code, int) else 0)
+    if code == INTERRUPTED:  # typer's word for Ctrl-C before the command had begun; a command ends by itself
+        raise KeyboardInterrupt
+    return int(code)
 
 
 def _usage(error: Exception) -> int:
