@@ -114,7 +114,8 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
 
 def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher, listener: Listener) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
-    from lab.production.run import prepare, teach_all
+    from lab.production.prepared import prepare
+    from lab.production.run import teach_all
 
     objective = wanted.objective or task.sequencing.objective
     if objective in WITH_DUE_TIMES:

@@ -33,7 +33,7 @@ from lab.tasks.task_file import load, load_cell
 from lab.teaching.listener import Listener
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
-from lab.vision.pictures import read_picture
+from lab.vision import read_picture
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 CONTRACT = {  # what CLI.md promises
@@ -645,7 +645,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int, int]]:
         route = (Stage("in"), Stage("hot"), Stage("out"))
         return SimpleNamespace(cell=Cell.alike(stations, route, step, 2 * step, "in", toasts))
 
-    monkeypatch.setattr("lab.production.run.prepare", prepare)
+    monkeypatch.setattr("lab.production.prepared.prepare", prepare)
     monkeypatch.setattr("lab.production.run.teach_all", cell)
     return prepared
 

@@ -111,7 +111,7 @@ class InsertEnv(TableEnv):
         slices = min(2, *(found.station(stage.station).capacity for stage in (found.route[0], found.route[-1])))
         layout = draw_layout(found, slices, np.random.default_rng([layout_seed, 1]))  # as for a lesson of this seed
         problem = Insert(station).setup(Surveys(found, layout))
-        super().__init__(problem.mdp, found.subtask("insert").learner.max_steps, render_mode)
+        super().__init__(problem.mdp, found.subtask(Insert.subtask).learner.max_steps, render_mode)
 
 
 class CellEnv(gymnasium.Env[Any, Any]):

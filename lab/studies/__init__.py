@@ -149,7 +149,7 @@ def run_study(name: str, job: "Job", out: Path, advisor_table: str | None = None
     advisor_table: one of TABLES. BadInput for an unknown study or advisor table and for a folder that cannot be;
     WorkFailed when it cannot be written.
     """
-    from lab.production.report import check_out
+    from lab.files import check_out
     from lab.studies.runner import STORE
 
     if name not in STUDIES:

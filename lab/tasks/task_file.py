@@ -18,7 +18,7 @@ from lab.tasks.toml_text import TomlText, explain
 
 MAX_TOASTS = 50
 RESERVED = ("robot", "table", "insert", "the slice", "carried slice")  # names of other things in the cell
-RESERVED_STARTS = ("slice ", "toast ", "toasted ", "butter ", "robot ")
+RESERVED_STARTS = ("slice ", "toast ", "toasted ", "robot ")
 RESERVED_ENDS = (" marker", " column", " head")
 MOST_THINGS = 200  # stations, stages or obstacles: on one table is no room for more
 _SAYS_WORLD = re.compile(r"""^[ \t]*kind[ \t]*=[ \t]*["']world["']""", re.MULTILINE)

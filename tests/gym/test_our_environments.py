@@ -14,7 +14,7 @@ from lab.cellfile import CellFile
 from lab.errors import BadInput
 from lab.gym import ENVIRONMENTS, CellEnv, FmsEnv, TableEnv, ToastCellEnv, WorldEnv, register
 from lab.mdp import coverage, grid
-from lab.production.run import prepare
+from lab.production.prepared import prepare
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.methods.exact import optimum

@@ -185,8 +185,8 @@ def test_all_that_moves_the_arm_is_in_the_key() -> None:
     assert here <= found.texts.keys()
     assert {
         "lab.mdp",
-        "lab.vision.pictures",
-        "lab.vision.overhead",
+        "lab.vision.markers",
+        "lab.vision.grid_view",
         "lab.production.skillset",
         "lab.production.floor",
     } <= found.texts.keys()

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.mdp import FloatArray, TabularMDP, grid
-from lab.production.run import prepare
+from lab.production.prepared import prepare
 from lab.seat.stage import SkillStage, Stage, WorldStage, stage_of
 from lab.seat.stage.markers import TRAIL, camera_for
 from lab.seat.stage.world_stage import MOST_OBSTACLES, WORLD_M
