@@ -9,9 +9,9 @@ def main() -> None:
 
     try:
         with ctrl_c_is_heard():
-            from lab.cli.app import run
+            from lab.cli.app import called
 
-            code = run()
+            code = called()
     except KeyboardInterrupt:  # before any command had begun
         from lab.cli.output import fail
 

@@ -99,7 +99,7 @@ def made() -> typer.Typer:
     return app
 
 
-def run() -> int:
+def called() -> int:
     """Runs the command that `sys.argv` holds; its exit code. typer's own complaints come in one line, too."""
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: a name must not end a command

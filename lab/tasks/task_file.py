@@ -4,7 +4,7 @@ import re
 from itertools import combinations
 from math import hypot
 from pathlib import Path
-from typing import Annotated, Literal, Self, TypeVar, cast, get_args
+from typing import Annotated, Any, Literal, Self, TypeVar, cast, get_args
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
@@ -263,6 +263,15 @@ def load_any(word: str, wanted: Kind | None = None) -> Task | CellFile | GridWor
     if kind == "cell":
         return CellFile.checked(toml)
     return _checked(Task, toml) if kind == "task" else _checked(GridWorld, toml)
+
+
+def describe(word: str) -> tuple[str, dict[str, Any]]:
+    """The text of a task, a cell or a world, and the document of `lab task show --json`; a drawn world has no "file"."""
+    found = load_any(word)
+    if isinstance(found, GridWorld) and word.startswith(RANDOM):
+        return found.to_toml(), {"file": None, **found.model_dump(mode="json")}
+    path = find(word)
+    return read_text(path), {"file": str(path), **found.model_dump(mode="json")}
 
 
 def _check_wanted(word: str, kind: Kind, wanted: Kind | None) -> None:
