@@ -33,7 +33,7 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "meshcat": {"lab.view.meshcat"},
     "cv2": {"lab.vision.markers", "lab.vision.picture_files", "lab.sim.camera"},
     "PIL": set(),
-    "numba": {"lab.learning.compiled", "lab.learning.kernels"},  # what is kept of it is kept in one place
+    "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
     "ortools": {"lab.sequencing.methods.cp_sat", "lab.sequencing.methods.cp_sat_model"},
     "pymoo": {"lab.sequencing.methods.genetic"},
     "starlette": {"lab.view.server", "lab.view.server_page"},

@@ -29,7 +29,7 @@ class SessionResult:
 
     q (S, A) float64, visits (S, A) int64; steps (episodes,) int64, a failed episode as max_steps + 1; guided
     (episodes,) bool: at least one advised step; requests: episodes in which the learner asked; helped_steps:
-    advised steps that were carried out; misleads and rejected_at_episode: see lab/learning/gates.py; final_steps:
+    advised steps that were carried out; misleads and rejected_at_episode: see lab/learning/gates; final_steps:
     those of the greedy path from the start, None if it does not reach the goal, optimal_steps: the fewest, None where
     nobody knows them, both counted as in `steps`; solved: see `Environment.judge`; interrupted: stopped by Ctrl-C, only
     finished episodes count.
@@ -110,13 +110,13 @@ class _Session:
         self.environment, self.mdp, self.settings, self.gate_settings = environment, environment.mdp, learner, gate
         self.advisor, self.advised, self.tell = advisor, advisor is not None, on_event
         mdp = self.mdp
-        self.update = UPDATES[learner.learner](_start_values(mdp, q0).tolist(), learner, mdp)
+        self.update = UPDATES[learner.learner].make(_start_values(mdp, q0).tolist(), learner, mdp)
         self.q = self.update.q
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
-        self.choose, self.draw = SELECTIONS[learner.selection], draw
+        self.choose, self.draw = SELECTIONS[learner.selection].make, draw
         several_starts = bool(mdp.starts) or not isinstance(environment, TableEnvironment)
         around = Surroundings(draw, self._others, several_starts)
-        make = GATES[gate.gate if self.advised else "never"]
+        make = GATES[gate.gate if self.advised else "never"].make
         self.gate = make(gate, learner.episodes, learner.max_steps, around)
         self.max_moves = learner.max_steps - learner.count_start
         self.recall = Recall(mdp.n_states, self.max_moves, learner.episodes, gate.window) if gate.memory else None
@@ -134,7 +134,7 @@ class _Session:
 
     def _others(self, tables: int) -> list[Update]:
         """Learners like this one whose start values are drawn within +-0.5."""
-        make, (states, actions) = UPDATES[self.settings.learner], self.mdp.successor.shape
+        make, (states, actions) = UPDATES[self.settings.learner].make, self.mdp.successor.shape
         others = [make([[0.0] * actions for _ in range(states)], self.settings, self.mdp) for _ in range(tables)]
         for other in others:
             other.scatter(self.draw)

@@ -141,7 +141,7 @@ def advised_srl(
     BadInput for a gate that does not judge by episodes, and as `srl` does. Source: thesis 10.2.1 iii with fig. 6.2.
     """
     check_advice("none", gate.gate)
-    session = _Advised(GATES[gate.gate](gate, search.episodes, NEVER_REACHED, None), gate, advisor)
+    session = _Advised(GATES[gate.gate].make(gate, search.episodes, NEVER_REACHED, None), gate, advisor)
     learned = learn_readably(cell, search, kernel_seed(rng), Srl, session)
     log = learned.log
     log.check(cell)
