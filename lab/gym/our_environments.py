@@ -8,13 +8,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from lab.cellfile import order_from_word, toast_case
 from lab.mdp import FloatArray, TabularMDP
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
 from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.cell.routes import entry
 from lab.sequencing.simulate.run import Run
+from lab.tasks.cell import order_from_word, toast_case
 from lab.tasks.task_file import load, load_cell, load_world
 
 ROOM = 10  # an episode in a cell may take so many times the decisions that its parts need at most

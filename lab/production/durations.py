@@ -17,7 +17,7 @@ from lab.production.prepared import Prepared
 from lab.production.skillset import route, stations
 from lab.production.sources import sources
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.routes import Moves
+from lab.sequencing.cell.routes import NeededMoves
 from lab.sim.scene import Layout
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
@@ -57,7 +57,7 @@ class Durations:
         }
 
     @classmethod
-    def from_json(cls, record: Mapping[str, Any], moves: Moves, processes: Sequence[str]) -> "Durations":
+    def from_json(cls, record: Mapping[str, Any], moves: NeededMoves, processes: Sequence[str]) -> "Durations":
         """What `to_json` wrote of these moves and of the stations with a process to learn.
 
         BadInput for a move or station too many or too few, and for what is no time [s].
@@ -145,7 +145,7 @@ def cell_of(task: Task, durations: Durations, toasts: int) -> Cell:
     return Cell.alike(places, route(task), tables[0], tables[1], task.robot.start, toasts)
 
 
-def kept_durations(toolbox: Toolbox, key: str, task: Task, moves: Moves) -> Durations | None:
+def kept_durations(toolbox: Toolbox, key: str, task: Task, moves: NeededMoves) -> Durations | None:
     """The durations kept under a key, None when there are none; BadInput for a record that does not hold them."""
     record = toolbox.load_record(RECORDS, key)
     if record is None:
@@ -157,7 +157,7 @@ def kept_durations(toolbox: Toolbox, key: str, task: Task, moves: Moves) -> Dura
 
 
 def durations_key(
-    task: Task, layout: Layout, moves: Moves, policies: Mapping[str, Policy], modules: Sequence[str] = MEASURED_BY
+    task: Task, layout: Layout, moves: NeededMoves, policies: Mapping[str, Policy], modules: Sequence[str] = MEASURED_BY
 ) -> str:
     """A hash of all that the durations depend on: task, layout, moves, policies, assets, source and libraries.
 

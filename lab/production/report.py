@@ -14,8 +14,8 @@ from lab.production.composer import Outcome
 from lab.production.durations import Durations
 from lab.production.prepared import Prepared
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.methods.exact import Optimum
+from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Recording
 from lab.skills import Skill

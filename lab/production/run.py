@@ -5,16 +5,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from lab.errors import LabError
-from lab.planner import find_sequence, search_for
 from lab.production.composer import carry_out
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
 from lab.production.floor import try_out
 from lab.production.prepared import Prepared
 from lab.production.recorder import Viewer, show_scene
 from lab.production.report import Report, Taught, write_files
+from lab.sequencing import find_sequence
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Reference
 from lab.skills.skill import Problem
+from lab.tasks.sequencing import search_for
 from lab.teaching.listener import Listener
 from lab.teaching.teacher import Teacher, Trial
 from lab.toolbox.policy import Policy

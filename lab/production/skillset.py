@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import needed_moves
-from lab.sequencing.cell.routes import Moves
+from lab.sequencing.cell.routes import NeededMoves
 from lab.sequencing.cell.stations import Product, Route, Stage, Station
 from lab.skills import SKILLS, Skill
 from lab.tasks.task_file import Task
@@ -24,7 +24,7 @@ class SkillSet:
     """
 
     task: Task
-    moves: Moves
+    moves: NeededMoves
     skills: dict[str, Skill] = field(default_factory=dict)
     legs: dict[Pair, Skills] = field(default_factory=dict)
     travels: dict[Pair, Skills] = field(default_factory=dict)

@@ -8,12 +8,12 @@ from typing import Annotated, Any, Literal, Self, TypeVar, cast, get_args
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from lab.cellfile import CellFile
-from lab.cellparts import Sequencing
 from lab.errors import BadInput, unknown
 from lab.files import tasks_folder
+from lab.tasks.cell import CellFile
 from lab.tasks.grid_world import RANDOM, GridWorld, from_text, from_words
 from lab.tasks.record import MAX_SHORT_BYTES, Count, Learned, Name, Record, as_tuple, read_text
+from lab.tasks.sequencing import Sequencing
 from lab.tasks.toml_text import TomlText, explain
 
 MAX_TOASTS = 50
