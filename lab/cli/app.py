@@ -9,7 +9,8 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from lab import __version__
-from lab.cli import glossary, replay, run, see, sequence, study, task, teach, toolbox, view
+from lab.cli import replay, run, see, sequence, study, task, teach, toolbox, view
+from lab.cli.families import CommandOfFamilies
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError
 
@@ -23,7 +24,7 @@ GROUPS = {
 
 
 class Command(NamedTuple):
-    """What a command calls, an example of its use, and what its help says below that."""
+    """What a command calls, an example of its use, and what its help says below that (see `lab.cli.families`)."""
 
     function: Callable[..., None]
     example: str
@@ -32,9 +33,11 @@ class Command(NamedTuple):
 
 COMMANDS = {  # what is typed after `lab` -> the command
     "run": Command(run.run, "lab run toast --toasts 3"),
-    "teach": Command(teach.teach, "lab teach insert --advisor terminal", glossary.help_text()),
+    "teach": Command(teach.teach, "lab teach insert --advisor terminal", "{words of teaching}"),
     "replay": Command(replay.replay, "lab replay lesson"),
-    "sequence": Command(sequence.sequence, "lab sequence toast --case II --toasts 4 --gantt order.svg"),
+    "sequence": Command(
+        sequence.sequence, "lab sequence toast --case II --toasts 4 --gantt order.svg", "{words of sequencing}"
+    ),
     "see": Command(see.see, "lab see overhead.png --task toast"),
     "view": Command(view.view, "lab view toast"),
     "toolbox list": Command(toolbox.toolbox_list, "lab toolbox list"),
@@ -93,7 +96,7 @@ def made() -> typer.Typer:
     for words, command in COMMANDS.items():
         group, _, name = words.rpartition(" ")
         epilog = "\n\n".join(filter(None, [f"Example: {command.example}", command.more]))
-        (groups[group] if group else app).command(name, epilog=epilog)(guarded(command.function))
+        (groups[group] if group else app).command(name, cls=CommandOfFamilies, epilog=epilog)(guarded(command.function))
     for name, group_app in groups.items():
         app.add_typer(group_app, name=name)
     return app

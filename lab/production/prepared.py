@@ -11,8 +11,7 @@ from lab.sim.scene import Layout, check_apart, draw_layout
 from lab.skills.skill import Problem
 from lab.skills.surveys import Surveys
 from lab.tasks.grid_world import RANDOM, GridWorld
-from lab.tasks.task_file import Task, check_number, check_toasts, find, load_any
-from lab.teaching.lesson import fitting
+from lab.tasks.task_file import Task, check_number, check_toasts, find, fitting, load_any
 
 
 @dataclass

@@ -324,3 +324,8 @@ def check_toasts(toasts: int, task: Task) -> None:
             raise BadInput(
                 f"{toasts} toasts (--toasts) do not fit on '{stage.station}': its capacity in the task file is {capacity}"
             )
+
+
+def fitting(task: Task, wanted: int) -> int:
+    """As many toasts as wanted, or as both ends of the route hold."""
+    return min(wanted, *(task.station(stage.station).capacity for stage in (task.route[0], task.route[-1])))
