@@ -203,9 +203,13 @@ def test_the_package_itself_imports_nothing() -> None:
     assert house()["lab"][1] == []
 
 
+def test_ctrl_c_is_heard_before_anything_is_loaded() -> None:
+    assert not [item.target for item in house()["lab.cli"][1] if item.at_load]
+
+
 def test_starting_the_command_loads_nothing_heavy() -> None:
-    """From lab.cli along module-level imports no heavy library is reached, or `lab --help` takes seconds."""
-    pending, seen = ["lab.cli"], set[str]()
+    """From lab.cli.app along module-level imports no heavy library is reached, or `lab --help` takes seconds."""
+    pending, seen = ["lab.cli.app"], set[str]()
     while pending:
         module = pending.pop()
         if module in seen or module not in house():

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from lab.cli.families import offers
 from lab.cli.lessons import lesson_room, teacher_of
 from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Plain, Port, Seed, ShowPage, ToolboxFolder, Wait
 from lab.cli.output import end, show
@@ -19,15 +20,11 @@ def sequence(
     toasts: Annotated[int | None, typer.Option("--toasts", "-n", help="How many parts of the only product.")] = None,
     method: Annotated[
         str | None,
-        typer.Option(
-            "--method", help="srl (as printed), srl-time, mc, random, fifo, ga, exact, ...; default: the file's."
-        ),
+        typer.Option("--method", help="{methods}; default: the file's.", autocompletion=offers("methods")),
     ] = None,
     objective: Annotated[
         str | None,
-        typer.Option(
-            "--objective", help="makespan, mean-tardiness, tardy-parts, robot-idle, machine-idle; default: the file's."
-        ),
+        typer.Option("--objective", help="{objectives}; default: the file's.", autocompletion=offers("objectives")),
     ] = None,
     episodes: Annotated[
         int | None,
@@ -44,10 +41,13 @@ def sequence(
         str,
         typer.Option(
             "--advisor",
-            help="Who srl may ask which part to move: expert, moderate, limited, novice, tau=X, wrong, terminal, web.",
+            help="Who srl may ask which part to move: {orderers}.",
+            autocompletion=offers("orderers"),
         ),
     ] = "none",
-    gate: Annotated[str, typer.Option("--gate", help="When srl asks: ccrl, always, never.")] = "ccrl",
+    gate: Annotated[
+        str, typer.Option("--gate", help="When srl asks: {order gates}.", autocompletion=offers("order gates"))
+    ] = "ccrl",
     plot: Annotated[
         Path | None, typer.Option("--plot", help="A .png or .svg file for the costs of the episodes.")
     ] = None,

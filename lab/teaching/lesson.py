@@ -18,7 +18,7 @@ from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.mdp import greedy_path
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.record import write_whole
-from lab.tasks.task_file import Task, check_toasts, is_path, load, load_world, names_file, names_of
+from lab.tasks.task_file import Task, check_toasts, fitting, is_path, load, load_world, names_file, names_of
 from lab.teaching.kept_session import KeptSession, NewSession, Words, check_new
 from lab.teaching.teacher import Audience, Interrupted, Lesson, Teacher, check_name, world_problem
 from lab.toolbox.registry import Toolbox, default_folder
@@ -346,8 +346,3 @@ def find_skill(skills: "dict[str, Skill]", name: str) -> "Skill":
     allowed = f"{', '.join(subtasks)}, or one skill's full name, such as '{next(iter(skills))}'"
     allowed += f", or a world: {', '.join(worlds)}"
     raise BadInput(f"unknown sub-task '{name}' (SUBTASK):{hint} known: {allowed}")
-
-
-def fitting(task: Task, wanted: int) -> int:
-    """As many toasts as wanted, or as both ends of the route hold."""
-    return min(wanted, *(task.station(stage.station).capacity for stage in (task.route[0], task.route[-1])))

@@ -13,9 +13,9 @@ from lab.learning.requests import AdviceRequest
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.skills import Butter, Grasp, Skill
 from lab.tasks.grid_world import GridWorld, View
-from lab.tasks.task_file import Task, load
+from lab.tasks.task_file import Task, fitting, load
 from lab.teaching.kept_session import Words
-from lab.teaching.lesson import find_skill, fitting, teach, teach_one, teach_world
+from lab.teaching.lesson import find_skill, teach, teach_one, teach_world
 from lab.teaching.teacher import Interrupted, Teacher
 from lab.toolbox.registry import Toolbox
 from lab.vision import read_picture
