@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from lab.errors import WorkFailed
-from lab.gym.found_model import SAME_REWARD, Policy, Worth
-from lab.gym.live import Live, Moved
-from lab.gym.table_of_gym import believed, table_of
+from lab.gym.gym_table import believed, table_of
+from lab.gym.numbered_environment import Live, Moved
+from lab.gym.transition_model import SAME_REWARD, Policy, Worth
 from lab.learning.environment import Judged, Step
 from lab.learning.selection import Draw
 from lab.learning.session import run_session

@@ -6,9 +6,9 @@ from typing import Literal, Self
 from pydantic import PrivateAttr
 
 from lab.errors import BadInput, counted
+from lab.gym.environment_name import parse_name
 from lab.gym.gym_environment import ALONE, GymEnvironment
-from lab.gym.live import Live
-from lab.gym.made import parse_name
+from lab.gym.numbered_environment import Live
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.skills.skill import Problem
 from lab.tasks.record import Learned

@@ -24,8 +24,8 @@ from lab.toolbox.policy import Policy
 from lab.view.progress import RunProgress
 
 if TYPE_CHECKING:
+    from lab.seat.lesson_scene import Stage
     from lab.seat.page.teaching_page import SeatPage
-    from lab.seat.stage import Stage
     from lab.sequencing.methods.srl_advised import SequenceRequest
 
     OrderAsk = Callable[[SequenceRequest], int | None]
@@ -136,7 +136,7 @@ class Classroom(Audience):
         self.leave()
         if self._page is None:
             return
-        from lab.seat.stage import stage_of
+        from lab.seat.lesson_scene import stage_of
 
         self._stage = stage_of(where, problem)
         if self._stage is not None:

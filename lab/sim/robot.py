@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from lab.errors import WorkFailed
 from lab.files import assets_folder
 from lab.sim import kinematics
-from lab.sim.assets import FINGER_OPEN
 from lab.sim.kinematics import ToolPose
+from lab.sim.models import FINGER_OPEN
 from lab.sim.world import TIME_STEP, World
 
 NAME = "robot"

@@ -9,7 +9,7 @@ import numpy as np
 
 from lab.errors import BadInput
 from lab.files import assets_folder
-from lab.sim import assets, kinematics
+from lab.sim import kinematics, models
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import Robot
 from lab.sim.world import World
@@ -46,7 +46,7 @@ class Spot:
 
     def grasp(self) -> ToolPose:
         """The tool pose that holds a slice standing here."""
-        return ToolPose(self.x, self.y, self.z + assets.SLICE[2] - GRASP_DEPTH, self.yaw)
+        return ToolPose(self.x, self.y, self.z + models.SLICE[2] - GRASP_DEPTH, self.yaw)
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def floor(station: Station) -> float:
     """How high a slice's foot is above the table at this station [m]."""
     if station.kind != "machine":
         return SLAB
-    return assets.APPLIER_FLOOR if is_applier(station) else assets.TOASTER_FLOOR
+    return models.APPLIER_FLOOR if is_applier(station) else models.TOASTER_FLOOR
 
 
 def spots(station: Station) -> list[Spot]:
@@ -152,7 +152,7 @@ def _kept_free(task: Task, toasts: int) -> list[tuple[str, Rectangle]]:
     for station in task.stations:
         x, y, yaw = station.pose
         if station.kind == "machine":
-            length, width, off = APPLIER_BASE if is_applier(station) else (*assets.TOASTER[:2], 0.0)
+            length, width, off = APPLIER_BASE if is_applier(station) else (*models.TOASTER[:2], 0.0)
             body = Rectangle(x - sin(yaw) * off, y + cos(yaw) * off, length / 2, width / 2, yaw)
             kept.append((station.name, body))
             continue
@@ -189,7 +189,7 @@ class Scene:
             if model == "toaster":
                 at = marker_of_toaster(station)
                 self.world.disc(
-                    f"{station.name} marker", assets.MARKER_RADIUS, assets.MARKER_THICK, at, assets.MARKER_CYAN
+                    f"{station.name} marker", models.MARKER_RADIUS, models.MARKER_THICK, at, models.MARKER_CYAN
                 )
         else:
             self._build_slab(station)
@@ -216,14 +216,14 @@ class Scene:
         if in_camera_grid(self.task, place):
             at = (*place, edge * obstacle.cubes + MARKER_ABOVE)
             self.world.disc(
-                f"{obstacle.name} marker", assets.MARKER_RADIUS, assets.MARKER_THICK, at, assets.MARKER_GREEN
+                f"{obstacle.name} marker", models.MARKER_RADIUS, models.MARKER_THICK, at, models.MARKER_GREEN
             )
 
     def add_slice(self, name: str, spot: Spot, off: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Stand a slice called `name` on `spot`, `off` it by x, y [m] and yaw [rad]."""
         c, s = cos(spot.yaw), sin(spot.yaw)
         x, y, yaw = spot.x + c * off[0] - s * off[1], spot.y + s * off[0] + c * off[1], spot.yaw + off[2]
-        height = assets.SLICE[2]
+        height = models.SLICE[2]
         self.world.load(name, assets_folder() / "slice.urdf", (x, y, spot.z + height / 2 + 0.0005), yaw, fixed=False)
         self.world.mass(name, self.task.slices.mass_kg)
         self.world.friction(name, self.task.slices.friction, spinning=0.001)
@@ -241,18 +241,18 @@ def marker_of_toaster(station: Station) -> tuple[float, float, float]:
     x, y, yaw = station.pose
     c, s = cos(yaw), sin(yaw)
     off = marker_offset_of_toaster()
-    return (x + c * off[0] - s * off[1], y + s * off[0] + c * off[1], assets.TOASTER[2] + MARKER_ABOVE)
+    return (x + c * off[0] - s * off[1], y + s * off[0] + c * off[1], models.TOASTER[2] + MARKER_ABOVE)
 
 
 def marker_offset_of_toaster() -> tuple[float, float]:
     """The toaster's marker off its slot's middle, along and across the slot [m]."""
-    return (0.0, (assets.TOASTER[1] + assets.TOASTER_SLOT[1]) / 4)
+    return (0.0, (models.TOASTER[1] + models.TOASTER_SLOT[1]) / 4)
 
 
 def check_scene(task: Task) -> None:
     """BadInput when spots are out of the arm's reach, a machine holds more than a slice, or transfers would sweep slices."""
     low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
-    size = assets.SLICE
+    size = models.SLICE
     highest = max(floor(s) for s in task.stations) + size[2]
     if low - (size[2] - GRASP_DEPTH) < highest + 0.01:
         raise BadInput(
@@ -281,7 +281,7 @@ def _check_toaster(task: Task) -> None:
         raise BadInput(
             f"machines '{toasters[0]}' and '{toasters[1]}' both have processing_s: the camera's grid leads to one toaster"
         )
-    lowest = assets.TOASTER[2] + assets.SLICE[2] - GRASP_DEPTH + 0.005
+    lowest = models.TOASTER[2] + models.SLICE[2] - GRASP_DEPTH + 0.005
     if toasters and task.insert.height_m < lowest:
         raise BadInput(
             f"insert.height_m {task.insert.height_m}: a carried slice would hit the toaster, at least {lowest:.3f} needed"

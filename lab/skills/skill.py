@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import Environment
 from lab.mdp import NoPath, TabularMDP, greedy_path
-from lab.sim import assets
+from lab.sim import models
 from lab.sim.frames import Body
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME as ROBOT
@@ -66,20 +66,20 @@ class Bench:
         position, turn = self.scene.world.pose(name)
         yaw = 2.0 * atan2(float(turn[2]), float(turn[3]))
         half = (yaw + np.pi / 2) % np.pi - np.pi / 2
-        z = float(position[2]) + assets.SLICE[2] / 2 - GRASP_DEPTH
+        z = float(position[2]) + models.SLICE[2] / 2 - GRASP_DEPTH
         return ToolPose(float(position[0]), float(position[1]), z, float(half))
 
     def put_slice(self, name: str, pose: ToolPose) -> None:
         """Put a slice at once to where the tool at `pose` would hold it: to show a scene, without physics."""
-        up = pose.z + GRASP_DEPTH - assets.SLICE[2] / 2
+        up = pose.z + GRASP_DEPTH - models.SLICE[2] / 2
         turn = (0.0, 0.0, float(np.sin(pose.yaw / 2)), float(np.cos(pose.yaw / 2)))
         self.scene.world.put(name, (pose.x, pose.y, up), turn)
 
     def hold(self, name: str, pose: ToolPose) -> None:
         """Stand a new slice between the fingers of the tool that is at `pose`, and grip it."""
         scene = self.scene
-        scene.robot.open_at_once(assets.SLICE[1] / 2 + FINGERS_OFF_M)
-        scene.add_slice(name, Spot(pose.x, pose.y, pose.z + GRASP_DEPTH - assets.SLICE[2], pose.yaw))
+        scene.robot.open_at_once(models.SLICE[1] / 2 + FINGERS_OFF_M)
+        scene.add_slice(name, Spot(pose.x, pose.y, pose.z + GRASP_DEPTH - models.SLICE[2], pose.yaw))
         for _ in scene.robot.grip():
             scene.world.step()
         self.held = name

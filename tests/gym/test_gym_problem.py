@@ -21,9 +21,9 @@ from hypothesis.strategies import SearchStrategy
 from lab.advice.advisors import make_advisor, skill
 from lab.errors import BadInput, LabError, WorkFailed
 from lab.gym import GymWorld, gym_world, names_environment, parse_name
-from lab.gym.found_model import Model, Worth
 from lab.gym.gym_environment import ALONE, GymEnvironment
-from lab.gym.spaces import Numbering, Unsupported
+from lab.gym.space_numbering import Numbering, Unsupported
+from lab.gym.transition_model import Model, Worth
 from lab.learning.environment import Judged
 from lab.learning.selection import Draw, uniforms
 from lab.learning.session import SessionResult, run_session
@@ -281,7 +281,7 @@ def test_what_is_no_model_is_refused(outcomes: Any, starts: list[float]) -> None
 
 
 def test_values_that_do_not_settle_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lab.gym.found_model.MAX_SWEEPS", 1000)
+    monkeypatch.setattr("lab.gym.transition_model.MAX_SWEEPS", 1000)
     endless = Model({0: {0: [(1.0, 0, -1.0, False)]}}, np.ones(1), 1)
     assert endless.best == -np.inf
     with pytest.raises(WorkFailed, match=r"discount 1\.0 did not settle in 1000 sweeps"):

@@ -7,7 +7,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.mdp import greedy_path
-from lab.sim.assets import SLICE as SIZE
+from lab.sim.models import SLICE as SIZE
 from lab.sim.scene import Layout, spots
 from lab.skills import Insert, Place
 from lab.skills.insert import ACTIONS, IN_SLOT_M, SEEN_WITHIN_M

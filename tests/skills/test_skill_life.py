@@ -12,7 +12,7 @@ from lab.errors import WorkFailed
 from lab.mdp import NoPath, greedy_path, grid, shortest_steps
 from lab.production.durations import measure
 from lab.production.skillset import SkillSet
-from lab.seat.stage import SkillStage
+from lab.seat.lesson_scene import SkillStage
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Layout
 from lab.skills import SKILLS, Skill

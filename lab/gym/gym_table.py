@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from lab.gym.found_model import Model
-from lab.gym.live import Live
+from lab.gym.numbered_environment import Live
+from lab.gym.transition_model import Model
 from lab.mdp import FloatArray, TabularMDP
 
 STEPS_PROBED = 2000  # of a model, before it is believed

@@ -5,8 +5,8 @@ from math import isfinite
 from typing import Any, NamedTuple, Self
 
 from lab.errors import BadInput, WorkFailed
-from lab.gym.made import GymName, make, quiet, said
-from lab.gym.spaces import SUPPORTED, Numbering, Unsupported
+from lab.gym.environment_name import GymName, make, quiet, said
+from lab.gym.space_numbering import SUPPORTED, Numbering, Unsupported
 
 MAX_ENTRIES = 1_000_000  # states x actions
 

@@ -5,8 +5,8 @@ from math import hypot, radians
 
 import numpy as np
 
-from lab.seat.stage.markers import GREEN, STEP_S, Changes, Marks, camera_for, corners, vector
-from lab.sim import assets
+from lab.seat.lesson_scene.episode_trail import GREEN, STEP_S, Changes, Marks, camera_for, corners, vector
+from lab.sim import models
 from lab.sim.frames import Body, Camera, Frame, Rgba, Shape, Vector
 from lab.sim.scene import Layout, Scene, spots
 from lab.sim.world import World
@@ -66,7 +66,7 @@ class SkillStage:
         bench, skill = self._bench, self._skill
         if skill.carries:
             bench.held = SLICE
-            bench.scene.robot.open_at_once(assets.SLICE[1] / 2 + FINGERS_OFF_M)
+            bench.scene.robot.open_at_once(models.SLICE[1] / 2 + FINGERS_OFF_M)
         elif skill.near:
             bench.put_slice(SLICE, spots(task.station(skill.station))[0].grasp())
         if not skill.near:
@@ -77,7 +77,7 @@ class SkillStage:
         ghosts = {
             name: (spot, GHOST)
             for name, spot in neighbours(station, foot).items()
-            if all(hypot(spot.x - at.x, spot.y - at.y) > assets.SLICE[0] / 4 for at in slices)
+            if all(hypot(spot.x - at.x, spot.y - at.y) > models.SLICE[0] / 4 for at in slices)
         }
         if skill.carries:
             ghosts["goal"] = (foot, GREEN)

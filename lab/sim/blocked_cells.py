@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.files import assets_folder
-from lab.sim import assets
+from lab.sim import models
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME
 from lab.sim.scene import GRASP_DEPTH, NEAREST_M, Scene
@@ -44,7 +44,7 @@ class Surveyor:
         world = scene.world
         if loaded:
             world.load(CARRIED, assets_folder() / "slice.urdf", _AWAY, fixed=False)
-            scene.robot.open_at_once(assets.SLICE[1] / 2 + 0.0005)
+            scene.robot.open_at_once(models.SLICE[1] / 2 + 0.0005)
 
     def cause(self, pose: ToolPose) -> str:
         """'' when the tool can be at `pose`, else why not."""
@@ -61,7 +61,7 @@ class Surveyor:
         return ""
 
     def _carry(self, pose: ToolPose) -> None:
-        up = pose.z + GRASP_DEPTH - assets.SLICE[2] / 2
+        up = pose.z + GRASP_DEPTH - models.SLICE[2] / 2
         turn = (0.0, 0.0, float(np.sin(pose.yaw / 2)), float(np.cos(pose.yaw / 2)))
         self.scene.world.put(CARRIED, (pose.x, pose.y, up), turn)
 

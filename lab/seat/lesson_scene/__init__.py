@@ -6,8 +6,8 @@ right is to the right, forward is away from the viewer.
 
 from typing import TYPE_CHECKING, Protocol
 
-from lab.seat.stage.skill_stage import SkillStage
-from lab.seat.stage.world_stage import WorldStage
+from lab.seat.lesson_scene.skill_scene import SkillStage
+from lab.seat.lesson_scene.world_scene import WorldStage
 from lab.sim.frames import Body, Camera, Frame
 from lab.skills.skill import Problem
 from lab.tasks.grid_world import GridWorld

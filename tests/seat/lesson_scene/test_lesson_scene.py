@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from lab.mdp import FloatArray, TabularMDP, grid
 from lab.production.run import prepare
-from lab.seat.stage import SkillStage, Stage, WorldStage, stage_of
-from lab.seat.stage.markers import TRAIL, camera_for
-from lab.seat.stage.world_stage import MOST_OBSTACLES, WORLD_M
-from lab.sim import assets
+from lab.seat.lesson_scene import SkillStage, Stage, WorldStage, stage_of
+from lab.seat.lesson_scene.episode_trail import TRAIL, camera_for
+from lab.seat.lesson_scene.world_scene import MOST_OBSTACLES, WORLD_M
+from lab.sim import models
 from lab.sim.frames import Camera, Frame, Recording, Shape
 from lab.sim.kinematics import TOOL, ToolPose, inverse
 from lab.sim.scene import GRASP_DEPTH
@@ -268,7 +268,7 @@ def test_in_every_free_state_the_tool_is_at_the_pose_of_the_skill(name: str, dat
         return
     assert tool_of(frame) == pytest.approx(at(pose), abs=1e-6)
     if skill.carries:
-        middle = pose.shifted(dz=GRASP_DEPTH - assets.SLICE[2] / 2)
+        middle = pose.shifted(dz=GRASP_DEPTH - models.SLICE[2] / 2)
         assert place(frame, "slice 1") == pytest.approx(at(middle))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lab.mdp import FloatArray, TabularMDP
-from lab.seat.stage.markers import GREEN, STEP_S, Marks, camera_for, corners, upright, vector
+from lab.seat.lesson_scene.episode_trail import GREEN, STEP_S, Marks, camera_for, corners, upright, vector
 from lab.sim.frames import Body, Camera, Frame, Rgba, Shape, Vector
 from lab.tasks.grid_world import GridWorld
 
