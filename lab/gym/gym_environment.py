@@ -7,7 +7,7 @@ import numpy as np
 
 from lab.errors import WorkFailed
 from lab.gym.gym_table import believed, table_of
-from lab.gym.numbered_environment import Live, Moved
+from lab.gym.numbered_environment import Moved, NumberedEnvironment
 from lab.gym.transition_model import SAME_REWARD, Policy, Worth
 from lab.learning.environment import Judged, Step
 from lab.learning.selection import Draw
@@ -47,7 +47,7 @@ class GymEnvironment:
     model, has had so far in the session.
     """
 
-    def __init__(self, live: Live):
+    def __init__(self, live: NumberedEnvironment):
         self.live = live
         self.model = believed(live)
         self.mdp: TabularMDP = table_of(live, self.model)

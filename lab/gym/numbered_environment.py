@@ -21,7 +21,7 @@ class Moved(NamedTuple):
     success: bool | None
 
 
-class Live:
+class NumberedEnvironment:
     """An environment that is stepped, and where its state can be set, a second one that is put where it is to be drawn.
 
     states, actions: the numbering of its spaces; first: a state that it begins in; limit: the steps of an episode, None

@@ -13,9 +13,9 @@ from lab.mdp import MAX_SWEEPS, BoolArray, FloatArray, IntArray
 SETTLED = 1e-12  # changes of a value, and chances, below this are none
 SAME_REWARD = 1e-9
 
-Outcome = tuple[float, int, float, bool]  # chance, state entered, reward, the episode is over
-Outcomes = Mapping[
-    int, Mapping[int, Sequence[Outcome]]
+Transition = tuple[float, int, float, bool]  # chance, state entered, reward, the episode is over
+Transitions = Mapping[
+    int, Mapping[int, Sequence[Transition]]
 ]  # [state][action], as Gymnasium's toy-text environments hold it
 Policy = NDArray[np.int64]
 
@@ -28,7 +28,7 @@ class Worth(NamedTuple):
     steps: float
 
 
-class Model:
+class TransitionModel:
     """A problem left to chance: its outcomes side by side, and the chance (S,) of starting in each state.
 
     live (S,) bool: states in which an episode can go on; terminal (S,) bool: those it can only end in, and
@@ -37,7 +37,7 @@ class Model:
     no step is left to chance.
     """
 
-    def __init__(self, outcomes: Outcomes, starts: FloatArray, n_actions: int):
+    def __init__(self, outcomes: Transitions, starts: FloatArray, n_actions: int):
         """Raises KeyError, IndexError, TypeError or ValueError when the outcomes are none of such a problem."""
         self.starts, self.n_states, self.n_actions = starts, len(starts), n_actions
         rows = [

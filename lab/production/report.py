@@ -9,6 +9,7 @@ from typing import Any
 
 from lab.errors import BadInput, WorkFailed, counted
 from lab.files import draft, nearest
+from lab.learning.problem import Problem
 from lab.mdp import TabularMDP, greedy_path
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
@@ -20,7 +21,7 @@ from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Recording
 from lab.sim.scene import Layout
 from lab.skills import Skill
-from lab.skills.skill import Photo, Problem
+from lab.skills.skill import Photo
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Task
 from lab.teaching.teacher import Lesson

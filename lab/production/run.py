@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lab.errors import LabError
+from lab.learning.problem import Problem
 from lab.planner import find_sequence, search_for
 from lab.production.composer import carry_out
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
@@ -17,7 +18,6 @@ from lab.production.skillset import SkillSet
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Reference
 from lab.sim.scene import check_apart, draw_layout
-from lab.skills.skill import Problem
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Task, check_toasts
 from lab.teaching.listener import Listener

@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from lab.learning.problem import Problem
 from lab.mdp import coverage
 from lab.sim import models
 from lab.sim.frames import Body, Shape
 from lab.sim.kinematics import ToolPose
 from lab.sim.world import TIME_STEP, Array
-from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path
+from lab.skills.skill import Bench, Skill, SkillFailed, learned_path
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Task
 

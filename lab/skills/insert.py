@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
+from lab.learning.problem import Problem
 from lab.mdp import NoPath, grid
 from lab.sim import models
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import GRASP_DEPTH, Spot, is_toaster, spots
 from lab.skills.place import let_go, release_pose
-from lab.skills.skill import Bench, Photo, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
+from lab.skills.skill import Bench, Photo, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import INSERT_START, Surveys, camera_view, overhead_camera
 from lab.tasks.task_file import Obstacle, Task
 from lab.vision.overhead import Marker

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed
-from lab.learning.environment import Environment
+from lab.learning.problem import Problem
 from lab.mdp import NoPath, TabularMDP, greedy_path
 from lab.sim import models
 from lab.sim.frames import Body
@@ -42,16 +42,6 @@ class Status(Enum):
 
 class SkillFailed(Exception):
     """A skill noticed that it did not do what it is for; the text says why."""
-
-
-@dataclass(frozen=True)
-class Problem:
-    """What one skill has to learn: its name, the sub-task, the table's problem; environment: where its steps are made."""
-
-    name: str
-    subtask: str
-    mdp: TabularMDP
-    environment: Environment | None = None
 
 
 @dataclass

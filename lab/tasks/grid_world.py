@@ -30,15 +30,15 @@ _WANTED = "wanted random:SHAPE:DENSITY:SEED, such as random:10x10x10:0.06:7"
 
 Ints = NDArray[np.int_]
 Coordinates = tuple[int, ...]
-Cell = Annotated[Coordinates, BeforeValidator(as_tuple)]
+GridCell = Annotated[Coordinates, BeforeValidator(as_tuple)]
 Shape = Annotated[tuple[Count, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=3)]
 
 
 class View(Record):
     """The block of cells in which an advisor with a limited view sees the robot, from corner to corner, both inside."""
 
-    lower: Cell
-    upper: Cell
+    lower: GridCell
+    upper: GridCell
 
 
 class GridWorld(Learned):
@@ -52,9 +52,9 @@ class GridWorld(Learned):
     name: Name
     title: str = ""
     shape: Shape
-    start: Cell
-    goal: Cell
-    obstacles: Annotated[tuple[Cell, ...], BeforeValidator(as_tuple)] = ()
+    start: GridCell
+    goal: GridCell
+    obstacles: Annotated[tuple[GridCell, ...], BeforeValidator(as_tuple)] = ()
     view: View | None = None
 
     @model_validator(mode="after")

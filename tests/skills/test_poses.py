@@ -5,13 +5,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from lab.learning.problem import Problem
 from lab.mdp import greedy_path
 from lab.sim import models
 from lab.sim.kinematics import ToolPose, inverse
 from lab.sim.robot import NAME as ROBOT
 from lab.skills import SKILLS, Skill, Transfer
 from lab.skills.butter import SHAPE
-from lab.skills.skill import Bench, Problem, Status
+from lab.skills.skill import Bench, Status
 from lab.skills.surveys import Surveys
 from lab.toolbox.policy import Policy
 

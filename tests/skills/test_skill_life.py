@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from lab.errors import WorkFailed
+from lab.learning.problem import Problem
 from lab.mdp import NoPath, greedy_path, grid, shortest_steps
 from lab.production.durations import measure
 from lab.production.skillset import SkillSet
-from lab.seat.lesson_scene import SkillStage
+from lab.seat.lesson_scene import SkillScene
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Layout
 from lab.skills import SKILLS, Skill
-from lab.skills.skill import Bench, Problem, SkillFailed, Status, learned_path, no_way
+from lab.skills.skill import Bench, SkillFailed, Status, learned_path, no_way
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Stage, Subtask, Task
 from lab.teaching.lesson import teach_one
@@ -236,7 +237,7 @@ def test_a_new_skill_is_a_class_and_a_row_and_all_else_knows_it(
     assert all(way[0] in hovers for way in skillset.travels.values())
     for name, skill in skillset.skills.items():
         skillset.policies[name] = optimal(skill.setup(surveys))
-    with closing(SkillStage(task, 1, Layout(surveys.layout.obstacles, ((0.0, 0.0, 0.0),)), hovers[0])) as stage:
+    with closing(SkillScene(task, 1, Layout(surveys.layout.obstacles, ((0.0, 0.0, 0.0),)), hovers[0])) as stage:
         assert stage.frame(2).poses["robot tool"][2] == pytest.approx(stage.frame(0).poses["robot tool"][2] + 0.06)
     durations = measure(skillset, surveys)
     assert set(durations.empty_s) == set(skillset.moves.empty)

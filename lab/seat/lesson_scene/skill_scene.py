@@ -1,11 +1,12 @@
-"""The stage of a skill: the cell with the arm, or the applier's head, where the state has it."""
+"""The scene of a skill: the cell with the arm, or the applier's head, where the state has it."""
 
 from dataclasses import dataclass
 from math import hypot, radians
 
 import numpy as np
 
-from lab.seat.lesson_scene.episode_trail import GREEN, STEP_S, Changes, Marks, camera_for, corners, vector
+from lab.seat.lesson_scene.camera_placement import camera_for, corners, vector
+from lab.seat.lesson_scene.episode_trail import GREEN, STEP_S, Changes, EpisodeTrail
 from lab.sim import models
 from lab.sim.frames import Body, Camera, Frame, Rgba, Shape, Vector
 from lab.sim.scene import Layout, Scene, spots
@@ -41,7 +42,7 @@ class OnSlice:
         return dict.fromkeys(seen, pose), seen
 
 
-class SkillStage:
+class SkillScene:
     """A skill's scene with the first slice in the gripper, or before it on its spot."""
 
     def __init__(self, task: Task, toasts: int, layout: Layout, skill: Skill) -> None:
@@ -89,9 +90,9 @@ class SkillStage:
         pose = self._skill.pose(state)
         return (pose.x, pose.y, pose.z)
 
-    def _marks(self) -> Marks:
+    def _marks(self) -> EpisodeTrail:
         size = self._size()
-        return Marks(self._mdp, self._place, max(0.11 * size, TRAIL_M), max(0.6 * size, COLLISION_M))
+        return EpisodeTrail(self._mdp, self._place, max(0.11 * size, TRAIL_M), max(0.6 * size, COLLISION_M))
 
     def _size(self) -> float:
         """How far apart neighbouring states are, at least [m]."""
