@@ -8,7 +8,7 @@ import numpy as np
 from lab.errors import WorkFailed
 from lab.gym.gym_table import believed, table_of
 from lab.gym.numbered_environment import Moved, NumberedEnvironment
-from lab.gym.transition_model import SAME_REWARD, Policy, Worth
+from lab.gym.transition_model import SAME_REWARD, Actions, Worth
 from lab.learning.environment import Judged, Step
 from lab.learning.selection import Draw
 from lab.learning.session import run_session
@@ -151,7 +151,7 @@ class GymEnvironment:
         top = max([own.best_end, *([known.best_end] if known is not None else [])])
         return own.worth(top), None if known is None else known.worth(top)
 
-    def _played(self, policy: Policy, horizon: int) -> Played:
+    def _played(self, policy: Actions, horizon: int) -> Played:
         """What a policy did in seeded episodes of a second environment."""
         other, actions = self.live.again(), policy.tolist()
         returned, ends = 0.0, list[tuple[int, Moved]]()

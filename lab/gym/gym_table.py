@@ -105,11 +105,7 @@ def _follows(live: NumberedEnvironment, model: TransitionModel) -> bool:
 def table_of(live: NumberedEnvironment, model: TransitionModel | None) -> GymTable:
     """The environment's states and actions by name, with its likeliest steps where there is a model."""
     states, actions = live.states.count, live.actions.count
-    names: dict[str, Any] = {
-        "action_labels": _labels(live),
-        "environment": str(live.name),
-        "digits": _digits(live),
-    }
+    names: dict[str, Any] = {"action_labels": _labels(live), "environment": str(live.name), "digits": _digits(live)}
     if model is None:
         stays = np.repeat(np.arange(states)[:, None], actions, axis=1)
         no = np.zeros(states, bool)

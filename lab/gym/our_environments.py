@@ -38,6 +38,7 @@ class TableEnv(gymnasium.Env[Any, Any]):
         self.action_labels, self.shape = mdp.action_labels, mdp.shape
         self.observation_space = spaces.Discrete(mdp.n_states)
         self.action_space = spaces.Discrete(mdp.n_actions)
+        self.starts = mdp.starts or (mdp.start,)
         self.s, self._moves = mdp.start, 0
 
     @cached_property
@@ -54,16 +55,14 @@ class TableEnv(gymnasium.Env[Any, Any]):
     @property
     def initial_state_distrib(self) -> FloatArray:
         """The chance (S,) of beginning in each state."""
-        starts = list(self.mdp.starts or (self.mdp.start,))
         chances = np.zeros(self.mdp.n_states)
-        chances[starts] = 1.0 / len(starts)
+        chances[list(self.starts)] = 1.0 / len(self.starts)
         return chances
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[int, Info]:
         """The start, or one of several."""
         super().reset(seed=seed)
-        starts = self.mdp.starts or (self.mdp.start,)
-        self.s, self._moves = starts[int(self.np_random.integers(len(starts)))], 0
+        self.s, self._moves = self.starts[int(self.np_random.integers(len(self.starts)))], 0
         return self.s, {"is_success": False}
 
     def step(self, action: int) -> tuple[int, float, bool, bool, Info]:

@@ -14,10 +14,8 @@ SETTLED = 1e-12  # changes of a value, and chances, below this are none
 SAME_REWARD = 1e-9
 
 Transition = tuple[float, int, float, bool]  # chance, state entered, reward, the episode is over
-Transitions = Mapping[
-    int, Mapping[int, Sequence[Transition]]
-]  # [state][action], as Gymnasium's toy-text environments hold it
-Policy = NDArray[np.int64]
+Transitions = Mapping[int, Mapping[int, Sequence[Transition]]]  # [state][action], as Gymnasium's toy texts hold it
+Actions = NDArray[np.int64]  # (S,) the one that a policy takes in each state
 
 
 class Worth(NamedTuple):
@@ -32,9 +30,8 @@ class TransitionModel:
     """A problem left to chance: its outcomes side by side, and the chance (S,) of starting in each state.
 
     live (S,) bool: states in which an episode can go on; terminal (S,) bool: those it can only end in, and
-    those that hold an ended one; best: the highest
-    reward of a step that ends an episode, -inf when none does; goal (S,) bool: terminal states entered with it; certain:
-    no step is left to chance.
+    those that hold an ended one; best: the highest reward of a step that ends an episode, -inf when none does; goal (S,)
+    bool: terminal states entered with it; certain: no step is left to chance.
     """
 
     def __init__(self, outcomes: Transitions, starts: FloatArray, n_actions: int):
@@ -148,8 +145,8 @@ class TransitionModel:
                 return q
         raise WorkFailed(f"value iteration with discount {discount} did not settle in {MAX_SWEEPS} sweeps")
 
-    def worth(self, policy: Policy, horizon: int) -> Worth:
-        """What following a policy, an action (S,) for each state, brings in episodes of at most so many steps."""
+    def worth(self, policy: Actions, horizon: int) -> Worth:
+        """What following a policy (S,) brings in episodes of at most so many steps."""
         states = np.arange(self.n_states)
         goes = self._onward[states * self.n_actions + policy].T.tocsr()  # (S, S), to state row from state column
         gain, wins = self.gain[states, policy], self._wins[states, policy]

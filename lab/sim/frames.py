@@ -87,7 +87,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Camera:
+class Viewpoint:
     """Where the page looks from and to, in the world [m], z up."""
 
     eye: Vector = (2.65, -1.8, 1.65)
@@ -100,7 +100,7 @@ class Recording:
 
     bodies: tuple[Body, ...]
     frames: list[Frame] = field(default_factory=list)
-    camera: Camera = field(default_factory=Camera)
+    camera: Viewpoint = field(default_factory=Viewpoint)
 
     @property
     def duration_s(self) -> float:

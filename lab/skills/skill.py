@@ -59,12 +59,6 @@ class Bench:
         z = float(position[2]) + models.SLICE[2] / 2 - GRASP_DEPTH
         return ToolPose(float(position[0]), float(position[1]), z, float(half))
 
-    def put_slice(self, name: str, pose: ToolPose) -> None:
-        """Put a slice at once to where the tool at `pose` would hold it: to show a scene, without physics."""
-        up = pose.z + GRASP_DEPTH - models.SLICE[2] / 2
-        turn = (0.0, 0.0, float(np.sin(pose.yaw / 2)), float(np.cos(pose.yaw / 2)))
-        self.scene.world.put(name, (pose.x, pose.y, up), turn)
-
     def hold(self, name: str, pose: ToolPose) -> None:
         """Stand a new slice between the fingers of the tool that is at `pose`, and grip it."""
         scene = self.scene
@@ -175,7 +169,7 @@ class Skill:
         if not bench.scene.robot.stand(pose):
             return False
         if bench.held is not None:
-            bench.put_slice(bench.held, pose)
+            bench.scene.put_slice(bench.held, pose)
         return True
 
     @classmethod

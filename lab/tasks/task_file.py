@@ -160,7 +160,8 @@ class Task(Record):
             if twice:
                 raise ValueError(f"{label} '{min(twice)}' stands twice in the file")
             for name in names:
-                if _reserved(name) or (label == "obstacle" and name in stations):
+                reserved = name in RESERVED or name.startswith(RESERVED_STARTS) or name.endswith(RESERVED_ENDS)
+                if reserved or (label == "obstacle" and name in stations):
                     raise ValueError(f"{label} '{name}' has the name of something else in the cell: choose another")
         for stage in self.route:
             for name in filter(None, (stage.station, stage.buffer)):
@@ -186,10 +187,6 @@ class Task(Record):
         for _, error in self.sequencing.faults(due=False):
             raise error
         return self
-
-
-def _reserved(name: str) -> bool:
-    return name in RESERVED or name.startswith(RESERVED_STARTS) or name.endswith(RESERVED_ENDS)
 
 
 def shipped() -> dict[str, str]:
@@ -231,23 +228,17 @@ def find(task: str) -> Path:
 
 def load(task: str) -> Task:
     """Read and check a task given by name or path; BadInput names the file, the line or field, the value and what is allowed."""
-    found = load_any(task, "task")
-    assert isinstance(found, Task)
-    return found
+    return cast(Task, load_any(task, "task"))
 
 
 def load_cell(cell: str) -> CellFile:
     """As `load`: a cell for the sequencer alone, by name or by file; BadInput names file and line."""
-    found = load_any(cell, "cell")
-    assert isinstance(found, CellFile)
-    return found
+    return cast(CellFile, load_any(cell, "cell"))
 
 
 def load_world(world: str) -> GridWorld:
     """As `load`: a world by name, by file (.toml, or .txt with a text grid) or by chance ("random:10x10x10:0.06:7")."""
-    found = load_any(world, "world")
-    assert isinstance(found, GridWorld)
-    return found
+    return cast(GridWorld, load_any(world, "world"))
 
 
 def load_any(word: str, wanted: Kind | None = None) -> Task | CellFile | GridWorld:
@@ -278,9 +269,8 @@ def _check_wanted(word: str, kind: Kind, wanted: Kind | None) -> None:
 
 def _kind(toml: TomlText) -> Kind:
     kind = toml.raw.get("kind", "task")
-    for known in get_args(Kind):
-        if kind == known:
-            return cast(Kind, known)
+    if kind in get_args(Kind):
+        return cast(Kind, kind)
     raise toml.refusal(("kind",), str(unknown("kind", kind, ("cell", "world"), "of task file")))
 
 

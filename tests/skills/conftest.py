@@ -120,7 +120,7 @@ def stage(surveys: Surveys, layout: Layout) -> Iterator[Callable[..., Bench]]:
             skill.spot = spot
             if any(off):
                 foot = spots(task.station(skill.station))[0].grasp()
-                bench.put_slice(SLICE, foot.local(off[0], off[1], 0.0, off[2]))
+                bench.scene.put_slice(SLICE, foot.local(off[0], off[1], 0.0, off[2]))
                 for _ in range(30):
                     bench.scene.world.step()
             return bench

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 from lab.learning.problem import Problem
 from lab.seat.lesson_scene.skill_scene import SkillScene
 from lab.seat.lesson_scene.world_scene import WorldScene
-from lab.sim.frames import Body, Camera, Frame
+from lab.sim.frames import Body, Frame, Viewpoint
 from lab.tasks.grid_world import GridWorld
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ class LessonScene(Protocol):
     """What a page shows of a lesson; it belongs to one thread."""
 
     @property
-    def camera(self) -> Camera:
+    def camera(self) -> Viewpoint:
         """Where to look from: all cells are in sight."""
 
     def bodies(self) -> tuple[Body, ...]:

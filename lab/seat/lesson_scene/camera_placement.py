@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lab.mdp import FloatArray
-from lab.sim.frames import Camera, Vector
+from lab.sim.frames import Vector, Viewpoint
 
 _HALF_VIEW = radians(19.0)  # half of the page's field of view, from bottom to top
 _WIDE = 1.2  # the narrowest picture, width to height, in which all is to be seen
 _MARGIN = 1.06
 
 
-def camera_for(points: ArrayLike, azimuth: float, elevation: float) -> Camera:
+def camera_for(points: ArrayLike, azimuth: float, elevation: float) -> Viewpoint:
     """The nearest camera on one side of the `points` (n, 3) [m] that has them all in its picture.
 
     `azimuth` [rad] from the x axis, counter-clockwise as seen from above; `elevation` [rad] above the horizon.
@@ -26,7 +26,7 @@ def camera_for(points: ArrayLike, azimuth: float, elevation: float) -> Camera:
     off = seen - target
     aside = np.maximum(abs(off @ np.cross(back, right)), abs(off @ right) / _WIDE)
     eye = target + back * float((_MARGIN * aside / tan(_HALF_VIEW) + off @ back).max())
-    return Camera(vector(eye), vector(target))
+    return Viewpoint(vector(eye), vector(target))
 
 
 def corners(low: ArrayLike, high: ArrayLike) -> FloatArray:

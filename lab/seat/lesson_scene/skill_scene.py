@@ -8,7 +8,7 @@ import numpy as np
 from lab.seat.lesson_scene.camera_placement import camera_for, corners, vector
 from lab.seat.lesson_scene.episode_trail import GREEN, STEP_S, Changes, EpisodeTrail
 from lab.sim import models
-from lab.sim.frames import Body, Camera, Frame, Rgba, Shape, Vector
+from lab.sim.frames import Body, Frame, Rgba, Shape, Vector, Viewpoint
 from lab.sim.scene import Layout, Scene, spots
 from lab.sim.world import World
 from lab.skills import Skill
@@ -69,7 +69,7 @@ class SkillScene:
             bench.held = SLICE
             bench.scene.robot.open_at_once(models.SLICE[1] / 2 + FINGERS_OFF_M)
         elif skill.near:
-            bench.put_slice(SLICE, spots(task.station(skill.station))[0].grasp())
+            bench.scene.put_slice(SLICE, spots(task.station(skill.station))[0].grasp())
         if not skill.near:
             return {}
         station = task.station(skill.station)
@@ -109,11 +109,11 @@ class SkillScene:
         return (Body("goal", (Shape("sphere", (0.35 * self._size(),), None, GREEN, at),)),)
 
     @property
-    def camera(self) -> Camera:
+    def camera(self) -> Viewpoint:
         """From the front, of the slice or of the whole cell; a little from the right, so that nothing hides the rest."""
         return self._camera
 
-    def _look(self) -> Camera:
+    def _look(self) -> Viewpoint:
         free = np.flatnonzero(~self._mdp.terminal | self._mdp.goal)
         places = np.array([self._place(int(state)) for state in free])
         azimuth, elevation = (radians(angle) for angle in self._skill.looks_from)

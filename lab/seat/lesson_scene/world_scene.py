@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from lab.mdp import FloatArray, TabularMDP
 from lab.seat.lesson_scene.camera_placement import camera_for, corners, vector
 from lab.seat.lesson_scene.episode_trail import GREEN, STEP_S, EpisodeTrail, upright
-from lab.sim.frames import Body, Camera, Frame, Rgba, Shape, Vector
+from lab.sim.frames import Body, Frame, Rgba, Shape, Vector, Viewpoint
 from lab.tasks.grid_world import GridWorld
 
 WORLD_M = 2.0  # [m] the longest side of a drawn world
@@ -74,7 +74,7 @@ class WorldScene:
         return (edge, edge, edge * (_LOW if self._flat else 1.0))
 
     @property
-    def camera(self) -> Camera:
+    def camera(self) -> Viewpoint:
         """From the front: steeply onto a board, a little from the right into a room."""
         x, y, z = self._extent
         seen = corners((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))

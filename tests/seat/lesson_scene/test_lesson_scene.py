@@ -19,7 +19,7 @@ from lab.seat.lesson_scene.camera_placement import camera_for
 from lab.seat.lesson_scene.episode_trail import TRAIL
 from lab.seat.lesson_scene.world_scene import MOST_OBSTACLES, WORLD_M
 from lab.sim import models
-from lab.sim.frames import Camera, Frame, Recording, Shape
+from lab.sim.frames import Frame, Recording, Shape, Viewpoint
 from lab.sim.kinematics import TOOL, ToolPose, inverse
 from lab.sim.scene import GRASP_DEPTH
 from lab.skills.skill import Skill
@@ -72,7 +72,7 @@ def shown(frame: Frame) -> set[str]:
     return {name for name, visible in frame.visible.items() if visible}
 
 
-def in_picture(camera: Camera, points: FloatArray) -> bool:
+def in_picture(camera: Viewpoint, points: FloatArray) -> bool:
     """Whether a page 1.2 times as wide as high, with 38 degrees from bottom to top, has all points (n, 3) in it."""
     eye, target = np.array(camera.eye), np.array(camera.target)
     ahead = (target - eye) / np.linalg.norm(target - eye)
