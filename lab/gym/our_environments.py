@@ -16,6 +16,7 @@ from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.cell.routes import entry
 from lab.sequencing.simulate.run import Run
 from lab.tasks.task_file import load, load_cell, load_world
+from lab.view.grid_planes import GridPlanes
 
 ROOM = 10  # an episode in a cell may take so many times the decisions that its parts need at most
 METADATA: dict[str, Any] = {"render_modes": ["ansi"], "render_fps": 4}
@@ -80,11 +81,9 @@ class TableEnv(gymnasium.Env[Any, Any]):
         mdp, cell = self.mdp, self.mdp.state_cell(self.s)
         if len(cell) < 2 or mdp.coverage_shape:
             return f"state {mdp.state_label(self.s)}\n"
-        marks = np.where(mdp.goal, "G", np.where(mdp.terminal, "#", ".")).reshape(mdp.shape)
-        marks[cell] = "R"
-        plane = marks.reshape(*mdp.shape[:2], -1)[:, :, cell[2] if len(cell) == 3 else 0]
-        if mdp.action_labels[:2] == ("left", "right"):
-            plane = plane.T[::-1]
+        planes = GridPlanes(mdp)
+        plane = planes.marks(planes.layer(cell)).copy()
+        plane[planes.place(cell)] = "R"
         below = "" if len(cell) == 2 else f"level {cell[2]} of 0..{mdp.shape[2] - 1}\n"
         return "".join(f"{' '.join(row)}\n" for row in plane) + below
 

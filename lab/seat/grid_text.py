@@ -11,6 +11,7 @@ from rich.text import Text
 
 from lab.learning.requests import AdviceRequest
 from lab.mdp import TabularMDP
+from lab.view.grid_planes import GridPlanes, is_map
 
 Plane = NDArray[np.str_]
 DIRECTIONS = ("up", "down", "left", "right")
@@ -73,11 +74,6 @@ def points_by_name(mdp: TabularMDP) -> bool:
     """Whether the actions are called after the four directions of a picture, or of the sky, in whatever order."""
     known = {NAMES.get(label.lower()) for label in mdp.action_labels}
     return len(mdp.coverage_shape or mdp.shape) <= 2 and known >= {0, 1, 2, 3}
-
-
-def is_map(mdp: TabularMDP) -> bool:
-    """Whether axes 0 and 1 are the x and y of a map seen from above: the moves along axis 0 are called left and right."""
-    return len(mdp.shape) >= 2 and mdp.action_labels[:2] == ("left", "right")
 
 
 def nearest_goal(mdp: TabularMDP, cell: tuple[int, ...]) -> tuple[int, ...] | None:
@@ -171,15 +167,8 @@ class _Slices:
         self.entered = mdp.state_cell(int(mdp.successor[request.state, request.learner_action]))
         self.goal = None if mdp.coverage_shape else nearest_goal(mdp, self.cell)
         self.layers, self.layer = (self.shape[2], self.cell[2]) if len(self.shape) > 2 else (1, 0)
-        self.flips = is_map(mdp)
-        rows, columns = (1, self.shape[0]) if len(self.shape) == 1 else self.shape[:2]
-        self.rows, self.columns = (columns, rows) if self.flips else (rows, columns)
-
-    def _place(self, cell: tuple[int, ...]) -> tuple[int, int]:
-        """Row and column of a cell in the picture."""
-        if len(cell) == 1:
-            return 0, cell[0]
-        return (self.rows - 1 - cell[1], cell[0]) if self.flips else (cell[0], cell[1])
+        self.grid = GridPlanes(mdp)
+        self.rows, self.columns, self._place = self.grid.rows, self.grid.columns, self.grid.place
 
     def plane(self, layer: int) -> Plane:
         """The marks of one layer, row by row as they are shown."""
@@ -187,10 +176,9 @@ class _Slices:
         if mdp.coverage_shape:
             plane = np.where(mdp.covered(self.request.state), "x", free)
         else:
-            index = (slice(None),) * min(2, len(self.shape)) + (layer, *self.cell[3:])[: len(self.shape) - 2]
-            goals, ends = (a.reshape(self.shape)[index] for a in (mdp.goal, mdp.terminal))
-            plane = np.atleast_2d(np.where(goals, "G", np.where(ends, "#", free)))
-            plane = plane.T[::-1].copy() if self.flips else plane
+            plane = self.grid.marks(
+                self.grid.layer((*self.cell[:2], layer, *self.cell[3:])[: len(self.shape)]), free
+            ).copy()
         own = layer == self.layer
         if own and self.goal is not None and plane[self._place(self.goal)] == free:
             plane[self._place(self.goal)] = "g"
@@ -256,7 +244,7 @@ class _Slices:
 
     def _shown(self, rows: range, columns: range, layers: range | None) -> tuple[tuple[int, int, int], ...]:
         """The axes of which a part is shown, with the first and the last cell."""
-        if self.flips:
+        if self.grid.flips:
             ranges = {0: columns, 1: range(self.rows - rows.stop, self.rows - rows.start)}
         else:
             ranges = {0: columns} if len(self.shape) == 1 else {0: rows, 1: columns}
