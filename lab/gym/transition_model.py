@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -108,21 +110,15 @@ class TransitionModel:
         Of several that are equally likely it is the middle one in the model's order: where an agent slips, Gymnasium
         lists the intended move between the two slips.
         """
-        keys, which = np.unique(self._row * self.n_states + self._entered, return_inverse=True)
-        chance = np.bincount(which, self._chance)
-        row, entered = np.divmod(keys, self.n_states)
-        first = np.full(len(keys), len(which))
-        np.minimum.at(first, which, np.arange(len(which)))  # where each state stands in the model's order
-        top = np.zeros(self.n_states * self.n_actions)
-        np.maximum.at(top, row, chance)
-        tied = chance >= top[row] - SETTLED
-        order = np.lexsort((first, row))
-        order = order[tied[order]]
-        counts = np.bincount(row[order], minlength=len(top))
-        middle = np.cumsum(counts) - counts + (counts - 1) // 2
-        successor = entered[order][middle].reshape(self.n_states, self.n_actions)
-        stays = np.arange(self.n_states)[:, None]
-        likeliest: IntArray = np.where(self.terminal[:, None], stays, successor).astype(np.int32)
+        likeliest: IntArray = np.repeat(np.arange(self.n_states, dtype=np.int32)[:, None], self.n_actions, axis=1)
+        steps = zip(self._row.tolist(), self._entered.tolist(), self._chance.tolist(), strict=True)
+        for row, outcomes in groupby(steps, key=itemgetter(0)):
+            chances: dict[int, float] = {}  # in the model's order
+            for _, entered, chance in outcomes:
+                chances[entered] = chances.get(entered, 0.0) + chance
+            tied = [entered for entered, chance in chances.items() if chance >= max(chances.values()) - SETTLED]
+            if not self.terminal[row // self.n_actions]:
+                likeliest.flat[row] = tied[(len(tied) - 1) // 2]
         return likeliest
 
     @cached_property

@@ -113,7 +113,9 @@ def picture_of(request: AdviceRequest, marks: Marks, width: int, height: int) ->
         for line in lines:
             line.truncate(width)
         return Picture(lines, is_fixed=True)
-    return _Slices(request, marks).fitting(width, height) if request.mdp.shape or request.mdp.coverage_shape else None
+    return (
+        _GridDrawing(request, marks).fitting(width, height) if request.mdp.shape or request.mdp.coverage_shape else None
+    )
 
 
 def safe_ansi(drawing: str) -> Text:
@@ -152,11 +154,11 @@ def draw(request: AdviceRequest, arrows: str = ARROWS, free: str = "·") -> Text
     """
     if not (request.mdp.shape or request.mdp.coverage_shape):
         return None
-    drawn = _Slices(request, Marks(arrows, free)).fitting(UNLIMITED, UNLIMITED, most=1)
+    drawn = _GridDrawing(request, Marks(arrows, free)).fitting(UNLIMITED, UNLIMITED, most=1)
     return Text("\n").join([*drawn.lines, Text(drawn.legend)])
 
 
-class _Slices:
+class _GridDrawing:
     """The grid of one request as planes of axes 0 and 1, layer by layer of axis 2."""
 
     def __init__(self, request: AdviceRequest, marks: Marks):

@@ -12,7 +12,7 @@ from typing import Literal
 
 from lab.errors import BadInput, unknown
 
-Kind = Literal["box", "cylinder", "sphere", "mesh"]
+ShapeKind = Literal["box", "cylinder", "sphere", "mesh"]
 Rgba = tuple[float, float, float, float]
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -31,7 +31,7 @@ class Shape:
     anything else.
     """
 
-    kind: Kind
+    kind: ShapeKind
     size: tuple[float, ...] = ()
     mesh: Path | None = None
     rgba: Rgba = (0.7, 0.7, 0.7, 1.0)

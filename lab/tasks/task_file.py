@@ -24,8 +24,8 @@ MOST_THINGS = 200  # stations, stages or obstacles: on one table is no room for 
 _SAYS_WORLD = re.compile(r"""^[ \t]*kind[ \t]*=[ \t]*["']world["']""", re.MULTILINE)
 NEAREST_STATIONS_M = 0.16  # two stations nearer than this overlap: a slice is 0.12 m wide
 
-Kind = Literal["task", "cell", "world"]  # of what a file holds
-Model = TypeVar("Model", bound=Record)
+FileKind = Literal["task", "cell", "world"]  # of what a file holds
+Checked = TypeVar("Checked", bound=Record)
 Size = Annotated[float, Field(ge=0.001, le=10)]  # the bounds keep a slip of the pen from taking all memory or all day
 Time = Annotated[float, Field(ge=0, le=86_400)]
 Number = Annotated[float, Field(ge=-10, le=10)]
@@ -198,7 +198,7 @@ def _files() -> dict[str, Path]:
     return {path.stem: path for path in sorted(tasks_folder().glob("*.toml"))}
 
 
-def names_of(wanted: Kind) -> list[str]:
+def names_of(wanted: FileKind) -> list[str]:
     """What ships of a kind, by name."""
     return [name for name, kind in shipped().items() if kind == wanted]
 
@@ -241,7 +241,7 @@ def load_world(world: str) -> GridWorld:
     return cast(GridWorld, load_any(world, "world"))
 
 
-def load_any(word: str, wanted: Kind | None = None) -> Task | CellFile | GridWorld:
+def load_any(word: str, wanted: FileKind | None = None) -> Task | CellFile | GridWorld:
     """A task, a cell or a world, as `load`, `load_cell` and `load_world` read it; BadInput also when another is wanted."""
     drawn = word.startswith(RANDOM)
     path = Path(word) if drawn else find(word)
@@ -256,7 +256,7 @@ def load_any(word: str, wanted: Kind | None = None) -> Task | CellFile | GridWor
     return _checked(Task, toml) if kind == "task" else _checked(GridWorld, toml)
 
 
-def _check_wanted(word: str, kind: Kind, wanted: Kind | None) -> None:
+def _check_wanted(word: str, kind: FileKind, wanted: FileKind | None) -> None:
     if wanted is None or kind == wanted:
         return
     instead = {
@@ -267,10 +267,10 @@ def _check_wanted(word: str, kind: Kind, wanted: Kind | None) -> None:
     raise BadInput(f"{word}: it is a {kind}, not a {wanted}: {instead[kind]}")
 
 
-def _kind(toml: TomlText) -> Kind:
+def _kind(toml: TomlText) -> FileKind:
     kind = toml.raw.get("kind", "task")
-    if kind in get_args(Kind):
-        return cast(Kind, kind)
+    if kind in get_args(FileKind):
+        return cast(FileKind, kind)
     raise toml.refusal(("kind",), str(unknown("kind", kind, ("cell", "world"), "of task file")))
 
 
@@ -281,7 +281,7 @@ def _toml(path: Path) -> TomlText:
     return TomlText.parsed(path, text)
 
 
-def _checked(model: type[Model], toml: TomlText) -> Model:
+def _checked(model: type[Checked], toml: TomlText) -> Checked:
     try:
         return model.model_validate(toml.raw)
     except ValidationError as error:

@@ -18,7 +18,7 @@ from lab.mdp import BoolArray, FloatArray, NoPath, TabularMDP, grid, shortest_st
 from lab.studies.statistics import PERCENT_POINTS, RELATIVE
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, Cell, printed
 from lab.studies.thesis.chapter_9_sessions import gate_of, learned_table
-from lab.tasks.grid_world import GridWorld, View
+from lab.tasks.grid_world import AdvisorView, GridWorld
 
 COMMENT = """\
 World II of the thesis (ch. 9, fig. 9.2 b), RECONSTRUCTED: the thesis prints only a picture of it. Like the printed one
@@ -83,7 +83,7 @@ def best_view(
 
 
 def _with(world: GridWorld, view: Ints) -> GridWorld:
-    return world.model_copy(update={"view": View(lower=_tuple(view[0]), upper=_tuple(view[1]))})
+    return world.model_copy(update={"view": AdvisorView(lower=_tuple(view[0]), upper=_tuple(view[1]))})
 
 
 def is_compared(cell: Cell, view: str) -> bool:
