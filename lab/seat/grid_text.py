@@ -1,8 +1,8 @@
 """The picture of where a learner is: a grid, slices of a space, or an environment's own drawing, cut to what fits."""
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ ASCII_ARROWS = "^v<>"
 NAMES = {"up": 0, "north": 0, "down": 1, "south": 1, "left": 2, "west": 2, "right": 3, "east": 3}
 LEGEND = {"R": "R robot", "r": "r its shadow", "G": "G goal", "g": "g the goal's shadow", "#": "# obstacle"}
 COVERING = {"R": "R head", "x": "x covered"}
+STYLES = {"R": "bold cyan", "r": "cyan", "G": "bold green", "g": "green", "#": "red", "x": "green"} | dict.fromkeys(
+    f"*{ARROWS}{ASCII_ARROWS}", "bold magenta"
+)
 GAP = 3  # columns between two slices
 FEWEST_COLUMNS = 9  # cells of a slice that is cut so that its neighbours can be seen beside it
 UNLIMITED = 10**6
@@ -222,19 +225,19 @@ class _GridDrawing:
         planes = {k: self.plane(k)[rows.start : rows.stop, columns.start : columns.stop] for k in layers}
         blocks = [self._block(plane, layer if titled else None) for layer, plane in planes.items()]
         widest = max(line.cell_len for block in blocks for line in block)
-        lines = [Text(" " * GAP).join(line for line in side) for side in zip(*_padded(blocks, widest), strict=True)]
+        for line in chain.from_iterable(blocks[:-1]):
+            line.pad_right(widest - line.cell_len)
+        lines = [Text(" " * GAP).join(side) for side in zip(*blocks, strict=True)]
         seen = {str(mark) for plane in planes.values() for mark in plane.ravel()}
         hides_goal = self.goal is not None and not seen & {"G"}
         return Picture(lines, self._legend(seen), self._shown(rows, columns, layers if titled else None), hides_goal)
 
-    def _title(self, layer: int) -> str:
-        return f"[level {layer}]" if layer == self.layer else f"level {layer}"
-
     def _block(self, plane: Plane, layer: int | None) -> list[Text]:
-        styles = _styles(self.marks)
-        title = [] if layer is None else [Text(f" {self._title(layer)}", "bold" if layer == self.layer else "dim")]
-        rows = [Text.assemble(*((f" {mark}", styles.get(str(mark), "dim")) for mark in row)) for row in plane]
-        return title + rows
+        rows = [Text.assemble(*((f" {mark}", STYLES.get(str(mark), "dim")) for mark in row)) for row in plane]
+        if layer is None:
+            return rows
+        own = layer == self.layer
+        return [Text(f" [level {layer}]" if own else f" level {layer}", "bold" if own else "dim"), *rows]
 
     def _legend(self, seen: set[str]) -> str:
         words = COVERING if self.mdp.coverage_shape else LEGEND
@@ -253,24 +256,3 @@ class _GridDrawing:
         if layers is not None:
             ranges[2] = layers
         return tuple((a, r.start, r.stop - 1) for a, r in ranges.items() if len(r) < self.shape[a])
-
-
-def _padded(blocks: Sequence[list[Text]], width: int) -> list[list[Text]]:
-    """Blocks of lines, all but the last one filled up to a width."""
-    for block in blocks[:-1]:
-        for line in block:
-            line.pad_right(width - line.cell_len)
-    return list(blocks)
-
-
-def _styles(marks: Marks) -> dict[str, str]:
-    return {
-        "R": "bold cyan",
-        "r": "cyan",
-        "G": "bold green",
-        "g": "green",
-        "#": "red",
-        "x": "green",
-        "*": "bold magenta",
-        **dict.fromkeys(marks.arrows, "bold magenta"),
-    }
