@@ -12,11 +12,11 @@ from lab.advice.panel import Panel
 from lab.advice.receipt import receipt
 from lab.errors import counted
 from lab.learning.events import EpisodeEnded, Event
+from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, Advisor, Ask
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray
 from lab.seat.terminal.prompt import TeachingPrompt
-from lab.skills.skill import Problem
 from lab.teaching.kept_session import known_values
 from lab.teaching.listener import Both, Listener
 from lab.teaching.teacher import Audience
@@ -24,8 +24,8 @@ from lab.toolbox.policy import Policy
 from lab.view.progress import RunProgress
 
 if TYPE_CHECKING:
+    from lab.seat.lesson_scene import LessonScene
     from lab.seat.page.teaching_page import SeatPage
-    from lab.seat.stage import Stage
     from lab.sequencing.methods.srl_advised import SequenceRequest
 
     OrderAsk = Callable[[SequenceRequest], int | None]
@@ -46,7 +46,7 @@ class Classroom(Audience):
     ) -> None:
         self.progress, self._prompt, self._page = progress, prompt, page
         self._plain = plain
-        self._stage: Stage | None = None
+        self._stage: LessonScene | None = None
         self._pause_s: float | None = None  # between two answers of a replay
         self._asked_here = False  # the last question was put to somebody here, and was shown
         self._shown_s = 0.0  # when the page was last shown a question that is not put to it
@@ -136,9 +136,9 @@ class Classroom(Audience):
         self.leave()
         if self._page is None:
             return
-        from lab.seat.stage import stage_of
+        from lab.seat.lesson_scene import lesson_scene_of
 
-        self._stage = stage_of(where, problem)
+        self._stage = lesson_scene_of(where, problem)
         if self._stage is not None:
             self._page.show(self._stage.bodies(), self._stage.camera)
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lab.errors import LabError
+from lab.learning.problem import Problem
 from lab.sim.scene import Layout, check_apart, draw_layout
-from lab.skills.skill import Problem
 from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.grid_world import RANDOM, GridWorld

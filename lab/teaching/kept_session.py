@@ -16,9 +16,9 @@ from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment
+from lab.learning.problem import Problem
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray
-from lab.skills.skill import Problem
 from lab.tasks.task_file import names_file
 from lab.teaching.teacher import MAX_SESSIONS, Keep
 from lab.toolbox.policy import Policy

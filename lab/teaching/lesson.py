@@ -25,7 +25,8 @@ from lab.toolbox.registry import Toolbox, default_folder
 
 if TYPE_CHECKING:
     from lab.gym import GymWorld
-    from lab.skills.skill import Problem, Skill
+    from lab.learning.problem import Problem
+    from lab.skills.skill import Skill
     from lab.toolbox.policy import Policy
 
 

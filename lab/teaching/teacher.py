@@ -15,11 +15,11 @@ from lab.advice.journal import Again, Journal
 from lab.errors import BadInput, WorkFailed, counted
 from lab.learning.environment import TableEnvironment, unreached
 from lab.learning.events import AdviceEnded, AdviceRejected, Event
+from lab.learning.problem import Problem
 from lab.learning.requests import Advisor
 from lab.learning.session import Session, SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray, TabularMDP, greedy_path
-from lab.skills.skill import Problem
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.record import Learned
 from lab.tasks.task_file import Subtask

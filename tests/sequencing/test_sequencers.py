@@ -110,7 +110,9 @@ def test_a_method_is_one_row(oven_cell: CellMaker, monkeypatch: pytest.MonkeyPat
         sequence = tuple(part for part in range(1, cell.parts + 1) for _ in range(2))
         return SequenceResult(sequence, simulate(cell, sequence).makespan_s, ())
 
-    monkeypatch.setattr("lab.sequencing.SEQUENCERS", {**SEQUENCERS, "one-by-one": Sequencer(lambda: one_by_one, "all of a part")})
+    monkeypatch.setattr(
+        "lab.sequencing.SEQUENCERS", {**SEQUENCERS, "one-by-one": Sequencer(lambda: one_by_one, "all of a part")}
+    )
     assert find_sequence(oven_cell(2), "one-by-one", Search(1), 0).cost == 29.0
     with pytest.raises(BadInput, match="did you mean 'one-by-one'"):
         find_sequence(oven_cell(2), "one-by-on", Search(1), 0)

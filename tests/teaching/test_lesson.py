@@ -12,7 +12,7 @@ from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.skills import Butter, Grasp, Skill
-from lab.tasks.grid_world import GridWorld, View
+from lab.tasks.grid_world import AdvisorView, GridWorld
 from lab.tasks.task_file import Task, fitting, load
 from lab.teaching.kept_session import Words
 from lab.teaching.lesson import find_skill, teach, teach_one, teach_world
@@ -198,7 +198,7 @@ def world() -> GridWorld:
         start=(0, 0),
         goal=(4, 3),
         obstacles=((1, 1), (3, 2)),
-        view=View(lower=(3, 0), upper=(4, 3)),
+        view=AdvisorView(lower=(3, 0), upper=(4, 3)),
         learner=LearnerSettings(learner="q", episodes=60, max_steps=60),
         gate=GateSettings(gate="always"),
     )

@@ -10,11 +10,11 @@ import pytest
 from lab.advice.counsel import Counsel
 from lab.errors import WorkFailed
 from lab.learning.events import AdviceRejected, EpisodeEnded, Event
+from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.session import Session, SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, greedy_path, grid
-from lab.skills.skill import Problem
 from lab.tasks.task_file import Subtask
 from lab.teaching.teacher import MAX_SESSIONS, MORE_SESSIONS, Audience, Interrupted, Teacher, fits
 from lab.toolbox.policy import Policy

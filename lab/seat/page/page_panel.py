@@ -42,7 +42,7 @@ class SeatPanel:
         Path(__file__).with_name(name)
         for name in (
             *("teaching.html", "teaching.css"),
-            *("teaching_draw.js", "teaching_side.js", "teaching_map.js", "teaching.js"),
+            *("teaching_draw.js", "teaching_status.js", "teaching_map.js", "teaching_question.js"),
         )
     )
 

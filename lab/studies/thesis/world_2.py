@@ -22,7 +22,7 @@ from lab.studies.runner import Progress
 from lab.studies.statistics import PERCENT_POINTS, RELATIVE
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, PrintedLine, printed
 from lab.studies.thesis.chapter_9_sessions import gate_of, learned_table
-from lab.tasks.grid_world import GridWorld, View
+from lab.tasks.grid_world import AdvisorView, GridWorld
 from lab.tasks.record import write_whole
 
 COMMENT = """\
@@ -97,7 +97,7 @@ def best_view(
 
 
 def _with(world: GridWorld, view: Ints) -> GridWorld:
-    return world.model_copy(update={"view": View(lower=_tuple(view[0]), upper=_tuple(view[1]))})
+    return world.model_copy(update={"view": AdvisorView(lower=_tuple(view[0]), upper=_tuple(view[1]))})
 
 
 def is_compared(cell: PrintedLine, view: str) -> bool:

@@ -4,8 +4,7 @@ import inspect
 import json
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -80,12 +79,9 @@ def _literal(text: str) -> object:
         return text
 
 
-@contextmanager
-def quiet() -> Iterator[None]:
+def quiet() -> "warnings.catch_warnings[None]":
     """Keeps what Gymnasium and environments warn of from whoever uses the lab."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
+    return warnings.catch_warnings(action="ignore")
 
 
 def make(name: GymName, where: str, render_mode: str | None = None) -> Env:
@@ -135,13 +131,10 @@ def _refusal(name: GymName, where: str, error: Exception) -> BadInput:
 
 def _discrete() -> list[str]:
     """Ids whose states and actions are discrete as far as it is known: Gymnasium's toy texts, and those of others."""
-    makers = {spec.id: _maker(spec.entry_point) for spec in gymnasium.registry.values()}
-    return [name for name, maker in makers.items() if not maker.startswith("gymnasium.envs") or "toy_text" in maker]
-
-
-def _maker(entry_point: object) -> str:
-    """The module that an environment comes from."""
-    return entry_point if isinstance(entry_point, str) else str(getattr(entry_point, "__module__", ""))
+    modules = {
+        spec.id: str(getattr(spec.entry_point, "__module__", spec.entry_point)) for spec in gymnasium.registry.values()
+    }
+    return [name for name, module in modules.items() if not module.startswith("gymnasium.envs") or "toy_text" in module]
 
 
 def _keywords(name: GymName) -> list[str]:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from lab.gym.found_model import Model
-from lab.gym.live import Live
+from lab.gym.numbered_environment import NumberedEnvironment
+from lab.gym.transition_model import TransitionModel
 from lab.mdp import FloatArray, TabularMDP
 
 STEPS_PROBED = 2000  # of a model, before it is believed
@@ -63,7 +63,7 @@ class GymTable(TabularMDP):
         return ", ".join(f"{name} {value}".strip() for (name, _), value in zip(self.digits, values, strict=True))
 
 
-def believed(live: Live) -> Model | None:
+def believed(live: NumberedEnvironment) -> TransitionModel | None:
     """The model that the environment's table `P` makes, if it has one and steps taken at random are as it says."""
     outcomes = getattr(live.inside, "P", None)
     if outcomes is None or len(live.states.sizes) != 1:
@@ -73,20 +73,20 @@ def believed(live: Live) -> Model | None:
         known = _sampled(live) if starts is None else np.asarray(starts, np.float64)
         if known.shape != (live.states.count,):
             return None
-        model = Model(outcomes, known, live.actions.count)
+        model = TransitionModel(outcomes, known, live.actions.count)
     except (KeyError, IndexError, TypeError, ValueError):
         return None
     return model if _follows(live, model) else None
 
 
-def _sampled(live: Live) -> FloatArray:
+def _sampled(live: NumberedEnvironment) -> FloatArray:
     """How often episodes began in each state (S,), as a share."""
     begun = [live.begin(seed) for seed in range(STARTS_PROBED)]
     shares: FloatArray = np.bincount(begun, minlength=live.states.count) / len(begun)
     return shares
 
 
-def _follows(live: Live, model: Model) -> bool:
+def _follows(live: NumberedEnvironment, model: TransitionModel) -> bool:
     """Whether every one of many random steps is one that the model knows."""
     rng = np.random.default_rng(0)
     state, over = live.begin(0), False
@@ -102,14 +102,10 @@ def _follows(live: Live, model: Model) -> bool:
     return True
 
 
-def table_of(live: Live, model: Model | None) -> GymTable:
+def table_of(live: NumberedEnvironment, model: TransitionModel | None) -> GymTable:
     """The environment's states and actions by name, with its likeliest steps where there is a model."""
     states, actions = live.states.count, live.actions.count
-    names: dict[str, Any] = {
-        "action_labels": _labels(live),
-        "environment": str(live.name),
-        "digits": _digits(live),
-    }
+    names: dict[str, Any] = {"action_labels": _labels(live), "environment": str(live.name), "digits": _digits(live)}
     if model is None:
         stays = np.repeat(np.arange(states)[:, None], actions, axis=1)
         no = np.zeros(states, bool)
@@ -127,16 +123,16 @@ def table_of(live: Live, model: Model | None) -> GymTable:
     )
 
 
-def _known(live: Live) -> Known:
+def _known(live: NumberedEnvironment) -> Known:
     return KNOWN.get(type(live.inside).__name__, Known())
 
 
-def _labels(live: Live) -> tuple[str, ...]:
+def _labels(live: NumberedEnvironment) -> tuple[str, ...]:
     labels = tuple(str(label) for label in getattr(live.inside, "action_labels", _known(live).actions))
     return labels if len(labels) == live.actions.count else tuple(f"action {a}" for a in range(live.actions.count))
 
 
-def _digits(live: Live) -> Digits:
+def _digits(live: NumberedEnvironment) -> Digits:
     known = _known(live).digits
     if known and prod(size for _, size in known) == live.states.count:
         return known

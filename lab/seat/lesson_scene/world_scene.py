@@ -1,4 +1,4 @@
-"""The stage of a grid world: the robot is a ball on a board (two axes) or in a room (three)."""
+"""The scene of a grid world: the robot is a ball on a board (two axes) or in a room (three)."""
 
 from math import radians
 from pathlib import Path
@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lab.mdp import FloatArray, TabularMDP
-from lab.seat.stage.markers import GREEN, STEP_S, Marks, camera_for, corners, upright, vector
-from lab.sim.frames import Body, Camera, Frame, Rgba, Shape, Vector
+from lab.seat.lesson_scene.camera_placement import camera_for, corners, vector
+from lab.seat.lesson_scene.episode_trail import GREEN, STEP_S, EpisodeTrail, upright
+from lab.sim.frames import Body, Frame, Rgba, Shape, Vector, Viewpoint
 from lab.tasks.grid_world import GridWorld
 
 WORLD_M = 2.0  # [m] the longest side of a drawn world
@@ -32,7 +33,7 @@ _BALL_M = 0.03  # [m] radius at least: in a world of many cells the robot is lar
 _FLAT = 0.04  # of a cell's edge: so thick are lines and marks on the ground
 
 
-class WorldStage:
+class WorldScene:
     """A world that stands on z = 0 around the origin, its longest side WORLD_M."""
 
     def __init__(self, world: GridWorld, mdp: TabularMDP) -> None:
@@ -41,8 +42,8 @@ class WorldStage:
         self._size = WORLD_M / max(world.shape)
         self._flat = len(world.shape) == 2
         self._ball = max(0.36 * self._size, _BALL_M)
-        self._marks = Marks(mdp, self.place, 0.3 * self._ball, 1.6 * self._ball)
-        self._folder = TemporaryDirectory(prefix="lab-stage-")  # of the mesh, until the stage is closed
+        self._marks = EpisodeTrail(mdp, self.place, 0.3 * self._ball, 1.6 * self._ball)
+        self._folder = TemporaryDirectory(prefix="lab-scene-")  # of the mesh, until the scene is closed
         made = (self._ground(), self._room(), self._obstacles(), self._ends(), self._robot(), self._marks.bodies())
         self._bodies = tuple(body for bodies in made for body in bodies)
 
@@ -73,7 +74,7 @@ class WorldStage:
         return (edge, edge, edge * (_LOW if self._flat else 1.0))
 
     @property
-    def camera(self) -> Camera:
+    def camera(self) -> Viewpoint:
         """From the front: steeply onto a board, a little from the right into a room."""
         x, y, z = self._extent
         seen = corners((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))

@@ -6,21 +6,21 @@ right is to the right, forward is away from the viewer.
 
 from typing import TYPE_CHECKING, Protocol
 
-from lab.seat.stage.skill_stage import SkillStage
-from lab.seat.stage.world_stage import WorldStage
-from lab.sim.frames import Body, Camera, Frame
-from lab.skills.skill import Problem
+from lab.learning.problem import Problem
+from lab.seat.lesson_scene.skill_scene import SkillScene
+from lab.seat.lesson_scene.world_scene import WorldScene
+from lab.sim.frames import Body, Frame, Viewpoint
 from lab.tasks.grid_world import GridWorld
 
 if TYPE_CHECKING:
     from lab.skills.prepared_scene import Prepared
 
 
-class Stage(Protocol):
+class LessonScene(Protocol):
     """What a page shows of a lesson; it belongs to one thread."""
 
     @property
-    def camera(self) -> Camera:
+    def camera(self) -> Viewpoint:
         """Where to look from: all cells are in sight."""
 
     def bodies(self) -> tuple[Body, ...]:
@@ -30,16 +30,16 @@ class Stage(Protocol):
         """What has moved now that the learner is in `state`; the first frame places everything, times count up."""
 
     def close(self) -> None:
-        """Free what the stage holds; safe to call again."""
+        """Free what the scene holds; safe to call again."""
 
 
-def stage_of(where: "Prepared | GridWorld | None", problem: Problem) -> Stage | None:
-    """The stage of a lesson in a world or in a skill of a prepared task; None where there is no scene."""
+def lesson_scene_of(where: "Prepared | GridWorld | None", problem: Problem) -> LessonScene | None:
+    """The scene of a lesson in a world or in a skill of a prepared task; None where there is no scene."""
     if isinstance(where, GridWorld):
-        return WorldStage(where, problem.mdp)
+        return WorldScene(where, problem.mdp)
     if where is None or problem.name not in where.problems:
         return None
-    return SkillStage(where.task, where.toasts, where.layout, where.skillset.skills[problem.name])
+    return SkillScene(where.task, where.toasts, where.layout, where.skillset.skills[problem.name])
 
 
-__all__ = ["SkillStage", "Stage", "WorldStage", "stage_of"]
+__all__ = ["LessonScene", "SkillScene", "WorldScene", "lesson_scene_of"]

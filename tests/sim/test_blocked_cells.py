@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from lab.sim.blocked_cells import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME
 from lab.sim.scene import Layout, Scene
-from lab.sim.survey import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.world import World
 from lab.tasks.task_file import Obstacle, Task
 

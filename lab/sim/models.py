@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lab.sim import kinematics as arm
-from lab.sim.parts import Joint, Link, Model, Part, Vector, box, cylinder, hull, join, urdf
+from lab.sim.frames import Vector
+from lab.sim.urdf_writer import Joint, Link, Model, Part, box, cylinder, hull, join, urdf
 
 if TYPE_CHECKING:
     from trimesh import Trimesh

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,11 +15,9 @@ from lab.mdp import MAX_SWEEPS, BoolArray, FloatArray, IntArray
 SETTLED = 1e-12  # changes of a value, and chances, below this are none
 SAME_REWARD = 1e-9
 
-Outcome = tuple[float, int, float, bool]  # chance, state entered, reward, the episode is over
-Outcomes = Mapping[
-    int, Mapping[int, Sequence[Outcome]]
-]  # [state][action], as Gymnasium's toy-text environments hold it
-Policy = NDArray[np.int64]
+Transition = tuple[float, int, float, bool]  # chance, state entered, reward, the episode is over
+Transitions = Mapping[int, Mapping[int, Sequence[Transition]]]  # [state][action], as Gymnasium's toy texts hold it
+Actions = NDArray[np.int64]  # (S,) the one that a policy takes in each state
 
 
 class Worth(NamedTuple):
@@ -28,16 +28,15 @@ class Worth(NamedTuple):
     steps: float
 
 
-class Model:
+class TransitionModel:
     """A problem left to chance: its outcomes side by side, and the chance (S,) of starting in each state.
 
     live (S,) bool: states in which an episode can go on; terminal (S,) bool: those it can only end in, and
-    those that hold an ended one; best: the highest
-    reward of a step that ends an episode, -inf when none does; goal (S,) bool: terminal states entered with it; certain:
-    no step is left to chance.
+    those that hold an ended one; best: the highest reward of a step that ends an episode, -inf when none does; goal (S,)
+    bool: terminal states entered with it; certain: no step is left to chance.
     """
 
-    def __init__(self, outcomes: Outcomes, starts: FloatArray, n_actions: int):
+    def __init__(self, outcomes: Transitions, starts: FloatArray, n_actions: int):
         """Raises KeyError, IndexError, TypeError or ValueError when the outcomes are none of such a problem."""
         self.starts, self.n_states, self.n_actions = starts, len(starts), n_actions
         rows = [
@@ -111,21 +110,15 @@ class Model:
         Of several that are equally likely it is the middle one in the model's order: where an agent slips, Gymnasium
         lists the intended move between the two slips.
         """
-        keys, which = np.unique(self._row * self.n_states + self._entered, return_inverse=True)
-        chance = np.bincount(which, self._chance)
-        row, entered = np.divmod(keys, self.n_states)
-        first = np.full(len(keys), len(which))
-        np.minimum.at(first, which, np.arange(len(which)))  # where each state stands in the model's order
-        top = np.zeros(self.n_states * self.n_actions)
-        np.maximum.at(top, row, chance)
-        tied = chance >= top[row] - SETTLED
-        order = np.lexsort((first, row))
-        order = order[tied[order]]
-        counts = np.bincount(row[order], minlength=len(top))
-        middle = np.cumsum(counts) - counts + (counts - 1) // 2
-        successor = entered[order][middle].reshape(self.n_states, self.n_actions)
-        stays = np.arange(self.n_states)[:, None]
-        likeliest: IntArray = np.where(self.terminal[:, None], stays, successor).astype(np.int32)
+        likeliest: IntArray = np.repeat(np.arange(self.n_states, dtype=np.int32)[:, None], self.n_actions, axis=1)
+        steps = zip(self._row.tolist(), self._entered.tolist(), self._chance.tolist(), strict=True)
+        for row, outcomes in groupby(steps, key=itemgetter(0)):
+            chances: dict[int, float] = {}  # in the model's order
+            for _, entered, chance in outcomes:
+                chances[entered] = chances.get(entered, 0.0) + chance
+            tied = [entered for entered, chance in chances.items() if chance >= max(chances.values()) - SETTLED]
+            if not self.terminal[row // self.n_actions]:
+                likeliest.flat[row] = tied[(len(tied) - 1) // 2]
         return likeliest
 
     @cached_property
@@ -148,8 +141,8 @@ class Model:
                 return q
         raise WorkFailed(f"value iteration with discount {discount} did not settle in {MAX_SWEEPS} sweeps")
 
-    def worth(self, policy: Policy, horizon: int) -> Worth:
-        """What following a policy, an action (S,) for each state, brings in episodes of at most so many steps."""
+    def worth(self, policy: Actions, horizon: int) -> Worth:
+        """What following a policy (S,) brings in episodes of at most so many steps."""
         states = np.arange(self.n_states)
         goes = self._onward[states * self.n_actions + policy].T.tocsr()  # (S, S), to state row from state column
         gain, wins = self.gain[states, policy], self._wins[states, policy]

@@ -42,10 +42,10 @@ const seat = (() => {
     dirty.clear();
     shown = state.question || null;
     for (const [names, draw] of RENDERERS) if (names.some((name) => parts.has(name))) draw();
-    seatSide.show(state, parts);
+    seatStatus.show(state, parts);
   }
 
-  const { make, percent } = seatSide;
+  const { make, percent } = seatStatus;
   const named = (move) => `${move.direction === null ? "" : `${ARROWS[move.direction]} `}${move.label}`;
   const ownMove = () => shown.moves.find((move) => move.action === shown.own);
 
@@ -57,7 +57,7 @@ const seat = (() => {
     document.body.classList.toggle("mine", Boolean(you.seat));
     document.title = `${shown && you.seat ? "● " : ""}${title}`;
     el("lesson").textContent = lesson.title || lesson.page;
-    const chair = finished ? "" : !send ? "connection lost: trying again" : you.seat ? `You answer here${you.pages > 1 ? `; ${seatSide.count(you.pages - 1, "other page")} watching` : ""}` : you.free ? "No page answers yet" : "You are watching: another page answers";
+    const chair = finished ? "" : !send ? "connection lost: trying again" : you.seat ? `You answer here${you.pages > 1 ? `; ${seatStatus.count(you.pages - 1, "other page")} watching` : ""}` : you.free ? "No page answers yet" : "You are watching: another page answers";
     el("chair-text").textContent = chair;
     el("chair").classList.toggle("yours", Boolean(you.seat && send));
     const button = el("chair-button");
@@ -268,7 +268,7 @@ const seat = (() => {
   }
 
   document.addEventListener("keydown", pressed);
-  document.getElementById("stage").classList.add("bare");
+  document.getElementById("page").classList.add("bare");
   el("words").addEventListener("click", (event) => {
     const button = event.target.closest("button");
     if (button) say(button.dataset.word);
@@ -298,7 +298,7 @@ const seat = (() => {
       online(null);
     },
     hasScene() {
-      el("stage").classList.remove("bare");
+      el("page").classList.remove("bare");
       redraw();
     },
   };

@@ -8,18 +8,17 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
+from lab.sim.frames import Rgba, Vector
+
 if TYPE_CHECKING:
     from trimesh import Trimesh
-
-Vector = tuple[float, float, float]
-Color = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
 class Part:
     """A visible and, unless `ghost`, solid piece of a link: a mesh, or a box or cylinder of `size` [m] at `at` [m]."""
 
-    color: Color
+    color: Rgba
     size: tuple[float, ...] = ()
     at: Vector = (0.0, 0.0, 0.0)
     mesh: "Trimesh | None" = None

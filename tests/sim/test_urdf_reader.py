@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lab.errors import BadInput
-from lab.sim import urdf
+from lab.sim import urdf_reader
 
 GOOD = """<robot name="thing">
   <link name="root">
@@ -37,7 +37,7 @@ def written(folder: Path, text: str = GOOD, mesh: str | bytes | None = MESH) -> 
 
 def refusal(path: Path) -> str:
     with pytest.raises(BadInput) as caught:
-        urdf.validate(path)
+        urdf_reader.validate(path)
     message = str(caught.value)
     assert message.startswith(str(path))
     assert "\n" not in message
@@ -46,8 +46,8 @@ def refusal(path: Path) -> str:
 
 def test_a_sound_urdf_is_accepted_and_its_looks_are_read(tmp_path: Path) -> None:
     path = written(tmp_path)
-    urdf.validate(path)
-    looks = urdf.looks(path)
+    urdf_reader.validate(path)
+    looks = urdf_reader.looks(path)
     assert set(looks) == {"", "arm"}
     (mesh,) = looks[""]  # the sphere is none of this lab's shapes
     assert (mesh.kind, mesh.mesh, mesh.rgba, mesh.position) == ("mesh", tmp_path / "part.obj", (1, 0, 0, 1), (0, 0, 1))

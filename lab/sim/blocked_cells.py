@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.files import assets_folder
-from lab.sim import assets
+from lab.sim import models
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME
-from lab.sim.scene import GRASP_DEPTH, NEAREST_M, Scene
+from lab.sim.scene import NEAREST_M, Scene
 
 OUT_OF_REACH = "out of reach"
 CARRIED = "carried slice"
@@ -44,7 +44,7 @@ class Surveyor:
         world = scene.world
         if loaded:
             world.load(CARRIED, assets_folder() / "slice.urdf", _AWAY, fixed=False)
-            scene.robot.open_at_once(assets.SLICE[1] / 2 + 0.0005)
+            scene.robot.open_at_once(models.SLICE[1] / 2 + 0.0005)
 
     def cause(self, pose: ToolPose) -> str:
         """'' when the tool can be at `pose`, else why not."""
@@ -52,18 +52,13 @@ class Surveyor:
             return OUT_OF_REACH
         world = self.scene.world
         if self.loaded:
-            self._carry(pose)
+            self.scene.put_slice(CARRIED, pose)
         for name in self.solid:
             if world.nearest(NAME, name, self.clearance) < self.clearance:
                 return name
             if self.loaded and world.nearest(CARRIED, name, self.clearance) < self.clearance:
                 return name
         return ""
-
-    def _carry(self, pose: ToolPose) -> None:
-        up = pose.z + GRASP_DEPTH - assets.SLICE[2] / 2
-        turn = (0.0, 0.0, float(np.sin(pose.yaw / 2)), float(np.cos(pose.yaw / 2)))
-        self.scene.world.put(CARRIED, (pose.x, pose.y, up), turn)
 
     def grid(self, shape: tuple[int, ...], pose_of: Callable[[tuple[int, ...]], ToolPose]) -> Survey:
         """Survey every cell of a grid whose cell i has the tool at pose_of(i)."""

@@ -1,7 +1,7 @@
 // Beside the question: the learning curve, how advice stands, what the learner says, the work, the receipt, a run's progress.
 "use strict";
 
-const seatSide = (() => {
+const seatStatus = (() => {
   const el = (id) => document.getElementById(id);
   const percent = (part) => `${Math.round(100 * part)} %`;
   const count = (number, thing) => `${number} ${thing}${number === 1 ? "" : "s"}`;

@@ -1,13 +1,14 @@
-"""The stage of a skill: the cell with the arm, or the applier's head, where the state has it."""
+"""The scene of a skill: the cell with the arm, or the applier's head, where the state has it."""
 
 from dataclasses import dataclass
 from math import hypot, radians
 
 import numpy as np
 
-from lab.seat.stage.markers import GREEN, STEP_S, Changes, Marks, camera_for, corners, vector
-from lab.sim import assets
-from lab.sim.frames import Body, Camera, Frame, Rgba, Shape, Vector
+from lab.seat.lesson_scene.camera_placement import camera_for, corners, vector
+from lab.seat.lesson_scene.episode_trail import GREEN, STEP_S, Changes, EpisodeTrail
+from lab.sim import models
+from lab.sim.frames import Body, Frame, Rgba, Shape, Vector, Viewpoint
 from lab.sim.scene import Layout, Scene, spots
 from lab.sim.world import World
 from lab.skills import Skill
@@ -41,7 +42,7 @@ class OnSlice:
         return dict.fromkeys(seen, pose), seen
 
 
-class SkillStage:
+class SkillScene:
     """A skill's scene with the first slice in the gripper, or before it on its spot."""
 
     def __init__(self, task: Task, toasts: int, layout: Layout, skill: Skill) -> None:
@@ -66,9 +67,9 @@ class SkillStage:
         bench, skill = self._bench, self._skill
         if skill.carries:
             bench.held = SLICE
-            bench.scene.robot.open_at_once(assets.SLICE[1] / 2 + FINGERS_OFF_M)
+            bench.scene.robot.open_at_once(models.SLICE[1] / 2 + FINGERS_OFF_M)
         elif skill.near:
-            bench.put_slice(SLICE, spots(task.station(skill.station))[0].grasp())
+            bench.scene.put_slice(SLICE, spots(task.station(skill.station))[0].grasp())
         if not skill.near:
             return {}
         station = task.station(skill.station)
@@ -77,7 +78,7 @@ class SkillStage:
         ghosts = {
             name: (spot, GHOST)
             for name, spot in neighbours(station, foot).items()
-            if all(hypot(spot.x - at.x, spot.y - at.y) > assets.SLICE[0] / 4 for at in slices)
+            if all(hypot(spot.x - at.x, spot.y - at.y) > models.SLICE[0] / 4 for at in slices)
         }
         if skill.carries:
             ghosts["goal"] = (foot, GREEN)
@@ -89,9 +90,9 @@ class SkillStage:
         pose = self._skill.pose(state)
         return (pose.x, pose.y, pose.z)
 
-    def _marks(self) -> Marks:
+    def _marks(self) -> EpisodeTrail:
         size = self._size()
-        return Marks(self._mdp, self._place, max(0.11 * size, TRAIL_M), max(0.6 * size, COLLISION_M))
+        return EpisodeTrail(self._mdp, self._place, max(0.11 * size, TRAIL_M), max(0.6 * size, COLLISION_M))
 
     def _size(self) -> float:
         """How far apart neighbouring states are, at least [m]."""
@@ -108,11 +109,11 @@ class SkillStage:
         return (Body("goal", (Shape("sphere", (0.35 * self._size(),), None, GREEN, at),)),)
 
     @property
-    def camera(self) -> Camera:
+    def camera(self) -> Viewpoint:
         """From the front, of the slice or of the whole cell; a little from the right, so that nothing hides the rest."""
         return self._camera
 
-    def _look(self) -> Camera:
+    def _look(self) -> Viewpoint:
         free = np.flatnonzero(~self._mdp.terminal | self._mdp.goal)
         places = np.array([self._place(int(state)) for state in free])
         azimuth, elevation = (radians(angle) for angle in self._skill.looks_from)

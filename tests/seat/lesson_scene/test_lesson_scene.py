@@ -11,16 +11,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lab.learning.problem import Problem
 from lab.mdp import FloatArray, TabularMDP, grid
-from lab.seat.stage import SkillStage, Stage, WorldStage, stage_of
-from lab.seat.stage.markers import TRAIL, camera_for
-from lab.seat.stage.world_stage import MOST_OBSTACLES, WORLD_M
-from lab.sim import assets
-from lab.sim.frames import Camera, Frame, Recording, Shape
+from lab.seat.lesson_scene import LessonScene, SkillScene, WorldScene, lesson_scene_of
+from lab.seat.lesson_scene.camera_placement import camera_for
+from lab.seat.lesson_scene.episode_trail import TRAIL
+from lab.seat.lesson_scene.world_scene import MOST_OBSTACLES, WORLD_M
+from lab.sim import models
+from lab.sim.frames import Frame, Recording, Shape, Viewpoint
 from lab.sim.kinematics import TOOL, ToolPose, inverse
 from lab.sim.scene import GRASP_DEPTH
 from lab.skills.prepared_scene import prepare
-from lab.skills.skill import Problem, Skill
+from lab.skills.skill import Skill
 from lab.tasks.grid_world import GridWorld, random_world
 from lab.tasks.task_file import load, load_world
 from lab.teaching.teacher import world_problem
@@ -40,11 +42,11 @@ SMALL = GridWorld(name="small", shape=(2, 3), start=(0, 0), goal=(1, 2), obstacl
 
 
 @cache
-def lesson(name: str) -> tuple[Stage, Skill, TabularMDP]:
-    """A skill's stage as `lab teach` has it, and its skill and problem."""
+def lesson(name: str) -> tuple[LessonScene, Skill, TabularMDP]:
+    """A skill's scene as `lab teach` has it, and its skill and problem."""
     prepared = prepare(load("toast"), 2, 0, name)
-    made = stage_of(prepared, prepared.problems[name])
-    assert isinstance(made, SkillStage)
+    made = lesson_scene_of(prepared, prepared.problems[name])
+    assert isinstance(made, SkillScene)
     return made, prepared.skillset.skills[name], prepared.problems[name].mdp
 
 
@@ -56,9 +58,9 @@ def _close() -> Iterator[None]:
         lesson(name)[0].close()  # safe to call again
 
 
-def world_stage(world: GridWorld) -> WorldStage:
-    made = stage_of(world, Problem(world.name, "world", world.mdp()))
-    assert isinstance(made, WorldStage)
+def world_scene(world: GridWorld) -> WorldScene:
+    made = lesson_scene_of(world, Problem(world.name, "world", world.mdp()))
+    assert isinstance(made, WorldScene)
     return made
 
 
@@ -70,7 +72,7 @@ def shown(frame: Frame) -> set[str]:
     return {name for name, visible in frame.visible.items() if visible}
 
 
-def in_picture(camera: Camera, points: FloatArray) -> bool:
+def in_picture(camera: Viewpoint, points: FloatArray) -> bool:
     """Whether a page 1.2 times as wide as high, with 38 degrees from bottom to top, has all points (n, 3) in it."""
     eye, target = np.array(camera.eye), np.array(camera.target)
     ahead = (target - eye) / np.linalg.norm(target - eye)
@@ -95,16 +97,16 @@ worlds = st.builds(random_world, shapes, st.sampled_from([0.0, 0.1, 0.3]), st.in
 
 def test_a_board_by_hand() -> None:
     """Three columns are 2 m wide; rows run down, towards the viewer."""
-    with closing(world_stage(SMALL)) as stage:
+    with closing(world_scene(SMALL)) as scene:
         cell = WORLD_M / 3
-        assert place(stage.frame(0), "robot") == pytest.approx([-cell, cell / 2, cell / 2])  # (0, 0): left, behind
-        assert place(stage.frame(5), "robot") == pytest.approx([cell, -cell / 2, cell / 2])  # (1, 2): right, in front
-        boxes = {body.name: body.shapes for body in stage.bodies()}
+        assert place(scene.frame(0), "robot") == pytest.approx([-cell, cell / 2, cell / 2])  # (0, 0): left, behind
+        assert place(scene.frame(5), "robot") == pytest.approx([cell, -cell / 2, cell / 2])  # (1, 2): right, in front
+        boxes = {body.name: body.shapes for body in scene.bodies()}
         assert [shape.position[:2] for shape in boxes["obstacles"]] == [pytest.approx((0.0, cell / 2))]
         assert boxes["goal"][0].position == pytest.approx((cell, -cell / 2, cell / 2))
         assert boxes["start"][0].position[:2] == pytest.approx((-cell, cell / 2))
-        assert stage.camera.eye[0] == pytest.approx(0.0, abs=1e-9)
-        assert stage.camera.eye[1] < -1.0 < 1.0 < stage.camera.eye[2]
+        assert scene.camera.eye[0] == pytest.approx(0.0, abs=1e-9)
+        assert scene.camera.eye[1] < -1.0 < 1.0 < scene.camera.eye[2]
 
 
 WAYS = {
@@ -126,8 +128,8 @@ def test_an_action_moves_the_robot_by_a_cell_the_way_it_says(world: GridWorld, d
     state = data.draw(st.sampled_from(np.flatnonzero(~mdp.terminal).tolist()))
     action = data.draw(st.integers(0, mdp.n_actions - 1))
     after = int(mdp.successor[state, action])
-    with closing(world_stage(world)) as stage:
-        moved = place(stage.frame(after), "robot") - place(stage.frame(state), "robot")
+    with closing(world_scene(world)) as scene:
+        moved = place(scene.frame(after), "robot") - place(scene.frame(state), "robot")
     way = np.array(WAYS[len(world.shape)][mdp.action_labels[action]]) * (after != state)
     assert moved == pytest.approx(way * WORLD_M / max(world.shape), abs=1e-9)
 
@@ -139,13 +141,13 @@ def test_the_robot_is_in_the_world_and_in_the_picture_and_never_in_an_obstacle_u
     mdp = world.mdp()
     state = data.draw(st.integers(0, mdp.n_states - 1))
     size = WORLD_M / max(world.shape)
-    with closing(world_stage(world)) as stage:
-        frame = stage.frame(state)
+    with closing(world_scene(world)) as scene:
+        frame = scene.frame(state)
         at = place(frame, "robot")
-        bodies = {body.name: body.shapes for body in stage.bodies()}
+        bodies = {body.name: body.shapes for body in scene.bodies()}
         assert np.all(abs(at[:2]) <= WORLD_M / 2 - size / 2 + 1e-9)
         assert size / 2 <= at[2] + 1e-9 <= WORLD_M
-        assert in_picture(stage.camera, at + size / 2 * np.array(list(np.ndindex(3, 3, 3))) - size / 2)
+        assert in_picture(scene.camera, at + size / 2 * np.array(list(np.ndindex(3, 3, 3))) - size / 2)
         obstacles = np.array([shape.position for shape in bodies.get("obstacles", ())]).reshape(-1, 3)
         assert len(obstacles) == len(world.obstacles)
         hit = bool(np.any(np.all(abs(obstacles - at) < size / 2, axis=1)))
@@ -158,16 +160,16 @@ def test_whatever_the_states_the_frames_fit_the_bodies_and_times_count_up(
     world: GridWorld, data: st.DataObject
 ) -> None:
     states = data.draw(st.lists(st.integers(0, world.mdp().n_states - 1), min_size=1, max_size=20))
-    with closing(world_stage(world)) as stage:
-        frames = [stage.frame(state) for state in states]
-        Recording(stage.bodies(), frames, stage.camera).check()
+    with closing(world_scene(world)) as scene:
+        frames = [scene.frame(state) for state in states]
+        Recording(scene.bodies(), frames, scene.camera).check()
         assert all(before.time_s < after.time_s for before, after in pairwise(frames))
 
 
 def test_the_cells_of_an_episode_stay_marked_until_the_next_one() -> None:
     """(0, 0), (1, 0), (1, 1), against the lower border, and up into the obstacle; then from the start again."""
-    with closing(world_stage(SMALL)) as stage:
-        first, down, right, still, crash, again = (stage.frame(state) for state in (0, 3, 4, 4, 1, 0))
+    with closing(world_scene(SMALL)) as scene:
+        first, down, right, still, crash, again = (scene.frame(state) for state in (0, 3, 4, 4, 1, 0))
         assert shown(first) == set()
         assert len(first.visible) == TRAIL + 1  # all are hidden before the first step
         assert [shown(frame) for frame in (down, right, still)] == [{"trail 0"}, {"trail 1"}, set()]
@@ -177,14 +179,14 @@ def test_the_cells_of_an_episode_stay_marked_until_the_next_one() -> None:
         assert place(crash, "collision") == pytest.approx(place(crash, "robot"))
         assert set(again.visible) == {f"trail {number}" for number in range(TRAIL)} | {"collision"}
         assert shown(again) == set()
-        assert shown(stage.frame(5)) == set()  # suddenly elsewhere: no way of one move leads there
-        assert len(stage.frame(5).visible) == TRAIL + 1  # after the goal a new one begins
+        assert shown(scene.frame(5)) == set()  # suddenly elsewhere: no way of one move leads there
+        assert len(scene.frame(5).visible) == TRAIL + 1  # after the goal a new one begins
 
 
 def test_a_long_way_gives_up_its_oldest_marks() -> None:
     world = GridWorld(name="long", shape=(1, 100), start=(0, 0), goal=(0, 99))
-    with closing(world_stage(world)) as stage:
-        frames = [stage.frame(state) for state in range(TRAIL + 2)]
+    with closing(world_scene(world)) as scene:
+        frames = [scene.frame(state) for state in range(TRAIL + 2)]
         assert shown(frames[TRAIL + 1]) == {"trail 0"} == shown(frames[1])
         assert place(frames[TRAIL + 1], "trail 0") == pytest.approx(place(frames[TRAIL], "robot"))
 
@@ -199,21 +201,21 @@ def boxes_of(shape: Shape) -> FloatArray:
     return np.asarray((corners.min(axis=1) + corners.max(axis=1)) / 2)
 
 
-def test_hundreds_of_obstacles_are_one_mesh_that_goes_with_the_stage() -> None:
+def test_hundreds_of_obstacles_are_one_mesh_that_goes_with_the_scene() -> None:
     world = random_world((60, 50), 0.3, 1)
-    with closing(world_stage(world)) as stage:
-        (body,) = (body for body in stage.bodies() if body.name == "obstacles")
+    with closing(world_scene(world)) as scene:
+        (body,) = (body for body in scene.bodies() if body.name == "obstacles")
         (shape,) = body.shapes
-        expected = stage.centres(world.obstacles)
+        expected = scene.centres(world.obstacles)
         found = boxes_of(shape)
         assert len(found) == len(world.obstacles) == 900
         assert found[:, :2] == pytest.approx(expected[:, :2], abs=1e-6)
-        assert len(stage.bodies()) < 70
-        assert len(describe(stage.bodies(), stage.camera)["geometries"]) < 20
+        assert len(scene.bodies()) < 70
+        assert len(describe(scene.bodies(), scene.camera)["geometries"]) < 20
         assert shape.mesh is not None
         assert shape.mesh.is_file()
     assert not shape.mesh.exists()
-    stage.close()  # safe to call again
+    scene.close()  # safe to call again
 
 
 def test_of_too_many_obstacles_in_a_room_those_near_the_shortest_ways_are_drawn() -> None:
@@ -221,8 +223,8 @@ def test_of_too_many_obstacles_in_a_room_those_near_the_shortest_ways_are_drawn(
     assert len(world.obstacles) > MOST_OBSTACLES[3]
     ends = np.array([world.start, world.goal])
     detours = np.abs(np.array(world.obstacles)[:, None] - ends).sum(axis=(1, 2))
-    with closing(world_stage(world)) as stage:
-        (body,) = (body for body in stage.bodies() if body.name == "obstacles")
+    with closing(world_scene(world)) as scene:
+        (body,) = (body for body in scene.bodies() if body.name == "obstacles")
         found = boxes_of(body.shapes[0])
         size, middle = WORLD_M / 20, np.array([9.5, 9.5, -0.5])
         cells = np.round(found / size + middle)
@@ -232,15 +234,15 @@ def test_of_too_many_obstacles_in_a_room_those_near_the_shortest_ways_are_drawn(
 
 
 @pytest.mark.parametrize("name", ["world-1", "world-2"])
-def test_the_shipped_worlds_have_a_stage_that_the_page_can_draw(name: str) -> None:
+def test_the_shipped_worlds_have_a_scene_that_the_page_can_draw(name: str) -> None:
     world = load_world(name)
     problem = world_problem(world)
-    with closing(world_stage(world)) as stage:
-        drawn = describe(stage.bodies(), stage.camera)
+    with closing(world_scene(world)) as scene:
+        drawn = describe(scene.bodies(), scene.camera)
         assert {"robot", "goal", "start", "ground", "obstacles"} <= {body["name"] for body in drawn["bodies"]}
         (goal,) = np.flatnonzero(problem.mdp.goal)
-        (box,) = next(body.shapes for body in stage.bodies() if body.name == "goal")
-        assert place(stage.frame(int(goal)), "robot") == pytest.approx(np.array(box.position))
+        (box,) = next(body.shapes for body in scene.bodies() if body.name == "goal")
+        assert place(scene.frame(int(goal)), "robot") == pytest.approx(np.array(box.position))
 
 
 # ---- skills -------------------------------------------------------------------------------------------------------
@@ -258,42 +260,42 @@ def at(pose: ToolPose) -> FloatArray:
 @every_skill
 @given(data=st.data())
 def test_in_every_free_state_the_tool_is_at_the_pose_of_the_skill(name: str, data: st.DataObject) -> None:
-    stage, skill, mdp = lesson(name)
-    frame = stage.frame(data.draw(free(mdp)))
+    scene, skill, mdp = lesson(name)
+    frame = scene.frame(data.draw(free(mdp)))
     state = data.draw(free(mdp))
-    frame = stage.frame(state)
+    frame = scene.frame(state)
     pose = skill.pose(state)
     if name.startswith("butter"):
         assert place(frame, "butter_applier head") == pytest.approx(at(pose), abs=1e-6)
         return
     assert tool_of(frame) == pytest.approx(at(pose), abs=1e-6)
     if skill.carries:
-        middle = pose.shifted(dz=GRASP_DEPTH - assets.SLICE[2] / 2)
+        middle = pose.shifted(dz=GRASP_DEPTH - models.SLICE[2] / 2)
         assert place(frame, "slice 1") == pytest.approx(at(middle))
 
 
 @every_skill
 @given(data=st.data())
 def test_frames_of_a_skill_fit_its_bodies(name: str, data: st.DataObject) -> None:
-    stage, _, mdp = lesson(name)
+    scene, _, mdp = lesson(name)
     states = data.draw(st.lists(st.integers(0, mdp.n_states - 1), min_size=1, max_size=8))
-    frames = [stage.frame(state) for state in states]
-    Recording(stage.bodies(), frames, stage.camera).check()
+    frames = [scene.frame(state) for state in states]
+    Recording(scene.bodies(), frames, scene.camera).check()
     assert all(before.time_s < after.time_s for before, after in pairwise(frames))
 
 
 @every_skill
 def test_all_places_of_the_tool_are_in_the_picture(name: str) -> None:
-    stage, skill, mdp = lesson(name)
+    scene, skill, mdp = lesson(name)
     places = np.array([at(skill.pose(int(state))) for state in np.flatnonzero(~mdp.terminal | mdp.goal)])
-    assert in_picture(stage.camera, places)
+    assert in_picture(scene.camera, places)
 
 
 @every_skill
 def test_right_is_to_the_right_in_the_picture(name: str) -> None:
     """What the action "right" does, seen by the camera; "forward" goes away from it."""
-    stage, skill, mdp = lesson(name)
-    ahead = np.array(stage.camera.target) - stage.camera.eye
+    scene, skill, mdp = lesson(name)
+    ahead = np.array(scene.camera.target) - scene.camera.eye
     aside = np.cross(ahead, (0.0, 0.0, 1.0))
     for word, way in (("right", aside), ("forward", ahead)):
         if word in mdp.action_labels:
@@ -304,38 +306,38 @@ def test_right_is_to_the_right_in_the_picture(name: str) -> None:
 
 @every_skill
 def test_the_page_can_draw_a_skill(name: str) -> None:
-    stage, skill, _ = lesson(name)
-    drawn = {body["name"] for body in describe(stage.bodies(), stage.camera)["bodies"]}
+    scene, skill, _ = lesson(name)
+    drawn = {body["name"] for body in describe(scene.bodies(), scene.camera)["bodies"]}
     assert {"table", "robot tool", "slice 1", "slice 2"} <= drawn
     assert ("goal" in drawn) == (skill.subtask in ("insert", "transfer", "place"))
 
 
 def test_a_state_out_of_reach_leaves_the_arm_and_marks_where_it_was_to_go() -> None:
-    stage, skill, mdp = lesson("transfer plate to insert with slice")
-    before = stage.frame(mdp.start)
+    scene, skill, mdp = lesson("transfer plate to insert with slice")
+    before = scene.frame(mdp.start)
     far = next(state for state in range(mdp.n_states) if inverse(skill.pose(state)) is None)
-    after = stage.frame(far)
+    after = scene.frame(far)
     assert after.poses["robot tool"] == before.poses["robot tool"]
     assert after.poses["slice 1"] == before.poses["slice 1"]
     assert "collision" in shown(after)
     assert place(after, "collision") == pytest.approx(at(skill.pose(far)))
-    assert "collision" not in shown(stage.frame(mdp.start))
+    assert "collision" not in shown(scene.frame(mdp.start))
 
 
 def test_butter_is_where_the_state_has_it() -> None:
-    stage, _, mdp = lesson("butter at butter_applier")
+    scene, _, mdp = lesson("butter at butter_applier")
     cells = [f"butter 1 {row}{column}" for row, column in np.ndindex(3, 3)]
-    some = stage.frame(4 << 9 | 0b000010011)
+    some = scene.frame(4 << 9 | 0b000010011)
     assert shown(some) == {cells[0], cells[1], cells[4]}
     assert set(some.visible) == set(cells)
     assert some.poses[cells[0]] == some.poses["slice 1"]
-    assert shown(stage.frame(mdp.start)) == {cells[0]}  # a new slice
+    assert shown(scene.frame(mdp.start)) == {cells[0]}  # a new slice
 
 
 def test_slices_that_may_stand_beside_the_one_are_ghosts_and_real_ones_are_not() -> None:
     prepared = prepare(load("toast"), 2, 0, "grasp at plate")
-    with closing(SkillStage(prepared.task, 2, prepared.layout, prepared.skillset.skills["grasp at plate"])) as stage:
-        first, second = stage.frame(0), stage.frame(1)
+    with closing(SkillScene(prepared.task, 2, prepared.layout, prepared.skillset.skills["grasp at plate"])) as scene:
+        first, second = scene.frame(0), scene.frame(1)
         ghosts = {name for name in first.poses if name.startswith("slice ") and not name[6:].isdigit()}
         assert len(ghosts) == 3  # the second toast is where the fourth would be
         assert set(first.colors) == ghosts
@@ -346,22 +348,22 @@ def test_slices_that_may_stand_beside_the_one_are_ghosts_and_real_ones_are_not()
 
 
 def test_where_a_slice_is_to_be_set_down_its_ghost_stands() -> None:
-    stage, _, mdp = lesson("place at butter_buffer")
+    scene, _, mdp = lesson("place at butter_buffer")
     (goal,) = np.flatnonzero(mdp.goal)
-    frame = stage.frame(int(goal))
+    frame = scene.frame(int(goal))
     off = place(frame, "slice 1") - place(frame, "goal")
     assert off[:2] == pytest.approx([0.0, 0.0], abs=1e-6)
     assert 0.0 < off[2] < 0.003  # let go just above the spot
 
 
-# ---- which stage --------------------------------------------------------------------------------------------------
+# ---- which scene --------------------------------------------------------------------------------------------------
 
 
-def test_a_problem_without_a_scene_has_no_stage() -> None:
+def test_a_problem_without_a_scene_has_no_scene() -> None:
     mdp = grid((2, 2), np.zeros((2, 2), bool), (0, 0), (1, 1))
-    assert stage_of(None, Problem("FrozenLake-v1", "gym", mdp)) is None
+    assert lesson_scene_of(None, Problem("FrozenLake-v1", "gym", mdp)) is None
     prepared = prepare(load("toast"), 2, 0, "place at butter_buffer")
-    assert stage_of(prepared, Problem("FrozenLake-v1", "gym", mdp)) is None
+    assert lesson_scene_of(prepared, Problem("FrozenLake-v1", "gym", mdp)) is None
 
 
 coordinate = st.floats(-3.0, 3.0)

@@ -5,8 +5,8 @@ from math import isfinite
 from typing import Any, NamedTuple, Self
 
 from lab.errors import BadInput, WorkFailed
-from lab.gym.made import GymName, make, quiet, said
-from lab.gym.spaces import SUPPORTED, Numbering, Unsupported
+from lab.gym.environment_name import GymName, make, quiet, said
+from lab.gym.space_numbering import SUPPORTED, Numbering, Unsupported
 
 MAX_ENTRIES = 1_000_000  # states x actions
 
@@ -21,7 +21,7 @@ class Moved(NamedTuple):
     success: bool | None
 
 
-class Live:
+class NumberedEnvironment:
     """An environment that is stepped, and where its state can be set, a second one that is put where it is to be drawn.
 
     states, actions: the numbering of its spaces; first: a state that it begins in; limit: the steps of an episode, None
