@@ -74,10 +74,12 @@ def _replayed(kept: "OrderSession", room: "Classroom", toolbox: Path | None) -> 
     wanted = replace(wanted_of(kept, room, room.watch), people=dict.fromkeys(PEOPLE, nobody))
     teacher, words = teacher_of(toolbox, ["expert"], kept.words.seed, room), kept.words
     try:
-        sequence_named(words.task, words.case, words.toasts, wanted, teacher=teacher, listener=room.listener, files={})
-    except KeyboardInterrupt:  # the journal's end, when that came before an order was found, or Ctrl-C
-        if kept.journal is None or kept.journal.folding:
-            raise
-    if kept.journal is not None and kept.journal.folding:  # stopped by Ctrl-C
+        found = sequence_named(
+            words.task, words.case, words.toasts, wanted, teacher=teacher, listener=room.listener, files={}
+        )
+        stopped = found["interrupted"]
+    except KeyboardInterrupt:  # before an order was found
+        stopped = True
+    if stopped and (kept.journal is None or kept.journal.folding):  # by Ctrl-C, not by the journal's end
         raise KeyboardInterrupt
     return kept.replayed()
