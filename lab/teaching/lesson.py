@@ -10,8 +10,8 @@ from shlex import quote
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from lab.advice.advising import Advising, Watch
 from lab.advice.advisors import PEOPLE
-from lab.advice.counsel import Counsel, Watch
 from lab.advice.entries import line_of
 from lab.errors import BadInput, unknown
 from lab.learning.requests import AdviceRequest, AdvisorLeft
@@ -38,7 +38,7 @@ def check(words: Words, out: Path | None = None, kept: KeptSession | None = None
 
     It is called before anybody is asked or shown anything. `kept`: where the words come from, if nobody has typed them.
     """
-    Counsel(words.advisors, asked=words.asked, decide=words.decide).check()
+    Advising.of(words.advisors, asked=words.asked, decide=words.decide)
     if out is not None:
         check_new(out)
     _subject(words, kept)
@@ -106,10 +106,10 @@ def replay(kept: KeptSession, audience: Audience, watch: Watch) -> dict[str, Any
     """
     words, read = kept.words, kept.read
     people = dict.fromkeys(PEOPLE, _nobody)  # the journal answers for them
-    counsel = Counsel(words.advisors, people, words.asked, words.decide, watch=watch)
+    advising = Advising.of(words.advisors, people, words.asked, words.decide, watch=watch)
     subject = _subject(words, kept)
     with TemporaryDirectory() as folder:
-        teacher = Teacher(Toolbox(folder), counsel, words.seed, audience, keep=kept.keep, begun=kept.begun)
+        teacher = Teacher(Toolbox(folder), advising, words.seed, audience, keep=kept.keep, begun=kept.begun)
         options = {name: getattr(words, name) for name in ("learner", "gate", "memory", "episodes")}
         try:
             subject(teacher, **options, name=words.save, out=None)
@@ -242,7 +242,7 @@ def teach_world(
     settings, problem = world.changed(learner, gate, episodes, memory), world_problem(world)
     check_name(name)
     region = world.region() if view == "limited" else None
-    teacher = replace(teacher, counsel=replace(teacher.counsel, region=region))
+    teacher = replace(teacher, advising=replace(teacher.advising, region=region))
     teacher.audience.stands(world, problem)
     lesson = teacher.one_session(problem, settings, world.name, name)
     document = _document(problem, lesson, teacher) | {"view": view}

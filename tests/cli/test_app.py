@@ -35,7 +35,7 @@ def test_help_names_all_members(lab: Lab) -> None:
     """What is typed behind an option of a family stands in that option's help, and the shell completes it."""
     offered = {
         "teach": ("skills", "learners", "gates", "advisors", "asked", "decisions"),
-        "sequence": ("methods", "objectives", "orderers", "order gates"),
+        "sequence": ("methods", "objectives", "advisors", "order gates"),
         "run": ("advisors", "asked", "decisions"),
     }
     for command, families in offered.items():

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from lab.advice.advisors import AdvisorName
 from lab.production.sequence import (
     Wanted,
     reference,
@@ -297,7 +298,7 @@ def test_nobody_is_asked_unless_it_is_wanted(lab: Lab) -> None:
 def test_an_advisor_has_chance_of_its_own_in_every_session() -> None:
     """Every decision is a novice's, so what differs between the sessions is what the novice says."""
     file = load_cell("toast-case-1")
-    wanted = Wanted("srl", 5, sessions=2, advisor="novice", gate="always")
+    wanted = Wanted("srl", 5, sessions=2, advisor=AdvisorName.of("novice"), gate="always")
     _, (one, other) = sequence_cell(file.cell(3), file.sequencing, wanted, NO_CHANCE)
     assert one.episode_costs != other.episode_costs
 
@@ -308,7 +309,7 @@ def test_a_person_is_asked_on_the_terminal(lab: Lab) -> None:
     ran = lab("sequence", *words.split(), "--json", stdin="2\nauto\n")
     assert ran.code == 0, ran.err
     assert ran.json["advice"] == [{"requests": 2, "helped_steps": 1, "misleads": 0, "rejected_at_episode": None}]
-    assert "Episode 1: the learner asks which part to move next." in ran.err
+    assert "Episode 1: the learner asks for advice about 'The order of the transfers'." in ran.err
 
 
 # ---- pictures -----------------------------------------------------------------------------------------------------
@@ -403,7 +404,7 @@ def test_what_was_found_until_ctrl_c_is_told() -> None:
     def ask(request: object) -> int | None:
         raise KeyboardInterrupt
 
-    wanted = Wanted("srl", 60, advisor="terminal", people={"terminal": ask})
+    wanted = Wanted("srl", 60, advisor=AdvisorName.of("terminal"), people={"terminal": ask})
     document, found = sequence_cell(file.cell(3), file.sequencing, wanted, Chance())
     assert document["interrupted"] is True
     assert (document["episodes"], len(found)) == (29, 1)
@@ -420,6 +421,6 @@ def test_ctrl_c_before_an_order_was_found() -> None:
         sequence_cell(
             file.cell(3),
             file.sequencing,
-            Wanted("srl", 60, advisor="terminal", gate="always", people={"terminal": ask}),
+            Wanted("srl", 60, advisor=AdvisorName.of("terminal"), gate="always", people={"terminal": ask}),
             Chance(),
         )

@@ -71,7 +71,7 @@ def test_what_is_refused_at_once(lab: Lab, folder: Path, words: str, line: str, 
             "objective 'tardy-parts': the cell has no due times (due_s); without them: makespan, robot-idle, machine-idle",
         ),
         ("--advisor exprt --method srl", "unknown advisor 'exprt' (--advisor): did you mean 'expert'? known: expert, "),
-        ("--advisor tau=0 --method srl", "unknown advisor 'tau=0' (--advisor): "),
+        ("--advisor tau=0 --method srl", "advisor 'tau=0' (--advisor): tau must be a number above 0"),
         (
             "--advisor expert --gate cclr --method srl",
             "unknown gate 'cclr' (--gate, for sequencing): did you mean 'ccrl'? known: always, ccrl, never",
