@@ -88,13 +88,10 @@ def sequence_named(
         cell, chance = ordered_cell(loaded, case, toasts), loaded.chance()
     else:
         if case is not None:
-            raise BadInput(
-                f"case '{case}' (--case): task '{name}' has none; toast has I, II and III, a cell its orders"
-            )
-        cell, chance = (
-            measured_cell(loaded, DEFAULT_TOASTS if toasts is None else toasts, wanted, teacher, listener),
-            Chance(),
-        )
+            which = "toast has I, II and III, a cell its orders"
+            raise BadInput(f"case '{case}' (--case): task '{name}' has none; {which}")
+        wanted_toasts = DEFAULT_TOASTS if toasts is None else toasts
+        cell, chance = measured_cell(loaded, wanted_toasts, wanted, teacher, listener), Chance()
     check_objective(wanted.objective or loaded.sequencing.objective, cell)
     listener.phase("sequence", wanted.sessions)
     document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, listener=listener)
@@ -174,8 +171,7 @@ def _sessions(
     )
     check_objective(search.objective, cell)
     known = reference(cell, search.objective)
-    found = []
-    interrupted = False
+    found, interrupted = list[SequenceResult](), False
     shown = known if search.chance == NO_CHANCE else None
     for session in range(wanted.sessions):
         heard = _Heard(listener)
@@ -268,9 +264,7 @@ def _document(
     # What was found in drawn times is judged by the means, too.
     costs = [result.cost if same_times else cost(follow(cell, result.sequence), search.objective) for result in found]
     best, least = found[costs.index(min(costs))], min(costs)
-    hits = [result.cost <= known.bound + SAME for result in found]
-    finals = [result.final_cost <= known.bound + SAME for result in found if isinstance(result, LearnedSequence)]
-    optimal = known.bound if known.proven else None
+    optimal, mean = known.bound if known.proven else None, float(np.mean([result.cost for result in found]))
     return {
         "toasts": cell.parts,
         "order": list(cell.order),
@@ -294,15 +288,24 @@ def _document(
         "bound_cost": known.bound,
         "bound_by": known.method,
         "gap": known.gap(least),
-        "success_percent": 100.0 * sum(hits) / len(found) if known.proven and same_times else None,
-        "final_success_percent": 100.0 * sum(finals) / len(finals) if finals and known.proven and same_times else None,
-        "mean_best_s": float(np.mean([result.cost for result in found])) if timed else None,
-        "mean_best_cost": float(np.mean([result.cost for result in found])),
+        **_success(found, known.bound if known.proven and same_times else None),
+        "mean_best_s": mean if timed else None,
+        "mean_best_cost": mean,
         "advisor": str(wanted.advisor),
         "advice": _advice(found) if wanted.advisor.row != "none" else None,
         "stochastic": None,
         "files": {},
     }
+
+
+def _success(found: Sequence[SequenceResult], optimal: float | None) -> dict[str, float | None]:
+    """How many of the sessions found the optimum, and how many end with it [%]; None where it is not known."""
+    finals = [result.final_cost for result in found if isinstance(result, LearnedSequence)]
+    rates: dict[str, float | None] = {}
+    for name, costs in (("success_percent", [result.cost for result in found]), ("final_success_percent", finals)):
+        hits = [optimal is not None and cost <= optimal + SAME for cost in costs]
+        rates[name] = 100.0 * sum(hits) / len(hits) if hits and optimal is not None else None
+    return rates
 
 
 def _advice(found: "Sequence[Any]") -> list[dict[str, Any]]:
