@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from lab.errors import BadInput
 from lab.view.canvas import BLUE, INK, ORANGE, RED, SKY, check_png, picture_file
 from lab.view.gantt import gantt
-from lab.view.sequencing_plots import sequence_plot, success_picture, success_plot
+from lab.view.sequencing_plots import sequence_plot, success_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +25,6 @@ __all__ = [
     "learning_curves",
     "sequence_plot",
     "success_picture",
-    "success_plot",
     "value_map",
 ]
 
