@@ -13,10 +13,10 @@ from lab.errors import BadInput
 from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Memory, places
 from lab.learning.gates import GATES
-from lab.learning.gates.rules import ASKS_WHERE_TABLES_DIFFER
+from lab.learning.gates.gate_rules import ASKS_WHERE_TABLES_DIFFER
 from lab.learning.kernels import records
 from lab.learning.kernels.records import LANES
-from lab.learning.kernels.sessions import run
+from lab.learning.kernels.session_loop import run
 from lab.learning.selection import SELECTIONS
 from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings

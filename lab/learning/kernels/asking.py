@@ -1,4 +1,4 @@
-"""The compiled forms of the gates, by their rules (`gates.rules.CompiledGate`), and of the advisor who is asked."""
+"""The compiled forms of the gates, by their rules (`gates.gate_rules.CompiledGate`), and of the advisor who is asked."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from lab.learning import advice_memory as memory
 from lab.learning.compiled import inlined, inner
-from lab.learning.gates import rules
+from lab.learning.gates import gate_rules as rules
 from lab.learning.kernels.learners import draw, gauge
 
 _OWN, _REMEMBERED, _ASKED, _PRACTISED = memory.OWN, memory.REMEMBERED, memory.ASKED, memory.PRACTISED

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.learning.advice_memory import Now
-from lab.learning.gates.rules import CompiledGate
+from lab.learning.gates.gate_rules import CompiledGate
 from lab.mdp import FloatArray
 
 LANES = 24
