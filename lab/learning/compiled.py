@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import numba
 from platformdirs import user_cache_dir
 
-MOST_FOLDERS = 60  # of a few MB at the most each; a version of the lab has about twenty
+MOST_FOLDERS = 60  # of a few MB at the most each; a version of the lab has about ten
 _CONFIG: Any = numba.config  # its types do not know what it holds
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -49,7 +49,7 @@ def inner(function: Function, **options: Any) -> Function:
 
 def inlined(function: Function) -> Function:
     """For what lean functions call in every step: becomes part of its callers, so that handing records on costs nothing."""
-    return lean(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
+    return inner(function, forceinline=True)
 
 
 def cache_folder() -> Path:

@@ -195,7 +195,7 @@ def _sequence_document(taught: Taught, report: Report) -> dict[str, Any]:
 
 def draw_value_map(mdp: TabularMDP, photo: Photo, policy: Policy, path: Path) -> None:
     """The values of a problem over the picture that it was read from, with the learned way."""
-    from lab.view.plots import cell_corners, value_map
+    from lab.view.plots import Places, cell_corners, value_map
 
     states, _, _ = greedy_path(policy.q, mdp, mdp.n_states)
     cells = [mdp.state_cell(state) for state in states]
@@ -204,10 +204,12 @@ def draw_value_map(mdp: TabularMDP, photo: Photo, policy: Policy, path: Path) ->
         photo.picture,
         path,
         corners=cell_corners(photo.seen.view),
-        route=[(cell[0], cell[1]) for cell in cells],
-        blocked=(mdp.terminal & ~mdp.goal).reshape(mdp.shape),
-        start=photo.seen.start,
-        goal=photo.seen.goal,
+        places=Places(
+            route=[(cell[0], cell[1]) for cell in cells],
+            blocked=(mdp.terminal & ~mdp.goal).reshape(mdp.shape),
+            start=photo.seen.start,
+            goal=photo.seen.goal,
+        ),
     )
 
 

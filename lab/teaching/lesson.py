@@ -314,7 +314,7 @@ def _draw_curve(name: str, policy: "Policy", out: Path) -> dict[str, str]:
 
 def _draw_world(world: GridWorld, policy: "Policy", path: Path) -> str:
     """The values of a world with two axes, and the learned way through it."""
-    from lab.view.plots import value_map
+    from lab.view.plots import Places, value_map
 
     mdp = world.mdp()
     states, _, _ = greedy_path(policy.q, mdp, mdp.n_states)
@@ -322,10 +322,12 @@ def _draw_world(world: GridWorld, policy: "Policy", path: Path) -> str:
         policy.q.max(axis=1).reshape(world.shape),
         None,
         path,
-        route=[(row, column) for row, column in map(mdp.state_cell, states)],
-        blocked=world.blocked(),
-        start=(world.start[0], world.start[1]),
-        goal=(world.goal[0], world.goal[1]),
+        places=Places(
+            route=[(row, column) for row, column in map(mdp.state_cell, states)],
+            blocked=world.blocked(),
+            start=(world.start[0], world.start[1]),
+            goal=(world.goal[0], world.goal[1]),
+        ),
     )
     return str(path)
 

@@ -16,14 +16,14 @@ from lab.errors import BadInput, WorkFailed, counted
 from lab.learning.environment import TableEnvironment, unreached
 from lab.learning.events import AdviceEnded, AdviceRejected, Event
 from lab.learning.requests import Advisor
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session, SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray, TabularMDP, greedy_path
 from lab.skills.skill import Problem
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.record import Learned
 from lab.tasks.task_file import Subtask
-from lab.toolbox.policy import MAX_NAME_LENGTH, Policy, is_name
+from lab.toolbox.policy import MAX_NAME_LENGTH, Origin, Policy, is_name
 from lab.toolbox.registry import Toolbox
 
 MAX_SESSIONS = 20  # to reach the goal at all; further sessions go on from the table of the one before
@@ -249,7 +249,7 @@ class Teacher:
             left -= 1
             table = None if kept is None else kept.q
             asked = None if alone else advisor()
-            result = run_session(problem.mdp, learner, gate, asked, rng, q0=table, on_event=tell, environment=place)
+            result = Session(place or problem.mdp, learner, gate, asked, rng, table).run(tell)
             whole, now = _joined(whole, result), _moves(result.q, problem, learner)
             if now <= moves:
                 if now < moves == inf:
@@ -293,17 +293,8 @@ class Teacher:
         task: str,
         name: str,
     ) -> Policy:
-        return Policy.of(
-            result,
-            problem.mdp,
-            name=name,
-            subtask=problem.subtask,
-            task=task,
-            learner=learner,
-            gate=gate,
-            advisor=self.advisor,
-            seed=self.seed,
-        )
+        origin = Origin(name, problem.subtask, task, self.advisor, self.seed)
+        return Policy.of(result, problem.mdp, learner, gate, origin)
 
 
 def fits(q: FloatArray, problem: Problem, learner: LearnerSettings) -> bool:

@@ -124,7 +124,7 @@ def learned(world: GymWorld, seed: int, advisor: str = "none", draw: Draw | None
     assert problem.environment is not None
     asked = make_advisor(advisor, problem.mdp, world.learner.discount, rng, values=problem.environment.values)
     place = problem.environment
-    return run_session(problem.mdp, world.learner, world.gate, asked, rng, environment=place, draw=draw)
+    return run_session(place, world.learner, world.gate, asked, rng if draw is None else draw)
 
 
 # ---- names ----------------------------------------------------------------------------------------------------------
@@ -314,12 +314,9 @@ def test_a_world_of_ours_is_learned_to_the_same_table(name: str) -> None:
     world = load_world(name)
     place = gym_world(f"gym:TeachingLab/World{name[-1]}-v0").problem().environment
     assert place is not None
-    rng = np.random.default_rng(0)
-    ours = run_session(
-        world.mdp(), world.learner, GateSettings(gate="never"), None, rng, draw=uniforms(np.random.default_rng(7))
-    )
+    ours = run_session(world.mdp(), world.learner, GateSettings(gate="never"), None, np.random.default_rng(7))
     draw = itertools.chain([0.5], iter(uniforms(np.random.default_rng(7)), None)).__next__
-    theirs = run_session(place.mdp, world.learner, GateSettings(gate="never"), None, rng, draw=draw, environment=place)
+    theirs = run_session(place, world.learner, GateSettings(gate="never"), None, draw)
     assert np.array_equal(ours.q, theirs.q)
     assert ours.steps.tolist() == theirs.steps.tolist()
     assert (ours.final_steps, ours.optimal_steps, ours.solved) == (

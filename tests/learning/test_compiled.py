@@ -97,9 +97,9 @@ def test_what_was_not_used_for_longest_goes(kitchen: Path, monkeypatch: pytest.M
 
 def test_the_kernels_know_all_that_they_are_made_of(monkeypatch: pytest.MonkeyPatch) -> None:
     """A change of a rule in any of these files is a change of the kernel."""
-    importlib.import_module("lab.learning.kernels.sessions")
-    before = compiled.key.__wrapped__("lab.learning.kernels.sessions")
-    for name in ("gates.rules", "advice_memory", "selection", "updates.update"):
+    importlib.import_module("lab.learning.kernels.session_loop")
+    before = compiled.key.__wrapped__("lab.learning.kernels.session_loop")
+    for name in ("gates.gate_rules", "advice_memory", "selection", "updates.update"):
         with monkeypatch.context() as patch:
             patch.setattr(sys.modules[f"lab.learning.{name}"], "__file__", __file__)
-            assert compiled.key.__wrapped__("lab.learning.kernels.sessions") != before
+            assert compiled.key.__wrapped__("lab.learning.kernels.session_loop") != before

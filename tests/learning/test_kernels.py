@@ -39,7 +39,7 @@ def alone(
     """The interactive session with the numbers that the kernel draws for this seed."""
     draw = stream(seed)
     advisor = None if who is None else TableAdvisor(who, draw)
-    return run_session(mdp, learner, gate, advisor, np.random.default_rng(0), draw=draw)
+    return run_session(mdp, learner, gate, advisor, draw)
 
 
 def assert_same(batch: Batch, n: int, one: SessionResult) -> None:
