@@ -5,6 +5,7 @@ module imports only its own room and the rooms below it. A new module belongs to
 """
 
 import ast
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -195,6 +196,18 @@ def test_a_module_keeps_the_walls(module: str) -> None:
 def test_no_import_runs_in_a_circle() -> None:
     graph = {name: {to for item in found for to in loads(name, item)} for name, (_, found) in house().items()}
     assert cycle(graph) == []
+
+
+def test_the_architecture_is_the_one_that_is_told() -> None:
+    """docs/architecture.md: every folder of modules stands in its tree, and its floors are those of LAYERS."""
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    told, parents = set[str](), list[str]()
+    for indent, name in re.findall(r"^    ( *)(\w+)/ ", text, re.MULTILINE):
+        parents[len(indent) // 2 :] = [name]
+        told.add("/".join(parents))
+    assert told == {path.parent.relative_to(ROOT).as_posix() for path in (ROOT / "lab").rglob("__init__.py")}
+    floors = re.findall(r"^    \d+ +([a-z, ]+)$", text, re.MULTILINE)
+    assert [tuple(f"lab.{room}" for room in floor.split(", ")) for floor in floors] == list(LAYERS)
 
 
 def test_the_package_itself_imports_nothing() -> None:

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.learning import selection, splitmix
-from lab.learning.advice_memory import places
+from lab.learning.advice_memory import Memory, places
 from lab.learning.gates import GATES
-from lab.learning.gates.rules import ASKS_WHERE_TABLES_DIFFER
+from lab.learning.gates.gate_rules import ASKS_WHERE_TABLES_DIFFER
 from lab.learning.kernels import records
 from lab.learning.kernels.records import LANES
-from lab.learning.kernels.sessions import run
+from lab.learning.kernels.session_loop import run
 from lab.learning.selection import SELECTIONS
 from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -66,11 +66,13 @@ def run_sessions(
     found = _sessions(mdp, learner, seeds, keep_tables)
     asking = _asking(gate, advice is not None)
     learning, problem = _learning(mdp, learner), _problem(mdp, learner)
-    told = _nothing(mdp) if advice is None else records.Advice(advice.thresholds, advice.region)
+    said = (np.zeros((1, 1, mdp.n_actions)), np.zeros(mdp.n_states, np.bool_))
+    if advice is not None:
+        said = advice.thresholds, advice.region
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, found.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, learning.max_moves) if gate.memory else None
-    run(records.Work(problem, learning, asking, told, found, lanes), memories)
+    run(records.Work(problem, learning, asking, *said, found, lanes), memories)
     return _batch(found.steps, found.guided, found.counts, _action_values(mdp, learning, found.kept))
 
 
@@ -144,21 +146,14 @@ def _lanes(actions: int, episodes: int, size: int, ensemble: int) -> records.Lan
     )
 
 
-def _memories(states: int, moves: int) -> records.Memories:
-    def blank(cells: int) -> NDArray[np.int32]:
-        return np.zeros((LANES, cells), np.int32)
-
-    said, way, on_walk, place = (blank(states) for _ in range(4))
-    walk, did, own = (blank(places(states, moves)) for _ in range(3))
-    return records.Memories(said, way, on_walk, place, walk, did, own, np.zeros(LANES, records.NOW))
+def _memories(states: int, moves: int) -> Memory:
+    walk = places(states, moves)
+    cells = (np.zeros((LANES, n), np.int32) for n in (states, states, states, states, walk, walk, walk))
+    return Memory._make((*cells, np.zeros(LANES, records.NOW)))
 
 
 def _is_afterstate(learner: LearnerSettings) -> bool:
     return bool(UPDATES[learner.learner].compiled == STATE_VALUES)
-
-
-def _nothing(mdp: TabularMDP) -> records.Advice:
-    return records.Advice(np.zeros((1, 1, mdp.n_actions)), np.zeros(mdp.n_states, np.bool_))
 
 
 def _problem(mdp: TabularMDP, learner: LearnerSettings) -> records.Problem:
@@ -169,31 +164,18 @@ def _problem(mdp: TabularMDP, learner: LearnerSettings) -> records.Problem:
 
 
 def _learning(mdp: TabularMDP, learner: LearnerSettings) -> records.Learning:
-    return records.Learning(
-        afterstate=_is_afterstate(learner),
-        alpha=float(learner.alpha),
-        discount=float(learner.discount),
-        max_moves=learner.max_steps - learner.count_start,
-        max_steps=learner.max_steps,
-        count_start=int(learner.count_start),
-        actions=(0,) * mdp.n_actions,
-    )
+    given = vars(learner) | {
+        "afterstate": _is_afterstate(learner),
+        "max_moves": learner.max_steps - learner.count_start,
+        "actions": (0,) * mdp.n_actions,
+    }
+    return records.Learning(**{name: given[name] for name in records.Learning._fields})
 
 
 def _asking(gate: GateSettings, somebody: bool) -> records.Asking:
-    return records.Asking(
-        gate=GATES[gate.gate if somebody else "never"].compiled,
-        threshold=float(gate.lambda_threshold),
-        omega=gate.omega,
-        first_episode=gate.first_episode,
-        window=gate.window,
-        psi=float(gate.psi),
-        spread=float(gate.spread),
-        rate=float(gate.rate),
-        enough=float(gate.enough_steps),
-        budget=gate.budget,
-        judge_unhelped=gate.judge_unhelped and not gate.memory,
-    )
+    rules = GATES[gate.gate if somebody else "never"].compiled
+    given = vars(gate) | {"gate": rules, "judge_unhelped": gate.judge_unhelped and not gate.memory}
+    return records.Asking(**{name: given[name] for name in records.Asking._fields})
 
 
 def _action_values(mdp: TabularMDP, learning: records.Learning, tables: FloatArray) -> FloatArray:

@@ -7,7 +7,6 @@ because meshcat's own server listens on every interface and packs every transfor
 import html
 import json
 import math
-import os
 import re
 from collections.abc import Mapping, Sequence
 from getpass import getuser
@@ -18,6 +17,7 @@ from socket import gethostname
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
+from lab import files
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.sim.frames import Body, Frame, Recording, Viewpoint
 
@@ -58,10 +58,10 @@ class LiveView:
 
         self._token = token_urlsafe(16)
         if self._replay is None:
-            files = self._files()
+            served = self._files()
         else:
-            files = {"": File(_read(self._replay).encode(), "text/html", f"{RULES}; frame-ancestors 'none'")}
-        self._server = Server(self._wanted, files, self._token, self._panel)
+            served = {"": File(_read(self._replay).encode(), "text/html", f"{RULES}; frame-ancestors 'none'")}
+        self._server = Server(self._wanted, served, self._token, self._panel)
         self._server.start()
         return self
 
@@ -85,10 +85,10 @@ class LiveView:
             scripts="\n".join(f'<script src="{path.name}{ask}"></script>' for path in scripts),
             panel="".join(path.read_text(encoding="utf-8") for path in brought if path.suffix == ".html"),
         )
-        files = {"": File(page.encode(), "text/html", SERVED)}
+        served = {"": File(page.encode(), "text/html", SERVED)}
         for kind, paths in (("text/css", styles), ("text/javascript", scripts)):
-            files |= {path.name: File(path.read_bytes(), kind) for path in paths}
-        return files
+            served |= {path.name: File(path.read_bytes(), kind) for path in paths}
+        return served
 
     @property
     def port(self) -> int:
@@ -236,13 +236,8 @@ def _read(path: Path) -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            beside.write_text(text, encoding="utf-8")
-            os.replace(beside, path)
-        finally:
-            beside.unlink(missing_ok=True)
+        files.write_whole(path, text.encode())
     except OSError as reason:
         raise BadInput(f"cannot write the replay '{path}': {reason.strerror or reason}") from None

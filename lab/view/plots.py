@@ -11,7 +11,7 @@ from lab.errors import BadInput
 from lab.mdp import FloatArray, TabularMDP, greedy_path
 from lab.view.canvas import BLUE, INK, ORANGE, RED, SKY, check_png, picture_file
 from lab.view.gantt import gantt
-from lab.view.sequencing_plots import sequence_plot, success_picture, success_plot
+from lab.view.sequencing_plots import sequence_plot, success_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +26,6 @@ __all__ = [
     "learning_curves",
     "sequence_plot",
     "success_picture",
-    "success_plot",
     "value_map",
     "values_seen",
 ]

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput, counted
@@ -19,7 +18,6 @@ from lab.view.canvas import (
     PALE_GREY,
     RED,
     picture_bytes,
-    picture_file,
     seconds,
     tip,
 )
@@ -94,20 +92,12 @@ FEW, MANY = Scale(0.42, 0.34, 0.4, 8.0, 0.067, "\n"), Scale(0.125, 0.1, 0.45, 5.
 FEW_LEAVES = 40
 
 
-def branch_plot(branches: Sequence[Branch], path: Path, *, title: str = "", near: bool = False) -> None:
-    """A tree from the root at the left, one column a move; the way to the optimum is bold, what was cut off is pale.
-
-    near: only the way to the optimum and what branches off it, as fig. IV.3. PNG or SVG by the path's suffix. Raises
-    BadInput for no nodes, more than MAX_NODES of them, a parent that does not come before its child, and as all plots
-    here do. Source: thesis figs. IV.2, IV.3.
-    """
-    draw, size_inch = _drawing(branches, title, near)
-    with picture_file(path, *size_inch) as figure:
-        draw(figure)
-
-
 def branch_picture(branches: Sequence[Branch], form: str = "svg", *, title: str = "", near: bool = False) -> bytes:
-    """The same as PNG or SVG bytes; BadInput as `branch_plot`, and for another form."""
+    """A tree as PNG or SVG bytes, from the root at the left, one column a move; the way to the optimum bold, cuts pale.
+
+    near: only the way to the optimum and what branches off it, as fig. IV.3. Raises BadInput for no nodes, more than
+    MAX_NODES of them, a parent that does not come before its child, and another form. Source: thesis figs. IV.2, IV.3.
+    """
     draw, size_inch = _drawing(branches, title, near)
     return picture_bytes(draw, *size_inch, form)
 

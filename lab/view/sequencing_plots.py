@@ -88,12 +88,6 @@ def sequence_plot(
         figure.legend(loc="outside lower center", ncols=3)
 
 
-def success_plot(rows: Mapping[str, Curve], path: Path, **around: Unpack[Around]) -> None:
-    """`success_picture` as a file, PNG or SVG by the path's suffix; BadInput as there and as all plots here do."""
-    with picture_file(path, *SIZE_INCH) as figure:
-        _draw_success(figure, rows, around)
-
-
 def success_picture(rows: Mapping[str, Curve], form: str = "svg", **around: Unpack[Around]) -> bytes:
     """Success of each method by session length, with intervals, as PNG or SVG bytes; what is printed as open markers.
 

@@ -98,13 +98,13 @@ def test_what_was_not_used_for_longest_goes(kitchen: Path, monkeypatch: pytest.M
 
 def test_the_kernels_know_all_that_they_are_made_of(monkeypatch: pytest.MonkeyPatch) -> None:
     """A change of a rule in any of these files is a change of the kernel."""
-    importlib.import_module("lab.learning.kernels.sessions")
-    before = compiled.key("lab.learning.kernels.sessions")
-    for name in ("gates.rules", "advice_memory", "selection", "updates.update"):
+    importlib.import_module("lab.learning.kernels.session_loop")
+    before = compiled.key("lab.learning.kernels.session_loop")
+    for name in ("gates.gate_rules", "advice_memory", "selection", "updates.update"):
         with monkeypatch.context() as patch:
             patch.setattr(sys.modules[f"lab.learning.{name}"], "__file__", __file__)
             compiled.key.cache_clear()
             compiled.source.cache_clear()
-            assert compiled.key("lab.learning.kernels.sessions") != before
+            assert compiled.key("lab.learning.kernels.session_loop") != before
     compiled.key.cache_clear()
     compiled.source.cache_clear()

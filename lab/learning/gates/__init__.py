@@ -1,11 +1,11 @@
 """When a learner asks for advice, and when it stops: the gates, one file a family."""
 
-from lab.learning.gates import rules
+from lab.learning.gates import gate_rules as rules
 from lab.learning.gates.ccrl import Ccrl, Combined
-from lab.learning.gates.chance import Random
 from lab.learning.gates.constant_performance import ConstantPerformance
 from lab.learning.gates.gate import Gate, GateClass, Never, Surroundings
-from lab.learning.gates.rules import CompiledGate, Steps, improvement
+from lab.learning.gates.gate_rules import CompiledGate, Steps, improvement
+from lab.learning.gates.random_share import Random
 from lab.learning.gates.uncertainty import Uncertainty, deviation
 from lab.learning.gates.values import Importance, Introspection
 from lab.learning.members import Member

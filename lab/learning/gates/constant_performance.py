@@ -1,7 +1,7 @@
 """The gate that asks until performance is good enough."""
 
 from lab.learning.gates.gate import Gate
-from lab.learning.gates.rules import Steps, window_mean
+from lab.learning.gates.gate_rules import Steps, window_mean
 from lab.learning.reasons import TooLong
 
 

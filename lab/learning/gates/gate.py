@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from lab.learning.events import Verdict
-from lab.learning.gates.rules import Steps
+from lab.learning.gates.gate_rules import Steps
 from lab.learning.reasons import Reason
 from lab.learning.selection import Draw
 from lab.learning.settings import GateSettings

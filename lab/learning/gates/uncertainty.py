@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from lab.learning.gates.gate import PerStep, Surroundings, Values
-from lab.learning.gates.rules import Steps
+from lab.learning.gates.gate_rules import Steps
 from lab.learning.reasons import TablesDiffer
 from lab.learning.settings import GateSettings
 from lab.learning.updates.update import Update

@@ -1,7 +1,7 @@
 """Gates that look at the values of a state: they ask where these lie close together, or far apart."""
 
 from lab.learning.gates.gate import PerStep, Values
-from lab.learning.gates.rules import unsure
+from lab.learning.gates.gate_rules import unsure
 from lab.learning.reasons import ValuesAlike, ValuesApart
 
 

@@ -1,4 +1,4 @@
-"""The compiled forms of the gates, by their rules (`gates.rules.CompiledGate`), and of the advisor who is asked."""
+"""The compiled forms of the gates, by their rules (`gates.gate_rules.CompiledGate`), and of the advisor who is asked."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from lab.learning import advice_memory as memory
 from lab.learning.compiled import inlined, inner
-from lab.learning.gates import rules
+from lab.learning.gates import gate_rules as rules
 from lab.learning.kernels.learners import draw, gauge
 
 _OWN, _REMEMBERED, _ASKED, _PRACTISED = memory.OWN, memory.REMEMBERED, memory.ASKED, memory.PRACTISED
@@ -34,7 +34,7 @@ def opens(asking: Any, lane: Any, steps: Any, max_steps: int, rejected: bool) ->
     if episode < asking.first_episode:
         return False
     if rule == _LONG:
-        return bool(episode > window and _window_mean(steps, episode - 1, window) > asking.enough)
+        return bool(episode > window and _window_mean(steps, episode - 1, window) > asking.enough_steps)
     if rule == _FROM_X or rejected or episode <= 2 * window:
         return bool(rule == _FROM_X)
     result = steps[episode - 2]
@@ -46,7 +46,7 @@ def opens(asking: Any, lane: Any, steps: Any, max_steps: int, rejected: bool) ->
         lane.last_result, lane.equal_results = result, 0
     current = _window_mean(steps, episode - 1, window)
     previous = _window_mean(steps, episode - 1 - window, window)
-    slow = _too_slow(current, previous, asking.threshold)
+    slow = _too_slow(current, previous, asking.lambda_threshold)
     return bool(slow and lane.converged == 0 and episode < len(steps))
 
 
@@ -99,7 +99,7 @@ def asks(work: Any, j: int, state: Any) -> bool:
 @inlined
 def advised(work: Any, j: int, state: Any) -> Any:
     """The action that the advisor draws for lane j: `TableAdvisor`."""
-    thresholds, last = work.advice.thresholds, len(work.learning.actions) - 1
+    thresholds, last = work.thresholds, len(work.learning.actions) - 1
     row = min(work.lanes.lane[j].episode, thresholds.shape[0]) - 1
     mark, action = draw(work.lanes.rng, j) * thresholds[row, state, last], np.uint64(0)
     for a in range(last):
@@ -123,7 +123,7 @@ def decided(work: Any, memories: Any, j: int) -> Any:
             if said != _NOTHING:
                 return np.uint64(said), np.int64(_REMEMBERED)
             lane.asked = 1
-            if work.advice.region[state]:
+            if work.region[state]:
                 lane.helped += 1
                 action, source = advised(work, j, state), np.int64(_ASKED)
                 if memories is not None:

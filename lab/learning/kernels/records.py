@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.learning.advice_memory import Now
-from lab.learning.gates.rules import CompiledGate
+from lab.learning.gates.gate_rules import CompiledGate
 from lab.mdp import FloatArray
 
 LANES = 24
@@ -25,38 +25,31 @@ class Problem(NamedTuple):
 
 
 class Learning(NamedTuple):
-    """The learner's settings; actions: a tuple of A numbers, whose length the compiler knows."""
+    """The learner's settings, see `LearnerSettings`; actions: a tuple of A numbers, whose length the compiler knows."""
 
     afterstate: bool
     alpha: float
     discount: float
     max_moves: int
     max_steps: int
-    count_start: int
+    count_start: bool
     actions: tuple[int, ...]
 
 
 class Asking(NamedTuple):
-    """The gate's rules and settings."""
+    """The gate's rules and settings, see `GateSettings`."""
 
     gate: CompiledGate
-    threshold: float
+    lambda_threshold: float
     omega: int
     first_episode: int
     window: int
     psi: float
     spread: float
     rate: float
-    enough: float
+    enough_steps: float
     budget: int
     judge_unhelped: bool
-
-
-class Advice(NamedTuple):
-    """As `advice.advisors.Advice`."""
-
-    thresholds: FloatArray
-    region: NDArray[np.bool_]
 
 
 # What each of the sessions under way remembers; session -1: none. `converged` as in `gates.Ccrl`.
@@ -104,25 +97,17 @@ class Lanes(NamedTuple):
     others: FloatArray
 
 
-class Memories(NamedTuple):
-    """An `advice_memory.Memory` for each lane: the arrays are (LANES, ...), `now` (LANES,) is of NOW."""
-
-    said: NDArray[np.int32]
-    way: NDArray[np.int32]
-    on_walk: NDArray[np.int32]
-    place: NDArray[np.int32]
-    walk: NDArray[np.int32]
-    did: NDArray[np.int32]
-    own: NDArray[np.int32]
-    now: NDArray[np.void]
-
-
 class Work(NamedTuple):
-    """All of it but the memories, which are handed on by themselves: where there are none, numba leaves out what needs them."""
+    """All but the memories: where there are none, numba leaves out what needs them, if they are handed on by themselves.
+
+    The memories are an `advice_memory.Memory` with arrays (LANES, ...); `now` (LANES,) is of NOW. thresholds, region: as in
+    the advisor's `Advice`.
+    """
 
     problem: Problem
     learning: Learning
     asking: Asking
-    advice: Advice
+    thresholds: FloatArray
+    region: NDArray[np.bool_]
     sessions: Sessions
     lanes: Lanes

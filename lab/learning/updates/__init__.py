@@ -5,7 +5,7 @@ from collections.abc import Callable
 from lab.learning.members import Member
 from lab.learning.settings import LearnerSettings
 from lab.learning.updates.afterstate import Afterstate
-from lab.learning.updates.monte_carlo import MonteCarlo
+from lab.learning.updates.episode_returns import MonteCarlo
 from lab.learning.updates.one_step import QLearning, Sarsa
 from lab.learning.updates.traces import SarsaLambda, WatkinsQLambda
 from lab.learning.updates.update import ACTION_VALUES, STATE_VALUES, Row, Table, Update

@@ -5,7 +5,7 @@ from typing import overload
 
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
-from lab.learning.updates.update import Row, Table, towards
+from lab.learning.updates.update import Row, Update, towards
 from lab.mdp import TabularMDP
 
 
@@ -43,7 +43,7 @@ class AfterstateRows(Sequence[Row]):
         return [self.values[entered] for entered in self._successor[state]]
 
 
-class Afterstate:
+class Afterstate(Update):
     """TD(0) on afterstates: V(s) += alpha (r + gamma V(s') - V(s)), s' being where the chosen action led.
 
     A terminal state is worth 0 until it is first entered, then its reward. All ordinary moves must have one reward.
@@ -51,21 +51,13 @@ class Afterstate:
     Source: thesis App. VII (the text speaks of Q(s,a), the listing keeps a value per state).
     """
 
-    lookahead = chained = False
-
     def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
         self._alpha, self._discount = settings.alpha, settings.discount
         self._step_reward = mdp.step_reward
         self._arrival: Row = mdp.arrival.tolist()
         self._values = _values_behind(q, mdp, settings.discount)
         self._rows = AfterstateRows(mdp, settings.discount, self._values)
-        self.q: Table = self._rows
-
-    def begin(self) -> None:
-        """Nothing is carried from episode to episode."""
-
-    def end(self) -> None:
-        """Nothing is left to learn."""
+        self.q = self._rows
 
     def gauge(self, state: int) -> Row:
         """The values of the states that the actions lead to, as the listing compares them."""
