@@ -33,8 +33,8 @@ def run(
 
     from lab.advice.advisors import PEOPLE
     from lab.advice.counsel import Counsel
-    from lab.production.report import check_out
-    from lab.production.run import prepare
+    from lab.files import check_out
+    from lab.production.prepared import prepare
     from lab.production.run import run as run_task
     from lab.tasks import task_file as taskfile
     from lab.teaching.kept_session import Words, kept_by

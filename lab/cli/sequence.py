@@ -61,7 +61,7 @@ def sequence(
     as_json: Json = False,
 ) -> None:
     """The high level alone: the order of the robot's transfers, beside the proven optimum."""
-    from lab.sequence import Wanted, sequence_named
+    from lab.production.sequence import Wanted, sequence_named
     from lab.view.summary import sequence_summary
 
     with lesson_room([advisor], page=page, port=port, wait_s=wait, plain=plain) as room:

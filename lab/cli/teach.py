@@ -89,7 +89,7 @@ def teach(
 
     Each session keeps a journal: --resume goes on with one that was broken off, lab replay shows it again.
     """
-    from lab.production.report import check_out
+    from lab.files import check_out
     from lab.teaching.kept_session import Words
     from lab.teaching.lesson import check
     from lab.teaching.lesson import teach as teach_session

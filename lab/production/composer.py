@@ -5,17 +5,16 @@ from dataclasses import dataclass, field
 from math import hypot
 
 from lab.production.floor import Floor
+from lab.production.prepared import Prepared
 from lab.production.recorder import Viewer
-from lab.production.skillset import SkillSet
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Move, Schedule
 from lab.sequencing.simulate.run import Run
 from lab.sim.frames import Recording
-from lab.sim.scene import Layout, Spot, spots
+from lab.sim.scene import Spot, spots
 from lab.sim.world import World
 from lab.skills import Skill
 from lab.skills.skill import UPRIGHT, Status
-from lab.skills.surveys import Surveys
 
 MAX_TRIES = 3  # a failed step is tried again from the state reached, at most twice
 ASTRAY_M = 0.15  # a slice this near to a spot of a station can be taken up again from there
@@ -45,7 +44,6 @@ class Production:
 
     floor: Floor
     cell: Cell
-    surveys: Surveys
     on_move: Callable[[Move], None] | None = None
     on_retry: Callable[[str], None] | None = None
     moves: list[Move] = field(default_factory=list)
@@ -96,6 +94,7 @@ class Production:
             self.on_move(self.moves[-1])
 
     def _free_spot(self, station: str) -> Spot:
+        """The first spot of a station on which no toast stands."""
         return next(s for s in spots(self.floor.skillset.task.station(station)) if s not in self.spot_of.values())
 
     def _carry(self, toast: int, origin: str, target: str, spot: Spot) -> None:
@@ -165,6 +164,7 @@ class Production:
             self.floor.tick()
 
     def _start_machine(self, toast: int, station: str) -> None:
+        """Let the machine that a toast has been brought to begin: with its learned process, or for its time."""
         floor, place = self.floor, self.floor.skillset.task.station(station)
         for skill in floor.skillset.processes[station]:
             floor.start(skill.aim(_slice(toast)))
@@ -193,9 +193,7 @@ def _slice(toast: int) -> str:
 
 
 def carry_out(
-    skillset: SkillSet,
-    surveys: Surveys,
-    layout: Layout,
+    prepared: Prepared,
     cell: Cell,
     sequence: Sequence[int],
     *,
@@ -208,10 +206,10 @@ def carry_out(
     A toast is delivered when its slice stands on the last station at the end; dropped when it is nowhere upright.
     """
     with World() as world:
-        floor = Floor(world, skillset, layout, cell.parts, film=True, viewer=viewer)
-        floor.stand(surveys.approach(cell.robot_start))
+        floor = Floor(world, prepared.skillset, prepared.layout, cell.parts, film=True, viewer=viewer)
+        floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
-        work = Production(floor, cell, surveys, on_move, on_retry)
+        work = Production(floor, cell, on_move, on_retry)
         floor.on_tick = work.watch
         failure = work.carry_out(sequence)
         floor.recorder.take()  # type: ignore[union-attr]

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from lab.production.prepared import Prepared
 from lab.production.recorder import Recorder, Viewer
 from lab.production.skillset import SkillSet
 from lab.sim.kinematics import ToolPose
@@ -9,7 +10,6 @@ from lab.sim.scene import Layout, Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
 from lab.skills.skill import STAND_STEPS, Bench, Status
-from lab.skills.surveys import Surveys
 
 _SETTLE_STEPS = 60
 
@@ -76,9 +76,9 @@ class Floor:
             self.tick()
 
 
-def try_out(skillset: SkillSet, surveys: Surveys, skill: Skill) -> str | None:
+def try_out(prepared: Prepared, skill: Skill) -> str | None:
     """Carry a skill out once in physics, with its policy; None when it did what it is for, else why it did not."""
     with World() as world:
-        floor = Floor(world, skillset, surveys.layout, 0)
+        floor = Floor(world, prepared.skillset, prepared.surveys.layout, 0)
         skill.begin(floor.bench)
         return None if floor.run(skill) is Status.SUCCESS else skill.reason

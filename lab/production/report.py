@@ -7,23 +7,19 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lab.errors import BadInput, WorkFailed, counted
-from lab.files import draft, nearest
-from lab.learning.problem import Problem
+from lab.errors import WorkFailed, counted
+from lab.files import draft
 from lab.mdp import TabularMDP, greedy_path
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
-from lab.production.skillset import SkillSet
+from lab.production.prepared import Prepared
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.methods.exact import Optimum
+from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Recording
-from lab.sim.scene import Layout
 from lab.skills import Skill
 from lab.skills.skill import Photo
-from lab.skills.surveys import Surveys
-from lab.tasks.task_file import Task
 from lab.teaching.teacher import Lesson
 from lab.toolbox.policy import Policy
 
@@ -36,20 +32,6 @@ FILES = {
     "sequence": "sequence.json",
     "run": "run.json",
 }
-
-
-@dataclass
-class Prepared:
-    """A task whose scene is surveyed, which took `wall_s`: nothing is learned yet, and nothing is written."""
-
-    task: Task
-    toasts: int
-    seed: int
-    layout: Layout
-    surveys: Surveys
-    skillset: SkillSet
-    problems: dict[str, Problem]
-    wall_s: float = 0.0
 
 
 @dataclass
@@ -132,18 +114,6 @@ def _skill_row(name: str, lesson: Lesson) -> dict[str, Any]:
     }
 
 
-def check_out(out: Path) -> None:
-    """BadInput unless `out` is a folder that can be written, or can be made; makes nothing."""
-    try:
-        place = nearest(out)
-    except OSError as error:
-        raise BadInput(f"output folder '{out}' (--out): {error.strerror}") from None
-    if not place.is_dir():
-        raise BadInput(f"output folder '{out}' (--out): '{place}' is a file; give a folder")
-    if not os.access(place, os.W_OK | os.X_OK):
-        raise BadInput(f"output folder '{out}' (--out): '{place}' is not writable")
-
-
 def write_files(prepared: Prepared, taught: Taught, report: Report, out: Path) -> None:
     """Write what there is of `FILES` to `out`, all at once at the end: none is ever half written, none is left of a run before.
 
@@ -180,7 +150,7 @@ def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) 
     """The pictures, the replay and the two JSON files."""
     from lab.view.meshcat import replay_html
     from lab.view.plots import gantt, learning_curves
-    from lab.vision.pictures import write_picture
+    from lab.vision import write_picture
 
     paths = {name: folder / file for name, file in FILES.items()}
     predicted = simulate(taught.cell, report.sequenced.sequence)

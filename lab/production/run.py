@@ -4,40 +4,21 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from lab.errors import LabError
 from lab.learning.problem import Problem
-from lab.planner import find_sequence, search_for
 from lab.production.composer import carry_out
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
 from lab.production.floor import try_out
+from lab.production.prepared import Prepared
 from lab.production.recorder import Viewer, show_scene
-from lab.production.report import Prepared, Report, Taught, write_files
-from lab.production.skillset import SkillSet
+from lab.production.report import Report, Taught, write_files
+from lab.sequencing import find_sequence
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Reference
-from lab.sim.scene import check_apart, draw_layout
-from lab.skills.surveys import Surveys
-from lab.tasks.task_file import Task, check_toasts
+from lab.tasks.sequencing import search_for
 from lab.teaching.listener import Listener
 from lab.teaching.teacher import Teacher, Trial
 from lab.toolbox.policy import Policy
-
-
-def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prepared:
-    """Lay the scene out as the seed says and survey every problem of it, or `only` one skill's.
-
-    BadInput for whatever cannot be; writes nothing.
-    """
-    began = time.perf_counter()
-    check_toasts(toasts, task)
-    check_apart(task, toasts)
-    skillset = SkillSet.of(task, toasts)
-    layout = draw_layout(task, toasts, np.random.default_rng([seed, 1]))
-    surveys = Surveys(task, layout)
-    problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items() if only in (None, name)}
-    return Prepared(task, toasts, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
 
 
 def trial_of(prepared: Prepared) -> Trial:
@@ -48,7 +29,7 @@ def trial_of(prepared: Prepared) -> Trial:
         if not skill.tried:
             return None
         prepared.skillset.policies[skill.name] = policy
-        return try_out(prepared.skillset, prepared.surveys, skill)
+        return try_out(prepared, skill)
 
     return trial
 
@@ -84,7 +65,7 @@ def _durations(prepared: Prepared, teacher: Teacher, listener: Listener) -> Dura
         return kept
     processes = sum(station.process is not None for station in prepared.task.stations)
     listener.phase("measure", len(skillset.moves.loaded) + len(skillset.moves.empty) + processes)
-    durations = measure(skillset, prepared.surveys, listener.measured)
+    durations = measure(prepared, listener.measured)
     if key:
         teacher.toolbox.save_record(RECORDS, key, durations.to_json())
     return durations
@@ -93,7 +74,7 @@ def _durations(prepared: Prepared, teacher: Teacher, listener: Listener) -> Dura
 def run(
     prepared: Prepared, teacher: Teacher, out: Path, *, listener: Listener | None = None, viewer: Viewer | None = None
 ) -> Report:
-    """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.production.report.check_out`)."""
+    """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.files.check_out`)."""
     began = time.perf_counter() - prepared.wall_s
     listener = listener or Listener()
     if viewer is not None:
@@ -106,9 +87,7 @@ def run(
     listener.sequenced(found, Reference(proven.bound_s, proven.proven, "A*"))
     listener.phase("carry out", len(found.sequence))
     outcome, recording = carry_out(
-        prepared.skillset,
-        prepared.surveys,
-        prepared.layout,
+        prepared,
         taught.cell,
         found.sequence,
         viewer=viewer,

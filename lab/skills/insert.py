@@ -18,8 +18,7 @@ from lab.skills.place import let_go, release_pose
 from lab.skills.skill import Bench, Photo, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import INSERT_START, Surveys, camera_view, overhead_camera
 from lab.tasks.task_file import Obstacle, Task
-from lab.vision.overhead import Marker
-from lab.vision.pictures import find_markers, locate, see
+from lab.vision import Marker, find_markers, locate, see
 
 if TYPE_CHECKING:
     from lab.toolbox.policy import Policy

@@ -18,7 +18,7 @@ from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME as ROBOT
 from lab.sim.scene import GRASP_DEPTH, Scene, Spot, spots
 from lab.tasks.task_file import Task
-from lab.vision.overhead import GridView
+from lab.vision import GridView
 
 if TYPE_CHECKING:
     from lab.skills.surveys import Surveys

@@ -194,8 +194,9 @@ def teach_one(
     solved when that succeeds, too; `failure` says why it did not. `toasts` and `sessions`: those of the run that the lesson
     belongs to. BadInput when the policy called `name` is of another problem.
     """
+    from lab.production.prepared import prepare
     from lab.production.report import draw_value_map
-    from lab.production.run import prepare, trial_of
+    from lab.production.run import trial_of
     from lab.production.skillset import SkillSet
 
     toasts = fitting(task, 2) if toasts is None else toasts

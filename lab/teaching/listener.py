@@ -1,8 +1,8 @@
 """Who hears how a run goes on: the composer and the teacher tell, a view or nobody listens."""
 
 from lab.learning.settings import GateSettings
-from lab.sequencing.cell.schedule import EpisodeSequenced, Move, SequenceResult
-from lab.sequencing.search import Reference
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
 from lab.teaching.teacher import Lesson
 
 

@@ -15,7 +15,7 @@ from lab.view.sequencing_plots import sequence_plot, success_picture, success_pl
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from lab.vision.overhead import View
+    from lab.vision import View
 
 __all__ = [
     "Curve",

@@ -12,8 +12,8 @@ from rich.text import Text
 
 from lab.errors import counted
 from lab.learning.events import AdviceRejected, AdviceRequested, Event
-from lab.sequencing.cell.schedule import Move, SequenceResult
-from lab.sequencing.search import Reference
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.search import Reference, SequenceResult
 from lab.teaching.listener import Listener
 from lab.teaching.teacher import Lesson
 from lab.view.figures import beside, gap_of

@@ -12,6 +12,7 @@ from lab.errors import WorkFailed
 from lab.learning.problem import Problem
 from lab.mdp import NoPath, greedy_path, grid, shortest_steps
 from lab.production.durations import measure
+from lab.production.prepared import Prepared
 from lab.production.skillset import SkillSet
 from lab.seat.lesson_scene import SkillScene
 from lab.sim.kinematics import ToolPose
@@ -235,9 +236,9 @@ def test_a_new_skill_is_a_class_and_a_row_and_all_else_knows_it(
     hovers = [skill for skill in skillset.skills.values() if isinstance(skill, Hover)]
     assert hovers
     assert all(way[0] in hovers for way in skillset.travels.values())
-    for name, skill in skillset.skills.items():
-        skillset.policies[name] = optimal(skill.setup(surveys))
+    problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items()}
+    skillset.policies = {name: optimal(problem) for name, problem in problems.items()}
     with closing(SkillScene(task, 1, Layout(surveys.layout.obstacles, ((0.0, 0.0, 0.0),)), hovers[0])) as stage:
         assert stage.frame(2).poses["robot tool"][2] == pytest.approx(stage.frame(0).poses["robot tool"][2] + 0.06)
-    durations = measure(skillset, surveys)
+    durations = measure(Prepared(short, 1, 0, surveys.layout, surveys, skillset, problems))
     assert set(durations.empty_s) == set(skillset.moves.empty)

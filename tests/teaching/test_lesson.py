@@ -18,7 +18,7 @@ from lab.teaching.kept_session import Words
 from lab.teaching.lesson import find_skill, fitting, teach, teach_one, teach_world
 from lab.teaching.teacher import Interrupted, Teacher
 from lab.toolbox.registry import Toolbox
-from lab.vision.pictures import read_picture
+from lab.vision import read_picture
 
 
 @pytest.fixture(scope="module")
@@ -180,7 +180,7 @@ def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
 def test_bad_words_are_refused_before_the_scene_is_surveyed(
     task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch, subtask: str, options: dict[str, Any], reason: str
 ) -> None:
-    monkeypatch.setattr("lab.production.run.prepare", lambda *_: pytest.fail("surveyed"))
+    monkeypatch.setattr("lab.production.prepared.prepare", lambda *_: pytest.fail("surveyed"))
     with pytest.raises(BadInput, match=reason):
         teach_one(task, subtask, teacher, **options)
     assert not teacher.toolbox.folder.exists()

@@ -14,8 +14,8 @@ from lab.learning.events import AdviceRejected, AdviceRequested
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
-from lab.sequencing.cell.schedule import Move, SequenceResult
-from lab.sequencing.search import Reference
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.search import Reference, SequenceResult
 from lab.teaching.teacher import Lesson
 from lab.toolbox.policy import Policy
 from lab.view.progress import BARS, PLAIN_BARS, RunProgress, sparkline

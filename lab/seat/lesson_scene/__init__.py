@@ -13,7 +13,7 @@ from lab.sim.frames import Body, Frame, Viewpoint
 from lab.tasks.grid_world import GridWorld
 
 if TYPE_CHECKING:
-    from lab.production.report import Prepared
+    from lab.production.prepared import Prepared
 
 
 class LessonScene(Protocol):

@@ -7,8 +7,8 @@ from typing import Protocol
 from lab.errors import counted
 from lab.learning.settings import GateSettings
 from lab.seat.page.page_state import MOST_LINES, Progress
-from lab.sequencing.cell.schedule import EpisodeSequenced, Move, SequenceResult
-from lab.sequencing.search import Reference
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
 from lab.teaching.listener import Listener
 from lab.teaching.teacher import Lesson
 from lab.view.figures import beside

@@ -21,8 +21,9 @@ from lab.seat.page.page_messages import Answer
 from lab.seat.page.page_order import Follower, bars_of
 from lab.seat.page.page_panel import CLOSED, SeatPanel
 from lab.seat.page.page_state import Learning, Pending, Progress, standing_of
-from lab.sequencing.cell.schedule import EpisodeSequenced, Move
+from lab.sequencing.cell.schedule import Move
 from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.search import EpisodeSequenced
 from lab.teaching.listener import Listener
 from lab.view.meshcat import LiveView
 

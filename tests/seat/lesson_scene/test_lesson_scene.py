@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from lab.learning.problem import Problem
 from lab.mdp import FloatArray, TabularMDP, grid
-from lab.production.run import prepare
+from lab.production.prepared import prepare
 from lab.seat.lesson_scene import LessonScene, SkillScene, WorldScene, lesson_scene_of
 from lab.seat.lesson_scene.camera_placement import camera_for
 from lab.seat.lesson_scene.episode_trail import TRAIL
