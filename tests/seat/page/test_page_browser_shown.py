@@ -198,12 +198,6 @@ def test_the_receipt_is_shown(tab: "Page", page: SeatPage, until: Until) -> None
     assert "Not the best\n0 of 1" in shown
 
 
-def test_a_receipt_of_another_kind_is_shown_as_it_is(tab: "Page", page: SeatPage, until: Until) -> None:
-    page.receipt({"own_tau": 0.31, "next_time": ["<i>less</i>"]})
-    until(tab, "!document.getElementById('receipt').hidden")
-    assert "own tau\n0.31\nnext time\n<i>less</i>" in tab.inner_text("#receipt")
-
-
 def test_everything_has_a_name_and_a_phone_has_no_sideways_scrolling(tab: "Page", page: SeatPage, until: Until) -> None:
     mdp = grid((2, 3), np.zeros((2, 3), bool), (0, 0), (1, 2), action_labels=("up", "down", "left", "right"))
     ask(
