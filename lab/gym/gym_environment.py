@@ -101,7 +101,7 @@ class GymEnvironment:
     def _learned_alone(self, discount: float) -> FloatArray:
         learner = replace(ALONE, discount=discount, max_steps=self.max_steps)
         alone, rng = _Unjudged(self.live.again()), np.random.default_rng(0)
-        result = run_session(alone.mdp, learner, GateSettings(gate="never"), None, rng, environment=alone)
+        result = run_session(alone, learner, GateSettings(gate="never"), None, rng)
         if result.interrupted:
             raise KeyboardInterrupt
         if not (np.ptp(result.q, axis=1) > 0.0).any():

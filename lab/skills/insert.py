@@ -36,6 +36,7 @@ class Insert(Skill):
     """Carry the slice in the gripper from the grid's start to the toaster's slot and let it go there."""
 
     subtask: ClassVar[str] = "insert"
+    help: ClassVar[str] = "by the overhead camera's picture to the toaster, and down into its slot"
     looks_from: ClassVar[tuple[float, float]] = (-84.0, 46.0)
     carries = True
 

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from lab.errors import BadInput, counted
 from lab.mdp import BoolArray, NoPath, TabularMDP, grid, shortest_steps
-from lab.tasks.record import Count, Learned, Name, Record, as_tuple, read_text
+from lab.tasks.record import Count, Learned, Name, Record, as_tuple, read_text, write_whole
 
 MAX_AXIS = 100  # cells; with 3 axes at most a million
 MAX_DENSITY = 0.6
@@ -23,6 +23,10 @@ ACTIONS = {  # of worlds with 2 and 3 axes, as `lab.mdp.grid` orders them: -axis
     2: ("up", "down", "left", "right"),  # rows run down, columns to the right
     3: ("left", "right", "backward", "forward", "down", "up"),  # x, y, z as seen from above
 }
+_AXES = """\
+Drawn at random. Cells are counted from 0; with two axes they are [row, column], row 0 on top, with three [x, y, z], y
+away from you and z up.
+"""
 _TRIES = 10  # at scattering obstacles that leave a way
 _ALONE: dict[str, Any] = {"learner": "afterstate", "beta": 1.0, "episodes": 500}
 _ROOM = 4  # an episode of a drawn world may take so many times the shortest way
@@ -296,3 +300,24 @@ def _fitted(world: GridWorld) -> GridWorld:
         rewards = replace(rewards, collision=round(endless - 1.0, 6))
     learner = replace(learner, **_ALONE, max_steps=max(learner.max_steps, _ROOM * moves))
     return world.model_copy(update={"rewards": rewards, "learner": learner})
+
+
+def write_random(shape: str, density: float, seed: int, out: Path) -> dict[str, Any]:
+    """Writes a random world as a task file, which must not be there yet; the document of `lab task random --json`."""
+    if out.suffix != ".toml":
+        raise BadInput(f"task file '{out}' (--out): its name must end in .toml")
+    world = random_world(parse_shape(shape, "SHAPE"), density, seed)
+    if out.exists():
+        raise BadInput(f"task file '{out}' (--out): there is one already: choose another name, or remove it")
+    write_whole(out, world.to_toml(_AXES))
+    return {
+        "file": str(out),
+        "name": world.name,
+        "shape": list(world.shape),
+        "density": density,
+        "seed": seed,
+        "start": list(world.start),
+        "goal": list(world.goal),
+        "obstacles": len(world.obstacles),
+        "optimal_steps": shortest_steps(world.mdp()),
+    }

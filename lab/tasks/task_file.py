@@ -4,7 +4,7 @@ import re
 from itertools import combinations
 from math import hypot
 from pathlib import Path
-from typing import Annotated, Literal, Self, TypeVar, cast, get_args
+from typing import Annotated, Any, Literal, Self, TypeVar, cast, get_args
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
@@ -256,6 +256,15 @@ def load_any(word: str, wanted: FileKind | None = None) -> Task | CellFile | Gri
     return _checked(Task, toml) if kind == "task" else _checked(GridWorld, toml)
 
 
+def describe(word: str) -> tuple[str, dict[str, Any]]:
+    """The text of a task, a cell or a world, and the document of `lab task show --json`; a drawn world has no "file"."""
+    found = load_any(word)
+    if isinstance(found, GridWorld) and word.startswith(RANDOM):
+        return found.to_toml(), {"file": None, **found.model_dump(mode="json")}
+    path = find(word)
+    return read_text(path), {"file": str(path), **found.model_dump(mode="json")}
+
+
 def _check_wanted(word: str, kind: FileKind, wanted: FileKind | None) -> None:
     if wanted is None or kind == wanted:
         return
@@ -305,3 +314,8 @@ def check_toasts(toasts: int, task: Task) -> None:
             raise BadInput(
                 f"{toasts} toasts (--toasts) do not fit on '{stage.station}': its capacity in the task file is {capacity}"
             )
+
+
+def fitting(task: Task, wanted: int) -> int:
+    """As many toasts as wanted, or as both ends of the route hold."""
+    return min(wanted, *(task.station(stage.station).capacity for stage in (task.route[0], task.route[-1])))

@@ -18,7 +18,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from lab.advice.advisors import make_advisor, skill
+from lab.advice.advisors import AdvisorName
+from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, LabError, WorkFailed
 from lab.gym import GymWorld, gym_world, names_environment, parse_name
 from lab.gym.gym_environment import ALONE, GymEnvironment
@@ -28,6 +29,7 @@ from lab.learning.environment import Judged
 from lab.learning.selection import Draw, uniforms
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.simulated_advice import advice_chances
 from lab.tasks.task_file import load_world
 
 
@@ -122,9 +124,11 @@ def model(word: str) -> TransitionModel:
 def learned(world: GymWorld, seed: int, advisor: str = "none", draw: Draw | None = None) -> SessionResult:
     problem, rng = world.problem(), np.random.default_rng(seed)
     assert problem.environment is not None
-    asked = make_advisor(advisor, problem.mdp, world.learner.discount, rng, values=problem.environment.values)
+    asked = TableLevel(problem.mdp, world.learner.discount, rng, values=problem.environment.values).advisor(
+        AdvisorName.of(advisor)
+    )
     place = problem.environment
-    return run_session(problem.mdp, world.learner, world.gate, asked, rng, environment=place, draw=draw)
+    return run_session(place, world.learner, world.gate, asked, rng if draw is None else draw)
 
 
 # ---- names ----------------------------------------------------------------------------------------------------------
@@ -314,12 +318,9 @@ def test_a_world_of_ours_is_learned_to_the_same_table(name: str) -> None:
     world = load_world(name)
     place = gym_world(f"gym:TeachingLab/World{name[-1]}-v0").problem().environment
     assert place is not None
-    rng = np.random.default_rng(0)
-    ours = run_session(
-        world.mdp(), world.learner, GateSettings(gate="never"), None, rng, draw=uniforms(np.random.default_rng(7))
-    )
+    ours = run_session(world.mdp(), world.learner, GateSettings(gate="never"), None, np.random.default_rng(7))
     draw = itertools.chain([0.5], iter(uniforms(np.random.default_rng(7)), None)).__next__
-    theirs = run_session(place.mdp, world.learner, GateSettings(gate="never"), None, rng, draw=draw, environment=place)
+    theirs = run_session(place, world.learner, GateSettings(gate="never"), None, draw)
     assert np.array_equal(ours.q, theirs.q)
     assert ours.steps.tolist() == theirs.steps.tolist()
     assert (ours.final_steps, ours.optimal_steps, ours.solved) == (
@@ -575,7 +576,7 @@ def test_an_expert_knows_the_lake_better_than_a_novice() -> None:
     starts, outcomes = lake.model.starts, lake.live.inside.P
 
     def reaches(tau: float) -> float:
-        chances = skill(lake.values(0.99), tau)
+        chances = advice_chances(lake.values(0.99), tau)
         mixed = {
             state: {0: [(c * chances[state, a], *rest) for a in range(4) for c, *rest in row[a]]}
             for state, row in outcomes.items()

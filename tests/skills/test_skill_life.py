@@ -12,13 +12,13 @@ from lab.errors import WorkFailed
 from lab.learning.problem import Problem
 from lab.mdp import NoPath, greedy_path, grid, shortest_steps
 from lab.production.durations import measure
-from lab.production.prepared import Prepared
-from lab.production.skillset import SkillSet
 from lab.seat.lesson_scene import SkillScene
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Layout
 from lab.skills import SKILLS, Skill
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Bench, SkillFailed, Status, learned_path, no_way
+from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Stage, Subtask, Task
 from lab.teaching.lesson import teach_one
@@ -35,6 +35,7 @@ class Hover(Skill):
     """A new skill, all of it: before it travels, the empty gripper rises from a station's approach, level by level."""
 
     subtask: ClassVar[str] = "hover"
+    help: ClassVar[str] = "the empty gripper rises before it travels"
 
     def __init__(self, station: str) -> None:
         super().__init__(f"hover at {station}")
@@ -82,6 +83,8 @@ def poses(bench: Bench) -> dict[str, tuple[float, ...]]:
 @every_skill
 def test_it_stands_in_the_table_under_its_own_name_and_the_shipped_task_needs_it(name: str, make: Make) -> None:
     assert SKILLS[name].subtask == make(name).subtask == name
+    assert SKILLS[name].help
+    assert not SKILLS[name].help.endswith(".")
     assert f" {make(name).station}" in f" {make(name).name}"
 
 

@@ -13,7 +13,7 @@ from lab.sim.frames import Body, Frame, Viewpoint
 from lab.tasks.grid_world import GridWorld
 
 if TYPE_CHECKING:
-    from lab.production.prepared import Prepared
+    from lab.skills.prepared_scene import Prepared
 
 
 class LessonScene(Protocol):

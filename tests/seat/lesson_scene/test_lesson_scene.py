@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from lab.learning.problem import Problem
 from lab.mdp import FloatArray, TabularMDP, grid
-from lab.production.prepared import prepare
 from lab.seat.lesson_scene import LessonScene, SkillScene, WorldScene, lesson_scene_of
 from lab.seat.lesson_scene.camera_placement import camera_for
 from lab.seat.lesson_scene.episode_trail import TRAIL
@@ -22,6 +21,7 @@ from lab.sim import models
 from lab.sim.frames import Frame, Recording, Shape, Viewpoint
 from lab.sim.kinematics import TOOL, ToolPose, inverse
 from lab.sim.scene import GRASP_DEPTH
+from lab.skills.prepared_scene import prepare
 from lab.skills.skill import Skill
 from lab.tasks.grid_world import GridWorld, random_world
 from lab.tasks.task_file import load, load_world

@@ -14,7 +14,15 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import LAWS, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES, stuck_cost
 from lab.sequencing.methods.many_sessions import METHODS, run_sessions, session_seeds
-from lab.sequencing.methods.sessions import BLOCK, ROWS, Learned, SessionLearner, learn, learn_compiled, learn_readably
+from lab.sequencing.methods.session_readable import (
+    BLOCK,
+    ROWS,
+    Learned,
+    SessionLearner,
+    learn,
+    learn_compiled,
+    learn_readably,
+)
 from lab.sequencing.methods.srl import Srl
 from lab.sequencing.methods.state_keys import keys_of
 from lab.sequencing.search import FACTORS, STATES, VALUES, EpisodeSequenced, Search, SrlSettings

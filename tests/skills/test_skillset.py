@@ -5,9 +5,9 @@ import pytest
 
 from lab.errors import BadInput
 from lab.production.durations import Durations, cell_of
-from lab.production.skillset import SkillSet, route, stations
 from lab.sim.scene import is_toaster
 from lab.skills import SKILLS, Insert, Place, Transfer
+from lab.skills.skillset import SkillSet, route, stations
 from lab.skills.surveys import INSERT_START
 from lab.tasks.task_file import Stage, Task, load
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.sequencing.methods.updates import average, best_of, explore, gain, log_factor, log_of, log_sum
+from lab.sequencing.methods.session_updates import average, best_of, explore, gain, log_factor, log_of, log_sum
 
 BELOW_ONE = math.nextafter(1.0, 0.0)
 
