@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from lab.cli.families import offers
+
 MAX_EPISODES = 1_000_000
 MAX_SESSIONS = 10_000
 
@@ -18,13 +20,17 @@ AdvisorNames = Annotated[
     list[str] | None,
     typer.Option(
         "--advisor",
-        help="Who advises: expert, moderate, limited, novice, tau=X, tau=X..Y (changing over the episodes), wrong, "
-        "terminal, web, recorded:DIR (a session's folder), none; several times for several advisors.",
+        help="Who advises: {advisors} (X..Y: changing over the episodes; DIR: a session's folder); "
+        "several times for several advisors.",
+        autocompletion=offers("advisors"),
     ),
 ]
-Asked = Annotated[str, typer.Option("--ask", help="Several advisors are asked: together, in-turn.")]
+Asked = Annotated[
+    str, typer.Option("--ask", help="Several advisors are asked: {asked}.", autocompletion=offers("asked"))
+]
 Decide = Annotated[
-    str, typer.Option("--decide", help="Whom of several to follow: majority, best-trusted, trust-weighted.")
+    str,
+    typer.Option("--decide", help="Whom of several to follow: {decisions}.", autocompletion=offers("decisions")),
 ]
 Plain = Annotated[bool, typer.Option("--plain", help="Plain sentences instead of pictures, as screen readers want.")]
 ShowPage = Annotated[

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.advice.advisors import Advice, TableAdvisor
 from lab.errors import BadInput
 from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Memory, places
@@ -20,6 +19,7 @@ from lab.learning.kernels.session_loop import run
 from lab.learning.selection import SELECTIONS
 from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.simulated_advice import Advice, TableAdvisor
 from lab.learning.updates import UPDATES
 from lab.learning.updates.update import STATE_VALUES
 from lab.mdp import FloatArray, TabularMDP
@@ -156,11 +156,11 @@ def _is_afterstate(learner: LearnerSettings) -> bool:
     return bool(UPDATES[learner.learner].compiled == STATE_VALUES)
 
 
-def _problem(mdp: TabularMDP, learner: LearnerSettings) -> records.Problem:
+def _problem(mdp: TabularMDP, learner: LearnerSettings) -> records.ProblemArrays:
     ends = np.where(mdp.goal, 1, np.where(mdp.terminal, 2, 0)).astype(np.uint8)
     starts = np.array(mdp.starts or (mdp.start,), np.int64)
     arrival, step_reward = (mdp.arrival, mdp.step_reward) if _is_afterstate(learner) else (np.zeros(1), 0.0)
-    return records.Problem(mdp.successor.flatten(), mdp.reward.flatten(), arrival, ends, starts, step_reward)
+    return records.ProblemArrays(mdp.successor.flatten(), mdp.reward.flatten(), arrival, ends, starts, step_reward)
 
 
 def _learning(mdp: TabularMDP, learner: LearnerSettings) -> records.Learning:
