@@ -185,6 +185,7 @@ CONTRACTS = (  # of a family, each run over all that its table lists
     "tests/learning/test_session.py::test_every_simulated_advisor_can_help",
     "tests/learning/test_gates.py::test_experts_and_novices_at_every_gate",
     "tests/learning/test_updates.py::test_scattered_values_lie_within_a_half",
+    "tests/learning/test_kernels.py",
     "tests/skills/test_skill_life.py",
     "tests/sequencing/test_sequencers.py",
     "tests/cli/test_app.py::test_every_command_has_help_with_an_example",

@@ -5,9 +5,9 @@ def main() -> None:
     """The `lab` command. Nothing is loaded before Ctrl-C is heard: the libraries of the commands take a while."""
     import sys
 
-    from lab.cli.interrupt import ctrl_c_is_heard
-
     try:
+        from lab.cli.interrupt import ctrl_c_is_heard
+
         with ctrl_c_is_heard():
             from lab.cli.app import called
 

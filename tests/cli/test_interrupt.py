@@ -91,7 +91,9 @@ main()
 """
 
 
-@pytest.mark.parametrize("module", ["lab.cli.app", "typer", "lab.errors", "lab.cli.task", "lab.cli.view"])
+@pytest.mark.parametrize(
+    "module", ["lab.cli.interrupt", "lab.cli.app", "typer", "lab.errors", "lab.cli.task", "lab.cli.view"]
+)
 def test_ctrl_c_while_the_command_is_loaded(root: Path, module: str) -> None:
     env = {**os.environ, "PYTHONPATH": str(root)}
     code = EARLY.format(module=module)
