@@ -22,7 +22,7 @@ from lab.sequencing.search import SAME, Reference, Search
 from lab.sequencing.simulate.run import follow, simulate
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.task_file import Task, load_any
-from lab.teaching.listener import Listener
+from lab.teaching.events import PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.teacher import Teacher
 
 if TYPE_CHECKING:
@@ -56,7 +56,6 @@ def sequence_named(
     wanted: Wanted,
     *,
     teacher: Teacher,
-    listener: Listener,
     files: dict[str, Path],
 ) -> dict[str, Any]:
     """What `lab sequence` does: a cell file's cell, or a task's over durations measured in simulation, and its pictures.
@@ -81,12 +80,12 @@ def sequence_named(
                 f"case '{case}' (--case): task '{name}' has none; toast has I, II and III, a cell its orders"
             )
         cell, chance = (
-            measured_cell(loaded, DEFAULT_TOASTS if toasts is None else toasts, wanted, teacher, listener),
+            measured_cell(loaded, DEFAULT_TOASTS if toasts is None else toasts, wanted, teacher),
             Chance(),
         )
     check_objective(wanted.objective or loaded.sequencing.objective, cell)
-    listener.phase("sequence", wanted.sessions)
-    document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, listener=listener)
+    teacher.tell(PhaseBegan("sequence", wanted.sessions))
+    document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, tell=teacher.tell)
     document = {"task": loaded.name} | document
     draw(cell, document, found, files)
     return document
@@ -112,14 +111,14 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
     return file.cell(order_from_word(file, case) if case is not None else toasts)
 
 
-def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher, listener: Listener) -> Cell:
+def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
     from lab.production.run import prepare, teach_all
 
     objective = wanted.objective or task.sequencing.objective
     if objective in WITH_DUE_TIMES:
         raise BadInput(f"objective '{objective}' (--objective) needs due times, and a task has none: use a cell file")
-    return teach_all(prepare(task, toasts, teacher.seed), teacher, listener).cell
+    return teach_all(prepare(task, toasts, teacher.seed), teacher).cell
 
 
 def sequence_cell(
@@ -128,7 +127,7 @@ def sequence_cell(
     wanted: Wanted,
     chance: Chance,
     *,
-    listener: Listener | None = None,
+    tell: Tell = unheard,
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     """Sessions of one method on a cell, beside what cannot be beaten; the document of `lab sequence`, and the sessions.
 
@@ -146,13 +145,11 @@ def sequence_cell(
     known = reference(cell, search.objective)
     found = []
     interrupted = False
-    listener = listener or Listener()
     shown = known if search.chance == NO_CHANCE else None
     for session in range(wanted.sessions):
-        heard = _Heard(listener)
-        listener.sequences(
-            search.episodes, shown, None if wanted.advisor == "none" else GateSettings(wanted.gate, spare_best=True)
-        )
+        heard = _Heard(tell)
+        gate = None if wanted.advisor == "none" else GateSettings(wanted.gate, spare_best=True)
+        tell(SequencingBegan(search.episodes, shown, gate))
         try:
             found.append(_session(cell, method, replace(search, on_episode=heard), wanted, session))
         except KeyboardInterrupt:
@@ -161,7 +158,7 @@ def sequence_cell(
                 raise KeyboardInterrupt("stopped by Ctrl-C before an order was found") from None
             found += [] if heard.best is None else [heard.result()]
             break
-        listener.sequenced(found[-1], shown)
+        tell(SequenceFound(found[-1], shown))
     document = _document(cell, method, search, found, known, wanted) | {"interrupted": interrupted}
     if wanted.stochastic and not interrupted:
         document["stochastic"] = stochastic(cell, method, search, min(found, key=_cost), chance, wanted.seed)
@@ -172,14 +169,14 @@ def sequence_cell(
 class _Heard:
     """Keeps what a session has found so far, for when it is stopped, and tells of it."""
 
-    listener: Listener
+    tell: Tell
     best: EpisodeSequenced | None = None
     costs: list[float] = field(default_factory=list)
 
     def __call__(self, event: EpisodeSequenced) -> None:
         self.costs.append(event.cost)
         self.best = event if event.best else self.best
-        self.listener.tried(event)
+        self.tell(event)
 
     def result(self) -> SequenceResult:
         assert self.best is not None

@@ -13,12 +13,10 @@ from lab.advice.panel import ASKED, DECISIONS, panel_of
 from lab.errors import BadInput, unknown
 from lab.learning.environment import Environment
 from lab.learning.events import Event
-from lab.learning.requests import AdviceRequest, Advisor, Ask, Walked
+from lab.learning.requests import Advisor, Ask
 from lab.learning.selection import uniforms
 from lab.learning.settings import LearnerSettings
 from lab.mdp import BoolArray, TabularMDP
-
-Watch = Callable[[AdviceRequest, int | None], None]
 
 
 @dataclass(frozen=True)
@@ -26,7 +24,7 @@ class Counsel:
     """Who is asked in a session, by name, and the people behind such names as "terminal".
 
     asked: several are asked "together" or "in-turn"; decide: whom to follow, a name in `panel.DECISIONS`; region (S,):
-    where anybody is heard; watch: is shown each question with its answer.
+    where anybody is heard.
     """
 
     names: tuple[str, ...] = ("expert",)
@@ -34,7 +32,6 @@ class Counsel:
     asked: str = "together"
     decide: str = "trust-weighted"
     region: BoolArray | None = None
-    watch: Watch | None = None
 
     def __str__(self) -> str:
         several = f" ({self.asked}, {self.decide})" if len(self.names) > 1 else ""
@@ -99,25 +96,9 @@ class Counsel:
             for name, stream in zip(self.names, streams, strict=False)
         ]
         if len(made) == 1:
-            one = made[0]
-        else:
-            states, draw = environment.mdp.n_states, uniforms(streams[-1])
-            one = panel_of(self.names, made, states, decide=self.decide, asked=self.asked, draw=draw, tell=tell)
-        return one if one is None or self.watch is None else Watched(one, self.watch)
-
-
-class Watched:
-    """An advisor whose answers somebody else is shown, too."""
-
-    def __init__(self, advisor: Advisor, watch: Watch):
-        self.advisor, self._watch = advisor, watch
-        self.followed: Callable[[Walked], None] | None = getattr(advisor, "followed", None)
-
-    def advise(self, request: AdviceRequest) -> int | None:
-        """The advisor's answer."""
-        action = self.advisor.advise(request)
-        self._watch(request, action)
-        return action
+            return made[0]
+        states, draw = environment.mdp.n_states, uniforms(streams[-1])
+        return panel_of(self.names, made, states, decide=self.decide, asked=self.asked, draw=draw, tell=tell)
 
 
 def _through(journal: Journal | None, by: str, ask: Ask) -> Ask:

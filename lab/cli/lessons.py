@@ -1,4 +1,4 @@
-"""What the commands that teach share: who is in the room, the teacher that the options describe, a kept session."""
+"""What the commands that teach share: who hears of it, the teacher that the options describe, a kept session."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -9,21 +9,22 @@ from lab.cli.output import complain, console
 from lab.errors import LabError
 
 if TYPE_CHECKING:
-    from lab.seat.people import Classroom
+    from lab.seat.lesson_seat import LessonSeat
     from lab.teaching.kept_session import KeptSession
+    from lab.teaching.lesson_options import LessonOptions
     from lab.teaching.teacher import Teacher
 
 
 @contextmanager
-def lesson_room(
+def lesson_seat(
     names: Sequence[str], *, page: bool = False, port: int = 0, wait_s: float | None = None, plain: bool = False
-) -> Iterator["Classroom"]:
-    """Who sits in the lessons of a command: the progress lines, and, when they are wanted, the prompt and the page."""
+) -> Iterator["LessonSeat"]:
+    """Who hears of a command's lessons: the progress lines, and, when they are wanted, the prompt and the page."""
     from contextlib import ExitStack
 
-    from lab.seat.people import Classroom
+    from lab.seat.lesson_seat import LessonSeat
+    from lab.seat.run_progress import RunProgress
     from lab.seat.terminal.prompt import TeachingPrompt
-    from lab.view.progress import RunProgress
 
     progress = RunProgress(console())
     with ExitStack() as stack:
@@ -34,34 +35,26 @@ def lesson_room(
             shown = stack.enter_context(SeatPage(port, wait_s=wait_s))
             progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
         prompt = TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
-        room = Classroom(progress, prompt, shown, plain=plain)
-        stack.callback(room.leave)
+        seat = LessonSeat(progress, prompt, shown, plain=plain)
+        stack.callback(seat.clear_stage)
         try:
-            yield room
+            yield seat
         except LabError as error:
             if shown is not None:
                 shown.finished(str(error))
             raise
 
 
-def teacher_of(
-    toolbox: Path | None,
-    names: Sequence[str],
-    seed: int,
-    room: "Classroom",
-    asked: str = "together",
-    decide: str = "trust-weighted",
-) -> "Teacher":
+def teacher_of(toolbox: Path | None, options: "LessonOptions", seat: "LessonSeat") -> "Teacher":
     """The teacher that the options describe; raises BadInput for options and folders that cannot be."""
-    from lab.advice.counsel import Counsel
     from lab.teaching.teacher import Teacher
     from lab.toolbox.registry import Toolbox
 
-    counsel = Counsel(tuple(names), room.people(), asked, decide, watch=room.passing)
+    counsel = options.counsel(seat.people())
     counsel.check()
     for journal in counsel.cut_records():
         complain(f"journal '{journal.path}': its last line was cut off and is left out: {journal.cut[:60]!r}")
-    teacher = Teacher(Toolbox(toolbox), counsel, seed, room)
+    teacher = Teacher(Toolbox(toolbox), counsel, options.seed, seat.hear)
     teacher.toolbox.check()
     return teacher
 
@@ -80,7 +73,7 @@ def kept_session(
 
 def say_outside(kept: "KeptSession") -> None:
     """Says which files the session has the lab read that are not its own."""
-    from lab.teaching.lesson import outside
+    from lab.cli.subjects import files_outside
 
-    if files := outside(kept):
+    if files := files_outside(kept):
         complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(files)}")

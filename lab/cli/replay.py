@@ -5,9 +5,10 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.lessons import kept_session, lesson_room, say_outside
+from lab.cli.lessons import kept_session, lesson_seat, say_outside
 from lab.cli.options import Json, Plain, Port, ToolboxFolder, TrustModule
 from lab.cli.output import end, show
+from lab.cli.subjects import subject_of
 
 
 def replay(
@@ -38,10 +39,12 @@ def replay(
     kept = kept_session(folder, "DIR", read_only=True, trusted=trust_module)
     say_outside(kept)
     try:
-        with lesson_room([] if as_json else ["terminal"], page=page, port=port, plain=plain) as room:
-            document = replay_session(kept, room.replaying(0.0 if as_json else pause), room.watch)
-            room.ends(document)
+        with lesson_seat([] if as_json else ["terminal"], page=page, port=port, plain=plain) as seat:
+            document = replay_session(
+                kept, subject_of(kept.options, kept), seat.replaying(0.0 if as_json else pause).hear
+            )
+            seat.lesson_over(document)
             show(document, as_json, replay_summary)
-            room.stay()
+            seat.stay()
     except KeyboardInterrupt:
         end("stopped by Ctrl-C", 130)

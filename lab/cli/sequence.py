@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.lessons import lesson_room, teacher_of
+from lab.cli.lessons import lesson_seat, teacher_of
 from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Plain, Port, Seed, ShowPage, ToolboxFolder, Wait
 from lab.cli.output import end, show
 
@@ -62,14 +62,15 @@ def sequence(
 ) -> None:
     """The high level alone: the order of the robot's transfers, beside the proven optimum."""
     from lab.sequence import Wanted, sequence_named
+    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
     from lab.view.summary import sequence_summary
 
-    with lesson_room([advisor], page=page, port=port, wait_s=wait, plain=plain) as room:
-        teacher = teacher_of(toolbox, ["expert"], seed, room)
-        wanted = Wanted(method, episodes, objective, sessions, seed, stochastic, advisor, gate, room.orderers())
+    with lesson_seat([advisor], page=page, port=port, wait_s=wait, plain=plain) as seat:
+        teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=seed), seat)
+        wanted = Wanted(method, episodes, objective, sessions, seed, stochastic, advisor, gate, seat.orderers())
         files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
-        with room.progress:
-            document = sequence_named(task, case, toasts, wanted, teacher=teacher, listener=room.listener, files=files)
+        with seat.progress:
+            document = sequence_named(task, case, toasts, wanted, teacher=teacher, files=files)
     show(document, as_json, sequence_summary)
     if document["interrupted"]:
         end("stopped by Ctrl-C; the best order until then is above", 130)

@@ -18,8 +18,10 @@ from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP, grid, optimal_values
 from lab.seat.page.teaching_page import SeatPage
 from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.search import Reference
 from lab.sequencing.simulate.run import Run, follow
 from lab.tasks.task_file import load_cell
+from lab.teaching.events import SequencingBegan
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -104,7 +106,7 @@ def test_an_environments_own_drawing_is_shown_as_text(tab: "Page", page: SeatPag
 def test_the_order_is_advised(tab: "Page", page: SeatPage, until: Until) -> None:
     run = follow(load_cell("toast-case-1").cell(3), [1])
     request = SequenceRequest(run, run.allowed(), 1, 30, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
-    page.begin_order("toast", 100, GateSettings(), 213.0)
+    page.hear(SequencingBegan(100, Reference(213.0, True, "A*"), GateSettings()))
     ThreadPoolExecutor(1).submit(page.ask_order, replace(request, run=follow(run.cell, ()), allowed=(1, 2, 3)))
     until(tab, "document.querySelectorAll('#moves button:enabled').length === 3")
     tab.keyboard.press("1")
@@ -118,7 +120,7 @@ def test_the_order_is_advised(tab: "Page", page: SeatPage, until: Until) -> None
 
 def test_a_pallets_move_is_no_carry(tab: "Page", page: SeatPage, until: Until) -> None:
     run = Run(load_cell("fms").cell(("rook",)))
-    page.begin_order("fms", 100, GateSettings(), None)
+    page.hear(SequencingBegan(100, None, GateSettings()))
     while run.allowed():
         request = SequenceRequest(deepcopy(run), run.allowed(), run.allowed()[0], 1, None, None, None, Reason())
         ThreadPoolExecutor(1).submit(page.ask_order, request)

@@ -23,9 +23,22 @@ from lab.mdp import TabularMDP, grid
 from lab.seat.page.teaching_page import SeatPage
 from lab.sequencing.cell.schedule import EpisodeSequenced, Move, SequenceResult
 from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.search import Reference
 from lab.sequencing.simulate.run import follow
 from lab.skills.skill import Problem
 from lab.tasks.task_file import load_cell
+from lab.teaching.events import (
+    LessonBegan,
+    LessonEvent,
+    MoveMade,
+    MoveRetried,
+    MoveTimed,
+    PhaseBegan,
+    RecordSkipped,
+    SequenceFound,
+    SequencingBegan,
+)
+from lab.teaching.lesson_plan import LessonPlan
 
 if TYPE_CHECKING:
     Opens = Callable[..., AbstractContextManager[Any]]
@@ -75,11 +88,14 @@ def answer(page: Any, number: int | None = None, **what: Any) -> None:
 
 def test_a_whole_session_is_advised_from_the_page(page: SeatPage, mdp: TabularMDP, opens: "Opens") -> None:
     problem = Problem("row", "world", mdp)
-    page.begin(problem, LEARNER, ALWAYS)
+    page.hear(LessonBegan(LessonPlan(problem, LEARNER, ALWAYS, "")))
+
+    def hear(event: Event) -> None:
+        page.hear(LessonEvent("row", event))
 
     def session() -> SessionResult:
         rng = np.random.default_rng(0)
-        return run_session(mdp, LEARNER, ALWAYS, Person(page.ask), rng, on_event=lambda e: page.on_event(e, "row"))
+        return run_session(mdp, LEARNER, ALWAYS, Person(page.ask), rng, on_event=hear)
 
     with opens(page) as browser:
         result = meanwhile(session)
@@ -127,7 +143,7 @@ def test_a_question_waits_for_a_page_to_come(page: SeatPage, request_1: AdviceRe
 
 
 def test_a_lost_connection_loses_nothing(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
-    page.on_event(EpisodeEnded(1, 20, False, 0, None, False), "row")
+    page.hear(LessonEvent("row", EpisodeEnded(1, 20, False, 0, None, False)))
     asked = meanwhile(page.ask, request_1)
     with opens(page) as browser:
         before = dict(browser.hear_until(question))
@@ -323,7 +339,7 @@ def order_request(*decisions: int) -> SequenceRequest:
 
 def test_the_order_is_asked_and_the_work_shown(page: SeatPage, opens: "Opens") -> None:
     with opens(page) as browser:
-        page.begin_order("toast", 100, GateSettings(window=4, first_episode=8), 213.0)
+        page.hear(SequencingBegan(100, Reference(213.0, True, "A*"), GateSettings(window=4, first_episode=8)))
         number = 0
         for decisions, said in (((), 1), ((1,), 2)):
             asked = meanwhile(page.ask_order, order_request(*decisions))
@@ -333,8 +349,8 @@ def test_the_order_is_asked_and_the_work_shown(page: SeatPage, opens: "Opens") -
             assert asked.result(20) == said
         assert browser.seat["work"]["rows"] == ["robot", "toaster"]
         assert browser.seat["work"]["now_s"] == 57.0
-        page.on_order_episode(EpisodeSequenced(30, 250.0, 250.0, (1, 2)))
-        page.on_order_episode(EpisodeSequenced(31, 240.0, 240.0, (2, 1)))
+        page.hear(EpisodeSequenced(30, 250.0, 250.0, (1, 2)))
+        page.hear(EpisodeSequenced(31, 240.0, 240.0, (2, 1)))
         seat = browser.hear_until(lambda seat: seat["curve"]["count"] == 2)
         assert seat["curve"]["guided"] == [1, 0]
         assert (seat["lesson"]["optimal"], seat["lesson"]["kind"]) == (213.0, "order")
@@ -351,17 +367,17 @@ def test_an_order_may_be_left_to_the_learner(page: SeatPage, opens: "Opens") -> 
 
 
 def test_a_lesson_that_begins_again_begins_anew(page: SeatPage, mdp: TabularMDP, opens: "Opens") -> None:
-    page.begin(Problem("row", "world", mdp), LEARNER, ALWAYS)
+    page.hear(LessonBegan(LessonPlan(Problem("row", "world", mdp), LEARNER, ALWAYS, "")))
     ended: Event = EpisodeEnded(1, 7, True, 1, None, True)
-    page.on_event(ended, "row")
+    page.hear(LessonEvent("row", ended))
     with opens(page) as browser:
         browser.hear_until(lambda seat: seat.get("curve", {}).get("count") == 1 and seat["notices"])
-        page.begin(Problem("row", "world", mdp), LEARNER, ALWAYS)
+        page.hear(LessonBegan(LessonPlan(Problem("row", "world", mdp), LEARNER, ALWAYS, "")))
         seat = browser.hear_until(lambda seat: seat["curve"]["count"] == 0)
         assert seat["notices"] == []
         assert seat["lesson"]["title"] == "row"
         assert seat["place"]["columns"] == 3
-        page.on_event(ended, "another")
+        page.hear(LessonEvent("another", ended))
         seat = browser.hear_until(lambda seat: seat["lesson"]["title"] == "another")
         assert seat["place"] is None
 
@@ -377,7 +393,7 @@ def test_a_question_of_another_problem_brings_its_map(page: SeatPage, request_1:
 def test_pages_look_at_different_layers(page: SeatPage, opens: "Opens") -> None:
     labels = ("left", "right", "backward", "forward", "down", "up")
     space = grid((2, 2, 3), np.zeros((2, 2, 3), bool), (0, 0, 1), (1, 1, 2), action_labels=labels)
-    page.begin(Problem("space", "world", space), LEARNER, ALWAYS)
+    page.hear(LessonBegan(LessonPlan(Problem("space", "world", space), LEARNER, ALWAYS, "")))
     with opens(page) as first, opens(page) as second:
         assert first.hear_until(lambda seat: seat.get("slice"))["slice"]["layer"] == 1
         second.say({"layer": 2})
@@ -411,23 +427,22 @@ def test_receipt_advisors_and_the_end_are_shown(page: SeatPage, opens: "Opens") 
 
 
 def test_a_whole_run_is_told_in_the_panel(page: SeatPage, opens: "Opens") -> None:
-    listener = page.listener()
     with opens(page) as browser:
-        listener.phase("measure", 2)
-        listener.measured("grasp at plate", 1.5)
-        listener.skipped("a damaged file")
-        listener.sequenced(SequenceResult((1, 2), 213.0, (250.0, 213.0)), None)
-        listener.retried("a slice was dropped")
+        page.hear(PhaseBegan("measure", 2))
+        page.hear(MoveTimed("grasp at plate", 1.5))
+        page.hear(RecordSkipped("a damaged file"))
+        page.hear(SequenceFound(SequenceResult((1, 2), 213.0, (250.0, 213.0))))
+        page.hear(MoveRetried("a slice was dropped"))
         seat = browser.hear_until(lambda seat: seat.get("progress") and len(seat["progress"]["lines"]) == 5)
         assert seat["progress"]["lines"] == [
             "Time every move in simulation",
             "grasp at plate: 1.50 s",
             "skipped: a damaged file",
-            "order 1 2: 213.0 s",
+            "parts 1 2: 213.0 s found in episode 2 of 2, its luckiest drawn episode",
             "failed, trying again: a slice was dropped",
         ]
         assert (seat["progress"]["done"], seat["progress"]["parts"]) == (2, 2)
-        listener.phase("carry out", 1)
-        listener.moved(Move(1, "plate", "plate", "toaster", 0.0, 0.0, 1.0, 4.0, 60.0))
+        page.hear(PhaseBegan("carry out", 1))
+        page.hear(MoveMade(Move(1, "plate", "plate", "toaster", 0.0, 0.0, 1.0, 4.0, 60.0)))
         seat = browser.hear_until(lambda seat: seat["work"])
         assert seat["work"]["bars"][-1] == ["toaster", "process", 1, 4.0, 64.0]
