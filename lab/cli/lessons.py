@@ -1,18 +1,22 @@
-"""What the commands that teach share: who hears of it, the teacher that the options describe, a kept session."""
+"""What the commands that teach share: who hears of it, the teacher and the subject of the options, a kept session."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from lab.cli.output import complain, console
-from lab.errors import LabError
+from lab.errors import BadInput, LabError
 
 if TYPE_CHECKING:
     from lab.seat.lesson_seat import LessonSeat
     from lab.teaching.kept_session import KeptSession
+    from lab.teaching.lesson import Subject
     from lab.teaching.lesson_options import LessonOptions
     from lab.teaching.teacher import Teacher
+
+GYM = "gym:"
 
 
 @contextmanager
@@ -71,9 +75,46 @@ def kept_session(
     return kept
 
 
-def say_outside(kept: "KeptSession") -> None:
-    """Says which files the session has the lab read that are not its own."""
-    from lab.cli.subjects import files_outside
+def subject_of(options: "LessonOptions", kept: "KeptSession | None" = None) -> "Subject":
+    """The subject that the options name: an environment, a world or a skill of a task. BadInput for bad options.
 
-    if files := files_outside(kept):
-        complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(files)}")
+    A module whose name comes out of a file, `kept`, is imported only when the user has said that it is trusted.
+    """
+    from lab.tasks.task_file import names_file
+
+    if options.subtask.startswith(GYM):
+        from lab.gym import parse_name
+
+        module = "" if kept is None else parse_name(options.subtask, kept.where).module
+        if kept is not None and module and module not in kept.trusted:
+            raise BadInput(
+                f"journal '{kept.read.path}' ({kept.where}): it names the module '{module}', whose code would run: if you "
+                f"trust whoever made it, say --trust-module {quote(module)}"
+            )
+        from lab.gym.gym_subject import GymSubject
+
+        return GymSubject.of(options)
+    if names_file(options.subtask):
+        from lab.teaching.world_subject import WorldSubject
+
+        return WorldSubject.of(options)
+    from lab.production.skill_subject import SkillSubject
+
+    return SkillSubject.of(options)
+
+
+def say_outside(kept: "KeptSession") -> None:
+    """Says which files that are not its own a session has the lab read when it goes on or is shown again."""
+    from lab.tasks.task_file import is_path
+
+    options = kept.options
+    named: list[object] = [options.subtask, options.task]
+    if options.subtask.startswith(GYM):
+        from lab.gym import parse_name
+
+        named = list(parse_name(options.subtask, kept.where).options.values())
+    files = [word for word in named if isinstance(word, str) and is_path(word) and Path(word).is_file()]
+    files += [name.removeprefix("recorded:") for name in options.advisors if name.startswith("recorded:")]
+    here = kept.read.path.parent.resolve()
+    if outside := [name for name in files if not Path(name).resolve().is_relative_to(here)]:
+        complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(outside)}")

@@ -5,10 +5,9 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.lessons import kept_session, lesson_seat, say_outside
+from lab.cli.lessons import kept_session, lesson_seat, say_outside, subject_of
 from lab.cli.options import Json, Plain, Port, ToolboxFolder, TrustModule
 from lab.cli.output import end, show
-from lab.cli.subjects import subject_of
 
 
 def replay(

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.lessons import kept_session, lesson_seat, say_outside, teacher_of
+from lab.cli.lessons import kept_session, lesson_seat, say_outside, subject_of, teacher_of
 from lab.cli.options import (
     MAX_EPISODES,
     AdvisorNames,
@@ -21,7 +21,6 @@ from lab.cli.options import (
     Wait,
 )
 from lab.cli.output import end, show
-from lab.cli.subjects import subject_of
 from lab.errors import BadInput, counted
 
 

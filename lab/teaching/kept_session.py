@@ -24,8 +24,6 @@ from lab.toolbox.registry import Toolbox, slug
 SESSIONS = "sessions"  # the folder in the toolbox
 _BEGUN = "begun"  # the folder in a session's folder for the policy that it went on from
 _MOST = 100_000  # sessions of one name
-
-
 _OPTIONS = {
     "subtask": "SUBTASK",
     "advisors": "--advisor",

@@ -59,7 +59,7 @@ class _Sessions:
         while left:
             left -= 1
             result = self._session(None if kept is None else kept.q)
-            whole, now = _joined(whole, result), moves_to_goal(result.q, plan.problem, plan.learner)
+            whole, now = joined(whole, result), moves_to_goal(result.q, plan.problem, plan.learner)
             if now <= moves:
                 if now < moves == inf:
                     left = MORE_SESSIONS if several else 0
@@ -125,30 +125,21 @@ def moves_to_goal(q: FloatArray, problem: Problem, learner: LearnerSettings) -> 
     return len(actions) if reached and not unreached(q, mdp) else inf
 
 
-def after(policy: Policy, result: SessionResult) -> SessionResult:
-    """What was learned on from a policy, with the history of that policy before it."""
-    return replace(
-        result,
-        visits=policy.visits + result.visits,
-        steps=np.concatenate([np.array(policy.curve, np.int64), result.steps]),
-        guided=np.concatenate([np.array(policy.guided, bool), result.guided]),
-        requests=policy.requests + result.requests,
-        helped_steps=policy.helped_steps + result.helped_steps,
-    )
-
-
-def _joined(before: SessionResult | None, after: SessionResult) -> SessionResult:
-    """Two sessions of one table as one: curves one after the other, counts added, the later table."""
+def joined(before: SessionResult | Policy | None, now: SessionResult) -> SessionResult:
+    """A session with the history of what it went on from before it: curves one after the other, counts added."""
     if before is None:
-        return after
-    rejected = (before.rejected_at_episode, after.rejected_at_episode)
-    return replace(
-        after,
-        visits=before.visits + after.visits,
-        steps=np.concatenate([before.steps, after.steps]),
-        guided=np.concatenate([before.guided, after.guided]),
-        requests=before.requests + after.requests,
-        helped_steps=before.helped_steps + after.helped_steps,
-        misleads=before.misleads + after.misleads,
-        rejected_at_episode=next((episode for episode in rejected if episode is not None), None),
+        return now
+    steps = before.curve if isinstance(before, Policy) else before.steps
+    whole = replace(
+        now,
+        visits=before.visits + now.visits,
+        steps=np.concatenate([np.asarray(steps, np.int64), now.steps]),
+        guided=np.concatenate([np.asarray(before.guided, bool), now.guided]),
+        requests=before.requests + now.requests,
+        helped_steps=before.helped_steps + now.helped_steps,
     )
+    if isinstance(before, Policy):  # it does not know of misleads
+        return whole
+    first = before.rejected_at_episode
+    first = now.rejected_at_episode if first is None else first
+    return replace(whole, misleads=before.misleads + now.misleads, rejected_at_episode=first)

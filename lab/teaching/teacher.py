@@ -12,7 +12,7 @@ from lab.mdp import TabularMDP
 from lab.skills.skill import Problem
 from lab.teaching.events import LessonContinued, Tell, unheard
 from lab.teaching.lesson_plan import Interrupted, Keep, Lesson, LessonPlan, Trial
-from lab.teaching.lesson_sessions import after, fits, learn
+from lab.teaching.lesson_sessions import fits, joined, learn
 from lab.toolbox.policy import MAX_NAME_LENGTH, Policy, is_name
 from lab.toolbox.registry import Toolbox
 
@@ -103,7 +103,7 @@ class Teacher:
         try:
             result = learn(plan, self.counsel, self.seed, journal, self.tell)
             policy = Policy.of(
-                result if unfinished is None else after(unfinished, result),
+                joined(unfinished, result),
                 problem.mdp,
                 name=plan.name or self._free_name(problem, result.solved),
                 subtask=problem.subtask,

@@ -5,7 +5,7 @@ Nothing here waits, sends or draws. `document` says all; `Known.since` finds wha
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from lab.learning.gates import improvement
@@ -218,13 +218,6 @@ def _standing(known: Known, now_s: float) -> Json:
     }
 
 
-def _progress(known: Known, now_s: float) -> Json | None:
-    progress = known.progress
-    if progress is None:
-        return None
-    return {"phase": progress.phase, "parts": progress.parts, "done": progress.done, "lines": list(progress.lines)}
-
-
 PARTS: dict[str, Callable[[Known, float], Any]] = {
     "lesson": _lesson,
     "place": _place,
@@ -233,7 +226,7 @@ PARTS: dict[str, Callable[[Known, float], Any]] = {
     "curve": lambda known, now_s: known.learning.curve.document(),
     "standing": _standing,
     "notices": lambda known, now_s: [vars(notice) for notice in known.learning.notices],
-    "progress": _progress,
+    "progress": lambda known, now_s: None if known.progress is None else asdict(known.progress),
     "work": lambda known, now_s: known.work,
     "members": lambda known, now_s: known.members,
     "receipt": lambda known, now_s: known.receipt,

@@ -7,7 +7,7 @@ the question waits. Several pages may watch, one of them has the seat.
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict
 from math import inf
 from typing import Any
 
@@ -164,8 +164,8 @@ class SeatPage(LiveView):
         self._show("receipt", dict(document))
 
     def members(self, members: Iterable[Any]) -> None:
-        """Several advisors: records or dicts with `name`, `trust`, `low`, `high` and `dropped`."""
-        self._show("members", [_member(member) for member in members])
+        """Several advisors: records with `name`, `trust`, `low`, `high` and `dropped`."""
+        self._show("members", [asdict(member) for member in members])
 
     def finished(self, text: str) -> None:
         """The lesson is over: nothing is asked any more."""
@@ -206,7 +206,3 @@ def _lesson(plan: LessonPlan) -> Learning:
         with suppress(NoPath):
             made.optimal = shortest_steps(mdp) + learner.count_start
     return made
-
-
-def _member(member: Any) -> dict[str, Any]:
-    return asdict(member) if is_dataclass(member) and not isinstance(member, type) else dict(member)

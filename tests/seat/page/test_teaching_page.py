@@ -416,14 +416,12 @@ class Trusted:
 def test_receipt_advisors_and_the_end_are_shown(page: SeatPage, opens: "Opens") -> None:
     with opens(page) as browser:
         page.receipt({"requests": 3, "own_tau": float("inf"), "next_time": ["less"]})
-        page.members([Trusted("ann", 0.5, 0.25, 0.75, False), {"name": "bob"}])
+        page.members([Trusted("ann", 0.5, 0.25, 0.75, False)])
         page.finished("The lesson is over.")
         seat = browser.hear_until(lambda seat: seat.get("ended"))
         assert seat["receipt"] == {"requests": 3, "own_tau": None, "next_time": ["less"]}
-        assert seat["members"] == [
-            {"name": "ann", "trust": 0.5, "low": 0.25, "high": 0.75, "dropped": False},
-            {"name": "bob"},
-        ]
+        ann = {"name": "ann", "trust": 0.5, "low": 0.25, "high": 0.75, "dropped": False}
+        assert seat["members"] == [ann]
 
 
 def test_a_whole_run_is_told_in_the_panel(page: SeatPage, opens: "Opens") -> None:
