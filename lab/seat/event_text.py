@@ -18,7 +18,17 @@ from lab.learning.events import Event as SessionEvent
 from lab.mdp import TabularMDP
 from lab.seat.request_text import percent, verdict
 from lab.sequencing.cell.schedule import Move
-from lab.teaching.events import LessonContinued, SequenceFound
+from lab.teaching.events import (
+    Event,
+    LessonContinued,
+    MoveMade,
+    MoveRetried,
+    MoveTimed,
+    PhaseBegan,
+    RecordSkipped,
+    SequenceFound,
+    SkillReady,
+)
 from lab.teaching.lesson_plan import Lesson
 from lab.view.figures import beside, gap_of
 
@@ -108,12 +118,6 @@ class SessionText:
         return Told(f"Step {event.step} at {where}: {said}; {whom}.", "note")
 
 
-def continued_text(event: LessonContinued) -> str:
-    """That an unfinished policy is learned on."""
-    left = event.unfinished
-    return f"'{left.name}' was left unfinished after {counted(len(left.curve), 'episode')}: it is learned on"
-
-
 def lesson_parts(lesson: Lesson, first_asked: int | None = None, rejected: AdviceRejected | None = None) -> list[str]:
     """What came of a lesson, beginning with the steps of the learned way and the fewest; where known, when it asked."""
     policy, result = lesson.policy, lesson.result
@@ -152,3 +156,26 @@ def move_text(move: Move) -> str:
     waited_s = move.pick_s - move.reach_s
     wait = f", waited {waited_s:.1f} s" if waited_s > _LEAST_WAIT_S else ""
     return f"toast {move.part}: {move.origin} to {move.target}{wait}"
+
+
+def run_text(event: Event) -> str:
+    """What happens in a run as one line; "" for what is not told."""
+    match event:
+        case PhaseBegan():
+            return PHASES.get(event.name, event.name)
+        case RecordSkipped():
+            return f"skipped: {event.why}"
+        case MoveRetried():
+            return f"failed, trying again: {event.why}"
+        case SkillReady():
+            return f"{event.lesson.source} {event.name}: {', '.join(lesson_parts(event.lesson))}"
+        case MoveTimed():
+            return f"{event.name}: {event.seconds:.2f} s"
+        case SequenceFound():
+            return " ".join(sequence_parts(event))
+        case MoveMade():
+            return f"{event.move.drop_s:.1f} s: {move_text(event.move)}"
+        case LessonContinued(unfinished=left):
+            length = counted(len(left.curve), "episode")
+            return f"'{left.name}' was left unfinished after {length}: it is learned on"
+    return ""

@@ -10,14 +10,12 @@ from lab.advice.panel import Panel
 from lab.learning.events import EpisodeEnded
 from lab.learning.requests import AdviceRequest, Ask
 from lab.mdp import FloatArray
-from lab.seat.event_text import continued_text
 from lab.seat.run_progress import RunProgress
 from lab.seat.terminal.prompt import TeachingPrompt
 from lab.teaching.events import (
     AdvisorGathered,
     Event,
     LessonBegan,
-    LessonContinued,
     LessonEvent,
     QuestionAnswered,
     ScenePrepared,
@@ -73,8 +71,6 @@ class LessonSeat:
                 self._panel = event.advisor if isinstance(event.advisor, Panel) else None
             case ScenePrepared():
                 self._show_stage(event)
-            case LessonContinued():
-                self.progress.console.print(continued_text(event), soft_wrap=True)
             case _:
                 self.progress.hear(event)
 

@@ -9,9 +9,10 @@ from rich.progress import TaskID
 from rich.text import Text
 
 from lab.learning.events import AdviceRejected, AdviceRequested
-from lab.seat.event_text import PHASES, lesson_parts, move_text, sequence_parts
+from lab.seat.event_text import lesson_parts, move_text, run_text, sequence_parts
 from lab.teaching.events import (
     Event,
+    LessonContinued,
     LessonEvent,
     MoveMade,
     MoveRetried,
@@ -75,11 +76,11 @@ class RunProgress:
             case LessonEvent(lesson=name, event=AdviceRejected() as rejected):
                 self._rejected[name] = rejected
             case PhaseBegan():
-                self._begin(PHASES.get(event.name, event.name), event.parts)
-            case RecordSkipped():
-                self._say(("  skipped: ", "yellow"), event.why)
-            case MoveRetried():
-                self._say(("  failed, trying again: ", "yellow"), event.why)
+                self._begin(run_text(event), event.parts)
+            case LessonContinued():
+                self._say(run_text(event))
+            case RecordSkipped() | MoveRetried():
+                self._say((f"  {run_text(event)}", "yellow"))
             case SkillReady() | MoveTimed() | SequenceFound() | MoveMade():
                 self._done(event)
                 if self._task is not None:
