@@ -10,7 +10,7 @@ from secrets import token_hex
 from shutil import rmtree
 from tempfile import mkdtemp
 
-from lab.errors import WorkFailed
+from lab.errors import BadInput, WorkFailed
 
 PACKAGE = Path(__file__).resolve().parent
 
@@ -70,6 +70,18 @@ def nearest(folder: Path) -> Path:
     while not place.exists() and place != place.parent:
         place = place.parent
     return place
+
+
+def check_out(out: Path) -> None:
+    """BadInput unless `out` is a folder that can be written, or can be made; makes nothing."""
+    try:
+        place = nearest(out)
+    except OSError as error:
+        raise BadInput(f"output folder '{out}' (--out): {error.strerror}") from None
+    if not place.is_dir():
+        raise BadInput(f"output folder '{out}' (--out): '{place}' is a file; give a folder")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise BadInput(f"output folder '{out}' (--out): '{place}' is not writable")
 
 
 @contextmanager

@@ -4,14 +4,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from lab.cellfile import CellFile
 from lab.errors import BadInput, LabError
+from lab.files import check_out
 from lab.mdp import shortest_steps
-from lab.production.report import check_out
-from lab.production.skill_subject import fitting
+from lab.tasks.cell import CellFile
 from lab.tasks.grid_world import RANDOM, GridWorld, parse_shape, random_world
 from lab.tasks.record import read_text, write_whole
 from lab.tasks.task_file import check_number, find, load_any
+from lab.teaching.skill_subject import fitting
 from lab.teaching.world_subject import world_problem
 
 AXES = """\
@@ -40,7 +40,7 @@ def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
         elif isinstance(task, CellFile):
             task.cell(toasts)
         else:
-            from lab.production.run import prepare
+            from lab.skills.prepared_scene import prepare
 
             prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
     except LabError as error:

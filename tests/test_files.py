@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from lab.files import draft, nearest, write_whole
+from lab.errors import BadInput
+from lab.files import check_out, draft, nearest, write_whole
 
 
 def test_a_file_is_written_and_replaced(tmp_path: Path) -> None:
@@ -88,3 +89,12 @@ def test_a_killed_process_leaves_a_draft_that_the_next_one_clears(tmp_path: Path
         assert drafts(tmp_path) == {made.name, ".run-mine"}
     for _, ready in (killed, alive):
         os.close(ready)
+
+
+def test_output_folders(tmp_path: Path) -> None:
+    check_out(tmp_path / "a" / "b")
+    assert os.listdir(tmp_path) == []
+    (tmp_path / "file").write_text("mine")
+    for wrong in ("file", "file/below", "x" * 300):
+        with pytest.raises(BadInput, match=r"output folder '.*' .--out.: "):
+            check_out(tmp_path / wrong)

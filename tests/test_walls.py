@@ -31,8 +31,8 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "pybullet_data": {"lab.sim.world"},
     "pybullet_utils": {"lab.sim.world"},
     "meshcat": {"lab.view.meshcat"},
-    "cv2": {"lab.vision.pictures", "lab.sim.camera"},
-    "PIL": {"lab.vision.pictures", "lab.sim.camera"},
+    "cv2": {"lab.vision.markers", "lab.vision.picture_files", "lab.sim.camera"},
+    "PIL": set(),
     "numba": {"lab.learning.compiled", "lab.learning.kernels"},  # what is kept of it is kept in one place
     "ortools": {"lab.sequencing.methods.cp_sat", "lab.sequencing.methods.cp_sat_model"},
     "pymoo": {"lab.sequencing.methods.genetic"},
@@ -230,8 +230,8 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.sim.robot", "import pybullet", "allowed in ['lab.sim.world']"),
         ("lab.sim.robot", "def f():\n    import pybullet as p", "lab.sim.robot:2 imports pybullet"),
         ("lab.view.plots", "from meshcat.geometry import Box", "allowed in ['lab.view.meshcat']"),
-        ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.sim.camera', 'lab.vision.pictures']"),
-        ("lab.view.plots", "from PIL import Image", "allowed in ['lab.sim.camera', 'lab.vision.pictures']"),
+        ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.sim.camera', 'lab.vision.markers', "),
+        ("lab.view.plots", "from PIL import Image", "allowed in no module"),
         (
             "lab.sequencing.methods.exact",
             "from ortools.sat.python import cp_model",

@@ -98,7 +98,7 @@ def subject_of(options: "LessonOptions", kept: "KeptSession | None" = None) -> "
         from lab.teaching.world_subject import WorldSubject
 
         return WorldSubject.of(options)
-    from lab.production.skill_subject import SkillSubject
+    from lab.teaching.skill_subject import SkillSubject
 
     return SkillSubject.of(options)
 

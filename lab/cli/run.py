@@ -32,9 +32,9 @@ def run(
     from dataclasses import replace
 
     from lab.advice.advisors import PEOPLE
-    from lab.production.report import check_out
-    from lab.production.run import prepare
+    from lab.files import check_out
     from lab.production.run import run as run_task
+    from lab.skills.prepared_scene import prepare
     from lab.tasks import task_file as taskfile
     from lab.teaching.kept_session import kept_by
     from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions

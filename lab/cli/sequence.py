@@ -61,7 +61,7 @@ def sequence(
     as_json: Json = False,
 ) -> None:
     """The high level alone: the order of the robot's transfers, beside the proven optimum."""
-    from lab.sequence import Wanted, sequence_named
+    from lab.production.sequence import Wanted, sequence_named
     from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
     from lab.view.summary import sequence_summary
 

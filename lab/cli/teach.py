@@ -89,7 +89,7 @@ def teach(
 
     Each session keeps a journal: --resume goes on with one that was broken off, lab replay shows it again.
     """
-    from lab.production.report import check_out
+    from lab.files import check_out
     from lab.teaching.kept_session import check_new
     from lab.teaching.lesson import teach as teach_session
     from lab.teaching.lesson_options import LessonOptions

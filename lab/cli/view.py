@@ -1,11 +1,15 @@
 """`lab view`: a scene or a replay on a page."""
 
+import time
+from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from lab.cli.options import Json, Seed, Toasts
 from lab.cli.output import end, write, write_json
+from lab.errors import BadInput
 
 
 def view(
@@ -18,7 +22,6 @@ def view(
     as_json: Json = False,
 ) -> None:
     """Look at a task's scene or at a run's replay, on a page on 127.0.0.1, until Ctrl-C."""
-    from lab.look import show
 
     def tell(url: str, hint: str) -> None:
         if as_json:
@@ -30,3 +33,34 @@ def view(
         show(what, toasts, seed, port, tell)
     except KeyboardInterrupt:
         end("stopped by Ctrl-C", 130)
+
+
+def show(what: str, toasts: int, seed: int, port: int, tell: Callable[[str, str], None]) -> None:
+    """Serve a run's replay, or a task's scene, on 127.0.0.1 until interrupted; `tell(url, hint)` once it is there."""
+    import numpy as np
+
+    from lab.production.recorder import show_scene
+    from lab.sim.scene import check_scene, draw_layout
+    from lab.tasks.task_file import check_number, load
+    from lab.view.meshcat import LiveView
+
+    folder = Path(what)
+    if folder.is_dir():
+        replay = folder / "replay.html"
+        if not replay.is_file():
+            raise BadInput(f"'{what}' holds no replay.html: give the folder of a run (--out of lab run) or a task")
+        with LiveView(port, replay=replay) as page:
+            tell(page.url, page.hint)
+            _wait()
+    check_number(toasts)
+    task = load(what)
+    check_scene(task)
+    with LiveView(port) as live:
+        show_scene(task, toasts, draw_layout(task, toasts, np.random.default_rng([seed, 1])), live)
+        tell(live.url, live.hint)
+        _wait()
+
+
+def _wait() -> None:
+    while True:
+        time.sleep(3600)

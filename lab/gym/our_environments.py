@@ -8,13 +8,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from lab.cellfile import order_from_word, toast_case
 from lab.mdp import FloatArray, TabularMDP
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
 from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.cell.routes import entry
 from lab.sequencing.simulate.run import Run
+from lab.tasks.cell import order_from_word, toast_case
 from lab.tasks.task_file import load, load_cell, load_world
 
 ROOM = 10  # an episode in a cell may take so many times the decisions that its parts need at most
@@ -111,7 +111,7 @@ class InsertEnv(TableEnv):
         slices = min(2, *(found.station(stage.station).capacity for stage in (found.route[0], found.route[-1])))
         layout = draw_layout(found, slices, np.random.default_rng([layout_seed, 1]))  # as for a lesson of this seed
         problem = Insert(station).setup(Surveys(found, layout))
-        super().__init__(problem.mdp, found.subtask("insert").learner.max_steps, render_mode)
+        super().__init__(problem.mdp, found.subtask(Insert.subtask).learner.max_steps, render_mode)
 
 
 class CellEnv(gymnasium.Env[Any, Any]):

@@ -42,9 +42,9 @@ def lean(function: Function, **options: Any) -> Function:
     return compiled(function, error_model="numpy", _nrt=False, **options)
 
 
-def inner(function: Function) -> Function:
+def inner(function: Function, **options: Any) -> Function:
     """For what only lean functions call: what Python would need to call it takes a third of the time to compile."""
-    return lean(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return lean(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
 
 
 def cache_folder() -> Path:

@@ -29,9 +29,9 @@ _NOTHING = memory.NOTHING
 _Memory: Any = memory.Memory
 _BELOW_ONE = selection.BELOW_ONE
 _exp_of: Any = njit(selection.exp_of)
-_following: Any = njit(splitmix.following)
-_mixed: Any = njit(splitmix.mixed)
-_fraction: Any = njit(splitmix.fraction)
+_following: Any = njit(inline="always")(splitmix.following)
+_mixed: Any = njit(inline="always")(splitmix.mixed)
+_fraction: Any = njit(inline="always")(splitmix.fraction)
 _window_mean: Any = njit(gates.window_mean)
 _too_slow: Any = njit(gates.too_slow)
 _misled: Any = njit(gates.misled)

@@ -1,1 +1,1 @@
-"""A whole job carried out: which skills it needs, who is where, how long moves take, and what a run leaves behind."""
+"""A whole job carried out, or only planned: the skills it needs, who is where, how long moves take, what a run leaves behind."""

@@ -6,16 +6,15 @@ from math import hypot
 
 from lab.production.floor import Floor
 from lab.production.recorder import Viewer
-from lab.production.skillset import SkillSet
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Move, Schedule
 from lab.sequencing.simulate.run import Run
 from lab.sim.frames import Recording
-from lab.sim.scene import Layout, Spot, spots
+from lab.sim.scene import Spot, spots
 from lab.sim.world import World
 from lab.skills import Skill
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import UPRIGHT, Status
-from lab.skills.surveys import Surveys
 from lab.teaching.events import MoveMade, MoveRetried, Tell, unheard
 
 MAX_TRIES = 3  # a failed step is tried again from the state reached, at most twice
@@ -46,7 +45,6 @@ class Production:
 
     floor: Floor
     cell: Cell
-    surveys: Surveys
     tell: Tell = unheard
     moves: list[Move] = field(default_factory=list)
     retries: list[str] = field(default_factory=list)
@@ -95,6 +93,7 @@ class Production:
         self.tell(MoveMade(self.moves[-1]))
 
     def _free_spot(self, station: str) -> Spot:
+        """The first spot of a station on which no toast stands."""
         return next(s for s in spots(self.floor.skillset.task.station(station)) if s not in self.spot_of.values())
 
     def _carry(self, toast: int, origin: str, target: str, spot: Spot) -> None:
@@ -163,6 +162,7 @@ class Production:
             self.floor.tick()
 
     def _start_machine(self, toast: int, station: str) -> None:
+        """Let the machine that a toast has been brought to begin: with its learned process, or for its time."""
         floor, place = self.floor, self.floor.skillset.task.station(station)
         for skill in floor.skillset.processes[station]:
             floor.start(skill.aim(_slice(toast)))
@@ -191,9 +191,7 @@ def _slice(toast: int) -> str:
 
 
 def carry_out(
-    skillset: SkillSet,
-    surveys: Surveys,
-    layout: Layout,
+    prepared: Prepared,
     cell: Cell,
     sequence: Sequence[int],
     *,
@@ -205,10 +203,10 @@ def carry_out(
     A toast is delivered when its slice stands on the last station at the end; dropped when it is nowhere upright.
     """
     with World() as world:
-        floor = Floor(world, skillset, layout, cell.parts, film=True, viewer=viewer)
-        floor.stand(surveys.approach(cell.robot_start))
+        floor = Floor(world, prepared.skillset, prepared.layout, cell.parts, film=True, viewer=viewer)
+        floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
-        work = Production(floor, cell, surveys, tell)
+        work = Production(floor, cell, tell)
         floor.on_tick = work.watch
         failure = work.carry_out(sequence)
         floor.recorder.take()  # type: ignore[union-attr]

@@ -13,15 +13,15 @@ import numpy as np
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.files import assets_folder
 from lab.production.floor import Floor
-from lab.production.skillset import SkillSet, route, stations
 from lab.production.sources import sources
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.routes import Moves
+from lab.sequencing.cell.routes import NeededMoves
 from lab.sim.scene import Layout
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import TRIED_WITH, Status
-from lab.skills.surveys import Surveys
+from lab.skills.skillset import route, stations
 from lab.tasks.task_file import Task
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
@@ -57,7 +57,7 @@ class Durations:
         }
 
     @classmethod
-    def from_json(cls, record: Mapping[str, Any], moves: Moves, processes: Sequence[str]) -> "Durations":
+    def from_json(cls, record: Mapping[str, Any], moves: NeededMoves, processes: Sequence[str]) -> "Durations":
         """What `to_json` wrote of these moves and of the stations with a process to learn.
 
         BadInput for a move or station too many or too few, and for what is no time [s].
@@ -91,15 +91,15 @@ def _times(record: Mapping[str, Any], table: str, wanted: set[str]) -> dict[str,
     return {name: float(seconds) for name, seconds in times.items()}
 
 
-def measure(skillset: SkillSet, surveys: Surveys, on_move: Callable[[str, float], None] | None = None) -> Durations:
+def measure(prepared: Prepared, on_move: Callable[[str, float], None] | None = None) -> Durations:
     """Carry every needed move out once in simulation and time it [s]; WorkFailed when one does not succeed."""
-    tell = on_move or (lambda name, seconds: None)
+    tell, skillset = on_move or (lambda name, seconds: None), prepared.skillset
     loaded: dict[Pair, float] = {}
     process: dict[str, float] = {}
     steps = 0
     for (origin, target), leg in skillset.legs.items():
         with World() as world:
-            floor = Floor(world, skillset, surveys.layout, 0)
+            floor = Floor(world, skillset, prepared.surveys.layout, 0)
             leg[0].begin(floor.bench)
             loaded[origin, target] = _timed(floor, leg)
             tell(f"{origin} > {target}, loaded", loaded[origin, target])
@@ -107,18 +107,16 @@ def measure(skillset: SkillSet, surveys: Surveys, on_move: Callable[[str, float]
                 process[target] = _timed(floor, [skill])
                 tell(skill.name, process[target])
             steps += world.steps
-    empty, more = _measure_empty(skillset, surveys, tell)
+    empty, more = _measure_empty(prepared, tell)
     return Durations(empty, loaded, process, (steps + more) * TIME_STEP)
 
 
-def _measure_empty(
-    skillset: SkillSet, surveys: Surveys, tell: Callable[[str, float], None]
-) -> tuple[dict[Pair, float], int]:
+def _measure_empty(prepared: Prepared, tell: Callable[[str, float], None]) -> tuple[dict[Pair, float], int]:
     """The times [s] of all ways of the empty gripper, one after the other in one scene, and the physics steps that took."""
     empty: dict[Pair, float] = {}
     with World() as world:
-        floor = Floor(world, skillset, surveys.layout, 0)
-        for (origin, target), way in skillset.travels.items():
+        floor = Floor(world, prepared.skillset, prepared.surveys.layout, 0)
+        for (origin, target), way in prepared.skillset.travels.items():
             way[0].begin(floor.bench)
             empty[origin, target] = _timed(floor, way)
             tell(f"{origin} > {target}, empty", empty[origin, target])
@@ -147,7 +145,7 @@ def cell_of(task: Task, durations: Durations, toasts: int) -> Cell:
     return Cell.alike(places, route(task), tables[0], tables[1], task.robot.start, toasts)
 
 
-def kept_durations(toolbox: Toolbox, key: str, task: Task, moves: Moves) -> Durations | None:
+def kept_durations(toolbox: Toolbox, key: str, task: Task, moves: NeededMoves) -> Durations | None:
     """The durations kept under a key, None when there are none; BadInput for a record that does not hold them."""
     record = toolbox.load_record(RECORDS, key)
     if record is None:
@@ -159,7 +157,7 @@ def kept_durations(toolbox: Toolbox, key: str, task: Task, moves: Moves) -> Dura
 
 
 def durations_key(
-    task: Task, layout: Layout, moves: Moves, policies: Mapping[str, Policy], modules: Sequence[str] = MEASURED_BY
+    task: Task, layout: Layout, moves: NeededMoves, policies: Mapping[str, Policy], modules: Sequence[str] = MEASURED_BY
 ) -> str:
     """A hash of all that the durations depend on: task, layout, moves, policies, assets, source and libraries.
 

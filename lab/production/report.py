@@ -7,22 +7,17 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lab.errors import BadInput, WorkFailed, counted
-from lab.files import draft, nearest
-from lab.mdp import TabularMDP, greedy_path
+from lab.errors import WorkFailed, counted
+from lab.files import draft
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
-from lab.production.skillset import SkillSet
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.methods.exact import Optimum
+from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Recording
-from lab.sim.scene import Layout
 from lab.skills import Skill
-from lab.skills.skill import Photo, Problem
-from lab.skills.surveys import Surveys
-from lab.tasks.task_file import Task
+from lab.skills.prepared_scene import Prepared
 from lab.teaching.lesson_plan import Lesson
 from lab.toolbox.policy import Policy
 
@@ -35,20 +30,6 @@ FILES = {
     "sequence": "sequence.json",
     "run": "run.json",
 }
-
-
-@dataclass
-class Prepared:
-    """A task whose scene is surveyed, which took `wall_s`: nothing is learned yet, and nothing is written."""
-
-    task: Task
-    toasts: int
-    seed: int
-    layout: Layout
-    surveys: Surveys
-    skillset: SkillSet
-    problems: dict[str, Problem]
-    wall_s: float = 0.0
 
 
 @dataclass
@@ -131,18 +112,6 @@ def _skill_row(name: str, lesson: Lesson) -> dict[str, Any]:
     }
 
 
-def check_out(out: Path) -> None:
-    """BadInput unless `out` is a folder that can be written, or can be made; makes nothing."""
-    try:
-        place = nearest(out)
-    except OSError as error:
-        raise BadInput(f"output folder '{out}' (--out): {error.strerror}") from None
-    if not place.is_dir():
-        raise BadInput(f"output folder '{out}' (--out): '{place}' is a file; give a folder")
-    if not os.access(place, os.W_OK | os.X_OK):
-        raise BadInput(f"output folder '{out}' (--out): '{place}' is not writable")
-
-
 def write_files(prepared: Prepared, taught: Taught, report: Report, out: Path) -> None:
     """Write what there is of `FILES` to `out`, all at once at the end: none is ever half written, none is left of a run before.
 
@@ -178,8 +147,8 @@ def _photographed(prepared: Prepared) -> Skill | None:
 def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) -> None:
     """The pictures, the replay and the two JSON files."""
     from lab.view.meshcat import replay_html
-    from lab.view.plots import gantt, learning_curves
-    from lab.vision.pictures import write_picture
+    from lab.view.plots import gantt, learning_curves, values_seen
+    from lab.vision import write_picture
 
     paths = {name: folder / file for name, file in FILES.items()}
     predicted = simulate(taught.cell, report.sequenced.sequence)
@@ -189,7 +158,9 @@ def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) 
     skill = _photographed(prepared)
     photo = None if skill is None else skill.photo()
     if skill is not None and photo is not None:
-        draw_value_map(skill.problem.mdp, photo, taught.lessons[skill.name].policy, paths["value_map"])
+        values_seen(
+            taught.lessons[skill.name].policy.q, skill.problem.mdp, photo.picture, photo.seen, paths["value_map"]
+        )
         write_picture(paths["overhead"], photo.picture)
     title = f"{prepared.task.title or prepared.task.name}: {counted(prepared.toasts, 'toast')}"
     replay_html(report.recording, paths["replay"], title=title)
@@ -220,24 +191,6 @@ def _sequence_document(taught: Taught, report: Report) -> dict[str, Any]:
         "stations": [asdict(station) for station in taught.cell.stations],
         "predicted": simulate(taught.cell, report.sequenced.sequence).to_json(),
     }
-
-
-def draw_value_map(mdp: TabularMDP, photo: Photo, policy: Policy, path: Path) -> None:
-    """The values of a problem over the picture that it was read from, with the learned way."""
-    from lab.view.plots import cell_corners, value_map
-
-    states, _, _ = greedy_path(policy.q, mdp, mdp.n_states)
-    cells = [mdp.state_cell(state) for state in states]
-    value_map(
-        policy.q.max(axis=1).reshape(mdp.shape),
-        photo.picture,
-        path,
-        corners=cell_corners(photo.seen.view),
-        route=[(cell[0], cell[1]) for cell in cells],
-        blocked=(mdp.terminal & ~mdp.goal).reshape(mdp.shape),
-        start=photo.seen.start,
-        goal=photo.seen.goal,
-    )
 
 
 def _write_json(path: Path, document: dict[str, Any]) -> None:

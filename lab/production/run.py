@@ -4,54 +4,20 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from lab.errors import LabError
-from lab.planner import find_sequence, search_for
 from lab.production.composer import carry_out
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
-from lab.production.floor import try_out
 from lab.production.recorder import Viewer, show_scene
-from lab.production.report import Prepared, Report, Taught, write_files
-from lab.production.skillset import SkillSet
+from lab.production.report import Report, Taught, write_files
+from lab.sequencing import find_sequence
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Reference
-from lab.sim.scene import check_apart, draw_layout
-from lab.skills.skill import Problem
-from lab.skills.surveys import Surveys
-from lab.tasks.task_file import Task, check_toasts
+from lab.skills.prepared_scene import Prepared
+from lab.skills.trial import trial_of
+from lab.tasks.sequencing import search_for
 from lab.teaching.events import MoveTimed, PhaseBegan, RecordSkipped, SequenceFound, SkillReady
-from lab.teaching.lesson_plan import LessonPlan, Trial
+from lab.teaching.lesson_plan import LessonPlan
 from lab.teaching.teacher import Teacher
-from lab.toolbox.policy import Policy
-
-
-def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prepared:
-    """Lay the scene out as the seed says and survey every problem of it, or `only` one skill's.
-
-    BadInput for whatever cannot be; writes nothing.
-    """
-    began = time.perf_counter()
-    check_toasts(toasts, task)
-    check_apart(task, toasts)
-    skillset = SkillSet.of(task, toasts)
-    layout = draw_layout(task, toasts, np.random.default_rng([seed, 1]))
-    surveys = Surveys(task, layout)
-    problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items() if only in (None, name)}
-    return Prepared(task, toasts, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
-
-
-def trial_of(prepared: Prepared) -> Trial:
-    """What tries a learned skill in physics before it is kept: a grasp must lift its slice; most skills are not tried."""
-
-    def trial(problem: Problem, policy: Policy) -> str | None:
-        skill = prepared.skillset.skills[problem.name]
-        if not skill.tried:
-            return None
-        prepared.skillset.policies[skill.name] = policy
-        return try_out(prepared.skillset, prepared.surveys, skill)
-
-    return trial
 
 
 def teach_all(prepared: Prepared, teacher: Teacher) -> Taught:
@@ -86,14 +52,14 @@ def _durations(prepared: Prepared, teacher: Teacher) -> Durations:
         return kept
     processes = sum(station.process is not None for station in prepared.task.stations)
     teacher.tell(PhaseBegan("measure", len(skillset.moves.loaded) + len(skillset.moves.empty) + processes))
-    durations = measure(skillset, prepared.surveys, lambda name, seconds: teacher.tell(MoveTimed(name, seconds)))
+    durations = measure(prepared, lambda name, seconds: teacher.tell(MoveTimed(name, seconds)))
     if key:
         teacher.toolbox.save_record(RECORDS, key, durations.to_json())
     return durations
 
 
 def run(prepared: Prepared, teacher: Teacher, out: Path, *, viewer: Viewer | None = None) -> Report:
-    """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.production.report.check_out`)."""
+    """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.files.check_out`)."""
     began = time.perf_counter() - prepared.wall_s
     if viewer is not None:
         show_scene(prepared.task, prepared.toasts, prepared.layout, viewer)
@@ -104,15 +70,7 @@ def run(prepared: Prepared, teacher: Teacher, out: Path, *, viewer: Viewer | Non
     proven = optimum(taught.cell)
     teacher.tell(SequenceFound(found, Reference(proven.bound_s, proven.proven, "A*")))
     teacher.tell(PhaseBegan("carry out", len(found.sequence)))
-    outcome, recording = carry_out(
-        prepared.skillset,
-        prepared.surveys,
-        prepared.layout,
-        taught.cell,
-        found.sequence,
-        viewer=viewer,
-        tell=teacher.tell,
-    )
+    outcome, recording = carry_out(prepared, taught.cell, found.sequence, viewer=viewer, tell=teacher.tell)
     report = Report(
         prepared.task.name,
         prepared.seed,

@@ -1,89 +1,145 @@
 """The high level: in which order one robot serves the parts of a cell."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
+
+from lab.errors import unknown
 
 if TYPE_CHECKING:
     import numpy as np
 
     from lab.sequencing.cell.cell import Cell
-    from lab.sequencing.cell.schedule import SequenceResult
-    from lab.sequencing.search import Search
+    from lab.sequencing.search import Search, SequenceResult
+    from lab.sequencing.simulate.execution import Policy
 
-Sequencer = Callable[["Cell", "Search", "np.random.Generator"], "SequenceResult"]
-
-# Each sequencer is imported when it is used: numba and OR-Tools take their time.
+Find = Callable[["Cell", "Search", "np.random.Generator"], "SequenceResult"]
 
 
-def _srl(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+class Reaction(NamedTuple):
+    """A policy for times that are drawn, and what it does in words; plans: it does so at every decision, in its time."""
+
+    policy: "Policy"
+    words: str
+    plans: bool = True
+
+
+# Each method is imported when it is used: numba and OR-Tools take their time.
+
+
+def _srl() -> Find:
     from lab.sequencing.methods.srl import srl
 
-    return srl(cell, search, rng)
+    return srl
 
 
-def _srl_time(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+def _srl_time() -> Find:
     from lab.sequencing.methods.srl_time import srl_time
 
-    return srl_time(cell, search, rng)
+    return srl_time
 
 
-def _monte_carlo(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+def _monte_carlo() -> Find:
     from lab.sequencing.methods.monte_carlo import monte_carlo
 
-    return monte_carlo(cell, search, rng)
+    return monte_carlo
 
 
-def _random(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
-    from lab.sequencing.methods.fifo import random_search
+def _random() -> Find:
+    from lab.sequencing.methods.random_search import random_search
 
-    return random_search(cell, search, rng)
+    return random_search
 
 
-def _fifo(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+def _fifo() -> Find:
     from lab.sequencing.methods.fifo import fifo
 
-    return fifo(cell, search, rng)
+    return fifo
 
 
-def _genetic(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+def _genetic() -> Find:
     from lab.sequencing.methods.genetic import genetic
 
-    return genetic(cell, search, rng)
+    return genetic
 
 
-def _exact(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+def _exact() -> Find:
     from lab.sequencing.methods.exact import exact
 
-    return exact(cell, search, rng)
+    return exact
 
 
-def _cp_sat(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+def _cp_sat() -> Find:
     from lab.sequencing.methods.cp_sat import cp_sat_sequencer
 
-    return cp_sat_sequencer(cell, search, rng)
+    return cp_sat_sequencer
+
+
+def _planned_anew(cell: "Cell", objective: str, seed: int) -> Reaction:
+    from lab.sequencing.methods.rollout import replan
+
+    return Reaction(replan(objective=objective), "planned anew at every decision")
+
+
+def _learned_on(cell: "Cell", objective: str, seed: int) -> Reaction:
+    from lab.sequencing.methods.srl_time_reacting import reacting
+
+    return Reaction(reacting(cell, objective, seed), "it goes on learning before every decision")
+
+
+def _queued(cell: "Cell", objective: str, seed: int) -> Reaction:
+    from lab.sequencing.methods.fifo import first_in_first_out
+
+    return Reaction(first_in_first_out, "a queue of tasks as they become possible", plans=False)
+
+
+def _asked(name: str, cell: "Cell", objective: str, seed: int) -> Reaction:
+    from lab.sequencing.methods.rollout import by_rule
+    from lab.sequencing.methods.rules import RULES
+
+    return Reaction(by_rule(RULES[name]), f"the rule {name}, asked at every decision", plans=False)
+
+
+@dataclass(frozen=True)
+class Sequencer:
+    """A method; called with a cell, a search and a generator it finds a sequence.
+
+    load: imports its function. drawn: where chance is asked for it looks in drawn times; else with the means. react:
+    the policy in its manner, for a cell, an objective and a seed.
+    """
+
+    load: Callable[[], Find]
+    drawn: bool = False
+    react: Callable[["Cell", str, int], Reaction] = _planned_anew
+
+    def __call__(self, cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+        """One sequence."""
+        return self.load()(cell, search, rng)
 
 
 def _rule(name: str) -> Sequencer:
-    def sequencer(cell: "Cell", search: "Search", rng: "np.random.Generator") -> "SequenceResult":
+    """A dispatching rule: one sequence."""
+
+    def load() -> Find:
         from lab.sequencing.methods.rules import RULES, dispatched
 
-        return dispatched(cell, RULES[name], search)
+        return lambda cell, search, rng: dispatched(cell, RULES[name], search)
 
-    return sequencer
+    return Sequencer(load, react=partial(_asked, name))
 
 
-# name -> function(cell, search, rng); the last ones are dispatching rules, one sequence each.
 SEQUENCERS: Mapping[str, Sequencer] = MappingProxyType(
     {
-        "srl": _srl,
-        "srl-time": _srl_time,
-        "mc": _monte_carlo,
-        "random": _random,
-        "fifo": _fifo,
-        "ga": _genetic,
-        "exact": _exact,
-        "cp-sat": _cp_sat,
+        "srl": Sequencer(_srl, drawn=True),
+        "srl-time": Sequencer(_srl_time, react=_learned_on),
+        "mc": Sequencer(_monte_carlo, drawn=True),
+        "random": Sequencer(_random, drawn=True),
+        "fifo": Sequencer(_fifo, react=_queued),
+        "ga": Sequencer(_genetic),
+        "exact": Sequencer(_exact),
+        "cp-sat": Sequencer(_cp_sat),
         "shortest-move": _rule("shortest-move"),
         "longest-remaining-work": _rule("longest-remaining-work"),
         "most-urgent-machine": _rule("most-urgent-machine"),
@@ -91,5 +147,17 @@ SEQUENCERS: Mapping[str, Sequencer] = MappingProxyType(
         "earliest-due": _rule("earliest-due"),
     }
 )
-# Methods that, where chance is asked for, look in drawn times; the others look with the means.
-DRAWN = ("srl", "mc", "random")
+
+
+def check_method(name: str) -> None:
+    """BadInput for an unknown method."""
+    if name not in SEQUENCERS:
+        raise unknown("method", name, SEQUENCERS, "--method")
+
+
+def find_sequence(cell: "Cell", method: str, search: "Search", seed: int, session: int = 0) -> "SequenceResult":
+    """The best sequence that a method finds in a session of a seed; BadInput for an unknown method."""
+    import numpy as np
+
+    check_method(method)
+    return SEQUENCERS[method](cell, search, np.random.default_rng([seed, 2, session]))

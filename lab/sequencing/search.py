@@ -5,18 +5,46 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Literal
 
-import numpy as np
-
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective
-from lab.sequencing.cell.schedule import EpisodeSequenced
 
 FACTORS = ("A", "B")
 VALUES = ("pairs", "states")
 STATES = ("parts", "stations")
 SAME = 1e-6  # costs nearer than this are equal
+
+
+@dataclass(frozen=True)
+class EpisodeSequenced:
+    """One sequence tried: number from 1, its cost (see `SequenceResult`) and the best one so far, empty: there is none."""
+
+    episode: int
+    cost: float
+    best_cost: float
+    best: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class SequenceResult:
+    """What every sequencer returns: the best sequence found, its cost, and the cost of each sequence tried.
+
+    The cost is the value of the objective asked for: the makespan [s] unless it was another one.
+    """
+
+    sequence: tuple[int, ...]
+    cost: float
+    episode_costs: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class LearnedSequence(SequenceResult):
+    """What a learning sequencer returns beside: the cost of its greedy policy at the end."""
+
+    final_cost: float
+
+
 OnEpisode = Callable[[EpisodeSequenced], None]
 
 
@@ -118,8 +146,3 @@ class Log:
             raise WorkFailed(
                 f"no sequence for {cell.parts} parts came to its end in {len(self.costs)} episodes: deadlocks"
             )
-
-
-def kernel_seed(rng: np.random.Generator) -> int:
-    """A seed for the compiled streams, drawn from a generator."""
-    return int(rng.integers(2**63))

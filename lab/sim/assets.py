@@ -43,8 +43,13 @@ def _turning(number: int, parent: str, at: Vector, axis: Vector) -> Joint:
 
 def robot() -> Model:
     """The six-axis arm with its two-finger gripper (an approximate model of the UP6 class, see kinematics)."""
+    fingers = (_finger(name, side) for name, side in (("finger_left", 1.0), ("finger_right", -1.0)))
+    return Model("robot", [*_shoulder(), *_forearm(), _tool(), *fingers])
+
+
+def _shoulder() -> list[Link]:
+    """Base, turret and upper arm."""
     shoulder, elbow = (arm.SHOULDER_OUT, 0.0, 0.20), (0.0, 0.0, arm.UPPER_ARM)
-    forearm_root, half = 0.20, arm.FOREARM
     base = join(
         hull(cylinder(0.19, 0.02, (0, 0, 0.01)), cylinder(0.15, 0.02, (0, 0, 0.06))),
         cylinder(0.13, 0.19, (0, 0, 0.155)),
@@ -57,47 +62,52 @@ def robot() -> Model:
         hull(cylinder(0.085, 0.11, (0, 0, 0), "y"), cylinder(0.065, 0.10, elbow, "y")),
         cylinder(0.055, 0.17, elbow, "y"),
     )
+    return [
+        Link("base", 40.0, [Part(GRAPHITE, mesh=base)]),
+        Link("turret", 30.0, [Part(BLUE, mesh=turret)], _turning(0, "base", (0, 0, 0.25), (0, 0, 1))),
+        Link("upper_arm", 18.0, [Part(WHITE, mesh=upper)], _turning(1, "turret", shoulder, (0, 1, 0))),
+    ]
+
+
+def _forearm() -> list[Link]:
+    """Forearm, roll and wrist."""
+    elbow, root, half = (0.0, 0.0, arm.UPPER_ARM), 0.20, arm.FOREARM
     fore = hull(cylinder(0.085, 0.12, (0, 0, 0.06), "y"), cylinder(0.07, 0.14, (0.10, 0, arm.ELBOW_UP), "x"))
-    roll = hull(cylinder(0.062, 0.02, (0.0, 0, 0), "x"), cylinder(0.045, 0.02, (half - forearm_root - 0.04, 0, 0), "x"))
+    roll = hull(cylinder(0.062, 0.02, (0.0, 0, 0), "x"), cylinder(0.045, 0.02, (half - root - 0.04, 0, 0), "x"))
     wrist = join(cylinder(0.047, 0.085, (0, 0, 0), "y"), cylinder(0.034, 0.075, (0.0375, 0, 0), "x"))
-    tip_to_pad = arm.TOOL - FINGER[0]
+    return [
+        Link("forearm", 12.0, [Part(BLUE, mesh=fore)], _turning(2, "upper_arm", elbow, (0, 1, 0))),
+        Link("roll", 5.0, [Part(WHITE, mesh=roll)], _turning(3, "forearm", (root, 0, arm.ELBOW_UP), (1, 0, 0))),
+        Link("wrist", 2.0, [Part(GRAPHITE, mesh=wrist)], _turning(4, "roll", (half - root, 0, 0), (0, 1, 0))),
+    ]
+
+
+def _tool() -> Link:
+    """The palm, with the marker that the overhead camera sees on an outrigger."""
     palm = join(
         cylinder(0.032, 0.02, (0.01, 0, 0), "x"),
         box((0.05, 0.10, 0.05), (0.045, 0, 0)),
         box((0.026, 0.085, 0.034), (0.083, 0, 0)),
     )
     marker_x = arm.TOOL - MARKER_UP
+    marker = cylinder(MARKER_RADIUS, MARKER_THICK, (marker_x, 0, MARKER_OUT), "x")
     bar = (0.008, 0.018, MARKER_OUT - MARKER_RADIUS)
-    links = [
-        Link("base", 40.0, [Part(GRAPHITE, mesh=base)]),
-        Link("turret", 30.0, [Part(BLUE, mesh=turret)], _turning(0, "base", (0, 0, 0.25), (0, 0, 1))),
-        Link("upper_arm", 18.0, [Part(WHITE, mesh=upper)], _turning(1, "turret", shoulder, (0, 1, 0))),
-        Link("forearm", 12.0, [Part(BLUE, mesh=fore)], _turning(2, "upper_arm", elbow, (0, 1, 0))),
-        Link("roll", 5.0, [Part(WHITE, mesh=roll)], _turning(3, "forearm", (forearm_root, 0, arm.ELBOW_UP), (1, 0, 0))),
-        Link("wrist", 2.0, [Part(GRAPHITE, mesh=wrist)], _turning(4, "roll", (half - forearm_root, 0, 0), (0, 1, 0))),
-        Link(
-            "tool",
-            1.2,
-            [
-                Part(GRAPHITE, mesh=palm),
-                Part(STEEL, bar, (marker_x + 0.006, 0, bar[2] / 2), ghost=True),
-                Part(
-                    MARKER_MAGENTA,
-                    mesh=cylinder(MARKER_RADIUS, MARKER_THICK, (marker_x, 0, MARKER_OUT), "x"),
-                    ghost=True,
-                ),
-            ],
-            _turning(5, "wrist", (arm.FLANGE, 0, 0), (1, 0, 0)),
-        ),
+    parts = [
+        Part(GRAPHITE, mesh=palm),
+        Part(STEEL, bar, (marker_x + 0.006, 0, bar[2] / 2), ghost=True),
+        Part(MARKER_MAGENTA, mesh=marker, ghost=True),
     ]
-    for name, side in (("finger_left", 1.0), ("finger_right", -1.0)):
-        pad = Part(STEEL, FINGER, (FINGER[0] / 2, side * FINGER[1] / 2, 0))
-        rubber = Part(RUBBER, (0.03, 0.0016, 0.028), (FINGER[0] - 0.016, side * 0.0008, 0), ghost=True)
-        joint = Joint(
-            name, "prismatic", "tool", (tip_to_pad, 0, 0), (0, side, 0), (0.0, FINGER_OPEN + 0.008), 0.2, 200.0
-        )
-        links.append(Link(name, 0.08, [pad, rubber], joint))
-    return Model("robot", links)
+    return Link("tool", 1.2, parts, _turning(5, "wrist", (arm.FLANGE, 0, 0), (1, 0, 0)))
+
+
+def _finger(name: str, side: float) -> Link:
+    """One finger that slides outwards on its side, with rubber inside."""
+    pad = Part(STEEL, FINGER, (FINGER[0] / 2, side * FINGER[1] / 2, 0))
+    rubber = Part(RUBBER, (0.03, 0.0016, 0.028), (FINGER[0] - 0.016, side * 0.0008, 0), ghost=True)
+    root, open_m = (arm.TOOL - FINGER[0], 0, 0), FINGER_OPEN + 0.008
+    return Link(
+        name, 0.08, [pad, rubber], Joint(name, "prismatic", "tool", root, (0, side, 0), (0.0, open_m), 0.2, 200.0)
+    )
 
 
 def toaster() -> Model:

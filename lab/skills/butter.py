@@ -30,6 +30,7 @@ class Butter(Skill):
     """Butter the slice that stands in the applier; `covered` are the cells that the nozzle's ray has met, in order."""
 
     subtask: ClassVar[str] = "butter"
+    help: ClassVar[str] = "the applier's head covers a slice with butter, cell by cell"
     near: ClassVar[bool] = True
     moves_arm: ClassVar[bool] = False
     looks_from: ClassVar[tuple[float, float]] = (-42.0, 28.0)  # the head stands before the slice

@@ -29,6 +29,7 @@ class Grasp(Skill):
     """Take a slice at one station: the table holds the tool's pose relative to the slice (x, y, z, yaw)."""
 
     subtask: ClassVar[str] = "grasp"
+    help: ClassVar[str] = "the gripper comes to a slice, closes and lifts it"
     near: ClassVar[bool] = True
     tried: ClassVar[bool] = True
     looks_from: ClassVar[tuple[float, float]] = (-60.0, 28.0)

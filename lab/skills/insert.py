@@ -17,8 +17,7 @@ from lab.skills.place import let_go, release_pose
 from lab.skills.skill import Bench, Photo, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import INSERT_START, Surveys, camera_view, overhead_camera
 from lab.tasks.task_file import Obstacle, Task
-from lab.vision.overhead import Marker
-from lab.vision.pictures import find_markers, locate, see
+from lab.vision import Marker, find_markers, locate, see
 
 if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
@@ -36,6 +35,7 @@ class Insert(Skill):
     """Carry the slice in the gripper from the grid's start to the toaster's slot and let it go there."""
 
     subtask: ClassVar[str] = "insert"
+    help: ClassVar[str] = "by the overhead camera's picture to the toaster, and down into its slot"
     looks_from: ClassVar[tuple[float, float]] = (-84.0, 46.0)
     carries = True
 

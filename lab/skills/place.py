@@ -27,6 +27,7 @@ class Place(Skill):
     """Set a slice down at one station: the table holds the tool's position relative to the spot (x, y, z)."""
 
     subtask: ClassVar[str] = "place"
+    help: ClassVar[str] = "a slice is set down at a station and let go"
     near: ClassVar[bool] = True
     looks_from: ClassVar[tuple[float, float]] = (-60.0, 28.0)
     carries = True

@@ -18,7 +18,7 @@ from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME as ROBOT
 from lab.sim.scene import GRASP_DEPTH, Scene, Spot, spots
 from lab.tasks.task_file import Task
-from lab.vision.overhead import GridView
+from lab.vision import GridView
 
 if TYPE_CHECKING:
     from lab.skills.surveys import Surveys
@@ -28,6 +28,7 @@ LOST_M = 0.03  # [m] a slice farther than this from where the fingers hold it is
 UPRIGHT = 0.97  # cosine of the largest tilt of a slice that stands
 FINGERS_OFF_M = 0.0005  # [m] of a finger off a slice that is put between them
 TRIED_WITH = "slice 1"
+SETTLE_STEPS = 60  # physics steps until a new scene is at rest
 STAND_STEPS = 15  # physics steps until what was put somewhere at once is at rest
 
 
@@ -119,6 +120,7 @@ class Skill:
     """
 
     subtask: ClassVar[str]
+    help: ClassVar[str]  # what is learned, in one line of plain words
     moves_arm: ClassVar[bool] = True  # a machine's process does not
     tried: ClassVar[bool] = False  # whether a lesson ends with a trial in physics
     looks_from: ClassVar[tuple[float, float]] = (-72.0, 36.0)  # [deg] the camera of a lesson, azimuth and elevation

@@ -27,7 +27,7 @@ from lab.sim.scene import (
 from lab.sim.survey import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.world import World
 from lab.tasks.task_file import InsertGrid, Station, Task
-from lab.vision.overhead import View
+from lab.vision import View
 
 Cell = tuple[int, ...]
 

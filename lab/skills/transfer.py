@@ -22,6 +22,7 @@ class Transfer(Skill):
     """From one approach to another; a place is a station or the start of the insert grid."""
 
     subtask: ClassVar[str] = "transfer"
+    help: ClassVar[str] = "the tool's way through the workspace from one station to another"
 
     def __init__(self, origin: str, target: str, *, loaded: bool) -> None:
         super().__init__(f"transfer {origin} to {target}{' with slice' if loaded else ''}")

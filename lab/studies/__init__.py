@@ -98,30 +98,21 @@ STUDIES: dict[str, Study] = {
         "Table 9.2: best scores in world I with full view", _chapter_9("best_scores", "table-9.2"), True
     ),
     "table-9.3": Study(
-        "Table 9.3: best scores in world I with limited view",
-        _chapter_9("best_scores", "table-9.3"),
-        True,
+        "Table 9.3: best scores in world I with limited view", _chapter_9("best_scores", "table-9.3"), True
     ),
     "table-9.4": Study(
-        "Table 9.4: best scores in world II with full view",
-        _chapter_9("best_scores", "table-9.4"),
-        True,
+        "Table 9.4: best scores in world II with full view", _chapter_9("best_scores", "table-9.4"), True
     ),
     "table-9.5": Study(
-        "Table 9.5: best scores in world II with limited view",
-        _chapter_9("best_scores", "table-9.5"),
-        True,
+        "Table 9.5: best scores in world II with limited view", _chapter_9("best_scores", "table-9.5"), True
     ),
     "appendix-v": Study(
-        "Appendix V: all methods, parameters and advisors in both worlds and views",
-        _chapter_9("appendix_v"),
-        True,
+        "Appendix V: all methods, parameters and advisors in both worlds and views", _chapter_9("appendix_v"), True
     ),
     "figure-9.4": Study("Figure 9.4: learning alone with several decay factors", _chapter_9("figure_9_4")),
     "chapter-9": Study("Chapter 9: its tables, Appendix V and figures", _chapter_9("chapter_9"), True),
     "readings": Study(
-        "Readings of chapter 9: what the thesis leaves open, and what comes nearest",
-        _chapter_9("readings"),
+        "Readings of chapter 9: what the thesis leaves open, and what comes nearest", _chapter_9("readings")
     ),
     "advice-budget": Study("Success against helped steps: every gate with and without memory", _advice_budget, True),
     "advisors": Study("Several advisors at once, beside the best and the worst of them alone", _advisors, True),
@@ -132,8 +123,7 @@ STUDIES: dict[str, Study] = {
     "table-iv.2": Study("Table IV.2: SRL with reward factors of types A and B", _chapter_7("table_iv_2")),
     "chapter-7": Study("Chapter 7 and Appendix IV: tables and figures", _chapter_7("chapter_7")),
     "readings-7": Study(
-        "Readings of chapter 7: what the thesis leaves open, and what comes nearest",
-        _chapter_7("readings"),
+        "Readings of chapter 7: what the thesis leaves open, and what comes nearest", _chapter_7("readings")
     ),
     "appendix-iii": Study("Appendix III: a flexible manufacturing system", _appendix_iii),
     "srl-time": Study("SRL improved, beside every rival", _srl_time),
@@ -149,7 +139,7 @@ def run_study(name: str, job: "Job", out: Path, advisor_table: str | None = None
     advisor_table: one of TABLES. BadInput for an unknown study or advisor table and for a folder that cannot be;
     WorkFailed when it cannot be written.
     """
-    from lab.production.report import check_out
+    from lab.files import check_out
     from lab.studies.runner import STORE
 
     if name not in STUDIES:

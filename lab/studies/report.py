@@ -29,7 +29,7 @@ TEMPLATE = Path(__file__).with_name("report.html")
 
 
 @dataclass(frozen=True)
-class Cell:
+class TableCell:
     """A cell of a table: its text, what stands small behind it, and whether a printed figure agrees; span: a headline."""
 
     text: str
@@ -47,7 +47,7 @@ class Table:
 
     caption: str
     head: Sequence[str]
-    lines: Sequence[Sequence[Cell]]
+    lines: Sequence[Sequence[TableCell]]
 
     @property
     def numbers(self) -> set[int]:
@@ -132,19 +132,19 @@ def _agreement(rows: Sequence[Row]) -> Table | None:
     for row in compared:
         groups.setdefault(_settings(row, keys), []).append(row)
     lines = [[*_texts(line), *_shares(group, measures)] for line, group in groups.items() if keys]
-    total = [Cell("all", span=len(keys))] if keys else []
+    total = [TableCell("all", span=len(keys))] if keys else []
     return Table(
         "", [*map(_name, keys), *map(_measure, measures), "all"], [*lines, total + _shares(compared, measures)]
     )
 
 
-def _shares(rows: Sequence[Row], measures: Sequence[str]) -> list[Cell]:
+def _shares(rows: Sequence[Row], measures: Sequence[str]) -> list[TableCell]:
     """Cells "3 of 4, 75 %" for each measure and for all."""
     cells = []
     for group in [*([row for row in rows if row["measure"] == measure] for measure in measures), rows]:
         inside = sum(bool(row["within"]) for row in group)
         share = f"{100 * inside / len(group):.0f} %" if group else ""
-        cells.append(Cell(f"{inside} of {len(group)}" if group else "–", small=share))
+        cells.append(TableCell(f"{inside} of {len(group)}" if group else "–", small=share))
     return cells
 
 
@@ -153,11 +153,11 @@ def _largest(rows: Sequence[Row]) -> Table:
     compared = [row for row in rows if _known(row.get("value")) and _known(row.get("thesis"))]
     lines = [
         [
-            Cell(_words(_settings(row)), "text"),
-            Cell(_measure(row["measure"]), ""),
+            TableCell(_words(_settings(row)), "text"),
+            TableCell(_measure(row["measure"]), ""),
             *_result(row, True),
-            Cell(("+" if row["value"] > row["thesis"] else "") + _number(row["value"] - row["thesis"])),
-            Cell(_number(_excess(row))),
+            TableCell(("+" if row["value"] > row["thesis"] else "") + _number(row["value"] - row["thesis"])),
+            TableCell(_number(_excess(row))),
         ]
         for row in sorted(compared, key=_excess, reverse=True)[:LARGEST]
         if row["value"] != row["thesis"]
@@ -204,17 +204,17 @@ def _all_cells(place: Line, rows: Sequence[Row]) -> Table:
     return Table(_words(fixed), head, body)
 
 
-def _result(row: Row, printed: bool) -> list[Cell]:
+def _result(row: Row, printed: bool) -> list[TableCell]:
     """The measured value with its interval and, if wanted, the printed one with its mark."""
     if not row:
-        return [Cell("", "")] * (1 + printed)
+        return [TableCell("", "")] * (1 + printed)
     value, ends, thesis, within = (row.get(name) for name in ("value", "ci95", "thesis", "within"))
     interval = f"{_number(ends[0])} to {_number(ends[1])}" if ends else ""
-    cells = [Cell(_number(value), small=interval, is_interval=True)]
+    cells = [TableCell(_number(value), small=interval, is_interval=True)]
     if printed and thesis is not None and isfinite(thesis):
-        cells.append(Cell(f"{thesis:.10g}", f"number {MARKS[within][0]}", is_printed=True, within=within))
+        cells.append(TableCell(f"{thesis:.10g}", f"number {MARKS[within][0]}", is_printed=True, within=within))
     elif printed:
-        cells.append(Cell("–"))
+        cells.append(TableCell("–"))
     return cells
 
 
@@ -250,8 +250,8 @@ def _text(value: Any) -> str:
     return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
-def _texts(line: Iterable[tuple[str, Any]]) -> list[Cell]:
-    return [Cell(_text(value), "") for _, value in line]
+def _texts(line: Iterable[tuple[str, Any]]) -> list[TableCell]:
+    return [TableCell(_text(value), "") for _, value in line]
 
 
 def _words(settings: Iterable[tuple[str, Any]]) -> str:

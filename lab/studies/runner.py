@@ -47,6 +47,15 @@ class Job:
             self.progress(len(done), len(wanted))
         return {item: done[item] for item in wanted}
 
+    def in_turn(self, steps: Sequence[Callable[[], Result]]) -> list[Result]:
+        """What each step comes to, one after another in this process: what is timed has a core to itself."""
+        done: list[Result] = []
+        self.progress(0, len(steps))
+        for step in steps:
+            done.append(step())
+            self.progress(len(done), len(steps))
+        return done
+
     def computed(self, work: Callable[[Item], Result], items: list[Item]) -> Iterator[tuple[Item, Result]]:
         """Each item with what `work` makes of it, as soon as it is done.
 

@@ -5,7 +5,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import sqrt
-from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +16,8 @@ Range = tuple[float, float]
 
 PERCENT_POINTS = 5.0  # a percentage agrees with the printed one when it is this near [points]
 RELATIVE = 0.15  # any other figure when it is this near, as a fraction of the printed one
+LEVEL = 0.95  # of intervals and tests
+TAIL = (1 - LEVEL) / 2
 NOISE = 1e-12  # differences below this fraction of the largest value are rounding, not variation
 
 
@@ -38,21 +39,21 @@ class Comparison:
     ranks: dict[str, str]
 
 
-def interval(values: ArrayLike, level: float = 0.95) -> tuple[float, float, float]:
+def interval(values: ArrayLike) -> tuple[float, float, float]:
     """Mean, low and high end of the t interval of the mean of values (n,), one a session, in their unit.
 
-    Raises BadInput for fewer than two values, for one that is not finite, and for a level outside (0, 1).
+    Raises BadInput for fewer than two values, and for one that is not finite.
     """
     from scipy.stats import t
 
     sample = _sample(values, "interval")
     mean = _mean(sample)
     error = sqrt(np.square(sample - mean).sum() / (len(sample) - 1) / len(sample))
-    half = float(t.isf(_tail(level), len(sample) - 1)) * error
+    half = float(t.isf(TAIL, len(sample) - 1)) * error
     return mean, mean - half, mean + half
 
 
-def proportion_interval(successes: int, n: int, level: float = 0.95) -> tuple[float, float, float]:
+def proportion_interval(successes: int, n: int) -> tuple[float, float, float]:
     """Share of successful sessions, low and high end of its interval, all in percent.
 
     Raises BadInput unless 0 <= successes <= n and n >= 1. Source: E. B. Wilson, JASA 22 (1927), 209-212.
@@ -61,7 +62,7 @@ def proportion_interval(successes: int, n: int, level: float = 0.95) -> tuple[fl
 
     if not 0 <= successes <= n or n < 1:
         raise BadInput(f"interval of a proportion: {successes} successes of {n}; needed: 0 <= successes <= n, n >= 1")
-    z2 = float(ndtri(_tail(level))) ** 2
+    z2 = float(ndtri(TAIL)) ** 2
     share = successes / n
     middle = (share + z2 / (2 * n)) / (1 + z2 / n)
     half = sqrt(z2 * (share * (1 - share) + z2 / (4 * n)) / n) / (1 + z2 / n)
@@ -76,29 +77,20 @@ def share(success: ArrayLike) -> tuple[float, float, float]:
     return proportion_interval(int(ended.sum()), len(ended))
 
 
-@overload
-def score(sp: float, hs: float, sp_range: Range, hs_range: Range, weight: float = 0.5) -> float: ...
-@overload
-def score(sp: FloatArray, hs: FloatArray, sp_range: Range, hs_range: Range, weight: float = 0.5) -> FloatArray: ...
-def score(
-    sp: float | FloatArray, hs: float | FloatArray, sp_range: Range, hs_range: Range, weight: float = 0.5
-) -> float | FloatArray:
+def score(sp: ArrayLike, hs: ArrayLike, sp_range: Range, hs_range: Range) -> FloatArray:
     """How good a combination is: 1 with the highest success percentage and the fewest helped steps, 0 with neither.
 
     sp [%] and hs [steps] are numbers or arrays of one shape; the ranges are those of `ranges`, or of the printed
-    combinations (then a score may leave [0, 1]); `weight` is that of the success percentage. Where all have the
-    same, all are best. Raises BadInput for a range upside down and for a weight outside [0, 1].
-    Source: thesis eq. 9.4.
+    combinations (then a score may leave [0, 1]). Where all have the same, all are best. Raises BadInput for a range
+    upside down. Source: thesis eq. 9.4.
     """
-    if not 0 <= weight <= 1:
-        raise BadInput(f"score: weight {weight}: allowed 0 to 1")
     for name, (low, high) in (("SP", sp_range), ("HS", hs_range)):
         if not low <= high:
             raise BadInput(f"score: the {name} range {low} to {high} is upside down")
     sp_span, hs_span = sp_range[1] - sp_range[0], hs_range[1] - hs_range[0]
-    sp_part = 1 + (sp - sp_range[1]) / (sp_span or np.inf)
-    hs_part = 1 + (hs_range[0] - hs) / (hs_span or np.inf)
-    return weight * sp_part + (1 - weight) * hs_part
+    sp_part = 1 + (np.asarray(sp, np.float64) - sp_range[1]) / (sp_span or np.inf)
+    hs_part = 1 + (hs_range[0] - np.asarray(hs, np.float64)) / (hs_span or np.inf)
+    return np.asarray(0.5 * sp_part + 0.5 * hs_part)
 
 
 def ranges(sp: ArrayLike, hs: ArrayLike) -> tuple[Range, Range]:
@@ -110,7 +102,12 @@ def ranges(sp: ArrayLike, hs: ArrayLike) -> tuple[Range, Range]:
     return (float(percents.min()), float(percents.max())), (float(steps.min()), float(steps.max()))
 
 
-def compare(groups: Mapping[str, ArrayLike], level: float = 0.95, lowest_is_best: bool = False) -> Comparison:
+def part_means(values: ArrayLike, parts: int) -> FloatArray:
+    """The mean of each of so many replications that sessions are split into, (parts,)."""
+    return np.array([part.mean() for part in np.array_split(np.asarray(values), parts)])
+
+
+def compare(groups: Mapping[str, ArrayLike], lowest_is_best: bool = False) -> Comparison:
     """One-way ANOVA, Tukey's HSD, the tests of their assumptions, and ranks; groups name -> values (n,).
 
     Ranks follow Tukey's test, which counts only after a significant F-test; sizes may differ (Tukey-Kramer).
@@ -127,8 +124,7 @@ def compare(groups: Mapping[str, ArrayLike], level: float = 0.95, lowest_is_best
     scaled = {name: sample / unit for name, sample in samples.items()}  # no test here depends on the unit
     f, p, mean_square = _anova(list(scaled.values()))
     tukey = _tukey(scaled, mean_square)
-    alpha = 2 * _tail(level)
-    differ = [pair for pair, pair_p in tukey.items() if pair_p < alpha] if p < alpha else []
+    differ = [pair for pair, pair_p in tukey.items() if pair_p < 2 * TAIL] if p < 2 * TAIL else []
     order = sorted(means, key=lambda name: means[name], reverse=not lowest_is_best)
     return Comparison(
         means=means,
@@ -181,12 +177,6 @@ def _sample(values: ArrayLike, what: str, at_least: int = 2) -> FloatArray:
     if sample.ndim != 1 or len(sample) < at_least or not np.isfinite(sample).all():
         raise BadInput(f"{what}: shape {sample.shape}; needed: at least {at_least} finite values in one row")
     return sample
-
-
-def _tail(level: float) -> float:
-    if not 0 < level < 1:
-        raise BadInput(f"level {level} of an interval or a test: allowed between 0 and 1")
-    return (1 - level) / 2
 
 
 def _mean(sample: FloatArray) -> float:

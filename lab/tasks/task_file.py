@@ -8,17 +8,17 @@ from typing import Annotated, Literal, Self, TypeVar, cast, get_args
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from lab.cellfile import CellFile
-from lab.cellparts import Sequencing
 from lab.errors import BadInput, unknown
 from lab.files import tasks_folder
+from lab.tasks.cell import CellFile
 from lab.tasks.grid_world import RANDOM, GridWorld, from_text, from_words
 from lab.tasks.record import MAX_SHORT_BYTES, Count, Learned, Name, Record, as_tuple, read_text
+from lab.tasks.sequencing import Sequencing
 from lab.tasks.toml_text import TomlText, explain
 
 MAX_TOASTS = 50
 RESERVED = ("robot", "table", "insert", "the slice", "carried slice")  # names of other things in the cell
-RESERVED_STARTS = ("slice ", "toast ", "toasted ", "butter ", "robot ")
+RESERVED_STARTS = ("slice ", "toast ", "toasted ", "robot ")
 RESERVED_ENDS = (" marker", " column", " head")
 MOST_THINGS = 200  # stations, stages or obstacles: on one table is no room for more
 _SAYS_WORLD = re.compile(r"""^[ \t]*kind[ \t]*=[ \t]*["']world["']""", re.MULTILINE)

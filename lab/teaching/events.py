@@ -8,8 +8,8 @@ from lab.advice.journal import Journal
 from lab.learning import events as session
 from lab.learning.requests import AdviceRequest, Advisor
 from lab.learning.settings import GateSettings
-from lab.sequencing.cell.schedule import EpisodeSequenced, Move, SequenceResult
-from lab.sequencing.search import Reference
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
 from lab.skills.skill import Problem
 from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.toolbox.policy import Policy

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput
+from lab.mdp import FloatArray, TabularMDP, greedy_path
 from lab.view.canvas import BLUE, INK, ORANGE, RED, SKY, check_png, picture_file
 from lab.view.gantt import gantt
 from lab.view.sequencing_plots import sequence_plot, success_picture, success_plot
@@ -15,7 +16,7 @@ from lab.view.sequencing_plots import sequence_plot, success_picture, success_pl
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from lab.vision.overhead import View
+    from lab.vision import GridView, View
 
 __all__ = [
     "Curve",
@@ -26,6 +27,7 @@ __all__ = [
     "success_picture",
     "success_plot",
     "value_map",
+    "values_seen",
 ]
 
 
@@ -115,6 +117,21 @@ def value_map(
         axes.set_title(title)
         if axes.get_legend_handles_labels()[0]:
             figure.legend(loc="outside lower center", ncols=4)
+
+
+def values_seen(q: FloatArray, mdp: TabularMDP, picture: NDArray[np.uint8], seen: "GridView", path: Path) -> None:
+    """The values (states, actions) of a problem over the picture (H, W, 3) that it was read from, with the learned way."""
+    cells = [mdp.state_cell(state) for state in greedy_path(q, mdp, mdp.n_states)[0]]
+    value_map(
+        q.max(axis=1).reshape(mdp.shape),
+        picture,
+        path,
+        corners=cell_corners(seen.view),
+        route=[(cell[0], cell[1]) for cell in cells],
+        blocked=(mdp.terminal & ~mdp.goal).reshape(mdp.shape),
+        start=seen.start,
+        goal=seen.goal,
+    )
 
 
 def cell_corners(view: "View", height_m: float = 0.0) -> NDArray[np.float64]:

@@ -1,1 +1,20 @@
-"""Pictures to grids: what an overhead camera saw (numpy and OpenCV only)."""
+"""Pictures to grids: the markers in a picture, the grid that they make, and picture files."""
+
+from lab.vision.grid_view import GridView, Marker, View, plain_view
+from lab.vision.markers import MARKERS, draw, find_markers, locate, see
+from lab.vision.picture_files import Image, read_picture, write_picture
+
+__all__ = [
+    "MARKERS",
+    "GridView",
+    "Image",
+    "Marker",
+    "View",
+    "draw",
+    "find_markers",
+    "locate",
+    "plain_view",
+    "read_picture",
+    "see",
+    "write_picture",
+]

@@ -158,7 +158,7 @@ def test_a_failed_piece_of_work_ends_with_1(lab: Lab, monkeypatch: pytest.Monkey
     def fail(*_: object) -> None:
         raise WorkFailed("the arm is stuck\nat the table")
 
-    monkeypatch.setattr("lab.production.run.prepare", fail)
+    monkeypatch.setattr("lab.skills.prepared_scene.prepare", fail)
     ran = lab("run", "--json")
     why = r"the arm is stuck\nat the table"
     assert (ran.code, ran.json, ran.err) == (1, {"error": why, "exit_code": 1}, f"lab: {why}\n")
@@ -172,9 +172,9 @@ def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: 
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lab.production.run.prepare", stop)
-    monkeypatch.setattr("lab.production.skill_subject.load", stop)
-    monkeypatch.setattr("lab.look.load", stop)
+    monkeypatch.setattr("lab.skills.prepared_scene.prepare", stop)
+    monkeypatch.setattr("lab.teaching.skill_subject.load", stop)
+    monkeypatch.setattr("lab.tasks.task_file.load", stop)
     ran = lab(*words.split(), "--json")
     why = f"stopped by Ctrl-C{said}"
     assert (ran.code, ran.json, ran.err) == (130, {"error": why, "exit_code": 130}, f"lab: {why}\n")
@@ -184,7 +184,7 @@ def test_what_the_system_refuses_is_one_line(lab: Lab, monkeypatch: pytest.Monke
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device", "x")
 
-    monkeypatch.setattr("lab.production.run.prepare", full)
+    monkeypatch.setattr("lab.skills.prepared_scene.prepare", full)
     ran = lab("run")
     assert (ran.code, ran.out, ran.err) == (1, "", "lab: [Errno 28] No space left on device: 'x'\n")
 

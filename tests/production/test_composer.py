@@ -9,16 +9,18 @@ import pytest
 from lab.errors import WorkFailed
 from lab.production.composer import MAX_TRIES, Outcome, Production, carry_out
 from lab.production.durations import Durations, cell_of, measure
-from lab.production.floor import Floor, try_out
-from lab.production.skillset import SkillSet
+from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Body, Frame
 from lab.sim.scene import Layout, spots
 from lab.sim.world import World
 from lab.skills import Butter
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Status
+from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
+from lab.skills.trial import trial_of
 from lab.tasks.task_file import Stage, Task, load
 from lab.teaching.events import Event, MoveMade, MoveRetried
 from lab.teaching.lesson_plan import LessonPlan
@@ -48,25 +50,32 @@ def surveys(task: Task, layout: Layout) -> Surveys:
 
 
 @pytest.fixture(scope="module")
-def staffed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Task, Surveys, int], SkillSet]:
-    """A task's skills, learned from the expert."""
+def taught(
+    layout: Layout, surveys: Surveys, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[Task, int], Prepared]:
+    """A task with its skills, learned from the expert."""
     teacher = Teacher(Toolbox(tmp_path_factory.mktemp("skills")))
 
-    def staff(task: Task, surveys: Surveys, toasts: int) -> SkillSet:
+    def teach(task: Task, toasts: int) -> Prepared:
         skillset = SkillSet.of(task, toasts)
-        for name, skill in skillset.skills.items():
-            problem = skill.setup(surveys)
+        problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items()}
+        for name, problem in problems.items():
             settings = task.subtask(problem.subtask)
             lesson = LessonPlan(problem, settings.learner, settings.gate, task.name)
             skillset.policies[name] = teacher.find_or_teach(lesson, {}).policy
-        return skillset
+        return Prepared(task, toasts, 0, layout, surveys, skillset, problems)
 
-    return staff
+    return teach
 
 
 @pytest.fixture(scope="module")
-def skillset(task: Task, surveys: Surveys, staffed: Callable[[Task, Surveys, int], SkillSet]) -> SkillSet:
-    return staffed(task, surveys, 1)
+def prepared(task: Task, taught: Callable[[Task, int], Prepared]) -> Prepared:
+    return taught(task, 1)
+
+
+@pytest.fixture(scope="module")
+def skillset(prepared: Prepared) -> SkillSet:
+    return prepared.skillset
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +85,8 @@ def told() -> list[tuple[str, float]]:
 
 
 @pytest.fixture(scope="module")
-def durations(skillset: SkillSet, surveys: Surveys, told: list[tuple[str, float]]) -> Durations:
-    return measure(skillset, surveys, lambda name, seconds: told.append((name, seconds)))
+def durations(prepared: Prepared, told: list[tuple[str, float]]) -> Durations:
+    return measure(prepared, lambda name, seconds: told.append((name, seconds)))
 
 
 @pytest.fixture(scope="module")
@@ -125,29 +134,25 @@ def test_every_needed_move_is_measured(skillset: SkillSet, durations: Durations,
     }
 
 
-def test_measuring_again_gives_the_same_to_the_last_bit(
-    task: Task, surveys: Surveys, staffed: Callable[[Task, Surveys, int], SkillSet]
-) -> None:
-    short = staffed(task.model_copy(update={"route": (task.route[0], task.route[-1])}), surveys, 1)
-    one = measure(short, surveys)
+def test_measuring_again_gives_the_same_to_the_last_bit(task: Task, taught: Callable[[Task, int], Prepared]) -> None:
+    short = taught(task.model_copy(update={"route": (task.route[0], task.route[-1])}), 1)
+    one = measure(short)
     assert list(one.loaded_s) == [("plate", "finished_plate")]
-    assert one == measure(short, surveys)
+    assert one == measure(short)
 
 
 def test_a_move_that_cannot_be_measured_is_a_failure_that_says_so(
-    skillset: SkillSet, surveys: Surveys, clueless: Callable[[str], None]
+    prepared: Prepared, clueless: Callable[[str], None]
 ) -> None:
     clueless("grasp at plate")
     with pytest.raises(WorkFailed, match=r"^measuring 'grasp at plate': policy 'grasp at plate \w+' does not reach"):
-        measure(skillset, surveys)
+        measure(prepared)
 
 
-def test_one_toast_is_delivered_in_the_time_predicted(
-    skillset: SkillSet, surveys: Surveys, layout: Layout, cell: Cell
-) -> None:
+def test_one_toast_is_delivered_in_the_time_predicted(prepared: Prepared, skillset: SkillSet, cell: Cell) -> None:
     heard: list[Event] = []
     watcher = Watcher()
-    outcome, recording = carry_out(skillset, surveys, layout, cell, (1, 1, 1), viewer=watcher, tell=heard.append)
+    outcome, recording = carry_out(prepared, cell, (1, 1, 1), viewer=watcher, tell=heard.append)
     moves = [event.move for event in heard if isinstance(event, MoveMade)]
     assert outcome.failure is None
     assert (outcome.delivered, outcome.dropped, outcome.retries) == ((1,), (), ())
@@ -188,15 +193,14 @@ def failed(outcome: Outcome, where: str, why: str) -> None:
 def test_a_step_that_goes_on_failing_stops_the_run_with_toast_place_and_reason(
     skill: str,
     where: str,
+    prepared: Prepared,
     skillset: SkillSet,
-    surveys: Surveys,
-    layout: Layout,
     cell: Cell,
     clueless: Callable[[str], None],
 ) -> None:
     clueless(skill)
     heard: list[Event] = []
-    outcome, _ = carry_out(skillset, surveys, layout, cell, (1, 1, 1), tell=heard.append)
+    outcome, _ = carry_out(prepared, cell, (1, 1, 1), tell=heard.append)
     start = skillset.skills[skill].reason
     assert start.startswith(f"policy '{skillset.policies[skill].name}' does not reach its goal from ")
     failed(outcome, where, start)
@@ -205,11 +209,9 @@ def test_a_step_that_goes_on_failing_stops_the_run_with_toast_place_and_reason(
     assert outcome.schedule.robot == ()
 
 
-def test_slippery_slices_are_not_delivered_and_said_to_be_lost(
-    task: Task, skillset: SkillSet, surveys: Surveys, layout: Layout, cell: Cell
-) -> None:
+def test_slippery_slices_are_not_delivered_and_said_to_be_lost(task: Task, prepared: Prepared, cell: Cell) -> None:
     oily = task.model_copy(update={"slices": task.slices.model_copy(update={"friction": 0.0})})
-    outcome, recording = carry_out(replace(skillset, task=oily), surveys, layout, cell, (1, 1, 1))
+    outcome, recording = carry_out(replace(prepared, skillset=replace(prepared.skillset, task=oily)), cell, (1, 1, 1))
     assert outcome.failure is not None
     assert outcome.failure.startswith("toast 1 at 'plate': slice 1 is ")
     assert outcome.retries[0] == (
@@ -223,20 +225,20 @@ def test_slippery_slices_are_not_delivered_and_said_to_be_lost(
 class Ground:
     """A floor with a production on it, begun at the robot's start."""
 
-    def __init__(self, world: World, skillset: SkillSet, surveys: Surveys, layout: Layout, cell: Cell) -> None:
-        self.floor = Floor(world, skillset, layout, cell.parts)
-        self.floor.stand(surveys.approach(cell.robot_start))
+    def __init__(self, world: World, prepared: Prepared, cell: Cell) -> None:
+        self.floor = Floor(world, prepared.skillset, prepared.layout, cell.parts)
+        self.floor.stand(prepared.surveys.approach(cell.robot_start))
         self.floor.restart_clock()
-        self.work = Production(self.floor, cell, surveys)
+        self.work = Production(self.floor, cell)
 
     def put(self, name: str, x: float, y: float, z: float) -> None:
         self.floor.world.put(name, (x, y, z))
 
 
 @pytest.fixture
-def ground(skillset: SkillSet, surveys: Surveys, layout: Layout, cell: Cell) -> Iterator[Ground]:
+def ground(prepared: Prepared, cell: Cell) -> Iterator[Ground]:
     with World() as world:
-        yield Ground(world, skillset, surveys, layout, cell)
+        yield Ground(world, prepared, cell)
 
 
 def test_a_grasp_that_failed_once_is_tried_again_and_the_run_goes_on(ground: Ground) -> None:
@@ -345,9 +347,9 @@ def test_a_toast_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None
     assert ground.work.done() == [1]
 
 
-def test_a_grasp_can_be_tried_alone(skillset: SkillSet, surveys: Surveys, clueless: Callable[[str], None]) -> None:
-    grasp = skillset.skills["grasp at plate"]
+def test_a_grasp_can_be_tried_alone(prepared: Prepared, clueless: Callable[[str], None]) -> None:
+    grasp, trial = prepared.skillset.skills["grasp at plate"], trial_of(prepared)
     assert grasp.tried
-    assert try_out(skillset, surveys, grasp) is None
-    clueless("grasp at plate")
-    assert "does not reach its goal" in (try_out(skillset, surveys, grasp) or "")
+    assert trial(grasp.problem, prepared.skillset.policies[grasp.name]) is None
+    clueless(grasp.name)
+    assert "does not reach its goal" in (trial(grasp.problem, prepared.skillset.policies[grasp.name]) or "")

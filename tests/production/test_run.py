@@ -13,23 +13,23 @@ import numpy as np
 import pytest
 
 import lab.production.run
-from lab.errors import BadInput, WorkFailed
-from lab.planner import find_sequence, search_for
+from lab.errors import WorkFailed
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
-from lab.production.report import FILES, Prepared, Report, Taught, check_out, write_files
-from lab.production.run import prepare, teach_all
-from lab.production.skillset import SkillSet
-from lab.sequencing import SEQUENCERS
+from lab.production.report import FILES, Report, Taught, write_files
+from lab.production.run import teach_all
+from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import optimum
 from lab.sim.frames import Recording
+from lab.skills.prepared_scene import Prepared, prepare
+from lab.tasks.sequencing import search_for
 from lab.tasks.task_file import Task, load
 from lab.teaching.events import Event, PhaseBegan, RecordSkipped
 from lab.teaching.teacher import Teacher
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
-from lab.vision.pictures import read_picture
+from lab.vision import read_picture
 
 Lab = Callable[..., Any]
 
@@ -180,13 +180,14 @@ def toolbox(cold: Ran, tmp_path: Path) -> Toolbox:
 
 
 @pytest.fixture
-def measured(monkeypatch: pytest.MonkeyPatch) -> list[SkillSet]:
-    """The skill sets whose moves were timed; each move takes 5 s."""
-    timed: list[SkillSet] = []
+def measured(monkeypatch: pytest.MonkeyPatch) -> list[Prepared]:
+    """The tasks whose moves were timed; each move takes 5 s."""
+    timed: list[Prepared] = []
 
-    def measure(skillset: SkillSet, *_: object) -> Durations:
-        timed.append(skillset)
-        empty, loaded = (dict.fromkeys(pairs, 5.0) for pairs in (skillset.moves.empty, skillset.moves.loaded))
+    def measure(prepared: Prepared, *_: object) -> Durations:
+        timed.append(prepared)
+        moves = prepared.skillset.moves
+        empty, loaded = (dict.fromkeys(pairs, 5.0) for pairs in (moves.empty, moves.loaded))
         return Durations(empty, loaded, {"butter_applier": 5.0}, 1.0)
 
     monkeypatch.setattr(lab.production.run, "measure", measure)
@@ -197,7 +198,7 @@ def sources(taught: Taught) -> dict[str, str]:
     return {name: lesson.source for name, lesson in taught.lessons.items()}
 
 
-def test_the_same_scene_needs_nothing(prepared: Prepared, toolbox: Toolbox, measured: list[SkillSet]) -> None:
+def test_the_same_scene_needs_nothing(prepared: Prepared, toolbox: Toolbox, measured: list[Prepared]) -> None:
     heard: list[Event] = []
     taught = teach_all(prepared, Teacher(toolbox, tell=heard.append))
     assert set(sources(taught).values()) == {"reused"}
@@ -226,7 +227,7 @@ def same(one: Prepared, other: Prepared, name: str) -> bool:
     ("cubes", "by", "must"), [("tower left", (0.0, 0.1), "transfer"), ("cubes A", (0.0, -0.05), "insert")]
 )
 def test_a_moved_obstacle_is_learned_around_and_nothing_else(
-    prepared: Prepared, toolbox: Toolbox, measured: list[SkillSet], cubes: str, by: tuple[float, float], must: str
+    prepared: Prepared, toolbox: Toolbox, measured: list[Prepared], cubes: str, by: tuple[float, float], must: str
 ) -> None:
     changed = prepare(move(prepared.task, cubes, by), 1, 0)
     affected = {name for name in prepared.problems if not same(prepared, changed, name)}
@@ -240,7 +241,7 @@ def test_a_moved_obstacle_is_learned_around_and_nothing_else(
 
 
 def test_damaged_policies_are_named_and_learned_again(
-    prepared: Prepared, toolbox: Toolbox, measured: list[SkillSet]
+    prepared: Prepared, toolbox: Toolbox, measured: list[Prepared]
 ) -> None:
     files = {path.stem.partition("-at-")[0]: path for path in toolbox.folder.glob("*-at-*.safetensors")}
     files["insert"].write_bytes(files["insert"].read_bytes()[:-8])
@@ -269,7 +270,7 @@ def test_damaged_policies_are_named_and_learned_again(
     ],
 )
 def test_damaged_durations_are_measured_again(
-    prepared: Prepared, toolbox: Toolbox, measured: list[SkillSet], damage: Callable[[dict[str, Any]], dict[str, Any]]
+    prepared: Prepared, toolbox: Toolbox, measured: list[Prepared], damage: Callable[[dict[str, Any]], dict[str, Any]]
 ) -> None:
     (path,) = (toolbox.folder / "records" / "durations").glob("*.json")
     whole = json.loads(path.read_text(encoding="utf-8"))
@@ -365,15 +366,6 @@ def test_nothing_is_half_written(
     with pytest.raises((KeyboardInterrupt, WorkFailed)):
         write_files(prepared, taught, failed, out)
     assert {path.name: path.read_text() for path in out.iterdir()} == {"run.json": "old"}
-
-
-def test_output_folders(tmp_path: Path) -> None:
-    check_out(tmp_path / "a" / "b")
-    assert os.listdir(tmp_path) == []
-    (tmp_path / "file").write_text("mine")
-    for wrong in ("file", "file/below", "x" * 300):
-        with pytest.raises(BadInput, match=r"output folder '.*' .--out.: "):
-            check_out(tmp_path / wrong)
 
 
 def short_task(root: Path) -> str:

@@ -13,8 +13,8 @@ from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.run_progress import RunProgress
-from lab.sequencing.cell.schedule import Move, SequenceResult
-from lab.sequencing.search import Reference
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.search import Reference, SequenceResult
 from lab.teaching.events import (
     LessonEvent,
     MoveMade,

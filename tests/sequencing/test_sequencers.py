@@ -12,9 +12,8 @@ from lab.errors import BadInput
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, cost
-from lab.sequencing.cell.schedule import EpisodeSequenced, SequenceResult
 from lab.sequencing.methods.exact import optimum
-from lab.sequencing.search import Search
+from lab.sequencing.search import EpisodeSequenced, Search, SequenceResult
 from lab.sequencing.simulate.run import Run, simulate
 
 CellMaker = Callable[..., Cell]

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from lab.mdp import optimal_values, shortest_steps
-from lab.production.skillset import SkillSet
 from lab.sim.scene import Layout, Scene, spots
 from lab.sim.world import World
 from lab.skills import Skill
 from lab.skills.skill import Bench, Problem, Status
+from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Task, load
 from lab.toolbox.policy import Policy

@@ -30,21 +30,21 @@ THESIS_SESSIONS = {3: 1000, 4: 300}  # of a cell of tables 7.4-7.6, by toasts; c
 ROUNDING = {"SP_percent": 0.5, "HS_steps": 0.05, "BR_s": 0.5}  # of printed figures
 
 # Of each world, view and gate: how far the mean success percentage is from print [points], the mean number of helped
-# steps [%], and how many cells are beyond chance for each; the most of three seeds. In the full view helped steps hang on
-# the advisor's learned table, which is not printed, and world II is printed as a picture only.
+# steps [%], and how many cells are beyond chance for each; a little more than the most of eight seeds. In the full view
+# helped steps hang on the advisor's learned table, which is not printed; world II is printed as a picture only.
 FROM_PRINT = {
-    ("world-1", "full", "ia"): (2, 10, 1, 13),
-    ("world-1", "full", "ccrl"): (3, 5, 1, 4),
-    ("world-1", "full", "combined"): (3, 12, 1, 14),
-    ("world-1", "limited", "ia"): (3, 5, 1, 4),
-    ("world-1", "limited", "ccrl"): (2, 6, 1, 4),
-    ("world-1", "limited", "combined"): (3, 4, 1, 1),
-    ("world-2", "full", "ia"): (4, 6, 3, 18),
-    ("world-2", "full", "ccrl"): (4, 5, 10, 23),
-    ("world-2", "full", "combined"): (3, 10, 1, 15),
-    ("world-2", "limited", "ia"): (13, 28, 12, 21),
-    ("world-2", "limited", "ccrl"): (2, 9, 1, 4),
-    ("world-2", "limited", "combined"): (3, 5, 1, 4),
+    ("world-1", "full", "ia"): (3, 11, 2, 15),
+    ("world-1", "full", "ccrl"): (5, 5, 3, 6),
+    ("world-1", "full", "combined"): (3, 14, 3, 18),
+    ("world-1", "limited", "ia"): (4, 5, 2, 6),
+    ("world-1", "limited", "ccrl"): (3, 7, 2, 6),
+    ("world-1", "limited", "combined"): (3, 7, 2, 4),
+    ("world-2", "full", "ia"): (5, 7, 4, 20),
+    ("world-2", "full", "ccrl"): (5, 6, 12, 26),
+    ("world-2", "full", "combined"): (5, 13, 4, 21),
+    ("world-2", "limited", "ia"): (16, 28, 15, 23),
+    ("world-2", "limited", "ccrl"): (3, 11, 2, 8),
+    ("world-2", "limited", "combined"): (3, 6, 2, 8),
 }
 
 measured: dict[str, list[Row]] = {}  # what a study gave: both tests of it look at the same run
@@ -135,6 +135,19 @@ def test_appendix_v_is_as_before(study: Callable[[str], list[Row]], tmp_path: Pa
     same_as_stored("appendix-v.csv", side_by_side(study("appendix-v"), ADVICE), tmp_path)
 
 
+def test_the_labs_own_gates_are_as_before(lab: Lab, tmp_path: Path) -> None:
+    """Those that the thesis does not have, in one session each."""
+    lines = []
+    for gate, advisor in product(
+        ("cq", "always", "never", "random", "importance", "uncertainty"), ("moderate", "wrong")
+    ):
+        asked = ("--gate", gate, "--advisor", advisor, "--episodes", "80", "--seed", "0")
+        found = lab("teach", "world-1", *asked, "--toolbox", str(tmp_path / f"{gate}-{advisor}"), "--json").json
+        came = {"steps": sum(found["steps_per_episode"]), **{n: found[n] for n in ("requests", "helped_steps")}}
+        lines.append({"gate": gate, "advisor": advisor} | came)
+    same_as_stored("own-gates.csv", lines, tmp_path)
+
+
 # ---- chapter 7: sequencing ----------------------------------------------------------------------------------------
 
 
@@ -147,7 +160,7 @@ def test_sequencing_is_as_printed(study: Callable[[str], list[Row]], name: str) 
     }
     for (toasts, measure), rows in found.items():
         theirs = THESIS_SESSIONS[toasts]
-        assert beyond(rows, theirs) <= 1, (toasts, measure)
+        assert beyond(rows, theirs) <= 2, (toasts, measure)
         off = mean(abs(r["value"] - r["thesis"]) for r in rows)
         assert off < 1.5 * sqrt(2 / 3.1416) * mean(chance(r, theirs) for r in rows), (toasts, measure)
 

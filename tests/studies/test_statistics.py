@@ -35,7 +35,6 @@ samples = st.lists(finite, min_size=2, max_size=8)
 def test_interval_by_hand() -> None:
     """1, 2, 3: mean 2, deviation 1, standard error 1/sqrt 3, t(.975, 2 degrees) = 4.303."""
     assert interval([1, 2, 3]) == pytest.approx((2, 2 - 4.3027 / 3**0.5, 2 + 4.3027 / 3**0.5), abs=1e-4)
-    assert interval([1, 2, 3], level=0.5) == pytest.approx((2, 2 - 0.8165 / 3**0.5, 2 + 0.8165 / 3**0.5), abs=1e-4)
 
 
 @given(value=finite, n=st.integers(2, 9))
@@ -56,12 +55,6 @@ def test_interval_needs_two_finite_values(values: list[float]) -> None:
         interval(values)
 
 
-@pytest.mark.parametrize("level", [0.0, 1.0, -1.0, 95.0])
-def test_levels_that_are_none(level: float) -> None:
-    with pytest.raises(BadInput, match="allowed between 0 and 1"):
-        interval([1, 2], level)
-
-
 def test_wilson_by_hand() -> None:
     """Half of 100 with z = 1.96: 50 -+ 1.96 sqrt(.25/100 + 1.96^2/40000) / (1 + 1.96^2/100) = 50 -+ 9.62."""
     assert proportion_interval(50, 100) == pytest.approx((50, 40.38, 59.62), abs=0.01)
@@ -69,13 +62,13 @@ def test_wilson_by_hand() -> None:
     assert proportion_interval(10, 10)[2] == 100
 
 
-@given(n=st.integers(1, 500), data=st.data(), level=st.sampled_from([0.5, 0.95, 0.99]))
-def test_wilson_as_scipy_has_it(n: int, data: st.DataObject, level: float) -> None:
+@given(n=st.integers(1, 500), data=st.data())
+def test_wilson_as_scipy_has_it(n: int, data: st.DataObject) -> None:
     from scipy.stats import binomtest
 
     successes = data.draw(st.integers(0, n))
-    percent, low, high = proportion_interval(successes, n, level)
-    expected = binomtest(successes, n).proportion_ci(level, method="wilson")
+    percent, low, high = proportion_interval(successes, n)
+    expected = binomtest(successes, n).proportion_ci(method="wilson")
     assert 0 <= low <= percent <= high <= 100
     assert (low, high) == pytest.approx((100 * expected.low, 100 * expected.high), abs=1e-9)
 
@@ -113,7 +106,6 @@ def test_score_of_the_ends_and_of_arrays() -> None:
     sp_range, hs_range = ranges(sp, hs)
     assert (sp_range, hs_range) == ((0, 100), (10, 30))
     assert score(sp, hs, sp_range, hs_range).tolist() == [0.5, 0.5, 0.5]
-    assert score(sp, hs, sp_range, hs_range, weight=1.0).tolist() == [0, 0.5, 1]
     assert score(100.0, 10.0, sp_range, hs_range) == 1
     assert score(0.0, 30.0, sp_range, hs_range) == 0
 
@@ -123,16 +115,14 @@ def test_score_where_all_are_equal() -> None:
     assert score(40.0, 20.0, (40, 40), (10, 20)) == 0.5
 
 
-@given(sp=st.lists(st.floats(0, 100), min_size=1, max_size=6), data=st.data(), weight=st.floats(0, 1))
-def test_scores_of_the_combinations_lie_between_0_and_1(sp: list[float], data: st.DataObject, weight: float) -> None:
+@given(sp=st.lists(st.floats(0, 100), min_size=1, max_size=6), data=st.data())
+def test_scores_of_the_combinations_lie_between_0_and_1(sp: list[float], data: st.DataObject) -> None:
     hs = data.draw(st.lists(st.floats(0, 1e4), min_size=len(sp), max_size=len(sp)))
-    found = score(np.array(sp), np.array(hs), *ranges(sp, hs), weight)
+    found = score(np.array(sp), np.array(hs), *ranges(sp, hs))
     assert ((found >= -1e-9) & (found <= 1 + 1e-9)).all()
 
 
 def test_scores_that_are_none() -> None:
-    with pytest.raises(BadInput, match=r"weight 1\.5"):
-        score(1.0, 1.0, (0, 1), (0, 1), 1.5)
     with pytest.raises(BadInput, match="HS range 5 to 1 is upside down"):
         score(1.0, 1.0, (0, 1), (5, 1))
     with pytest.raises(BadInput, match="range of HS"):

@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -10,10 +10,11 @@ from xml.etree import ElementTree
 import pytest
 
 from lab.errors import BadInput
-from lab.studies import STUDIES, run_study
+from lab.studies import STUDIES, Study, run_study
+from lab.studies.findings import Findings, row
 from lab.studies.runner import STORE, Job
 from lab.studies.thesis import chapter_9_cells, chapter_9_sessions
-from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, sessions_of
+from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, sessions_of
 from lab.tasks.task_file import load_world
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
@@ -61,7 +62,7 @@ def test_a_study_writes_its_folder(folder: Path) -> None:
     assert (document["study"], document["seed"], document["sessions"]) == ("figure-9.4", 0, 10)
     assert {"sessions": 10, "seed": 0, "cells": 2}.items() <= document["summary"].items()
     keys = [json.loads(line)["key"] for line in Path(files["sessions"]).read_text(encoding="utf-8").splitlines()]
-    assert keys == [Setting(w, beta=b).key(10, 0) for w in ("world-1", "world-2") for b in (0.7, 1.3)]
+    assert keys == [AdviceSetting(w, beta=b).key(10, 0) for w in ("world-1", "world-2") for b in (0.7, 1.3)]
 
 
 def test_the_seed_decides(folder: Path) -> None:
@@ -99,14 +100,28 @@ def test_what_is_refused_writes_nothing(
     assert (folder / "taken").read_text(encoding="utf-8") == "mine"
 
 
+def test_a_row_is_all_that_a_new_study_needs(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is listed, run and reported as the others are."""
+
+    def dummy(job: Job, reading: Mapping[str, Any]) -> Findings:
+        return Findings([row({"seed": job.seed}, "answer_steps", 42.0)], {"read": dict(reading)})
+
+    monkeypatch.setitem(STUDIES, "dummy", Study("A dummy", dummy, has_advisors=True))
+    assert {"name": "dummy", "title": "A dummy"} in lab("study", "list", "--json").json["studies"]
+    document = lab("study", "run", "dummy", "--advisor-table", "exact", "--seed", "7", "--json").json
+    assert [(one["seed"], one["value"]) for one in document["rows"]] == [(7, 42.0)]
+    assert document["summary"]["read"] == {"advisor_table": "exact"}
+    assert "<h1>A dummy</h1>" in Path(document["files"]["report"]).read_text(encoding="utf-8")
+
+
 # ---- Ctrl-C -------------------------------------------------------------------------------------------------------
 
 
-def stop_after(count: int, monkeypatch: pytest.MonkeyPatch) -> list[Setting]:
+def stop_after(count: int, monkeypatch: pytest.MonkeyPatch) -> list[AdviceSetting]:
     """The settings that are done; the one after `count` is stopped."""
-    done: list[Setting] = []
+    done: list[AdviceSetting] = []
 
-    def stopped(setting: Setting, sessions: int, seed: int) -> Outcome:
+    def stopped(setting: AdviceSetting, sessions: int, seed: int) -> AdviceOutcome:
         if len(done) == count:
             raise KeyboardInterrupt
         done.append(setting)

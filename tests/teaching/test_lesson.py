@@ -11,17 +11,17 @@ from lab.advice.entries import read_journal
 from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.production.skill_subject import SkillSubject, find_skill, fitting
 from lab.skills import Butter, Grasp, Skill
 from lab.tasks.grid_world import GridWorld, View
 from lab.tasks.task_file import Task, load
 from lab.teaching.lesson import one_lesson, teach
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.lesson_plan import Interrupted
+from lab.teaching.skill_subject import SkillSubject, find_skill, fitting
 from lab.teaching.teacher import Teacher
 from lab.teaching.world_subject import WorldSubject
 from lab.toolbox.registry import Toolbox
-from lab.vision.pictures import read_picture
+from lab.vision import read_picture
 
 
 @pytest.fixture(scope="module")
@@ -127,14 +127,14 @@ def test_a_name_of_another_problem_is_refused(task: Task, teacher: Teacher) -> N
 def test_a_grasp_that_lifts_nothing_is_not_kept_as_solved(
     task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lab.production.run.try_out", lambda *_: "slice 1 is not in the gripper")
+    monkeypatch.setattr("lab.skills.trial.try_out", lambda *_: "slice 1 is not in the gripper")
     bad = teach_skill(task, "grasp", teacher)
     assert (bad["solved"], bad["failure"]) == (False, "slice 1 is not in the gripper")
     assert [(row["name"], row["solved"]) for row in teacher.toolbox.list()] == [(bad["saved_as"], False)]
     monkeypatch.undo()
     good = teach_skill(task, "grasp", teacher)
     assert [(row["name"], row["solved"]) for row in teacher.toolbox.list()] == [(good["saved_as"], True)]
-    monkeypatch.setattr("lab.production.run.try_out", lambda *_: "slice 1 is not in the gripper")
+    monkeypatch.setattr("lab.skills.trial.try_out", lambda *_: "slice 1 is not in the gripper")
     worse = teach_skill(task, "grasp", teacher)
     assert worse["saved_as"] == f"{good['saved_as']} unfinished"
     assert {row["name"]: row["solved"] for row in teacher.toolbox.list()} == {
@@ -162,7 +162,7 @@ def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lab.production.run.try_out", stop)
+    monkeypatch.setattr("lab.skills.trial.try_out", stop)
     with pytest.raises(KeyboardInterrupt):
         teach_skill(task, "grasp", teacher)
     (row,) = teacher.toolbox.list()
@@ -187,7 +187,7 @@ def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
 def test_bad_words_are_refused_before_the_scene_is_surveyed(
     task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch, subtask: str, options: dict[str, Any], reason: str
 ) -> None:
-    monkeypatch.setattr("lab.production.skill_subject.prepare", lambda *_: pytest.fail("surveyed"))
+    monkeypatch.setattr("lab.teaching.skill_subject.prepare", lambda *_: pytest.fail("surveyed"))
     with pytest.raises(BadInput, match=reason):
         teach_skill(task, subtask, teacher, **options)
     assert not teacher.toolbox.folder.exists()

@@ -10,7 +10,7 @@ import pytest
 from lab.errors import BadInput
 from lab.view.canvas import ORANGE, RED
 from lab.view.plots import cell_corners, learning_curves, value_map
-from lab.vision.overhead import plain_view
+from lab.vision import plain_view
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.vision import pictures as vision
-from lab.vision.pictures import MARKERS, read_picture, see, write_picture
+from lab.vision import MARKERS, picture_files, read_picture, see, write_picture
 
 PICTURE = np.full((240, 240, 3), (180, 150, 110), dtype=np.uint8)
 for kind, middle in (("gripper", (10, 230)), ("toaster", (190, 50)), ("obstacle", (110, 110))):
@@ -71,7 +70,7 @@ def test_a_huge_picture_is_refused_by_its_header(tmp_path: Path, monkeypatch: py
     path.write_bytes(data)
     with pytest.raises(BadInput, match="2147483647 x 240 pixels"):
         read_picture(path)
-    monkeypatch.setattr(vision, "MAX_BYTES", 10)
+    monkeypatch.setattr(picture_files, "MAX_BYTES", 10)
     with pytest.raises(BadInput, match="bytes: pictures up to 10 bytes"):
         read_picture(path)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from lab.seat.event_text import run_text
 from lab.seat.page.page_order import bars_of
 from lab.seat.page.page_state import MOST_LINES, Known, Learning, Progress
-from lab.sequencing.cell.schedule import EpisodeSequenced
+from lab.sequencing.search import EpisodeSequenced
 from lab.teaching.events import (
     Event,
     LessonContinued,

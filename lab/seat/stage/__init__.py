@@ -13,7 +13,7 @@ from lab.skills.skill import Problem
 from lab.tasks.grid_world import GridWorld
 
 if TYPE_CHECKING:
-    from lab.production.report import Prepared
+    from lab.skills.prepared_scene import Prepared
 
 
 class Stage(Protocol):

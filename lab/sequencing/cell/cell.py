@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput, unknown
-from lab.sequencing.cell.routes import Moves, Position, moves_between, positions_of
+from lab.sequencing.cell.routes import NeededMoves, Position, moves_between, positions_of
 from lab.sequencing.cell.stations import MAX_S, Arrivals, Product, Route, Station, check_layout, check_seconds, is_count
 
 MAX_PARTS = 200
@@ -60,11 +60,10 @@ class Cell:
         loaded_s: NDArray[np.float64],
         robot_start: str,
         parts: int,
-        product: str = "toast",
     ) -> "Cell":
-        """A cell of so many alike parts along one route, all there at the start. BadInput as for any cell."""
+        """A cell of so many toasts along one route, all there at the start. BadInput as for any cell."""
         check_parts(parts)
-        return cls(stations, (Product(product, (route,)),), (product,) * parts, empty_s, loaded_s, robot_start)
+        return cls(stations, (Product("toast", (route,)),), ("toast",) * parts, empty_s, loaded_s, robot_start)
 
     @property
     def parts(self) -> int:
@@ -93,7 +92,7 @@ class Cell:
         return tuple(first[[product.name for product in self.products].index(name)] for name in self.order)
 
     @cached_property
-    def needed(self) -> Moves:
+    def needed(self) -> NeededMoves:
         """The moves that some allowed sequence may contain (see `needed_moves`)."""
         return needed_moves(self.stations, self.products, self.robot_start, self.parts, self.buffers)
 
@@ -160,7 +159,7 @@ def needed_moves(
     robot_start: str,
     parts: int,
     buffers: Literal["busy", "free"] = "busy",
-) -> Moves:
+) -> NeededMoves:
     """Every move that some allowed sequence of this cell may contain: what must be measured before a Cell can be built.
 
     Loaded: along the routes, directly and through the buffers. Empty: from the start to the first stations, and from

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from math import cos, isfinite, log, pi, sqrt
 from types import MappingProxyType
 
+import numpy as np
+
 from lab.errors import BadInput, unknown
 from lab.learning.splitmix import uniform
 from lab.sequencing.cell.cell import Cell
@@ -79,3 +81,8 @@ class Episode:
             return mean_s
         u, v = uniform(self.seed, 2 * number), uniform(self.seed, 2 * number + 1)
         return LAWS[law](mean_s, self.chance.spread, u, v)
+
+
+def drawn_seed(rng: np.random.Generator) -> int:
+    """A seed for an episode's times, or a session's uniform numbers, drawn from a generator."""
+    return int(rng.integers(2**63))

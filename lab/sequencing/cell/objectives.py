@@ -2,13 +2,27 @@
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import Protocol
 
 from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.simulate.run import Run
 
 MAKESPAN = "makespan"
 WITH_DUE_TIMES = ("mean-tardiness", "tardy-parts")
+
+
+class Run(Protocol):
+    """What an objective looks at: `lab.sequencing.simulate.run.Run`, and whatever else knows as much."""
+
+    cell: Cell
+    now_s: float
+    waited_s: float
+    processed_s: float
+    finished_s: list[float | None]
+
+    @property
+    def done(self) -> bool:
+        """Whether every part is finished."""
 
 
 def _makespan(run: Run) -> float:

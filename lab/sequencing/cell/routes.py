@@ -57,7 +57,7 @@ class Position:
 
 
 @dataclass(frozen=True)
-class Moves:
+class NeededMoves:
     """The (origin, target) station names between which the robot may have to travel empty, and carry something."""
 
     empty: tuple[tuple[str, str], ...]
@@ -83,7 +83,7 @@ def positions_of(
     stations: Sequence[Station], products: Sequence[Product], buffers: Literal["busy", "free"]
 ) -> tuple[Position, ...]:
     """The positions of all products, each product's start first; routes that are sound are taken for granted."""
-    layout = _Layout(stations, buffers)
+    layout = _Positions(stations, buffers)
     for number, product in enumerate(products):
         layout.add(number, product)
     return tuple(layout.positions)
@@ -98,7 +98,9 @@ def from_the_ends(positions: Sequence[Position], value: Callable[[int, list[Valu
     return [found[number] for number in range(len(positions))]
 
 
-def moves_between(stations: Sequence[Station], positions: Sequence[Position], robot_start: str, parts: int) -> Moves:
+def moves_between(
+    stations: Sequence[Station], positions: Sequence[Position], robot_start: str, parts: int
+) -> NeededMoves:
     """The moves that may follow one another, and those that carry something; staying is left out."""
     names = [station.name for station in stations]
     options = [(place, option) for place in positions for option in place.options]
@@ -116,10 +118,10 @@ def moves_between(stations: Sequence[Station], positions: Sequence[Position], ro
             if other.origin not in gone and not full.intersection(other.needs):
                 empty[done.target, other.origin] = None
     named = [tuple((names[a], names[b]) for a, b in pairs if a != b) for pairs in (empty, loaded)]
-    return Moves(named[0], named[1])
+    return NeededMoves(named[0], named[1])
 
 
-class _Layout:
+class _Positions:
     """Positions as they are added, route by route."""
 
     def __init__(self, stations: Sequence[Station], buffers: str) -> None:
@@ -150,44 +152,38 @@ class _Layout:
             leave, service_s = reach, stage.service_s
             if stage.pallet and after is not None:
                 leave = self._position(product, stage.station, (stage.station, after.station), None)
-                self._join(reach, leave, after.station, waits=False, carries="pallet")
+                self._join(reach, leave, replace(self._way(after.station), waits=False, carries="pallet"))
 
     def _link(self, leave: int, reach: int, stage: Stage, service_s: float) -> None:
         """The ways from a position to a stage: directly, and through its buffer."""
-        self._join(leave, reach, stage.station, service_s=service_s)
+        self._join(leave, reach, self._way(stage.station, service_s))
         if stage.buffer is None:
             return
         wait = self._position(self.positions[leave].product, stage.buffer, (stage.buffer,))
         if self._buffers == "busy":
             # Never both at once: the decision is the same, and the cell says where it leads.
             choice = self.positions[leave].options[-1].choice
-            full = self._index[stage.station]
-            self._join(leave, wait, stage.buffer, service_s=service_s, choice=choice, if_full=full)
+            way = replace(self._way(stage.buffer, service_s), choice=choice, if_full=self._index[stage.station])
+            self._join(leave, wait, way)
         else:
-            self._join(leave, wait, stage.buffer, service_s=service_s)
-        self._join(wait, reach, stage.station)
+            self._join(leave, wait, self._way(stage.buffer, service_s))
+        self._join(wait, reach, self._way(stage.station))
+
+    def _way(self, target: str, service_s: float = 0.0) -> Option:
+        """An option of which only that is known yet."""
+        return Option(-1, -1, -1, self._index[target], (), service_s=service_s)
 
     def _position(self, product: int, station: str, holds: tuple[str, ...], processing_s: float | None = 0.0) -> int:
         held = tuple(self._index[name] for name in holds)
         self.positions.append(Position(product, self._index[station], held, processing_s, ()))
         return len(self.positions) - 1
 
-    def _join(
-        self,
-        leave: int,
-        reach: int,
-        target: str,
-        *,
-        service_s: float = 0.0,
-        choice: int | None = None,
-        if_full: int | None = None,
-        waits: bool = True,
-        carries: Literal["part", "pallet"] = "part",
-    ) -> None:
-        place, there = self.positions[leave], self.positions[reach]
-        number = choice if choice is not None else 1 + max((option.choice for option in place.options), default=-1)
+    def _join(self, leave: int, to: int, way: Option) -> None:
+        """A way from a position to another: what is said of it beside these, completed; no choice yet: a new one."""
+        place, there = self.positions[leave], self.positions[to]
+        choice = way.choice if way.choice >= 0 else 1 + max((option.choice for option in place.options), default=-1)
         needs = tuple(station for station in there.holds if station not in place.holds)
-        option = Option(number, reach, place.station, self._index[target], needs, if_full, service_s, waits, carries)
+        option = replace(way, choice=choice, to=to, origin=place.station, needs=needs)
         self.positions[leave] = replace(place, options=(*place.options, option))
 
     def _processing_s(self, stage: Stage) -> float:

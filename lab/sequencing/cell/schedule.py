@@ -101,35 +101,6 @@ class Schedule:
         return {"makespan_s": self.makespan_s, "sequence": list(self.sequence)} | rows
 
 
-@dataclass(frozen=True)
-class EpisodeSequenced:
-    """One sequence tried: number from 1, its cost (see `SequenceResult`) and the best one so far, empty: there is none."""
-
-    episode: int
-    cost: float
-    best_cost: float
-    best: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class SequenceResult:
-    """What every sequencer returns: the best sequence found, its cost, and the cost of each sequence tried.
-
-    The cost is the value of the objective asked for: the makespan [s] unless it was another one.
-    """
-
-    sequence: tuple[int, ...]
-    cost: float
-    episode_costs: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class LearnedSequence(SequenceResult):
-    """What a learning sequencer returns beside: the cost of its greedy policy at the end."""
-
-    final_cost: float
-
-
 def robot_activities(move: Move) -> list[Activity]:
     """What the robot does in one move, without what takes no time."""
     served_s = move.pick_s - move.service_s

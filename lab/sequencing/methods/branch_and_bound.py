@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.ways import TICKS_PER_S
-from lab.sequencing.simulate.merged import Key, MergedCell, State
+from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
 
 MAX_NODES = 20_000
 
@@ -57,8 +57,8 @@ class _Tree:
         self.heap: list[tuple[int, int]] = []
         self.best: tuple[int, ...] = ()
         self._cell = MergedCell(cell)
-        self._states: dict[int, State] = {}
-        self._reached: dict[Key, tuple[int, int]] = {}  # when, and by which node
+        self._states: dict[int, MergedState] = {}
+        self._reached: dict[MergedKey, tuple[int, int]] = {}  # when, and by which node
         self._most, self._finished_at = most, -1
         self._add(self._cell.start(named=True), ())
 
@@ -75,7 +75,7 @@ class _Tree:
             for branch in branches:
                 self._add(branch, (*self.decisions[number], self._cell.decision(branch)))
 
-    def _add(self, state: State, decisions: tuple[int, ...]) -> None:
+    def _add(self, state: MergedState, decisions: tuple[int, ...]) -> None:
         number = len(self.decisions)
         if number == self._most:
             raise BadInput(f"search tree: it has more than {self._most} nodes; take fewer parts")

@@ -11,10 +11,9 @@ from ortools.sat.python import cp_model
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective, cost
-from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.methods.cp_sat_model import Model
 from lab.sequencing.methods.rules import first_come
-from lab.sequencing.search import Log, Search
+from lab.sequencing.search import Log, Search, SequenceResult
 from lab.sequencing.simulate.run import follow
 
 TIME_LIMIT_S = 60.0

@@ -10,12 +10,11 @@ import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN
-from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
 from lab.sequencing.methods.rules import first_come
-from lab.sequencing.search import Log, Search, gap
-from lab.sequencing.simulate.merged import MergedCell, State
+from lab.sequencing.search import Log, Search, SequenceResult, gap
+from lab.sequencing.simulate.merged import MergedCell, MergedState
 from lab.sequencing.simulate.run import simulate
 
 MAX_EXPANDED = 300_000
@@ -56,11 +55,11 @@ class _Search:
         )  # what the clock brings is no wait: it comes anyway
         self.expanded = self.bound = self._serial = 0
         self._fronts: dict[tuple[int, int], list[tuple[int, ...]]] = {}
-        self._heap: list[tuple[int, int, State]] = []
+        self._heap: list[tuple[int, int, MergedState]] = []
         self._greedy = False
         self._reach(self.merged.start())
 
-    def run(self, most: int) -> State | None:
+    def run(self, most: int) -> MergedState | None:
         """The first complete state; None: when `most` states were opened in all there was none."""
         while self._heap:
             bound, serial, state = heapq.heappop(self._heap)
@@ -83,7 +82,7 @@ class _Search:
         self._heap = [(self._least.left(state), serial, state) for _, serial, state in self._heap]
         heapq.heapify(self._heap)
 
-    def _reach(self, state: State) -> None:
+    def _reach(self, state: MergedState) -> None:
         """Queue a state unless one that is alike otherwise is no later anywhere; those that it beats are forgotten."""
         if self.merged.one_by_one:
             # Since when a part waits to be picked does not matter either.
@@ -99,7 +98,7 @@ class _Search:
         left = self._least.left(state)
         heapq.heappush(self._heap, (left if self._greedy else state.now + left, self._serial, state))
 
-    def _times(self, state: State) -> tuple[int, ...]:
+    def _times(self, state: MergedState) -> tuple[int, ...]:
         """Now and all that is waited for: of states with equal counts and robot, one that is nowhere later is no worse."""
         return (state.now, *chain.from_iterable(state.waits[: self._waits]))
 

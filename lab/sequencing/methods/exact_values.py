@@ -6,7 +6,7 @@ from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import choice_of, part_of
 from lab.sequencing.cell.ways import TICKS_PER_S, Way
-from lab.sequencing.simulate.merged import Key, MergedCell, State
+from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
 from lab.sequencing.simulate.run import Run
 
 MOST_STATES = 100_000
@@ -23,7 +23,7 @@ class ExactValues:
         if cell.parts > MOST_PARTS:
             raise BadInput(f"an advisor who knows exact values: {cell.parts} parts are too many, at most {MOST_PARTS}")
         self.cell, self._merged = cell, MergedCell(cell)
-        self._left: dict[Key, float] = {}
+        self._left: dict[MergedKey, float] = {}
 
     def of(self, run: Run, allowed: tuple[int, ...]) -> list[float]:
         """The time from now to the end after each of the decisions; infinite where it ends in a deadlock."""
@@ -31,11 +31,11 @@ class ExactValues:
         left_s = {at: self._after(state, way) / TICKS_PER_S for at, way in self._merged.choices(state).items()}
         return [left_s[run.locations[part_of(d, parts) - 1], choice_of(d, parts)] for d in allowed]
 
-    def _after(self, state: State, way: Way) -> float:
+    def _after(self, state: MergedState, way: Way) -> float:
         ahead = self._merged.after(state, way)
         return ahead.now - state.now + self._least(ahead)
 
-    def _least(self, state: State) -> float:
+    def _least(self, state: MergedState) -> float:
         if self._merged.done(state):
             return 0.0
         key = self._merged.key(state)

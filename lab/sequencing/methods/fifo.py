@@ -1,38 +1,19 @@
-"""Plain sequencers to compare with: random search, and first in, first out."""
+"""First in, first out: what is possible first is served first, as a list and as a policy."""
 
 import numpy as np
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.chance import NO_CHANCE, Episode
 from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.routes import choice_of, part_of
-from lab.sequencing.cell.schedule import SequenceResult
-from lab.sequencing.methods.sessions import Learner, learn
-from lab.sequencing.search import Log, Search, kernel_seed
+from lab.sequencing.search import Log, Search, SequenceResult
 from lab.sequencing.simulate.execution import WAIT, Choose, Observed, carry_out
-
-
-def random_search(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
-    """The best of so many sequences, each decision drawn evenly from the allowed ones.
-
-    By chance, each sequence is judged by the times of its own episode. Raises BadInput for an objective that the cell
-    does not allow, WorkFailed when every sequence ends in a deadlock. Source: thesis 7.6, random search.
-    """
-    log = learn(cell, search, kernel_seed(rng), Learner).log
-    log.check(cell)
-    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
-
-
-def drawn_times(cell: Cell, search: Search, rng: np.random.Generator) -> Episode:
-    """The times of the next episode; a search without chance draws nothing."""
-    return Episode(cell) if search.chance == NO_CHANCE else Episode(cell, search.chance, kernel_seed(rng))
 
 
 def fifo(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
     """One sequence, by the cell's own times: what is possible first is served first (see `first_in_first_out`).
 
     When nothing is possible yet, the robot goes where something will be next and waits there: the sequence costs what
-    its simulation does. Raises BadInput and WorkFailed as `random_search`.
+    its simulation does. Raises BadInput and WorkFailed as `lab.sequencing.methods.random_search`.
     """
     search.check(cell)
     execution = carry_out(cell, lambda cell: _Queue(cell, stays=False))

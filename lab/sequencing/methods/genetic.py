@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Episode, drawn_seed
 from lab.sequencing.cell.objectives import cost
-from lab.sequencing.cell.schedule import SequenceResult
-from lab.sequencing.methods.fifo import drawn_times
-from lab.sequencing.search import Log, Search, kernel_seed
-from lab.sequencing.simulate.arrays import most_moves
+from lab.sequencing.search import Log, Search, SequenceResult
+from lab.sequencing.simulate.cell_arrays import most_moves
 from lab.sequencing.simulate.run import Run
 
 # Shares of a generation, and the chance of a gene to come from the elite parent: within what Gonçalves and Resende 2011
@@ -28,7 +27,7 @@ def genetic(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceRes
     Source: Gonçalves and Resende 2011, as pymoo has it; random keys: Bean 1994.
     """
     search.check(cell)
-    algorithm, log = _algorithm(genes(cell), search.episodes, kernel_seed(rng)), Log(search)
+    algorithm, log = _algorithm(genes(cell), search.episodes, drawn_seed(rng)), Log(search)
     while len(log.costs) < search.episodes:
         population = algorithm.ask()
         values = [_episode(cell, search, rng, keys, log) for keys in population.get("X")]
@@ -63,7 +62,7 @@ def _episode(cell: Cell, search: Search, rng: np.random.Generator, keys: NDArray
     """The cost of what the keys stand for; None, and nothing is done, when the session is over."""
     if len(log.costs) >= search.episodes:
         return None
-    run = Run(cell, drawn_times(cell, search, rng))
+    run = Run(cell, _drawn_times(cell, search, rng))
     log.note(decode(run, keys), cost(run, search.objective), run.done)
     return log.costs[-1]
 
@@ -80,3 +79,8 @@ def _algorithm(genes: int, episodes: int, seed: int) -> Any:
     algorithm = BRKGA(n_elites=elites, n_offsprings=size - elites - mutants, n_mutants=mutants, bias=BIAS, seed=seed)
     algorithm.setup(Problem(n_var=genes, n_obj=1, xl=0.0, xu=1.0), termination=NoTermination())
     return algorithm
+
+
+def _drawn_times(cell: Cell, search: Search, rng: np.random.Generator) -> Episode:
+    """The times of the next episode; a search without chance draws nothing."""
+    return Episode(cell) if search.chance == NO_CHANCE else Episode(cell, search.chance, drawn_seed(rng))

@@ -8,7 +8,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import from_the_ends
 from lab.sequencing.cell.ways import TICKS_PER_S, Way, distances, ticks, ways_of
 from lab.sequencing.methods.robot_bound import RobotWork, least_rest
-from lab.sequencing.simulate.merged import MergedCell, State
+from lab.sequencing.simulate.merged import MergedCell, MergedState
 
 NEVER = -(1 << 61)
 Spans = tuple[tuple[int, int], ...]
@@ -36,7 +36,7 @@ class Least(NamedTuple):
     latest: int
 
     def left(self, now: int, robot: int, waits: Sequence[Sequence[int]]) -> int:
-        """Ticks still needed at least; waits: by slot, until when (see `merged.State`)."""
+        """Ticks still needed at least; waits: by slot, until when (see `merged.MergedState`)."""
         most = max(self.fixed, self.rest + self.here[robot], self.latest - now)
         for slot, which, ways, plus in self.terms:
             wait = waits[slot][which] - now
@@ -58,7 +58,7 @@ class LowerBound:
         self._machines = [_MachineWork(cell, station, self._to_end) for station in single]
         self._after_arrival = _after_arrival(cell, self._to_end)
 
-    def left(self, state: State) -> int:
+    def left(self, state: MergedState) -> int:
         """Ticks still needed at least."""
         known = self._known.get(state.counts)
         if known is None:

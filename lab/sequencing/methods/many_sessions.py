@@ -13,16 +13,19 @@ from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective
-from lab.sequencing.methods import session_kernels as episodes
+from lab.sequencing.methods import session_kernels
 from lab.sequencing.methods.monte_carlo import MonteCarlo
-from lab.sequencing.methods.sessions import Learner, learn
+from lab.sequencing.methods.session_arrays import Found, session_arrays, value_table
+from lab.sequencing.methods.sessions import SessionLearner, learn
 from lab.sequencing.methods.srl import Srl
 from lab.sequencing.methods.state_keys import Keys
 from lab.sequencing.search import Search
-from lab.sequencing.simulate import arrays, kernels
-from lab.sequencing.simulate.arrays import Floats, Ints
+from lab.sequencing.simulate import kernels
+from lab.sequencing.simulate.cell_arrays import Floats, Ints, cell_arrays, most_moves, run_arrays
 
-METHODS: Mapping[str, type[Learner]] = MappingProxyType({kind.name: kind for kind in (Srl, MonteCarlo, Learner)})
+METHODS: Mapping[str, type[SessionLearner]] = MappingProxyType(
+    {kind.name: kind for kind in (Srl, MonteCarlo, SessionLearner)}
+)
 CHUNK = 2**20  # episodes at once: what their costs take is 8 MiB
 MOST_ROWS = 2**22  # a table that may need more rows grows as it is filled, session by session
 
@@ -84,8 +87,8 @@ def evaluate(
     for row, sequence in zip(rows, sequences, strict=True):
         row[: len(sequence)] = sequence
     costs = np.zeros((len(sequences), len(seeds)))
-    there = arrays.cell_arrays(cell, objective, chance)
-    kernels.follow_all(there, arrays.run_arrays(cell), rows, lengths, np.array(seeds, np.uint64), costs)
+    there = cell_arrays(cell, objective, chance)
+    kernels.follow_all(there, run_arrays(cell), rows, lengths, np.array(seeds, np.uint64), costs)
     for sequence in (sequences[n] for n in np.flatnonzero(np.isnan(costs).any(axis=1)).tolist()):
         raise BadInput(f"sequence {list(sequence)}: it has a decision that may not be taken there")
     return costs
@@ -96,51 +99,30 @@ def session_seeds(seed: int, sessions: int) -> NDArray[np.uint64]:
     return np.asarray(SeedSequence(seed).generate_state(sessions, np.uint64), np.uint64)
 
 
-def _chunk(cell: Cell, kind: type[Learner], search: Search, seeds: NDArray[np.uint64]) -> Sessions:
+def _chunk(cell: Cell, kind: type[SessionLearner], search: Search, seeds: NDArray[np.uint64]) -> Sessions:
     """Some sessions, with all their costs."""
-    keys, moves = kind.keys(cell, search.settings), arrays.most_moves(cell)
-    costs, sequences = np.zeros((len(seeds), search.episodes)), np.zeros((len(seeds), moves), np.int64)
-    ends = np.zeros((len(seeds), 2))
+    keys, moves = kind.keys(cell, search.settings), most_moves(cell)
     if keys is None or min(keys.size, search.episodes * moves) > MOST_ROWS:
+        found = Found.room(len(seeds), search.episodes, moves)
         for n, seed in enumerate(seeds.tolist()):
             learned = learn(cell, replace(search, on_episode=None), seed, kind)
-            costs[n], ends[n] = learned.log.costs, (learned.log.best_cost, learned.final_cost)
-            sequences[n, : len(learned.log.best)] = learned.log.best
+            found.costs[n], found.ends[n] = learned.log.costs, (learned.log.best_cost, learned.final_cost)
+            found.sequences[n, : len(learned.log.best)] = learned.log.best
     else:
-        _together(cell, kind(search), search, keys, seeds, costs, sequences, ends)
-    if kind is Learner:
-        ends[:, 1] = np.nan
-    return Sessions(ends[:, 0], ends[:, 1], _convergence(costs), sequences, costs)
+        found = _together(cell, kind(search), search, keys, seeds)
+    if kind is SessionLearner:
+        found.ends[:, 1] = np.nan
+    return Sessions(found.ends[:, 0], found.ends[:, 1], _convergence(found.costs), found.sequences, found.costs)
 
 
-def _together(
-    cell: Cell,
-    learner: Learner,
-    search: Search,
-    keys: Keys,
-    seeds: NDArray[np.uint64],
-    costs: Floats,
-    sequences: Ints,
-    ends: Floats,
-) -> None:
-    """Sessions in one compiled call; their costs, best sequences, and best and final costs are written to the last three."""
-    numbers = range(1, search.episodes + 1)
-    memory = arrays.memory_for(keys.size, search.episodes * arrays.most_moves(cell), learner.first)
-    episodes.advance(
-        arrays.cell_arrays(cell, search.objective, search.chance),
-        arrays.cell_arrays(cell, search.objective),
-        keys,
-        learner.rules,
-        arrays.work_for(cell, memory),
-        seeds,
-        np.array([learner.epsilon(episode) for episode in numbers]),
-        1,
-        costs,
-        np.zeros(costs.shape, np.bool_),
-        sequences,
-        ends,
-    )
-    learner.check(float(costs.min()))
+def _together(cell: Cell, learner: SessionLearner, search: Search, keys: Keys, seeds: NDArray[np.uint64]) -> Found:
+    """Sessions in one compiled call."""
+    moves, epsilons = most_moves(cell), [learner.epsilon(episode) for episode in range(1, search.episodes + 1)]
+    found = Found.room(len(seeds), search.episodes, moves)
+    work = session_arrays(cell, value_table(keys.size, search.episodes * moves, learner.first))
+    session_kernels.advance(learner.learning(cell, keys), work, seeds, np.array(epsilons), 1, found)
+    learner.check(float(found.costs.min()))
+    return found
 
 
 def _convergence(costs: Floats) -> Ints:

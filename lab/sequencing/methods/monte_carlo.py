@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import LearnedSequence
+from lab.sequencing.cell.chance import drawn_seed
 from lab.sequencing.methods.sessions import GreedyLearner, Table, Values, learn
 from lab.sequencing.methods.state_keys import Key
 from lab.sequencing.methods.updates import average, gain
-from lab.sequencing.search import Search, kernel_seed
+from lab.sequencing.search import LearnedSequence, Search
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def monte_carlo(cell: Cell, search: Search, rng: np.random.Generator) -> MonteCa
     as in `srl`. Raises BadInput for an objective that the cell has not got what it takes for, and for a makespan of 0 s;
     WorkFailed when every episode ended in a deadlock. Source: thesis ch. 7.6 and its listing (Q = 1 at the start).
     """
-    learned = learn(cell, search, kernel_seed(rng), MonteCarlo)
+    learned = learn(cell, search, drawn_seed(rng), MonteCarlo)
     log = learned.log
     log.check(cell)
     return MonteCarloResult(log.best, log.best_cost, tuple(log.costs), learned.final_cost, learned.table)

@@ -13,8 +13,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.routes import Option, from_the_ends, part_of
-from lab.sequencing.cell.schedule import SequenceResult
-from lab.sequencing.search import Log, Search
+from lab.sequencing.search import Log, Search, SequenceResult
 from lab.sequencing.simulate.run import Run
 
 Rule = Callable[[Run, tuple[int, ...]], int]

@@ -7,12 +7,12 @@ import numpy as np
 from lab.learning import splitmix
 from lab.learning.compiled import inner, lean
 from lab.sequencing.methods import updates
-from lab.sequencing.simulate.arrays import LEARNER_CODES
+from lab.sequencing.methods.session_arrays import LEARNER_CODES
 from lab.sequencing.simulate.kernels import cost, fraction, list_allowed, mixed, move, reset, uniform
 
 RANDOM, SRL, MONTE_CARLO = (LEARNER_CODES[name] for name in ("random", "srl", "mc"))
 _explore, _best_of, _log_sum = inner(updates.explore), inner(updates.best_of), inner(updates.log_sum)
-_following = inner(splitmix.following)
+_following = inner(splitmix.following, inline="always")
 _gain, _log_factor, _average = inner(updates.gain), inner(updates.log_factor), inner(updates.average)
 
 
@@ -116,9 +116,9 @@ def _choose(cell: Any, keys: Any, work: Any, state: int, count: int, epsilon: fl
 
 
 @inner
-def _episode(cell: Any, keys: Any, rules: Any, work: Any, epsilon: float, seed: Any, learns: bool) -> int:
-    """`sessions.walk`: one pass with the step update of SRL where it learns; how many moves were made."""
-    run, memory = work.run, work.memory
+def _episode(cell: Any, method: Any, work: Any, epsilon: float, seed: Any, learns: bool) -> int:
+    """`sessions.walk`: one pass through a cell with the step update of SRL where it learns; how many moves were made."""
+    run, memory, keys, rules = work.run, work.memory, method.keys, method.rules
     reset(cell, run, seed)
     moves, row, state = 0, 0, 0
     count = list_allowed(cell, run)
@@ -149,7 +149,7 @@ def _episode(cell: Any, keys: Any, rules: Any, work: Any, epsilon: float, seed: 
 
 @inner
 def _learn(rules: Any, work: Any, moves: int, value: float, best_before: float) -> None:
-    """`Learner.end`: what the cost of an episode does to the values of what was visited, once for each visit."""
+    """`SessionLearner.end`: what the cost of an episode does to the values of what was visited, once for each visit."""
     memory = work.memory
     if rules.learner == SRL:
         factor = _log_factor(value, best_before, rules.type_a, rules.offset)
@@ -164,48 +164,36 @@ def _learn(rules: Any, work: Any, moves: int, value: float, best_before: float) 
 
 
 @inner
-def _advance(
-    cell: Any, keys: Any, rules: Any, work: Any, seed: Any, epsilons: Any, first: int, costs: Any, complete: Any
-) -> None:
-    """Episodes of a session, numbered from `first`; epsilons, costs and complete (E,) are theirs."""
-    for n in range(len(epsilons)):
-        moves = _episode(cell, keys, rules, work, epsilons[n], _episode_seed(seed, first + n), rules.learner != RANDOM)
-        costs[n], complete[n] = cost(cell, work.run), work.run.whole[2] == 0
-        _learn(rules, work, moves, costs[n], work.best_cost[0])
-        if complete[n] and costs[n] < work.best_cost[0]:
-            work.best_cost[0] = costs[n]
-            for m in range(len(work.best)):
-                work.best[m] = work.sequence[m] if m < moves else 0
+def _keep(work: Any, value: float, moves: int) -> None:
+    """The episode under way is the best so far."""
+    work.best_cost[0] = value
+    for m in range(len(work.best)):
+        work.best[m] = work.sequence[m] if m < moves else 0
 
 
 @lean
-def advance(
-    cell: Any,
-    calm: Any,
-    keys: Any,
-    rules: Any,
-    work: Any,
-    seeds: Any,
-    epsilons: Any,
-    first: int,
-    costs: Any,
-    complete: Any,
-    sequences: Any,
-    ends: Any,
-) -> None:
-    """Sessions of the seeds (N,): E episodes numbered from `first`, and what the greedy policy costs then.
+def advance(learning: Any, work: Any, seeds: Any, epsilons: Any, first: int, found: Any) -> None:
+    """Sessions of the seeds (N,): E episodes numbered from `first`, and what the greedy policy costs then, into `found`.
 
-    first: 1, or how far the last session has come, as left in `work`. calm: the cell without chance. epsilons (E,);
-    costs, complete (N, E): of the episodes. sequences (N, L): the best so far; ends (N, 2): its cost, and the greedy
-    policy's. The only entry to this module's compiled sessions: each one more would take seconds to compile.
+    first: 1, or how far the last session has come, as left in `work`. epsilons (E,). The only entry to this module's
+    compiled sessions: each one more would take seconds to compile.
     """
+    cell, calm, method = learning.cell, learning.calm, learning.method
+    rules = method.rules
     for n in range(len(seeds)):
         if first == 1:
             _begin(work, seeds[n])
-        _advance(cell, keys, rules, work, seeds[n], epsilons, first, costs[n], complete[n])
+        for e in range(len(epsilons)):
+            times = _episode_seed(seeds[n], first + e)
+            moves = _episode(cell, method, work, epsilons[e], times, rules.learner != RANDOM)
+            value, complete = cost(cell, work.run), work.run.whole[2] == 0
+            found.costs[n, e], found.complete[n, e] = value, complete
+            _learn(rules, work, moves, value, work.best_cost[0])
+            if complete and value < work.best_cost[0]:
+                _keep(work, value, moves)
         stream = work.stream[0]
-        _episode(calm, keys, rules, work, 0.0, seeds[n], False)
+        _episode(calm, method, work, 0.0, seeds[n], False)
         work.stream[0] = stream
-        ends[n, 0], ends[n, 1] = work.best_cost[0], cost(calm, work.run)
+        found.ends[n, 0], found.ends[n, 1] = work.best_cost[0], cost(calm, work.run)
         for m in range(len(work.best)):
-            sequences[n, m] = work.best[m]
+            found.sequences[n, m] = work.best[m]

@@ -1,4 +1,4 @@
-"""A session of episodes that learns values of decisions: readable here, compiled in `episodes`, with the same numbers.
+"""A session of episodes that learns values of decisions: readable here, compiled in `session_kernels`, with the same numbers.
 
 Each choice takes the next of the session's uniform numbers, and each episode's chance has a seed of its own, so that
 both give the same sequences, costs and values. The compiled session is taken wherever a state fits in 63 bits.
@@ -15,11 +15,12 @@ from lab.learning.splitmix import MASK, stream, uniform
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.objectives import MAKESPAN, cost
-from lab.sequencing.methods import session_kernels as episodes
+from lab.sequencing.methods import session_arrays as arrays
+from lab.sequencing.methods import session_kernels
 from lab.sequencing.methods.state_keys import Key, Keys, State, decoded, key_of, keys_of, no_keys
 from lab.sequencing.methods.updates import best_of, explore, log_of
 from lab.sequencing.search import Log, Search, SrlSettings
-from lab.sequencing.simulate import arrays
+from lab.sequencing.simulate.cell_arrays import cell_arrays, most_moves
 from lab.sequencing.simulate.run import Run
 
 Table = dict[State, dict[int, float]]
@@ -49,16 +50,17 @@ class Values:
         return table
 
 
-class Learner:
+class SessionLearner:
     """What a session learns by. This one learns nothing and tries every allowed decision alike: random search."""
 
     name = "random"
     first = 0.0
 
     def __init__(self, search: Search) -> None:
+        self._search = search
         settings, keep = search.settings, log_of(1 - search.settings.alpha)
         per_state = settings.values == "states"
-        self.rules = arrays.Rules(
+        self.rules = arrays.LearningRules(
             learner=arrays.LEARNER_CODES[self.name],
             log_keep=keep,
             log_take=log_of(settings.alpha * settings.discount),
@@ -67,6 +69,11 @@ class Learner:
             type_a=settings.factor == "A",
             offset=0.0 if search.objective == MAKESPAN else 1.0,
         )
+
+    def learning(self, cell: Cell, keys: Keys) -> arrays.Learning:
+        """The same, compiled, in a cell; `keys`: those of its settings."""
+        there = cell_arrays(cell, self._search.objective, self._search.chance)
+        return arrays.Learning(there, cell_arrays(cell, self._search.objective), arrays.Method(keys, self.rules))
 
     def epsilon(self, episode: int) -> float:
         """The probability of a random decision in an episode, numbered from 1."""
@@ -87,7 +94,7 @@ class Learner:
         """After an episode: the keys that were visited, in order, and what it cost."""
 
 
-class GreedyLearner(Learner):
+class GreedyLearner(SessionLearner):
     """One that keeps values, and chooses by them more and more."""
 
     def __init__(self, search: Search) -> None:
@@ -138,13 +145,13 @@ class _Session:
 
     cell: Cell
     search: Search
-    learner: Learner
+    learner: SessionLearner
     draw: Callable[[], float]
     values: Values
     guide: Guide = field(default_factory=Guide)
 
 
-def learn(cell: Cell, search: Search, seed: int, kind: type[Learner]) -> Learned:
+def learn(cell: Cell, search: Search, seed: int, kind: type[SessionLearner]) -> Learned:
     """A session with the uniform numbers of a seed, 0 to 2**64 - 1; compiled, unless its states do not fit in 63 bits.
 
     Raises BadInput for an objective that the cell cannot be judged by, and for a cost of 0 where 1 / T is needed.
@@ -156,7 +163,9 @@ def learn(cell: Cell, search: Search, seed: int, kind: type[Learner]) -> Learned
     return learn_compiled(cell, search, seed, kind, keys)
 
 
-def learn_readably(cell: Cell, search: Search, seed: int, kind: type[Learner], guide: Guide | None = None) -> Learned:
+def learn_readably(
+    cell: Cell, search: Search, seed: int, kind: type[SessionLearner], guide: Guide | None = None
+) -> Learned:
     """`learn`, one move after the other in Python; a guide has a say in every decision, and is told how it went."""
     learner = kind(search)
     session = _Session(cell, search, learner, stream(seed), Values(learner.first))
@@ -211,38 +220,37 @@ def episode_seed(seed: int, episode: int) -> int:
     return int(uniform(~seed & MASK, episode) * 2.0**53)
 
 
-def learn_compiled(cell: Cell, search: Search, seed: int, kind: type[Learner], keys: Keys) -> Learned:
+def learn_compiled(cell: Cell, search: Search, seed: int, kind: type[SessionLearner], keys: Keys) -> Learned:
     """`learn`, compiled; `keys`: those of its settings."""
-    learner, noted, longest = kind(search), Log(search), arrays.most_moves(cell)
-    there = arrays.cell_arrays(cell, search.objective, search.chance)
-    calm = arrays.cell_arrays(cell, search.objective)
-    memory = arrays.memory_for(keys.size, min(search.episodes * longest, max(ROWS, BLOCK * longest)), learner.first)
-    work, seeds = arrays.work_for(cell, memory), np.array([seed], np.uint64)
-    best, ends = np.zeros((1, longest), np.int64), np.zeros((1, 2))
+    learner, noted, longest = kind(search), Log(search), most_moves(cell)
+    learning = learner.learning(cell, keys)
+    memory = arrays.value_table(keys.size, min(search.episodes * longest, max(ROWS, BLOCK * longest)), learner.first)
+    work, seeds = arrays.session_arrays(cell, memory), np.array([seed], np.uint64)
+    final_cost = 0.0
     for first in range(1, search.episodes + 1, BLOCK):
         numbers = range(first, min(first + BLOCK, search.episodes + 1))
         work = _with_room(work, keys, len(numbers) * longest)
-        costs, complete = np.zeros((1, len(numbers))), np.zeros((1, len(numbers)), np.bool_)
+        found = arrays.Found.room(1, len(numbers), longest)
         epsilons = np.array([learner.epsilon(episode) for episode in numbers])
-        episodes.advance(there, calm, keys, learner.rules, work, seeds, epsilons, first, costs, complete, best, ends)
-        sequence = tuple(best[best > 0].tolist())
-        for value, done in zip(costs[0].tolist(), complete[0].tolist(), strict=True):
+        session_kernels.advance(learning, work, seeds, epsilons, first, found)
+        sequence, final_cost = tuple(found.sequences[found.sequences > 0].tolist()), float(found.ends[0, 1])
+        for value, done in zip(found.costs[0].tolist(), found.complete[0].tolist(), strict=True):
             learner.check(value)
             noted.note(sequence, value, done)
-    return Learned(noted, float(ends[0, 1]), _table(keys, work.memory))
+    return Learned(noted, final_cost, _table(keys, work.memory))
 
 
-def _with_room(work: arrays.Work, keys: Keys, rows: int) -> arrays.Work:
+def _with_room(work: arrays.SessionArrays, keys: Keys, rows: int) -> arrays.SessionArrays:
     """The same with a table that has room for so many rows more, or for all there are."""
     memory, full = work.memory, int(work.memory.used[0]) + rows
     if full < len(memory.keys) or len(memory.keys) > keys.size:
         return work
-    larger = arrays.memory_for(keys.size, 2 * full, float(memory.values[0]))
-    episodes.copy_rows(memory, larger)
+    larger = arrays.value_table(keys.size, 2 * full, float(memory.values[0]))
+    session_kernels.copy_rows(memory, larger)
     return work._replace(memory=larger)
 
 
-def _table(keys: Keys, memory: arrays.Memory) -> Table:
+def _table(keys: Keys, memory: arrays.ValueTable) -> Table:
     """The rows of a table, by state and decision as in `key_of`."""
     table: Table = {}
     filled = slice(1, int(memory.used[0]) + 1)

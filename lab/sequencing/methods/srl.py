@@ -6,11 +6,11 @@ from math import exp
 import numpy as np
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import LearnedSequence
+from lab.sequencing.cell.chance import drawn_seed
 from lab.sequencing.methods.sessions import GreedyLearner, Table, Values, learn
 from lab.sequencing.methods.state_keys import Key
 from lab.sequencing.methods.updates import log_factor, log_sum
-from lab.sequencing.search import Search, kernel_seed
+from lab.sequencing.search import LearnedSequence, Search
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def srl(cell: Cell, search: Search, rng: np.random.Generator) -> SrlResult:
     Raises BadInput for an objective that the cell has not got what it takes for, and for type B when a makespan is 0 s;
     WorkFailed when every episode ended in a deadlock. Source: thesis fig. 5.1, eq. 5.1 to 5.4.
     """
-    learned = learn(cell, search, kernel_seed(rng), Srl)
+    learned = learn(cell, search, drawn_seed(rng), Srl)
     log = learned.log
     log.check(cell)
     return SrlResult(log.best, log.best_cost, tuple(log.costs), learned.final_cost, learned.table)

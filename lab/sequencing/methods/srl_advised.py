@@ -14,12 +14,12 @@ from lab.learning.requests import AdvisorLeft
 from lab.learning.selection import softmax
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import LearnedSequence
+from lab.sequencing.cell.chance import drawn_seed
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.exact_values import ExactValues
 from lab.sequencing.methods.sessions import Guide, learn_readably
 from lab.sequencing.methods.srl import Srl
-from lab.sequencing.search import Search, kernel_seed
+from lab.sequencing.search import LearnedSequence, Search
 from lab.sequencing.simulate.run import Run
 
 NEVER_REACHED = 10**12  # a cost that no episode has, so that a gate takes every episode for a finished one
@@ -142,7 +142,7 @@ def advised_srl(
     """
     check_advice("none", gate.gate)
     session = _Advised(GATES[gate.gate](gate, search.episodes, NEVER_REACHED, None), gate, advisor)
-    learned = learn_readably(cell, search, kernel_seed(rng), Srl, session)
+    learned = learn_readably(cell, search, drawn_seed(rng), Srl, session)
     log = learned.log
     log.check(cell)
     return AdvisedResult(

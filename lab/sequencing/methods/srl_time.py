@@ -8,11 +8,10 @@ import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, machine_places, stuck_cost
-from lab.sequencing.cell.schedule import LearnedSequence
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
-from lab.sequencing.search import SAME, Log, Search
-from lab.sequencing.simulate.merged import Key, MergedCell, State
+from lab.sequencing.search import SAME, LearnedSequence, Log, Search
+from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
 
 SMALL_JOBS = (5, 6, 7)  # parts; what is learned with so few is tried with more
 PRACTICE, TRIES = 5, 20  # each small job is practised in a fifth of the episodes, and tried in a twentieth
@@ -49,10 +48,10 @@ def srl_time(cell: Cell, search: Search, rng: np.random.Generator) -> SrlTimeRes
     """
     search.check(cell)
     log, final = Log(search), inf
-    learner, left = Learner(cell, search.objective, rng), search.episodes
+    learner, left = TimeLearner(cell, search.objective, rng), search.episodes
     for parts in SMALL_JOBS if _many_alike(cell) else ():
         practice, tries = search.episodes // PRACTICE, search.episodes // TRIES
-        small = Learner(replace(cell, order=cell.order[:parts]), search.objective, rng)
+        small = TimeLearner(replace(cell, order=cell.order[:parts]), search.objective, rng)
         for _ in range(practice):
             small.episode()
         for _ in range(tries):
@@ -72,7 +71,7 @@ def _many_alike(cell: Cell) -> bool:
     return alike and cell.parts > max(SMALL_JOBS)
 
 
-class Learner:
+class TimeLearner:
     """The table, and how an episode goes. distinct: alike parts are told apart, which due times make necessary."""
 
     def __init__(self, cell: Cell, objective: str, rng: np.random.Generator) -> None:
@@ -84,11 +83,11 @@ class Learner:
         self.stuck_cost, self._machines = stuck_cost(cell, objective), machine_places(cell)
         self._all_work_s = sum(place.processing_s or 0.0 for place in cell.positions)
 
-    def greedy(self, state: State) -> Action:
+    def greedy(self, state: MergedState) -> Action:
         """The action of least cost to come."""
         return self._best(self._row(state))
 
-    def episode(self, begin: State | None = None, *, learns: bool = True) -> tuple[tuple[int, ...], float, bool]:
+    def episode(self, begin: MergedState | None = None, *, learns: bool = True) -> tuple[tuple[int, ...], float, bool]:
         """One greedy pass, from the start or from `begin`; the decisions, their cost, and whether it came to its end."""
         state, sequence, total = begin or self.merged.start(named=True), list[int](), 0.0
         steps: list[tuple[Row, Action, float, Row]] = []
@@ -107,7 +106,7 @@ class Learner:
             row[action] = cost + min(following.values(), default=rest)
         return tuple(sequence), total if done else self.stuck_cost, done
 
-    def step(self, state: State, action: Action) -> tuple[State, float]:
+    def step(self, state: MergedState, action: Action) -> tuple[MergedState, float]:
         """The state after an action, and what that adds to the cost."""
         place, choice, part = action
         way = self.merged.choices(state)[place, choice]
@@ -121,7 +120,7 @@ class Learner:
         worked = self.merged.process[way.option.to] or 0
         return ahead, (self._machines * (ahead.now - state.now) - worked) / TICKS_PER_S
 
-    def tried_on(self, job: "Learner") -> tuple[tuple[int, ...], float, bool]:
+    def tried_on(self, job: "TimeLearner") -> tuple[tuple[int, ...], float, bool]:
         """One greedy pass through a larger job by what was learned in this one; what `episode` returns.
 
         As how many the done parts count while others still wait is drawn. Where nothing is known it serves any part.
@@ -137,7 +136,7 @@ class Learner:
         complete = job.merged.done(state)
         return tuple(sequence), total if complete else job.stuck_cost, complete
 
-    def actions(self, state: State) -> Iterator[Action]:
+    def actions(self, state: MergedState) -> Iterator[Action]:
         """What may be done now: from which position, by which of its ways, and with which part where that matters."""
         for place, choice in self.merged.choices(state):
             if not self.distinct or state.who is None:
@@ -147,7 +146,7 @@ class Learner:
             for part in state.who[place][:1] if in_order else state.who[place]:
                 yield place, choice, part
 
-    def _as_if_small(self, job: MergedCell, state: State, done: int) -> Key:
+    def _as_if_small(self, job: MergedCell, state: MergedState, done: int) -> MergedKey:
         """The state of a larger job as it would be with this one's few: those that wait and those that are done are fewer."""
         counts, first, ends = job.counted(state.counts), self._cell.starts[0], job.ends
         finished = sum(counts[place] for place in ends)
@@ -159,14 +158,14 @@ class Learner:
         _, robot, waits = job.key(state)
         return job.code(counts), robot, waits
 
-    def _row(self, state: State) -> Row:
+    def _row(self, state: MergedState) -> Row:
         """The values of what may be done now; none when all is done, or nothing can move any more."""
         key = (*self.merged.key(state), state.now, state.who) if self.distinct else self.merged.key(state)
         if key not in self.q:
             self.q[key] = {action: self._at_least(state, action) for action in self.actions(state)}
         return self.q[key]
 
-    def _at_least(self, state: State, action: Action) -> float:
+    def _at_least(self, state: MergedState, action: Action) -> float:
         """What an action costs, and what has to come at least after it."""
         ahead, cost = self.step(state, action)
         if self._bound is None:
@@ -174,11 +173,11 @@ class Learner:
         least_s = self._bound.left(ahead) / TICKS_PER_S
         return cost + (least_s if self._objective == MAKESPAN else self._machines * least_s - self._work_left_s(ahead))
 
-    def _work_left_s(self, state: State) -> float:
+    def _work_left_s(self, state: MergedState) -> float:
         """More than what machines still will be given to do [s]."""
         return (self._cell.parts - self.merged.finished(state)) * self._all_work_s
 
-    def _late(self, state: State) -> float:
+    def _late(self, state: MergedState) -> float:
         """What the part costs that was just finished."""
         due_s = self._cell.due_s
         if due_s is None:

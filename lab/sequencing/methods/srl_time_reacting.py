@@ -5,7 +5,7 @@ import numpy as np
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.routes import choice_of, part_of
-from lab.sequencing.methods.srl_time import Learner
+from lab.sequencing.methods.srl_time import TimeLearner
 from lab.sequencing.simulate.execution import Choose, Observed, Policy
 
 PRACTICE = 20  # simulated episodes before each decision
@@ -18,7 +18,7 @@ def reacting(cell: Cell, objective: str = MAKESPAN, seed: int = 0, practice: int
     is the one of `srl_time`, and it is kept from decision to decision and from episode to episode, so that little is
     learned twice. Source: learning real-time A* (Korf 1990), as `srl_time`; certainty equivalence for the times.
     """
-    learner = Learner(cell, objective, np.random.default_rng(seed))
+    learner = TimeLearner(cell, objective, np.random.default_rng(seed))
 
     def choose(seen: Observed, allowed: tuple[int, ...]) -> int:
         """The decision that serves the position of least cost to come; of alike parts the one that is ready first."""

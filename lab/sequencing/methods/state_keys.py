@@ -7,7 +7,7 @@ import numpy as np
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Position, entry, part_of
 from lab.sequencing.search import SrlSettings
-from lab.sequencing.simulate.arrays import Ints, most_choices
+from lab.sequencing.simulate.cell_arrays import Ints, most_choices
 from lab.sequencing.simulate.run import Run
 
 State = tuple[int, ...]

@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.chance import Chance, Episode
+from lab.sequencing.cell.chance import Chance, Episode, drawn_seed
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective, cost
-from lab.sequencing.cell.routes import choice_of, part_of
-from lab.sequencing.cell.schedule import Move, Schedule
-from lab.sequencing.methods.rules import Rule, usable
-from lab.sequencing.search import kernel_seed
-from lab.sequencing.simulate.run import Run, branch, follow, take_over
+from lab.sequencing.cell.routes import part_of
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.simulate.run import Run, follow, take_over
 
 WAIT = 0  # the decision to stay where the robot is until something happens: a machine finishes, a part arrives
 
@@ -24,21 +22,19 @@ WAIT = 0  # the decision to stay where the robot is until something happens: a m
 class Observed(Run):
     """What can be known of a run while it goes on; itself a run, by the mean times, so that it can be played on.
 
-    ready: whether each part may be picked now, part 1 first. busy_s: for how long the part's machine has been working
-    on it [s]; 0 where none is. ready_s: when it was ready or, as long as it is not, when it should be: by the mean time
-    since it began, and now when it is later than that. processed_s counts means for what is not finished.
+    ready: whether each part may be picked now, part 1 first. ready_s: when it was ready or, as long as it is not, when
+    it should be: by the mean time since it began, and now when it is later than that. processed_s counts means for what
+    is not finished.
     """
 
     def __init__(self, run: Run) -> None:
         super().__init__(run.cell)
         take_over(self, run)
         self.ready: tuple[bool, ...] = ()
-        self.busy_s: tuple[float, ...] = ()
 
 
 Choose = Callable[[Observed, tuple[int, ...]], int]  # (what is known, allowed decisions) -> one of them, or WAIT
 Policy = Callable[[Cell], Choose]  # called once an episode: what it remembers is of that episode
-Plan = Callable[[Run], Sequence[int]]  # the decisions from a run on, by the run's own times
 
 
 class Execution:
@@ -59,15 +55,12 @@ class Execution:
         seen.ready = tuple(
             ready_s <= run.now_s and not self._coming(index) for index, ready_s in enumerate(run.ready_s)
         )
-        busy_s = [0.0] * run.cell.parts
         for index, ready in enumerate(seen.ready):
             if not ready and not self._at_start(index):
                 began_s, mean_s = self._began_s[index], self._mean_s[index]
-                busy_s[index] = run.now_s - began_s
                 seen.ready_s[index] = max(run.now_s, began_s + mean_s)
                 seen.processed_s += mean_s - (run.ready_s[index] - began_s)
         self._expect_arrivals(seen)
-        seen.busy_s = tuple(busy_s)
         return seen
 
     def step(self, decision: int) -> None:
@@ -85,10 +78,6 @@ class Execution:
         place = run.cell.positions[run.locations[index]]
         if place.processing_s is not None:
             self._began_s[index], self._mean_s[index] = move.drop_s, place.processing_s
-
-    def schedule(self) -> Schedule:
-        """The schedule of what has been carried out."""
-        return Schedule.from_moves(self.run.cell, self.moves, self.sequence, self._came_s)
 
     def _wait(self) -> None:
         run = self.run
@@ -150,78 +139,9 @@ def replicate(
             raise BadInput(f"{name} = {value}: allowed are whole numbers from {least}")
     rng, costs = np.random.default_rng(seed), np.empty(episodes)
     for number in range(episodes):
-        times = Episode(cell, chance, kernel_seed(rng))
+        times = Episode(cell, chance, drawn_seed(rng))
         run = carry_out(cell, how, times).run if callable(how) else follow(cell, how, times)
         if not run.done and not callable(how) and run.allowed():
             raise BadInput(f"the sequence ends after {len(how)} moves, but not every part is finished")
         costs[number] = cost(run, objective)
     return costs
-
-
-def by_rule(rule: Rule) -> Policy:
-    """A dispatching rule as a policy: it goes by what is known, and by the means for what is not."""
-    return lambda cell: rule
-
-
-def replan(plan: Plan | None = None, objective: str = MAKESPAN) -> Policy:
-    """A policy that plans the rest of the work anew at every decision, by mean times, and takes the first step of it.
-
-    plan: called with the observed run, to be branched, not moved; None: `rollout` for the objective. A run of the policy
-    raises BadInput for an objective that the cell does not allow and for a plan that begins with what may not be done,
-    WorkFailed for one of nothing.
-    """
-
-    def policy(cell: Cell) -> Choose:
-        check_objective(objective, cell)
-
-        def choose(seen: Observed, allowed: tuple[int, ...]) -> int:
-            decisions = rollout(seen, objective) if plan is None else plan(seen)
-            if not decisions:
-                raise WorkFailed(f"the planner found nothing to do at {seen.now_s:g} s; parts are left")
-            return decisions[0]
-
-        return choose
-
-    return policy
-
-
-def rollout(run: Run, objective: str = MAKESPAN, depth: int = 1) -> tuple[int, ...]:
-    """The best of: each allowed decision, `depth` of them in a row, then each of the dispatching rules to the end.
-
-    A bounded search: branching ** depth times as many simulations as there are rules. Of alike parts in one position,
-    which a swap does not change, only the first to be ready is tried. Ties to the decision tried first.
-    Source: Bertsekas, Tsitsiklis and Wu 1997, rollout algorithms for combinatorial optimization.
-    """
-    allowed = _distinct(run)
-    if depth == 0 or not allowed:
-        return min((_finish(run, rule, objective) for rule in usable(run.cell).values()), key=lambda tail: tail[0])[1]
-    best: tuple[float, tuple[int, ...]] | None = None
-    for decision in allowed:
-        ahead = branch(run)
-        ahead.move(decision)
-        tail = rollout(ahead, objective, depth - 1)
-        for move in tail:
-            ahead.move(move)
-        value = cost(ahead, objective)
-        if best is None or value < best[0]:
-            best = value, (decision, *tail)
-    assert best is not None  # there was an allowed decision
-    return best[1]
-
-
-def _distinct(run: Run) -> list[int]:
-    """Of the allowed decisions those that differ: by position, choice and due time."""
-    parts, due_s = run.cell.parts, run.cell.due_s
-    found: dict[tuple[int, int, float], int] = {}
-    for decision in sorted(run.allowed(), key=lambda decision: (run.ready_s[part_of(decision, parts) - 1], decision)):
-        index = part_of(decision, parts) - 1
-        found.setdefault((run.locations[index], choice_of(decision, parts), due_s[index] if due_s else 0.0), decision)
-    return list(found.values())
-
-
-def _finish(run: Run, rule: Rule, objective: str) -> tuple[float, tuple[int, ...]]:
-    ahead, tail = branch(run), []
-    while allowed := ahead.allowed():
-        tail.append(rule(ahead, allowed))
-        ahead.move(tail[-1])
-    return cost(ahead, objective), tuple(tail)

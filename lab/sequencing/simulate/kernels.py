@@ -7,7 +7,7 @@ import numpy as np
 
 from lab.learning import splitmix
 from lab.learning.compiled import inner, lean
-from lab.sequencing.simulate.arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES
+from lab.sequencing.simulate.cell_arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES
 
 CLOCK, PICK = ARRIVAL_CODES["clock"], ARRIVAL_CODES["pick"]
 CONSTANT, NORMAL = LAW_CODES["constant"], LAW_CODES["normal"]
@@ -15,9 +15,9 @@ MAKESPAN, TARDINESS, ROBOT_IDLE, MACHINE_IDLE = (
     OBJECTIVE_CODES[name] for name in ("makespan", "mean-tardiness", "robot-idle", "machine-idle")
 )
 
-mixed: Any = inner(splitmix.mixed)
-fraction: Any = inner(splitmix.fraction)
-_state_at: Any = inner(splitmix.state_at)
+mixed: Any = inner(splitmix.mixed, inline="always")
+fraction: Any = inner(splitmix.fraction, inline="always")
+_state_at: Any = inner(splitmix.state_at, inline="always")
 
 
 @lean

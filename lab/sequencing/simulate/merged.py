@@ -13,11 +13,11 @@ from lab.sequencing.simulate.run import Run
 _BITS = 8  # a count in the code of all counts; MAX_PARTS fits
 _LOW = (1 << _BITS) - 1
 Choices = Mapping[tuple[int, int], Way]  # by position and choice, in their order
-Key = tuple[int, int, tuple[int, ...]]
+MergedKey = tuple[int, int, tuple[int, ...]]
 Who = tuple[tuple[int, ...], ...]
 
 
-class State(NamedTuple):
+class MergedState(NamedTuple):
     """Between two moves, in ticks: how many parts stand in each position, the robot's station, what is waited for.
 
     Of the parts of one product in one position the first that is ready goes first. waits: by slot (see `MergedCell`),
@@ -33,7 +33,7 @@ class State(NamedTuple):
     who: Who | None = None
     way: Way | None = None
     part: int = 0
-    parent: "State | None" = None
+    parent: "MergedState | None" = None
 
 
 class MergedCell:
@@ -60,7 +60,7 @@ class MergedCell:
             self._ways[way.place].append(way)
         self._known: dict[int, Choices] = {}
 
-    def start(self, *, named: bool = False) -> State:
+    def start(self, *, named: bool = False) -> MergedState:
         """Where all begins; `named`: parts are told from one another."""
         cell, waits = self.cell, list[tuple[int, ...]]([()] * len(self.slots))
         if self._intervals:
@@ -68,9 +68,9 @@ class MergedCell:
             waits.append(first if self.one_by_one else tuple(accumulate(self._intervals)))
         who = [tuple(n for n, start in enumerate(cell.starts, 1) if start == at) for at in range(len(cell.positions))]
         robot = cell.index(cell.robot_start)
-        return State(0, self._code_of(cell.starts), robot, tuple(waits), tuple(who) if named else None)
+        return MergedState(0, self._code_of(cell.starts), robot, tuple(waits), tuple(who) if named else None)
 
-    def of_run(self, run: Run) -> State:
+    def of_run(self, run: Run) -> MergedState:
         """Where a run is, to go on from by the cell's own times; parts are told from one another."""
         now, ready = round(run.now_s * TICKS_PER_S), [round(ready_s * TICKS_PER_S) for ready_s in run.ready_s]
         who: list[list[int]] = [[] for _ in self._ways]
@@ -83,7 +83,7 @@ class MergedCell:
         waits = [tuple([max(ready[part - 1], now) for part in who[place]]) for place in self.slots]
         if self._intervals:
             waits.append(tuple(ready[part - 1] for part in sorted(n for place in self.starts for n in who[place])))
-        return State(now, self._code_of(run.locations), run.robot, tuple(waits), tuple(map(tuple, who)))
+        return MergedState(now, self._code_of(run.locations), run.robot, tuple(waits), tuple(map(tuple, who)))
 
     def code(self, counts: Sequence[int]) -> int:
         """The parts in each position as one number."""
@@ -93,36 +93,36 @@ class MergedCell:
         """The parts in each position, of such a number."""
         return [counts >> _BITS * place & _LOW for place in range(len(self._ways))]
 
-    def finished(self, state: State) -> int:
+    def finished(self, state: MergedState) -> int:
         """How many parts are at an end of their routes."""
         return sum([state.counts >> _BITS * place & _LOW for place in self.ends])
 
-    def done(self, state: State) -> bool:
+    def done(self, state: MergedState) -> bool:
         """Whether all parts are finished."""
         return self.finished(state) == self.cell.parts
 
-    def fetched(self, state: State) -> int:
+    def fetched(self, state: MergedState) -> int:
         """How many parts have left their first station."""
         return self.cell.parts - sum([state.counts >> _BITS * place & _LOW for place in self.starts])
 
-    def key(self, state: State) -> Key:
+    def key(self, state: MergedState) -> MergedKey:
         """All that the future depends on when parts are alike: counts, robot, how long there is still to wait."""
         now = state.now
         return state.counts, state.robot, tuple([max(at - now, 0) for row in state.waits for at in row])
 
-    def choices(self, state: State) -> Choices:
+    def choices(self, state: MergedState) -> Choices:
         """The ways that may be taken now: one an option of a position, since its parts are alike."""
         known = self._known.get(state.counts)
         if known is None:
             known = self._known[state.counts] = self._allowed(self.counted(state.counts))
         return known
 
-    def successors(self, state: State) -> Iterator[State]:
+    def successors(self, state: MergedState) -> Iterator[MergedState]:
         """The states after each of them."""
         for way in self.choices(state).values():
             yield self.after(state, way)
 
-    def after(self, state: State, way: Way, part: int = 0) -> State:
+    def after(self, state: MergedState, way: Way, part: int = 0) -> MergedState:
         """The state after a way that may be taken, by the first part that is ready or, where they are named, by `part`."""
         place, option, work = way
         waits, who, first = list(state.waits), state.who, 0
@@ -151,19 +151,19 @@ class MergedCell:
             rows.append(self._left_to_come(coming, self.fetched(state), pick) if starts else coming)
         named = None if who is None else self._moved(who, way, first, behind)
         counts = state.counts + (1 << _BITS * option.to) - (1 << _BITS * place)
-        return State(now, counts, option.target, tuple(rows), named, way, part, state)
+        return MergedState(now, counts, option.target, tuple(rows), named, way, part, state)
 
-    def waited(self, state: State, ahead: State) -> int:
+    def waited(self, state: MergedState, ahead: MergedState) -> int:
         """How long the robot waited in the move from a state to the one ahead of it."""
         assert ahead.way is not None
         return ahead.now - state.now - ahead.way.work - self._empty[state.robot][ahead.way.option.origin]
 
-    def decision(self, state: State) -> int:
+    def decision(self, state: MergedState) -> int:
         """The entry of a sequence that led to a state, where parts are named."""
         assert state.way is not None
         return entry(state.part, state.way.option.choice, self.cell.parts)
 
-    def decisions(self, state: State) -> tuple[int, ...]:
+    def decisions(self, state: MergedState) -> tuple[int, ...]:
         """All entries from the start to a state in which parts need not be named."""
         ways, named = list[Way](), self.start(named=True)
         while state.way is not None and state.parent is not None:

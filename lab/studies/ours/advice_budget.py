@@ -14,7 +14,7 @@ from lab.studies.ours.advice_budget_figures import of_ccrl, of_gates
 from lab.studies.runner import Job
 from lab.studies.statistics import share
 from lab.studies.thesis.chapter_9 import ADVISOR, EXACT, RECONSTRUCTED
-from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, measured
+from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, measured
 
 WORLDS = ("world-1", "world-2")
 WRONG, NOBODY = "wrong", "nobody"
@@ -69,15 +69,15 @@ def advice_budget(job: Job, reading: Mapping[str, Any]) -> Findings:
     return Findings(rows + below, in_short(rows, below), pictures, notes)
 
 
-Cell = tuple[str, str, str, bool]  # world, gate, advisor, memory
+Asked = tuple[str, str, str, bool]  # world, gate, advisor, memory
 
 
-def settings() -> dict[Cell, Setting]:
+def settings() -> dict[Asked, AdviceSetting]:
     """What is measured; nobody: the gate never asks."""
-    cells: dict[Cell, Setting] = {}
+    cells: dict[Asked, AdviceSetting] = {}
     for place in WORLDS:
         for memory in (False, True):
-            alone = Setting(place, memory=memory, advisor_table="exact")
+            alone = AdviceSetting(place, memory=memory, advisor_table="exact")
             cells[place, "never", NOBODY, memory] = alone
             for gate in ASKING:
                 for name in ADVISORS:
@@ -86,7 +86,7 @@ def settings() -> dict[Cell, Setting]:
     return cells
 
 
-def rows_of(cell: Cell, outcome: Outcome, table: str) -> list[Row]:
+def rows_of(cell: Asked, outcome: AdviceOutcome, table: str) -> list[Row]:
     """The measures of one cell; where the project has a target it stands beside them."""
     place, gate, name, memory = cell
     named: Row = {"world": place, "view": "full", "gate": gate, "memory": memory, "advisor": name}
@@ -103,7 +103,7 @@ def rows_of(cell: Cell, outcome: Outcome, table: str) -> list[Row]:
     return rows
 
 
-def difference(one: Outcome, other: Outcome) -> tuple[float, float, float]:
+def difference(one: AdviceOutcome, other: AdviceOutcome) -> tuple[float, float, float]:
     """How much more often one setting's sessions succeed than another's, low and high end, in points.
 
     Source: R. G. Newcombe, Statistics in Medicine 17 (1998), 873-890, method 10.
@@ -113,7 +113,7 @@ def difference(one: Outcome, other: Outcome) -> tuple[float, float, float]:
     return gap, gap - hypot(percent - low, than_high - than), gap + hypot(high - percent, than - than_low)
 
 
-def worst(outcomes: Mapping[Cell, Outcome], place: str, gates: Sequence[str] = CCRL) -> list[Row]:
+def worst(outcomes: Mapping[Asked, AdviceOutcome], place: str, gates: Sequence[str] = CCRL) -> list[Row]:
     """The advisor (and gate) with whom sessions with memory succeed least, against nobody, without and with memory."""
     of = {(gate, name): outcomes[place, gate, name, True] for gate in gates for name in ADVISORS}
     gate, name = min(of, key=lambda cell: of[cell].success.mean())

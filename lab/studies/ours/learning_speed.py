@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from lab.learning.batch import run_sessions
 from lab.learning.settings import GateSettings
 from lab.studies.findings import Findings, Row, agreement, median_row
 from lab.studies.ours.learning_speed_rivals import RIVALS
-from lab.studies.ours.learning_speed_session import Missing
+from lab.studies.ours.learning_speed_session import Measured, Missing
 from lab.studies.runner import Job
 from lab.studies.thesis.chapter_9_sessions import learned_table, world
 
@@ -34,33 +35,31 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
     advice = Advice.of(skill(learned_table(place), 0.1))
     seeds = np.arange(job.seed, job.seed + job.sessions, dtype=np.uint64)
 
-    def learned(*gates: GateSettings) -> tuple[int, float]:
+    def learned(*gates: GateSettings) -> Measured:
         began, moves = time.perf_counter(), 0
         for gate in gates:
             moves += int(run_sessions(mdp, learner, gate, advice, seeds).moves.sum())
-        return moves, time.perf_counter() - began
+        return Measured(moves, time.perf_counter() - began)
 
-    def against(name: str) -> tuple[int, float]:
-        measured = RIVALS[name](mdp, learner, min(FEW.get(name, SESSIONS), job.sessions), job.seed)
-        return measured.moves, measured.seconds
+    def against(name: str) -> Row | str:
+        """The row of a rival, or why there is none."""
+        sessions = min(FEW.get(name, SESSIONS), job.sessions)
+        try:
+            return _row(name, lambda: RIVALS[name](mdp, learner, sessions, job.seed))
+        except Missing as error:
+            return f"{name}: not measured: {error}"
 
     rows = [_row("kernel", partial(learned, GateSettings("never"))), _row("kernel gated", partial(learned, *GATES))]
-    missing = []
-    for number, name in enumerate(RIVALS):
-        job.progress(number, len(RIVALS))
-        try:
-            rows.append(_row(name, partial(against, name)))
-        except Missing as error:
-            missing.append(f"{name}: not measured: {error}")
-    job.progress(len(RIVALS), len(RIVALS))
-    fastest = max(one["value"] for one in rows[2:]) if len(rows) > 2 else None
-    summary = agreement(rows) | {
-        "kernel to the fastest rival": None if fastest is None else round(rows[0]["value"] / fastest, 2)
-    }
-    return Findings(rows, summary, {}, (ABOUT.format(job.sessions), *missing))
+    found = job.in_turn([partial(against, name) for name in RIVALS])
+    rivals = [one for one in found if not isinstance(one, str)]
+    fastest = max((one["value"] for one in rivals), default=inf)
+    ratio = round(rows[0]["value"] / fastest, 2) if rivals else None
+    missing = [one for one in found if isinstance(one, str)]
+    summary = agreement(rows + rivals) | {"kernel to the fastest rival": ratio}
+    return Findings(rows + rivals, summary, {}, (ABOUT.format(job.sessions), *missing))
 
 
-def _row(name: str, run: Callable[[], tuple[int, float]]) -> Row:
+def _row(name: str, run: Callable[[], Measured]) -> Row:
     run()  # compiles
-    rates = [moves / seconds / 1e6 for moves, seconds in (run() for _ in range(REPEATS))]
+    rates = [found.moves / found.seconds / 1e6 for found in (run() for _ in range(REPEATS))]
     return median_row({"name": name, "world": "world-1"}, "speed_million steps per s", rates)

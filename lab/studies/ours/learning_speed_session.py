@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
@@ -24,8 +25,7 @@ class Measured:
 
     moves: int
     seconds: float
-    success_percent: float
-    compile_seconds: float = 0.0
+    success_percent: float = nan
 
 
 Rival = Callable[[TabularMDP, LearnerSettings, int, int], Measured]  # (problem, settings, sessions, seed)

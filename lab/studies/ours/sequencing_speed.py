@@ -3,19 +3,19 @@
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
+from itertools import chain
 from math import inf, isfinite
 from typing import Any
 
 import numpy as np
 
 from lab.sequencing import SEQUENCERS
-from lab.sequencing.cell.schedule import EpisodeSequenced
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.many_sessions import run_sessions
 from lab.sequencing.methods.sessions import learn_readably
 from lab.sequencing.methods.srl import Srl
-from lab.sequencing.search import Search, SrlSettings
+from lab.sequencing.search import EpisodeSequenced, Search, SrlSettings
 from lab.studies.findings import Findings, Row, agreement, median_row, row, those
 from lab.studies.runner import Job
 from lab.studies.thesis.chapter_7_cells import robot_cell
@@ -29,7 +29,6 @@ NEAR = 0.01  # above the optimum, as a fraction
 CP_SAT_LIMIT_S = 60.0
 REPEATS = 5
 RATE, SECONDS = "speed_thousand episodes per s", "wall_s"
-Timed = tuple[float, float]  # what was done, and in how many seconds
 ABOUT = (
     f"One process on one core, median of {REPEATS} runs, lowest and highest beside it; compiling is not counted. Rates: SRL of "
     f"type B and random search, {{}} sessions of {EPISODES} episodes, {TOASTS} toasts in case I; 'readable' is the same session "
@@ -44,80 +43,70 @@ ABOUT_MANY = (
 
 def sequencing_speed(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Rates, seconds and their ratios; the reading changes nothing here."""
-    total = 3 + len(CASES) * (len(PROVEN) + 2)
-    tell = _Count(job, total)
-    rates = _rates(job, tell)
-    proofs = [_proof(case, toasts, tell) for toasts in PROVEN for case in CASES]
-    learned, missed, solved = [], list[str](), []
-    for case in CASES:
-        near_s = _seconds_to_near(case, job)
-        learned += near_rows(case, near_s)
-        tell()
-        solved += solved_rows(case, missed, job.seed)
-        tell()
-    rows = [*rates, *proofs, *learned, *solved]
+    steps: list[Callable[[], list[Row]]] = [
+        *(partial(_rate, name, run) for name, run in _rated(job).items()),
+        *(partial(_proof, case, toasts) for toasts in PROVEN for case in CASES),
+        *(partial(near_rows, case, job) for case in CASES),
+        *(partial(solved_rows, case, job.seed) for case in CASES),
+    ]
+    found = job.in_turn(steps)
+    rates, learned, solved = found[:3], found[-2 * len(CASES) : -len(CASES)], found[-len(CASES) :]
+    missed = [
+        f"CP-SAT found no sequence for {MANY} toasts in case {case} within {CP_SAT_LIMIT_S:g} s."
+        for case, some in zip(CASES, solved, strict=True)
+        if not some
+    ]
     notes = (ABOUT.format(job.sessions), ABOUT_MANY.format(CP_SAT_LIMIT_S), *missed)
-    return Findings(rows, ratios(rates, learned, solved) | agreement(rows), {}, notes)
+    rows = list(chain(*found))
+    summary = ratios(*(list(chain(*some)) for some in (rates, learned, solved)))
+    return Findings(rows, summary | agreement(rows), {}, notes)
 
 
-class _Count:
-    """Tells the job how much of all is done, one more at each call."""
+def _rated(job: Job) -> dict[str, Callable[[], int]]:
+    """What is timed, by name; each returns how many episodes it was."""
+    cell, search = robot_cell("I", TOASTS), Search(EPISODES, settings=SrlSettings(beta=0.5, factor="B"))
 
-    def __init__(self, job: Job, total: int) -> None:
-        self._job, self._done, self._total = job, -1, total
-        self()
-
-    def __call__(self) -> None:
-        self._done += 1
-        self._job.progress(self._done, self._total)
-
-
-def _rates(job: Job, tell: Callable[[], None]) -> list[Row]:
-    cell = robot_cell("I", TOASTS)
-    search = Search(EPISODES, settings=SrlSettings(beta=0.5, factor="B"))
-
-    def compiled(method: str) -> Timed:
-        began = time.perf_counter()
+    def compiled(method: str) -> int:
         run_sessions(cell, method, search, job.sessions, job.seed)
-        return job.sessions * EPISODES, time.perf_counter() - began
+        return job.sessions * EPISODES
 
-    def readable() -> Timed:
-        began = time.perf_counter()
+    def readable() -> int:
         for seed in range(READABLE_SESSIONS):
             learn_readably(cell, search, seed, Srl)
-        return READABLE_SESSIONS * EPISODES, time.perf_counter() - began
+        return READABLE_SESSIONS * EPISODES
 
-    named: Row = {"case": "I", "toasts": TOASTS, "reward_factor": "B"}
-    rows = []
-    for name, run in (
-        ("srl, compiled", partial(compiled, "srl")),
-        ("random, compiled", partial(compiled, "random")),
-        ("srl, readable", readable),
-    ):
-        run()  # compiles
-        rates = [done / seconds / 1e3 for done, seconds in (run() for _ in range(REPEATS))]
-        own = named if name.startswith("srl") else {key: named[key] for key in ("case", "toasts")}
-        rows.append(median_row({"name": name, **own}, RATE, rates))
-        tell()
-    return rows
+    return {
+        "srl, compiled": partial(compiled, "srl"),
+        "random, compiled": partial(compiled, "random"),
+        "srl, readable": readable,
+    }
 
 
-def _proof(case: str, toasts: int, tell: Callable[[], None]) -> Row:
+def _rate(name: str, run: Callable[[], int]) -> list[Row]:
+    run()  # compiles
+    rates = []
+    for _ in range(REPEATS):
+        began = time.perf_counter()
+        rates.append(run() / (time.perf_counter() - began) / 1e3)
+    named: Row = {"name": name, "case": "I", "toasts": TOASTS}
+    return [median_row(named | ({"reward_factor": "B"} if name.startswith("srl") else {}), RATE, rates)]
+
+
+def _proof(case: str, toasts: int) -> list[Row]:
     """Seconds to the proof; of a search that gives up, to that, under another name."""
     cell, seconds, proven = robot_cell(case, toasts), list[float](), True
     for _ in range(REPEATS):
         began = time.perf_counter()
         proven &= optimum(cell).proven
         seconds.append(time.perf_counter() - began)
-    tell()
     name = "exact" if proven else "exact, not proven"
-    return median_row({"name": name, "case": case, "toasts": toasts}, SECONDS, seconds)
+    return [median_row({"name": name, "case": case, "toasts": toasts}, SECONDS, seconds)]
 
 
-def _seconds_to_near(case: str, job: Job) -> list[float]:
-    """Of each session of srl-time, the seconds until it was near enough; inf where it was not."""
-    cell = robot_cell(case, MANY)
-    wanted, found = (1.0 + NEAR) * optimum(cell).bound_s, []
+def near_rows(case: str, job: Job) -> list[Row]:
+    """The share of srl-time's sessions that came near enough, and where all did, their seconds until then."""
+    cell, found = robot_cell(case, MANY), list[float]()
+    wanted = (1.0 + NEAR) * optimum(cell).bound_s
     for session in range(min(job.sessions, MANY_SESSIONS)):
         reached, began = [inf], time.perf_counter()
 
@@ -128,23 +117,21 @@ def _seconds_to_near(case: str, job: Job) -> list[float]:
         rng = np.random.default_rng([job.seed, session])
         SEQUENCERS["srl-time"](cell, Search(MANY_EPISODES, on_episode=listen), rng)
         found.append(reached[0])
-    return found
+    return rows_of_near(case, found)
 
 
-def near_rows(case: str, seconds: list[float]) -> list[Row]:
-    """The share of sessions that came near, and where all did, their seconds."""
+def rows_of_near(case: str, seconds: list[float]) -> list[Row]:
+    """Of the seconds of each session, inf where it never came near."""
     named: Row = {"name": "srl-time, near the optimum", "case": case, "toasts": MANY}
-    share = 100.0 * sum(map(isfinite, seconds)) / len(seconds)
-    rows = [row(named, "near_percent", share)]
-    return [*rows, median_row(named, SECONDS, seconds)] if share == 100.0 else rows
+    near = row(named, "near_percent", 100.0 * sum(map(isfinite, seconds)) / len(seconds))
+    return [near, median_row(named, SECONDS, seconds)] if near["value"] == 100.0 else [near]
 
 
-def solved_rows(case: str, missed: list[str], seed: int) -> list[Row]:
-    """CP-SAT's gap after its limit; where it found nothing at all, a word of that is added to `missed`."""
+def solved_rows(case: str, seed: int) -> list[Row]:
+    """CP-SAT's gap after its limit; none where it found nothing at all."""
     cell = robot_cell(case, MANY)
     best, found = optimum(cell), cp_sat(cell, time_limit_s=CP_SAT_LIMIT_S, seed=seed)
     if not found.sequence:
-        missed.append(f"CP-SAT found no sequence for {MANY} toasts in case {case} within {CP_SAT_LIMIT_S:g} s.")
         return []
     named: Row = {"name": "cp-sat", "case": case, "toasts": MANY, "limit_s": CP_SAT_LIMIT_S}
     gap = max(0.0, 100.0 * best.gap(found.cost))

@@ -17,8 +17,15 @@ from lab.learning.session import run_session
 from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, share_row, those, varying_row
 from lab.studies.runner import Job, seeds_of
-from lab.studies.thesis import chapter_9_sessions as chapter_9
-from lab.studies.thesis.chapter_9_sessions import gate_of, learner_of, problem, succeeded, table_of, world
+from lab.studies.thesis.chapter_9_sessions import (
+    AdviceSetting,
+    gate_of,
+    learner_of,
+    problem,
+    succeeded,
+    table_of,
+    world,
+)
 
 WORLD = "world-1"
 PANELS: tuple[tuple[str, ...], ...] = (
@@ -50,21 +57,20 @@ LIMITS = f"At most {MOST} sessions a setting: they are run in plain Python, a te
 
 
 @dataclass(frozen=True)
-class Setting:
+class PanelSetting:
     """Who is asked and how: a row of DECISIONS or IN_TURN; way None: the first member alone, or nobody."""
 
     members: tuple[str, ...]
     way: str | None
-    lesson: chapter_9.Setting
+    lesson: AdviceSetting
 
 
 @dataclass(frozen=True, eq=False)
-class Tried:
+class PanelOutcome:
     """What N sessions came to, (N,) each; dropped: by member, how often; readmitted, disagreed: how often in all."""
 
     success: NDArray[np.bool_]
     helped_steps: NDArray[np.int64]
-    requests: NDArray[np.int64]
     disagreed: NDArray[np.int64]
     readmitted: NDArray[np.int64]
     dropped: Mapping[str, NDArray[np.int64]]
@@ -72,10 +78,10 @@ class Tried:
 
 def advisors(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Every panel by every way of deciding; the reading changes the lesson, as in chapter 9."""
-    lesson = replace(chapter_9.Setting(WORLD, gate="ccrl"), **reading)
-    alone = {name: Setting((name,), None, lesson) for panel in PANELS for name in panel}
-    nobody = Setting((), None, lesson)
-    together = {(panel, way): Setting(panel, way, lesson) for panel in PANELS for way in (*DECISIONS, IN_TURN)}
+    lesson = replace(AdviceSetting(WORLD, gate="ccrl"), **reading)
+    alone = {name: PanelSetting((name,), None, lesson) for panel in PANELS for name in panel}
+    nobody = PanelSetting((), None, lesson)
+    together = {(panel, way): PanelSetting(panel, way, lesson) for panel in PANELS for way in (*DECISIONS, IN_TURN)}
     settings = [*together.values(), *alone.values(), nobody]
     found = job.each(
         partial(tried, sessions=min(job.sessions, MOST), seed=job.seed),
@@ -96,15 +102,15 @@ def advisors(job: Job, reading: Mapping[str, Any]) -> Findings:
     return Findings(rows, in_short(rows), pictures, (MEASURES, WAYS_NOTE, LIMITS))
 
 
-def _merit(found: Tried) -> tuple[float, float]:
+def _merit(found: PanelOutcome) -> tuple[float, float]:
     return float(found.success.mean()), -float(found.helped_steps.mean())
 
 
-def tried(setting: Setting, *, sessions: int, seed: int) -> Tried:
+def tried(setting: PanelSetting, *, sessions: int, seed: int) -> PanelOutcome:
     """So many sessions of a setting."""
     seeds = seeds_of(replace(setting, way=None), sessions, seed)  # every way of a panel has the same chances
     runs = [one_session(setting, int(own)) for own in seeds]
-    events = [told for _, _, _, told in runs]
+    events = [told for _, _, told in runs]
     names = sorted({event.advisor for told in events for event in told if isinstance(event, AdvisorDropped)})
 
     def counted(kind: type[Event], name: str | None = None) -> NDArray[np.int64]:
@@ -116,19 +122,17 @@ def tried(setting: Setting, *, sessions: int, seed: int) -> Tried:
             np.int64,
         )
 
-    success, helped, requests = zip(*((one[0], one[1], one[2]) for one in runs), strict=True)
-    return Tried(
-        np.array(success, np.bool_),
-        np.array(helped, np.int64),
-        np.array(requests, np.int64),
+    return PanelOutcome(
+        np.array([success for success, _, _ in runs], np.bool_),
+        np.array([helped for _, helped, _ in runs], np.int64),
         counted(AdvisorsDisagreed),
         counted(AdvisorReadmitted),
         {name: counted(AdvisorDropped, name) for name in names},
     )
 
 
-def one_session(setting: Setting, seed: int) -> tuple[bool, int, int, list[Event]]:
-    """One session: whether its last episode took the shortest way, helped steps, requests, and what the panel told."""
+def one_session(setting: PanelSetting, seed: int) -> tuple[bool, int, list[Event]]:
+    """One session: whether its last episode took the shortest way, helped steps, and what the panel told."""
     lesson, mdp, told = setting.lesson, problem(setting.lesson.world), list[Event]()
     rng = np.random.default_rng(seed)
     streams = rng.spawn(len(setting.members) + 2)
@@ -150,16 +154,16 @@ def one_session(setting: Setting, seed: int) -> tuple[bool, int, int, list[Event
     gate = gate_of(lesson, world(lesson.world).gate)
     result = run_session(mdp, learner_of(lesson), gate, advisor, streams[-1])
     (success,) = succeeded(lesson, np.array([result.steps]))
-    return bool(success), result.helped_steps, result.requests, told
+    return bool(success), result.helped_steps, told
 
 
 @lru_cache(maxsize=64)
-def _advice(name: str, lesson: chapter_9.Setting) -> Advice:
+def _advice(name: str, lesson: AdviceSetting) -> Advice:
     wrong, values = name == "wrong", table_of(lesson)
     return Advice.of(skill(-values if wrong else values, SKILLS["expert" if wrong else name]))
 
 
-def rows_of(panel: Sequence[str], way: str, who: str, found: Tried) -> list[Row]:
+def rows_of(panel: Sequence[str], way: str, who: str, found: PanelOutcome) -> list[Row]:
     """The measures of one panel and way; who: the member that was asked alone."""
     sessions = len(found.success)
     named: Row = {"table": "World I", "panel": ", ".join(panel) or None, "way": way, "asked": who or None}

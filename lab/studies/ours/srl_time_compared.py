@@ -9,7 +9,17 @@ import numpy as np
 
 from lab.studies.findings import Findings, Row, agreement, row, share_row, those, varying_row
 from lab.studies.ours.srl_time_figures import by_episodes, by_wall_time, of_orders
-from lab.studies.ours.srl_time_sessions import CAPS, COMPILED, LEARNING, READABLE, Setting, Tried, Work, single, tried
+from lab.studies.ours.srl_time_sessions import (
+    CAPS,
+    COMPILED,
+    LEARNING,
+    READABLE,
+    Instance,
+    MethodOutcome,
+    MethodSetting,
+    single,
+    tried,
+)
 from lab.studies.runner import Job
 
 CASES = ("I", "II", "III")
@@ -61,13 +71,13 @@ def srl_time_study(job: Job, reading: Mapping[str, Any]) -> Findings:
     return Findings(rows, agreement(rows) | in_short(rows), pictures, (MEASURES, METHODS, WALLS, LIMITS))
 
 
-def works_of() -> list[Work]:
+def works_of() -> list[Instance]:
     """All that is sequenced."""
-    toasts = [Work(case, number) for number, case in product((*FEW, *MANY), CASES)]
-    return toasts + [Work(order=order, interval_s=mean_s) for order, mean_s in product(ORDERS, MEANS_S)]
+    toasts = [Instance(case, number) for number, case in product((*FEW, *MANY), CASES)]
+    return toasts + [Instance(order=order, interval_s=mean_s) for order, mean_s in product(ORDERS, MEANS_S)]
 
 
-def settings_of(work: Work) -> list[Setting]:
+def settings_of(work: Instance) -> list[MethodSetting]:
     """Every method with this work, at every session length."""
     lengths = ORDER_EPISODES if work.order is not None else FEW.get(work.toasts or 0, MANY_EPISODES)
     found = []
@@ -76,20 +86,20 @@ def settings_of(work: Work) -> list[Setting]:
             continue  # no better than srl there, and as slow
         for factor in _factors(work, method):
             found += [
-                Setting(work, method, episodes, factor)
+                MethodSetting(work, method, episodes, factor)
                 for episodes in lengths
                 if method != "srl" or (work.toasts or 0) < READABLE_FROM or episodes <= LONGEST_READABLE
             ]
-    return found + [Setting(work, method) for method in single(work)]
+    return found + [MethodSetting(work, method) for method in single(work)]
 
 
-def _factors(work: Work, method: str) -> tuple[str | None, ...]:
+def _factors(work: Instance, method: str) -> tuple[str | None, ...]:
     if method != "srl":
         return (None,)
     return FACTORS if work.size == "few" else ("B",)
 
 
-def rows_of(setting: Setting, found: Tried) -> list[Row]:
+def rows_of(setting: MethodSetting, found: MethodOutcome) -> list[Row]:
     """Success, gap and seconds of a setting."""
     named, rows = _described(setting, len(found.gap)), []
     for measure, gaps in (("SP_percent", found.gap), ("final_SP_percent", found.final_gap)):
@@ -100,7 +110,7 @@ def rows_of(setting: Setting, found: Tried) -> list[Row]:
     return [*rows, varying_row(named, "wall_s", found.wall_s)]
 
 
-def _described(setting: Setting, sessions: int) -> Row:
+def _described(setting: MethodSetting, sessions: int) -> Row:
     work = setting.work
     table = "FMS" if work.order is not None else f"{work.toasts} toasts"
     named: Row = {

@@ -11,20 +11,18 @@ from numpy.typing import NDArray
 
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import LearnedSequence, SequenceResult
 from lab.sequencing.methods.exact import Optimum, optimum
 from lab.sequencing.methods.many_sessions import METHODS, run_sessions
 from lab.sequencing.methods.rules import usable
 from lab.sequencing.methods.state_keys import keys_of
-from lab.sequencing.search import Search, SrlSettings
+from lab.sequencing.search import LearnedSequence, Search, SequenceResult, SrlSettings
 from lab.studies.runner import seeds_of
 from lab.studies.thesis.appendix_3_makespans import fms, settings
-from lab.studies.thesis.chapter_7_cells import robot_cell
+from lab.studies.thesis.chapter_7_cells import beta_of, robot_cell
 
 Floats = NDArray[np.float64]
 
 FEW_TOASTS = 4  # up to so many success can be counted; above, and in the orders of the FMS, gaps are
-BETAS = {3: 1.0}  # by number of toasts, section 7.6; .5 for more
 COMPILED, READABLE = "compiled", "readable"
 CAPS = {  # sessions at the most, by size of the job and method: the others would take too long
     "few": {"srl-time": 100, "ga": 40},
@@ -35,7 +33,7 @@ LEARNING = ("srl", "mc", "random", "srl-time", "ga")
 
 
 @dataclass(frozen=True)
-class Work:
+class Instance:
     """What is to be sequenced: toasts in a case of ch. 7, or an order of the FMS, with its interval of arrivals [s]."""
 
     case: str | None = None
@@ -57,17 +55,17 @@ class Work:
 
 
 @dataclass(frozen=True)
-class Setting:
+class MethodSetting:
     """A method with something to sequence; episodes None: it has one sequence and no chance."""
 
-    work: Work
+    work: Instance
     method: str
     episodes: int | None = None
     reward_factor: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Tried:
+class MethodOutcome:
     """What N sessions came to, (N,) each: gaps to the proven optimum, as fractions, and seconds.
 
     gap: of the best sequence of the session; final_gap: of the greedy policy at its end, NaN without one. wall_s: the
@@ -79,13 +77,13 @@ class Tried:
     wall_s: Floats
 
 
-def single(work: Work) -> tuple[str, ...]:
+def single(work: Instance) -> tuple[str, ...]:
     """The methods that have one sequence for this work: constructive ones, and those that prove the optimum (in seconds)."""
     proving = ("exact", "cp-sat") if work.size == "few" else ("exact",)
     return ("fifo", *usable(work.cell), *proving)
 
 
-def tried(setting: Setting, *, sessions: int, seed: int) -> Tried:
+def tried(setting: MethodSetting, *, sessions: int, seed: int) -> MethodOutcome:
     """So many sessions of a setting, or as many as its cap allows."""
     count, search = sessions_for(setting, sessions), _search(setting)
     seeds = seeds_of(setting, count, seed)
@@ -103,7 +101,7 @@ def tried(setting: Setting, *, sessions: int, seed: int) -> Tried:
     return _tried(best, costs, finals, np.array([wall_s for _, wall_s in runs]))
 
 
-def sessions_for(setting: Setting, sessions: int) -> int:
+def sessions_for(setting: MethodSetting, sessions: int) -> int:
     """How many sessions are run when so many are asked for."""
     if setting.method not in LEARNING:
         return 1
@@ -113,12 +111,12 @@ def sessions_for(setting: Setting, sessions: int) -> int:
     return min(sessions, caps.get(kind, sessions))
 
 
-def _is_compiled(setting: Setting) -> bool:
+def _is_compiled(setting: MethodSetting) -> bool:
     given = _settings(setting)
     return setting.method == "random" or keys_of(setting.work.cell, given.values, given.state) is not None
 
 
-def _timed(setting: Setting, search: Search, seed: int) -> tuple[SequenceResult, float]:
+def _timed(setting: MethodSetting, search: Search, seed: int) -> tuple[SequenceResult, float]:
     method: Callable[..., SequenceResult] = SEQUENCERS[setting.method]
     cell, rng = setting.work.cell, np.random.default_rng(seed)
     method(cell, Search(1), rng)  # what it needs is imported and laid out when it is first used
@@ -126,24 +124,24 @@ def _timed(setting: Setting, search: Search, seed: int) -> tuple[SequenceResult,
     return method(cell, search, rng), time.perf_counter() - began
 
 
-def _tried(best: Optimum, costs: Floats, finals: Floats, wall_s: Floats) -> Tried:
-    return Tried(costs / best.bound_s - 1.0, finals / best.bound_s - 1.0, wall_s)
+def _tried(best: Optimum, costs: Floats, finals: Floats, wall_s: Floats) -> MethodOutcome:
+    return MethodOutcome(costs / best.bound_s - 1.0, finals / best.bound_s - 1.0, wall_s)
 
 
-def _search(setting: Setting) -> Search:
+def _search(setting: MethodSetting) -> Search:
     return Search(setting.episodes or 1, settings=_settings(setting))
 
 
-def _settings(setting: Setting) -> SrlSettings:
+def _settings(setting: MethodSetting) -> SrlSettings:
     """Fig. 5.1 with the parameters of section 7.6 for toasts; for the FMS those of App. III."""
     work = setting.work
     factor: Literal["A", "B"] = "A" if setting.reward_factor == "A" else "B"
     if work.order is not None:
         return replace(settings(len(work.order)), factor=factor)
-    return SrlSettings(beta=BETAS.get(work.toasts or 0, 0.5), factor=factor)
+    return SrlSettings(beta=beta_of(work.toasts or 0), factor=factor)
 
 
 @lru_cache(maxsize=64)
-def _optimum(work: Work) -> Optimum:
+def _optimum(work: Instance) -> Optimum:
     """The proven optimum; where it cannot be proven, the bound counts."""
     return optimum(work.cell)

@@ -8,19 +8,20 @@ from numpy.typing import NDArray
 
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.chance import LAWS, Chance
+from lab.sequencing.cell.chance import LAWS, Chance, drawn_seed
 from lab.sequencing.cell.stations import Arrivals
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.many_sessions import evaluate, run_sessions
+from lab.sequencing.methods.rollout import replan
 from lab.sequencing.methods.srl_time_reacting import reacting
-from lab.sequencing.search import Search, SrlSettings, kernel_seed
-from lab.sequencing.simulate.execution import Policy, replan, replicate
+from lab.sequencing.search import Search, SrlSettings
+from lab.sequencing.simulate.execution import Policy, replicate
 from lab.studies.thesis.appendix_3_fifo import STARTS, queued_fifo
+from lab.studies.thesis.chapter_7_cells import beta_of
 
 Floats = NDArray[np.float64]
 
 EPISODES, REPLICATIONS, SPREAD = 200, 50, 0.1  # App. III
-BETAS = {3: 1.0}  # by number of parts; .5 for the larger orders
 LEARNED_BY = 10  # of the sessions asked for, one in so many is learned for each order,
 SLOW_BY = 250  # and one in so many by what is not compiled
 REACTIONS = {3: 6, 5: 2, 8: 1}  # replications of a policy that reacts, for 500 sessions: it takes its time
@@ -55,7 +56,7 @@ class Made:
 @lru_cache(maxsize=64)
 def fms(order: str, mean_s: float) -> Cell:
     """The system with an order to make, parts arriving one at a time, after the pick of the one before."""
-    from lab.cellfile import order_from_word
+    from lab.tasks.cell import order_from_word
     from lab.tasks.task_file import load_cell
 
     file = load_cell("fms")
@@ -67,7 +68,7 @@ def made(mix: Mix, *, sessions: int, seed: int) -> Made:
     """All methods with one order; `sessions` are those that the study was asked for."""
     cell = fms(mix.order, mix.mean_s)
     rng = np.random.default_rng([seed, int(mix.mean_s), *map(ord, mix.order)])
-    times_seed = kernel_seed(rng)
+    times_seed = drawn_seed(rng)
     best = optimum(cell)
     lists, greedy_s = _lists(cell, sessions, rng)
     lists["exact"] = [best.sequence]
@@ -88,17 +89,17 @@ def made(mix: Mix, *, sessions: int, seed: int) -> Made:
 def times_seeds(seed: int, episodes: int) -> list[int]:
     """The seeds of the times that `execution.replicate` meets, so that lists can be evaluated in the same."""
     rng = np.random.default_rng(seed)
-    return [kernel_seed(rng) for _ in range(episodes)]
+    return [drawn_seed(rng) for _ in range(episodes)]
 
 
 def settings(parts: int) -> SrlSettings:
     """Those of App. III and its listing: values per next state of the stations, type B."""
-    return SrlSettings(beta=BETAS.get(parts, 0.5), factor="B", values="states", state="stations")
+    return SrlSettings(beta=beta_of(parts), factor="B", values="states", state="stations")
 
 
 def _lists(cell: Cell, sessions: int, rng: np.random.Generator) -> tuple[dict[str, list[tuple[int, ...]]], Floats]:
     """By method the best sequence of each session, learned with constant arrivals; SRL's greedy makespan at the end (1,)."""
-    listed, seed = Search(EPISODES, settings=settings(cell.parts)), kernel_seed(rng)
+    listed, seed = Search(EPISODES, settings=settings(cell.parts)), drawn_seed(rng)
     pairs = replace(listed, settings=replace(listed.settings, values="pairs"))
     lists, greedy_s = {}, np.zeros(1)
     for name, method, search in (("srl", "srl", listed), ("srl pairs", "srl", pairs), ("random", "random", listed)):

@@ -16,14 +16,15 @@ from lab.studies.thesis.chapter_7_cells import (
     DECAY_FACTORS,
     READINGS,
     SESSION_LENGTHS,
-    Cell,
     Measured,
-    Setting,
+    PrintedFigure,
+    SequencingSetting,
     describe,
     printed,
     short_name,
 )
 
+Comparisons = dict[SequencingSetting, Comparison]
 Changes = Mapping[str, Any]  # to all settings: {"reading": "figure 5.1"}
 TABLES = {"I": "Table 7.4", "II": "Table 7.5", "III": "Table 7.6"}
 DECAY_TABLE, FACTOR_TABLE = "Table IV.1", "Table IV.2"
@@ -111,7 +112,7 @@ def readings(job: Job, changes: Changes) -> Findings:
     shown = [cell for cell in printed(SESSION_LENGTHS) if cell.measure == "SP_percent" and cell.setting.case == "I"]
     asked = [cell for name in READINGS for cell in _changed(shown, {**changes, "reading": name})]
     measured = Measured(job, [cell.setting for cell in asked])
-    groups: dict[Setting, list[Row]] = {}
+    groups: dict[SequencingSetting, list[Row]] = {}
     for cell in asked:
         same = replace(cell.setting, episodes=0)
         groups.setdefault(same, []).append(measured.row("Table 7.4", cell.setting, cell.measure, cell.value))
@@ -125,15 +126,15 @@ def readings(job: Job, changes: Changes) -> Findings:
     return Findings(rows, found, figures.readings(rows), notes)
 
 
-def _of_case(cells: Sequence[Cell], case: str) -> list[Cell]:
+def _of_case(cells: Sequence[PrintedFigure], case: str) -> list[PrintedFigure]:
     return [cell for cell in cells if cell.setting.case == case and cell.setting.reward_factor != "A"]
 
 
-def _changed(cells: Sequence[Cell], changes: Changes) -> list[Cell]:
+def _changed(cells: Sequence[PrintedFigure], changes: Changes) -> list[PrintedFigure]:
     return [replace(cell, setting=replace(cell.setting, **changes)) for cell in cells]
 
 
-def _decay_settings(changes: Changes) -> list[Setting]:
+def _decay_settings(changes: Changes) -> list[SequencingSetting]:
     settings = [cell.setting for cell in _changed(printed(DECAY_FACTORS), changes)]
     return [*settings, *(replace(setting, reward_factor="B") for setting in settings)]
 
@@ -150,9 +151,9 @@ def _decay_rows(measured: Measured, changes: Changes) -> list[Row]:
     return rows
 
 
-def _compared(measured: Measured, cells: Sequence[Cell], table: str) -> tuple[list[Row], dict[Setting, Comparison]]:
+def _compared(measured: Measured, cells: Sequence[PrintedFigure], table: str) -> tuple[list[Row], Comparisons]:
     """The rows of these cells with their ranks at each session length, then the tests behind these; the comparisons."""
-    groups: dict[Setting, list[Setting]] = {}
+    groups: dict[SequencingSetting, list[SequencingSetting]] = {}
     for cell in cells:
         groups.setdefault(_length(cell.setting), []).append(cell.setting)
     found = {same: measured.compared(settings) for same, settings in groups.items()}
@@ -166,12 +167,12 @@ def _compared(measured: Measured, cells: Sequence[Cell], table: str) -> tuple[li
     return rows, found
 
 
-def _length(setting: Setting) -> Setting:
+def _length(setting: SequencingSetting) -> SequencingSetting:
     """What those that are compared have in common."""
     return replace(setting, method="", reward_factor=None, beta=None)
 
 
-def _tests(table: str, same: Setting, found: Comparison) -> list[Row]:
+def _tests(table: str, same: SequencingSetting, found: Comparison) -> list[Row]:
     """The p values behind the ranks at one session length (Appendix II)."""
     named = {"table": table} | {name: value for name, value in describe(same).items() if name != "method"}
     pairs = [({**named, "method": f"{one} - {other}"}, p) for (one, other), p in found.tukey.items()]
@@ -189,7 +190,7 @@ def _assumptions(found: Sequence[Comparison]) -> str:
     )
 
 
-def examples(found: Mapping[Setting, Comparison]) -> list[str]:
+def examples(found: Mapping[SequencingSetting, Comparison]) -> list[str]:
     """Our test beside the one that Appendix II shows, where it is among these."""
     return [
         f"Appendix II's example (case I, 3 toasts, 30 episodes): {EXAMPLE} printed; here F = {test.f:.1f}, "

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.sequencing.cell.cell import Cell as RobotCell
+from lab.sequencing.cell.cell import Cell
 from lab.sequencing.simulate.run import simulate
 from lab.studies.charts import PRINTED, bars, curve, legend_below
 from lab.studies.findings import Row, those
 from lab.studies.runner import seeds_of
-from lab.studies.thesis.chapter_7_cells import READINGS, Setting, epsilons, listed, optimum_s, robot_cell
+from lab.studies.thesis.chapter_7_cells import READINGS, SequencingSetting, epsilons, listed, optimum_s, robot_cell
 from lab.studies.thesis.chapter_7_listing import run_sessions
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, picture_bytes
 from lab.view.sequencing_plots import success_picture
@@ -21,7 +21,7 @@ from lab.view.sequencing_plots import success_picture
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SESSION = Setting("II", 3, "srl", 200, reward_factor="A", beta=1.5)  # of figs. 7.3 and 7.4
+SESSION = SequencingSetting("II", 3, "srl", 200, reward_factor="A", beta=1.5)  # of figs. 7.3 and 7.4
 TRIED = 100  # sessions, of which the first that settles on the optimum is shown
 SETTLES_PRINTED = 67  # the episode that section 7.7.1 names for fig. 7.3
 SEQUENCE_PRINTED = (1, 2, 1, 2, 1, 2, 3, 2, 3, 3)  # section 7.7.1
@@ -157,7 +157,7 @@ def convergence(times_s: NDArray[np.float64]) -> bytes:
     return picture_bytes(draw, *SIZE_INCH, "svg")
 
 
-def _places(cell: RobotCell, sequence: Sequence[int]) -> bytes:
+def _places(cell: Cell, sequence: Sequence[int]) -> bytes:
     """The station of each toast over time; sloping where the robot carries it."""
     schedule = simulate(cell, sequence)
 

@@ -26,9 +26,9 @@ from lab.studies.thesis.chapter_7_listing_kernels import (
     TOASTER,
     TOASTER_BUFFER,
     Floats,
-    Rules,
+    ListingRules,
     Toasts,
-    Work,
+    Workspace,
 )
 
 KINDS = ("storage", "buffer", "machine", "buffer", "machine", "storage")
@@ -66,7 +66,7 @@ class Listed:
     """What a session does: the toast cell and its method as the listing reads them."""
 
     toasts: Toasts
-    rules: Rules
+    rules: ListingRules
     count: int  # of toasts
 
     @classmethod
@@ -91,8 +91,8 @@ class Listed:
         processing_s = np.array([station.processing_s for station in cell.stations])
         toasts = Toasts(np.nan_to_num(cell.loaded_s), processing_s, spread, banned_states(cell.parts, reading))
         a, b = FACTOR_A if cell.parts <= 3 else FACTOR_A_MORE
-        changed = {name: getattr(reading, name) for name in Rules._fields if hasattr(reading, name)}
-        return cls(toasts, Rules(METHODS.index(method), factor == "A", a, b, **changed), cell.parts)
+        changed = {name: getattr(reading, name) for name in ListingRules._fields if hasattr(reading, name)}
+        return cls(toasts, ListingRules(METHODS.index(method), factor == "A", a, b, **changed), cell.parts)
 
 
 def banned_states(toasts: int, reading: Reading = LISTING) -> NDArray[np.bool_]:
@@ -135,10 +135,10 @@ def run_sessions(
     return found if keep_times else found._replace(times_s=found.times_s[:0])
 
 
-def work_of(toasts: int) -> Work:
+def work_of(toasts: int) -> Workspace:
     """What a session with so many toasts works on, as it begins."""
     states = STATIONS**toasts
-    return Work(
+    return Workspace(
         values=np.ones(states),
         counts=np.zeros(states, np.int64),
         visits=np.zeros(states, np.int64),

@@ -22,7 +22,7 @@ ALPHA, DISCOUNT, GOAL_REWARD = 0.05, 0.9, 1.5
 LATEST_S = 20_000.0  # the listing gives an episode up then
 MOST_MOVES = 10_000_000  # null moves take no time, so time alone would not end every episode; never met
 _following, _mixed, _fraction = lean(splitmix.following), lean(splitmix.mixed), lean(splitmix.fraction)
-ROBOT, STATE, SEEN, MOVED = range(4)  # in Work.whole: its station, the state's number, states visited, toasts moved
+ROBOT, STATE, SEEN, MOVED = range(4)  # in `whole`: its station, the state's number, states visited, toasts moved
 
 
 class Toasts(NamedTuple):
@@ -37,7 +37,7 @@ class Toasts(NamedTuple):
     banned: NDArray[np.bool_]
 
 
-class Rules(NamedTuple):
+class ListingRules(NamedTuple):
     """How a session learns: a method's index, type A of the reward factor with a and b, or type B; see `Reading`."""
 
     method: int
@@ -51,7 +51,7 @@ class Rules(NamedTuple):
     frees_by_place: bool
 
 
-class Work(NamedTuple):
+class Workspace(NamedTuple):
     """What a session works on.
 
     values, counts (of all visits), visits (of the episode's) and seen (the states of the episode) (6 ** K,); place and

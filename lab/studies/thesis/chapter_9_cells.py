@@ -11,9 +11,9 @@ from lab.advice.advisors import SKILLS
 from lab.mdp import FloatArray
 from lab.studies.findings import Row, mean_row, row, share_row
 from lab.studies.runner import Job
-from lab.studies.statistics import Comparison, Range, compare, ranges, score
+from lab.studies.statistics import Comparison, Range, compare, part_means, ranges, score
 from lab.studies.thesis import printed_lines
-from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, learner_of, measured
+from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, learner_of, measured
 
 View = Literal["full", "limited"]
 
@@ -33,10 +33,10 @@ REPLICATIONS = 5  # section 9.8: five of 100 sessions each
 
 
 @dataclass(frozen=True)
-class Cell:
+class PrintedLine:
     """One printed line: a setting, or (average) the mean over the four advisors of one combination of parameters."""
 
-    setting: Setting
+    setting: AdviceSetting
     average: bool
     sp: float
     hs: float
@@ -45,17 +45,17 @@ class Cell:
 
 
 @cache
-def printed(file: str) -> tuple[Cell, ...]:
+def printed(file: str) -> tuple[PrintedLine, ...]:
     """The lines of a printed table, in its order."""
     return tuple(map(_cell, printed_lines(file)))
 
 
-def _cell(line: dict[str, str]) -> Cell:
+def _cell(line: dict[str, str]) -> PrintedLine:
     def number(name: str) -> float | None:
         return float(line[name]) if line[name] else None
 
     omega, average = number("Omega"), line["advisor_tau"] == "all"
-    setting = Setting(
+    setting = AdviceSetting(
         world=WORLDS[line["world"]],
         view=cast(View, line["view"]),
         gate=GATES[line["method"]],
@@ -65,10 +65,10 @@ def _cell(line: dict[str, str]) -> Cell:
         psi=number("Psi") if "Psi" in line else None,
     )
     sp, hs, points = (float(line[name]) for name in ("SP_percent", "HS_steps", "score"))
-    return Cell(setting, average, sp, hs, points, line.get("rank"))
+    return PrintedLine(setting, average, sp, hs, points, line.get("rank"))
 
 
-def _is_at(cell: Cell, place: str, view: View) -> bool:
+def _is_at(cell: PrintedLine, place: str, view: View) -> bool:
     return (cell.setting.world, cell.setting.view) == (place, view)
 
 
@@ -78,30 +78,31 @@ class Grid:
     def __init__(self, job: Job, place: str, view: View, reading: Mapping[str, Any]):
         self.reading = reading
         self.cells, self.best = ([c for c in printed(file) if _is_at(c, place, view)] for file in FILES)
-        settings = [setting for cell in (*self.cells, *self.best) for setting in self._settings(cell)]
+        settings = [setting for cell in (*self.cells, *self.best) for setting in self.settings_of(cell)]
         self.outcomes = measured(job, settings)  # one combination of table 9.3 is not in Appendix V
         sp = [100.0 * float(outcome.success.mean()) for outcome in self.outcomes.values()]
         hs = [float(outcome.helped_steps.mean()) for outcome in self.outcomes.values()]
         self.sp_range, self.hs_range = ranges(sp, hs)
 
-    def _asked(self, setting: Setting) -> Setting:
+    def _asked(self, setting: AdviceSetting) -> AdviceSetting:
         return replace(setting, **self.reading)
 
-    def _settings(self, cell: Cell) -> list[Setting]:
+    def settings_of(self, cell: PrintedLine) -> list[AdviceSetting]:
+        """The settings of a cell, those of its four advisors where it is their mean."""
         taus = TAUS if cell.average else [cell.setting.tau]
         return [self._asked(replace(cell.setting, tau=tau)) for tau in taus]
 
-    def of(self, cell: Cell) -> list[Outcome]:
+    def of(self, cell: PrintedLine) -> list[AdviceOutcome]:
         """The outcome of a cell, or those of its four advisors (some of which the scan of the thesis does not show)."""
-        return [self.outcomes[setting] for setting in self._settings(cell)]
+        return [self.outcomes[setting] for setting in self.settings_of(cell)]
 
-    def scores(self, cell: Cell) -> FloatArray:
+    def scores(self, cell: PrintedLine) -> FloatArray:
         """The score of each of five replications, averaged over the cell's advisors; eq. 9.4."""
         scores = [_replicated_scores(outcome, self.sp_range, self.hs_range) for outcome in self.of(cell)]
         means: FloatArray = np.mean(scores, axis=0)
         return means
 
-    def rows(self, cell: Cell) -> list[Row]:
+    def rows(self, cell: PrintedLine) -> list[Row]:
         """SP, HS and score of a cell beside the printed ones; for CCRL its requests, which are not printed."""
         outcomes, setting = self.of(cell), self._asked(cell.setting)
         named = describe(setting, "all" if cell.average else setting.tau)
@@ -122,13 +123,12 @@ class Grid:
         return rows
 
 
-def _replicated_scores(outcome: Outcome, sp_range: Range, hs_range: Range) -> FloatArray:
-    sp = np.array([100.0 * part.mean() for part in np.array_split(outcome.success, REPLICATIONS)])
-    hs = np.array([part.mean() for part in np.array_split(outcome.helped_steps, REPLICATIONS)])
-    return score(sp, hs, sp_range, hs_range)
+def _replicated_scores(outcome: AdviceOutcome, sp_range: Range, hs_range: Range) -> FloatArray:
+    sp, hs = part_means(outcome.success, REPLICATIONS), part_means(outcome.helped_steps, REPLICATIONS)
+    return score(100.0 * sp, hs, sp_range, hs_range)
 
 
-def describe(setting: Setting, tau: float | str | None = None) -> Row:
+def describe(setting: AdviceSetting, tau: float | str | None = None) -> Row:
     """A setting under the names that rows use, only what applies to it; `tau` is its own unless said otherwise."""
     own = {"tau": setting.tau if tau is None else tau, "beta": learner_of(setting).beta}
     names = ("world", "view", "gate", "tau", "lambda_threshold", "omega", "psi", "beta")
@@ -170,7 +170,7 @@ def _tests(named: Row, found: Comparison) -> list[Row]:
 
 def by_beta(job: Job, places: Iterable[str] = tuple(BEST_BETA)) -> list[Row]:
     """Learning alone with several decay factors: fig. 9.4 and the two figures that section 9.9.1 names."""
-    settings = [Setting(place, beta=beta) for place in places for beta in BETAS]
+    settings = [AdviceSetting(place, beta=beta) for place in places for beta in BETAS]
     rows = []
     for setting, outcome in measured(job, settings).items():
         best, percent = BEST_BETA[setting.world]

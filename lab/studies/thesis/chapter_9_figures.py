@@ -14,7 +14,7 @@ from lab.studies.charts import PRINTED, bars, curve, legend_below
 from lab.studies.findings import Row, mean_row, share_row, those
 from lab.studies.runner import Job
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, TAUS, describe
-from lab.studies.thesis.chapter_9_sessions import Setting, example, measured, table_of, walk_of_advisor, world
+from lab.studies.thesis.chapter_9_sessions import AdviceSetting, example, measured, table_of, walk_of_advisor, world
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, picture_bytes
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ PRINTED_WALKS = {0.01: (100.0, 13.0), 1.0: (None, 178.0)}  # share of shortest w
 LOWEST_RATE = -2.0  # improvement rates below are drawn as a mark at the edge
 WINDOW = 5  # K of the improvement rate
 
-Series = Mapping[str, Mapping[str, Setting]]  # of a figure: series -> group -> setting
+Series = Mapping[str, Mapping[str, AdviceSetting]]  # of a figure: series -> group -> setting
 
 
 def figures(job: Job, reading: Mapping[str, Any]) -> tuple[list[Row], dict[str, bytes]]:
@@ -47,9 +47,9 @@ def figures(job: Job, reading: Mapping[str, Any]) -> tuple[list[Row], dict[str, 
             xlabel="tau",
         )
     }
-    guided = Setting("world-1", gate="ccrl", tau=0.01, lambda_threshold=0.05, omega=1)
+    guided = AdviceSetting("world-1", gate="ccrl", tau=0.01, lambda_threshold=0.05, omega=1)
     for caption, setting, threshold in (
-        ("Figure 9.3: a session in world I, learning alone", Setting("world-1"), None),
+        ("Figure 9.3: a session in world I, learning alone", AdviceSetting("world-1"), None),
         ("Figures 9.5 and 9.6: a session with CCRL and an expert", replace(guided, **reading), 0.05),
     ):
         steps, helped = example(setting, job.seed)
@@ -86,17 +86,17 @@ def _compared(job: Job, reading: Mapping[str, Any], caption: str, series: Series
 def compared() -> dict[str, Series]:
     """What figures 9.7-9.13 compare, by caption."""
     by_skill = dict(zip(ADVISORS, TAUS, strict=True))
-    one = Setting("world-1", "limited", "ccrl", 0.01, 0.05, 1)
-    two = Setting("world-2", "limited", "ccrl", 0.01, 0.05, 7)
-    introspecting = Setting("world-2", "limited", "ia", 0.01, psi=1.0)
+    one = AdviceSetting("world-1", "limited", "ccrl", 0.01, 0.05, 1)
+    two = AdviceSetting("world-2", "limited", "ccrl", 0.01, 0.05, 7)
+    introspecting = AdviceSetting("world-2", "limited", "ia", 0.01, psi=1.0)
 
-    def skills(setting: Setting) -> dict[str, Setting]:
+    def skills(setting: AdviceSetting) -> dict[str, AdviceSetting]:
         return {name: replace(setting, tau=tau) for name, tau in by_skill.items()}
 
-    def by_threshold(setting: Setting) -> dict[str, Setting]:
+    def by_threshold(setting: AdviceSetting) -> dict[str, AdviceSetting]:
         return {f"{value:g}": replace(setting, lambda_threshold=value) for value in (0.01, 0.05, 0.1, 0.3, 0.5, 0.9)}
 
-    both = Setting("world-2", "limited", "combined", 0.01, 0.05, 5, 1.0)
+    both = AdviceSetting("world-2", "limited", "combined", 0.01, 0.05, 5, 1.0)
     return {
         "Figure 9.7: CCRL by Lambda, expert, world II, limited view": {
             "never rejects": by_threshold(replace(two, omega=NEVER_REJECTS)),
@@ -122,7 +122,7 @@ def compared() -> dict[str, Series]:
 def walks(reading: Mapping[str, Any]) -> list[Row]:
     """Figure 9.1: how often advisors of several skills take the shortest way themselves, and in how many steps they arrive."""
     known = reading.get("advisor_table", "learned")
-    place, table = world("world-1"), table_of(Setting("world-1", advisor_table=known))
+    place, table = world("world-1"), table_of(AdviceSetting("world-1", advisor_table=known))
     rows = []
     for tau in WALKERS:
         steps = walk_of_advisor(place, table, tau)

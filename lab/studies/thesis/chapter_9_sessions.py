@@ -26,7 +26,7 @@ Count = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Setting:
+class AdviceSetting:
     """One cell of a table: a world, who advises there, and when the learner asks.
 
     tau None: nobody advises. lambda_threshold, omega and psi are those of the gates that have them. advisor_table:
@@ -66,8 +66,8 @@ class Setting:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
-    """What N sessions came to, one number each (N,): whether they succeeded (see `Setting`), and the advice in them."""
+class AdviceOutcome:
+    """What N sessions came to, one number each (N,): whether they succeeded (see `AdviceSetting`), and the advice in them."""
 
     success: BoolArray
     helped_steps: Count
@@ -78,7 +78,7 @@ class Outcome:
         return {name: np.asarray(value, np.int64).tolist() for name, value in vars(self).items()}
 
     @classmethod
-    def from_json(cls, record: dict[str, list[int]]) -> "Outcome":
+    def from_json(cls, record: dict[str, list[int]]) -> "AdviceOutcome":
         """What `to_json` wrote. Raises KeyError, TypeError, ValueError or OverflowError for anything else."""
         success, helped, requests = (np.array(record[n], np.int64) for n in ("success", "helped_steps", "requests"))
         if not success.shape == helped.shape == requests.shape == (len(success),):
@@ -86,7 +86,7 @@ class Outcome:
         return cls(success.astype(bool), helped, requests)
 
 
-def measured(job: Job, settings: Sequence[Setting]) -> dict[Setting, Outcome]:
+def measured(job: Job, settings: Sequence[AdviceSetting]) -> dict[AdviceSetting, AdviceOutcome]:
     """The outcome of every setting; those that the job's folder holds are read, the others computed and kept there.
 
     Raises WorkFailed when the folder cannot be written or the cluster cannot be reached. After Ctrl-C all that is
@@ -94,10 +94,10 @@ def measured(job: Job, settings: Sequence[Setting]) -> dict[Setting, Outcome]:
     """
     wanted = list(dict.fromkeys(settings))
     keys = {setting.key(job.sessions, job.seed): setting for setting in wanted}
-    done: dict[Setting, Outcome] = {}
+    done: dict[AdviceSetting, AdviceOutcome] = {}
     for entry in job.kept():
         try:
-            key, outcome = str(entry["key"]), Outcome.from_json(entry)
+            key, outcome = str(entry["key"]), AdviceOutcome.from_json(entry)
         except (ValueError, KeyError, TypeError, OverflowError):
             continue  # not ours: computed anew
         if key in keys and len(outcome.success) == job.sessions:
@@ -111,20 +111,20 @@ def measured(job: Job, settings: Sequence[Setting]) -> dict[Setting, Outcome]:
     return {setting: done[setting] for setting in wanted}
 
 
-def sessions_of(setting: Setting, sessions: int, seed: int) -> Outcome:
+def sessions_of(setting: AdviceSetting, sessions: int, seed: int) -> AdviceOutcome:
     """Learns so many sessions of one setting."""
     batch = _learned(setting, seeds_of(setting, sessions, seed))
-    return Outcome(succeeded(setting, batch.steps), batch.helped_steps, batch.requests)
+    return AdviceOutcome(succeeded(setting, batch.steps), batch.helped_steps, batch.requests)
 
 
-def example(setting: Setting, seed: int) -> tuple[NDArray[np.int32], BoolArray]:
+def example(setting: AdviceSetting, seed: int) -> tuple[NDArray[np.int32], BoolArray]:
     """Steps and guided episodes (E,) of the first session of a setting that succeeds, of EXAMPLES."""
     batch = _learned(setting, seeds_of(setting, EXAMPLES, seed))
     n = int(np.argmax(succeeded(setting, batch.steps)))
     return batch.steps[n], batch.guided[n]
 
 
-def succeeded(setting: Setting, steps: NDArray[np.integer[Any]]) -> BoolArray:
+def succeeded(setting: AdviceSetting, steps: NDArray[np.integer[Any]]) -> BoolArray:
     """Whether each session took the shortest way, (N,) bool, by the steps of its episodes (N, E)."""
     shown = steps[:, -1] if setting.success == "last" else steps.min(axis=1)
     return np.asarray(shown == shortest_steps(problem(setting.world)) + world(setting.world).learner.count_start)
@@ -181,28 +181,28 @@ def walk_of_advisor(place: GridWorld, table: FloatArray, tau: float, walks: int 
     return run_sessions(place.mdp(), learner, GateSettings("always"), advice, seeds).steps[:, 0]
 
 
-def table_of(setting: Setting) -> FloatArray:
+def table_of(setting: AdviceSetting) -> FloatArray:
     """What the advisor of a setting knows, (S, A)."""
     learned = LEARNED_SEED if setting.table_seed is None else setting.table_seed
     return known_values(setting.world, learned if setting.advisor_table == "learned" else None)
 
 
-def learner_of(setting: Setting) -> LearnerSettings:
+def learner_of(setting: AdviceSetting) -> LearnerSettings:
     """The world's learner with what the setting says."""
     return replace(world(setting.world).learner, **_given(setting, "beta", "learner"))
 
 
-def gate_of(setting: Setting, gate: GateSettings) -> GateSettings:
+def gate_of(setting: AdviceSetting, gate: GateSettings) -> GateSettings:
     """The world's gate with what the setting says, and its misleads as printed."""
     names = ("gate", "lambda_threshold", "omega", "psi", "judge_unhelped", "memory")
     return replace(gate, **{"spare_best": False} | _given(setting, *names))
 
 
-def _given(setting: Setting, *names: str) -> dict[str, Any]:
+def _given(setting: AdviceSetting, *names: str) -> dict[str, Any]:
     return {name: getattr(setting, name) for name in names if getattr(setting, name) is not None}
 
 
-def _learned(setting: Setting, seeds: NDArray[np.uint64]) -> "Batch":
+def _learned(setting: AdviceSetting, seeds: NDArray[np.uint64]) -> "Batch":
     from lab.advice.advisors import Advice, skill
     from lab.learning.batch import run_sessions
 

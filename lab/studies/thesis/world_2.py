@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from lab.errors import WorkFailed
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import BoolArray, FloatArray, NoPath, TabularMDP, grid, shortest_steps
+from lab.studies.runner import Progress
 from lab.studies.statistics import PERCENT_POINTS, RELATIVE
-from lab.studies.thesis.chapter_9_cells import BEST_BETA, Cell, printed
+from lab.studies.thesis.chapter_9_cells import BEST_BETA, PrintedLine, printed
 from lab.studies.thesis.chapter_9_sessions import gate_of, learned_table
 from lab.tasks.grid_world import GridWorld, View
 
@@ -39,7 +40,6 @@ MAX_TRIES = 20_000
 LEARNER = LearnerSettings("afterstate", beta=BETA, count_start=True)
 
 Ints = NDArray[np.int_]
-Progress = Callable[[int, int], None]
 
 
 def reconstruct(seed: int, progress: Progress = lambda done, total: None) -> GridWorld:
@@ -86,7 +86,7 @@ def _with(world: GridWorld, view: Ints) -> GridWorld:
     return world.model_copy(update={"view": View(lower=_tuple(view[0]), upper=_tuple(view[1]))})
 
 
-def is_compared(cell: Cell, view: str) -> bool:
+def is_compared(cell: PrintedLine, view: str) -> bool:
     """The printed lines that layouts and views are compared by: experts and novices of world II."""
     setting = cell.setting
     return (setting.world, setting.view) == ("world-2", view) and setting.tau in (0.01, 1.0)
@@ -153,7 +153,7 @@ def success_alone(mdp: TabularMDP, beta: float, sessions: int) -> float:
     return 100.0 * float((batch.steps[:, -1] == MOVES + 1).mean())
 
 
-def distance(world: GridWorld, table: FloatArray, cells: Sequence[Cell]) -> float:
+def distance(world: GridWorld, table: FloatArray, cells: Sequence[PrintedLine]) -> float:
     """How far success and helped steps are from the printed ones; 1: on average just what counts as agreeing."""
     from lab.advice.advisors import Advice, skill
     from lab.learning.batch import run_sessions

@@ -21,9 +21,9 @@ from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.page.teaching_page import SeatPage
-from lab.sequencing.cell.schedule import EpisodeSequenced, Move, SequenceResult
+from lab.sequencing.cell.schedule import Move
 from lab.sequencing.methods.srl_advised import SequenceRequest
-from lab.sequencing.search import Reference
+from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
 from lab.sequencing.simulate.run import follow
 from lab.skills.skill import Problem
 from lab.tasks.task_file import load_cell

@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.mdp import FloatArray, TabularMDP, grid
-from lab.production.run import prepare
 from lab.seat.stage import SkillStage, Stage, WorldStage, stage_of
 from lab.seat.stage.markers import TRAIL, camera_for
 from lab.seat.stage.world_stage import MOST_OBSTACLES, WORLD_M
@@ -20,6 +19,7 @@ from lab.sim import assets
 from lab.sim.frames import Camera, Frame, Recording, Shape
 from lab.sim.kinematics import TOOL, ToolPose, inverse
 from lab.sim.scene import GRASP_DEPTH
+from lab.skills.prepared_scene import prepare
 from lab.skills.skill import Problem, Skill
 from lab.tasks.grid_world import GridWorld, random_world
 from lab.tasks.task_file import load, load_world

@@ -1,16 +1,14 @@
-"""The plain sequencers."""
+"""First in, first out, as a list and as a policy."""
 
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from lab.errors import BadInput, WorkFailed
+from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.chance import Chance
-from lab.sequencing.cell.schedule import EpisodeSequenced
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
-from lab.sequencing.methods.fifo import fifo, first_in_first_out, random_search
+from lab.sequencing.methods.fifo import fifo, first_in_first_out
 from lab.sequencing.search import Search
 from lab.sequencing.simulate.execution import carry_out
 from lab.sequencing.simulate.run import simulate
@@ -94,48 +92,6 @@ def test_nothing_is_fetched_before_it_has_come(fms_cell: CellMaker) -> None:
     assert all(move.reach_s == move.pick_s for move in execution.moves), "it never waits before a machine"
 
 
-def test_random_search_keeps_the_best(toast_cell: CellMaker) -> None:
-    seen: list[EpisodeSequenced] = []
-    result = random_search(toast_cell("I", 3), Search(50, on_episode=seen.append), rng())
-    assert len(result.episode_costs) == 50
-    assert result.cost == min(result.episode_costs) < max(result.episode_costs)
-    assert tuple(episode.cost for episode in seen) == result.episode_costs
-    assert result.cost == simulate(toast_cell("I", 3), result.sequence).makespan_s
-
-
-def test_random_search_by_another_objective() -> None:
-    """The robot waits at least for the first part; how long it waits is what counts, not the makespan."""
-    cell = far_oven(5.0)
-    result = random_search(cell, Search(5, "robot-idle"), rng())
-    assert result.cost == 2.0 + 10.0 + 10.0
-
-
-def test_random_search_by_chance_meets_other_times_in_every_episode(oven_cell: CellMaker) -> None:
-    """One oven has one sequence: only the times can differ."""
-    result = random_search(oven_cell(1), Search(20, chance=Chance("exponential")), rng())
-    assert len(set(result.episode_costs)) == 20
-    assert result == random_search(oven_cell(1), Search(20, chance=Chance("exponential")), rng())
-
-
-def test_random_search_says_when_all_it_met_were_deadlocks() -> None:
-    """Two parts that want each other's machine: half of the first two moves lead into a deadlock, some do not."""
-    stations = (Station("in", "storage", 9), Station("m", "machine", 1), Station("n", "machine", 1))
-    names = ("in", "m", "n", "out")
-    ways = [tuple(Stage(name) for name in way) for way in (names, ("in", "n", "m", "out"))]
-    products = tuple(Product(name, (way,)) for name, way in zip("ab", ways, strict=True))
-    table = 1.0 - np.eye(4)
-    cell = Cell((*stations, Station("out", "storage", 9)), products, ("a", "b"), table, table, "in")
-    ends: set[object] = set()
-    for seed in range(20):
-        try:
-            ends.add(random_search(cell, Search(1), rng(seed)).sequence)
-        except WorkFailed as error:
-            ends.add(str(error))
-    assert "no sequence for 2 parts came to its end in 1 episodes: deadlocks" in ends
-    assert (1, 1, 1, 2, 2, 2) in ends
-
-
 def test_objectives_that_the_cell_has_no_data_for(oven_cell: CellMaker) -> None:
-    for method in (random_search, fifo):
-        with pytest.raises(BadInput, match="due times"):
-            method(oven_cell(), Search(objective="mean-tardiness"), rng())
+    with pytest.raises(BadInput, match="due times"):
+        fifo(oven_cell(), Search(objective="mean-tardiness"), rng())

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Chance
-from lab.sequencing.cell.schedule import EpisodeSequenced
 from lab.sequencing.methods.genetic import decode, genes, genetic
-from lab.sequencing.search import Search
+from lab.sequencing.search import EpisodeSequenced, Search
 from lab.sequencing.simulate.run import Run, simulate
 
 CellMaker = Callable[..., Cell]

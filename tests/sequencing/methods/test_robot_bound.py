@@ -14,7 +14,7 @@ from lab.sequencing.cell.ways import FAR, TICKS_PER_S, distances, follows, ticks
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.lower_bound import LowerBound
 from lab.sequencing.methods.robot_bound import RobotWork
-from lab.sequencing.simulate.merged import MergedCell, State
+from lab.sequencing.simulate.merged import MergedCell, MergedState
 from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
@@ -103,7 +103,7 @@ def test_no_state_is_bound_above_what_follows_it(
     cell = data.draw(cells(max_machines=2, max_parts=4, many=True))
     merged = MergedCell(cell)
     bound = LowerBound(merged)
-    state, least = merged.start(), list[tuple[State, int]]()
+    state, least = merged.start(), list[tuple[MergedState, int]]()
     while not merged.done(state):
         least.append((state, bound.left(state)))
         state = data.draw(st.sampled_from(list(merged.successors(state))))

@@ -13,12 +13,11 @@ from lab.errors import WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import LAWS, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES, stuck_cost
-from lab.sequencing.cell.schedule import EpisodeSequenced
 from lab.sequencing.methods.many_sessions import METHODS, run_sessions, session_seeds
-from lab.sequencing.methods.sessions import BLOCK, ROWS, Learned, Learner, learn, learn_compiled, learn_readably
+from lab.sequencing.methods.sessions import BLOCK, ROWS, Learned, SessionLearner, learn, learn_compiled, learn_readably
 from lab.sequencing.methods.srl import Srl
 from lab.sequencing.methods.state_keys import keys_of
-from lab.sequencing.search import FACTORS, STATES, VALUES, Search, SrlSettings
+from lab.sequencing.search import FACTORS, STATES, VALUES, EpisodeSequenced, Search, SrlSettings
 
 CellMaker = Callable[..., Cell]
 SEED = 2**64 - 59
@@ -34,7 +33,7 @@ def assert_same(one: Learned, other: Learned) -> None:
         assert row == pytest.approx(other.table[state]), state
 
 
-def compiled(cell: Cell, search: Search, kind: type[Learner]) -> Learned:
+def compiled(cell: Cell, search: Search, kind: type[SessionLearner]) -> Learned:
     keys = kind.keys(cell, search.settings)
     assert keys is not None
     return learn_compiled(cell, search, SEED, kind, keys)

@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, cost
-from lab.sequencing.cell.schedule import EpisodeSequenced
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.srl_time import SrlTimeResult, srl_time
-from lab.sequencing.search import Search
+from lab.sequencing.search import EpisodeSequenced, Search
 from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]

@@ -11,19 +11,10 @@ from hypothesis import strategies as st
 from lab.errors import BadInput, WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
-from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
-from lab.sequencing.methods.rules import RULES, dispatch, usable
-from lab.sequencing.simulate.execution import (
-    WAIT,
-    Execution,
-    Observed,
-    by_rule,
-    carry_out,
-    replan,
-    replicate,
-    rollout,
-)
+from lab.sequencing.methods.rollout import by_rule, rollout
+from lab.sequencing.methods.rules import RULES
+from lab.sequencing.simulate.execution import WAIT, Execution, Observed, carry_out, replicate
 from lab.sequencing.simulate.run import Run, branch, follow, simulate
 
 CellMaker = Callable[..., Cell]
@@ -71,7 +62,6 @@ def test_the_mean_is_expected_whatever_was_drawn() -> None:
     cell = two_ovens()
     seen = after(cell, Told(cell, process={1: 28.0, 2: 2.0}), 1, 2).observe()
     assert (seen.now_s, seen.ready_s, seen.ready) == (5.0, [12.0, 15.0], (False, False))
-    assert seen.busy_s == (3.0, 0.0)
     assert seen.processed_s == 20.0
 
 
@@ -81,11 +71,11 @@ def test_what_is_late_is_expected_now_and_what_is_ready_is_known() -> None:
     execution = after(cell, Told(cell, process={1: 28.0, 2: 2.0}), 1, 2, WAIT)
     seen = execution.observe()
     assert (seen.now_s, seen.ready_s, seen.ready) == (7.0, [12.0, 7.0], (False, True))
-    assert (seen.busy_s, seen.processed_s) == ((5.0, 0.0), 12.0)
+    assert seen.processed_s == 12.0
     execution.step(2)
     execution.run.now_s = 20.0
     late = execution.observe()
-    assert (late.ready_s[0], late.ready[0], late.busy_s[0]) == (20.0, False, 18.0)
+    assert (late.ready_s[0], late.ready[0]) == (20.0, False)
 
 
 @given(data=st.data(), longer_s=st.floats(0.5, 1e6))
@@ -166,17 +156,6 @@ def test_a_decision_that_may_not_be_taken(oven_cell: CellMaker) -> None:
         after(oven_cell(2), Episode(oven_cell(2)), 1, 2)
 
 
-@given(data=st.data())
-def test_by_mean_times_a_policy_is_its_rule(cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject) -> None:
-    cell = data.draw(cells(max_machines=2, max_parts=4, many=True))
-    rule = RULES[data.draw(st.sampled_from(sorted(RULES)))]
-    execution = carry_out(cell, by_rule(rule))
-    run, sequence = dispatch(cell, rule)
-    assert tuple(execution.sequence) == sequence
-    assert execution.run.now_s == run.now_s
-    assert execution.schedule() == simulate(cell, sequence)
-
-
 def test_following_is_simulating(fms_cell: CellMaker) -> None:
     cell = fms_cell("RS")
     times = Episode(cell, EXPONENTIAL, 5)
@@ -255,16 +234,6 @@ def test_a_branch_goes_its_own_way(oven_cell: CellMaker) -> None:
     assert (run.finished_s, other.finished_s) == ([None, None], [14.0, None])
 
 
-@given(data=st.data(), depth=st.integers(0, 2))
-def test_a_rollout_is_allowed_and_no_worse_than_any_rule(
-    cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject, depth: int
-) -> None:
-    cell = data.draw(cells(max_machines=2, max_parts=3, many=True))
-    run = follow(cell, rollout(Run(cell), depth=depth))
-    assert run.done
-    assert cost(run, "makespan") <= min(cost(dispatch(cell, rule)[0], "makespan") for rule in usable(cell).values())
-
-
 def test_planning_anew_reacts_to_what_has_happened() -> None:
     """Nothing is known of part 1 but that it is late: at 20 s it is expected at once, and still part 2 may be ready."""
     cell = two_ovens()
@@ -273,44 +242,3 @@ def test_planning_anew_reacts_to_what_has_happened() -> None:
     assert rollout(execution.observe())[0] == 1
     execution.step(WAIT)
     assert rollout(execution.observe())[0] == 2
-
-
-def test_another_planner_can_be_plugged_in(toast_cell: CellMaker) -> None:
-    """It is called at every decision with what is known, by the mean times; the first of its decisions is taken."""
-    cell = toast_cell("I", 3)
-    best, known = [1, 2, 1, 2, 1, 2, 3, 2, 3, 3], []
-
-    def plan(run: Run) -> list[int]:
-        known.append((run.now_s, run.times))
-        return best[len(known) - 1 :]
-
-    times = Episode(cell, NORMAL, 3)
-    execution = carry_out(cell, replan(plan), times)
-    assert execution.sequence == best
-    assert [now_s for now_s, _ in known] == [0.0, *(move.drop_s for move in execution.moves[:-1])]
-    assert all(seen == Episode(cell) for _, seen in known)
-
-
-def test_a_plan_of_nothing_and_one_that_cannot_be(oven_cell: CellMaker) -> None:
-    with pytest.raises(WorkFailed, match="found nothing to do at 0 s"):
-        carry_out(oven_cell(1), replan(lambda run: ()))
-    with pytest.raises(BadInput, match="there is no part 2"):
-        carry_out(oven_cell(1), replan(lambda run: (2,)))
-
-
-def test_of_alike_parts_the_first_to_be_ready_is_planned_with(oven_cell: CellMaker) -> None:
-    """Two parts in storage, part 2 wanted first: parts with other due times are not alike."""
-    assert rollout(Run(oven_cell(2)))[0] == 1
-    assert rollout(Run(oven_cell(2, due_s=(90.0, 14.0))), "tardy-parts")[0] == 2
-
-
-def test_planning_anew_is_no_worse_than_the_rules_on_the_toasts(toast_cell: CellMaker) -> None:
-    """On average over 10 episodes with the same times, for each rule that it plans with."""
-    cell = toast_cell("I", 3)
-    planned = replicate(cell, replan(), NORMAL, 10, 0).mean()
-    assert planned <= min(replicate(cell, by_rule(rule), NORMAL, 10, 0).mean() for rule in usable(cell).values())
-
-
-def test_an_objective_that_the_cell_has_no_data_for(oven_cell: CellMaker) -> None:
-    with pytest.raises(BadInput, match="due times"):
-        carry_out(oven_cell(), replan(objective="mean-tardiness"))

@@ -15,7 +15,7 @@ from lab.sequencing.cell import objectives
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance, Episode
 from lab.sequencing.simulate import kernels
-from lab.sequencing.simulate.arrays import CellArrays, RunArrays, cell_arrays, most_moves, run_arrays
+from lab.sequencing.simulate.cell_arrays import CellArrays, RunArrays, cell_arrays, most_moves, run_arrays
 from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]

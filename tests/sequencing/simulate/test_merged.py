@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import choice_of, part_of
 from lab.sequencing.cell.ways import TICKS_PER_S
-from lab.sequencing.simulate.merged import MergedCell, State
+from lab.sequencing.simulate.merged import MergedCell, MergedState
 from lab.sequencing.simulate.run import Run
 
 Cells = Callable[..., st.SearchStrategy[Cell]]
@@ -21,7 +21,7 @@ def places(run: Run) -> set[tuple[int, int]]:
     return {(run.locations[part_of(d, parts) - 1], choice_of(d, parts)) for d in run.allowed()}
 
 
-def same(merged: MergedCell, state: State, run: Run) -> bool:
+def same(merged: MergedCell, state: MergedState, run: Run) -> bool:
     """Whether a state is where a run is; times to a microsecond."""
     counts = [run.locations.count(place) for place in range(len(run.cell.positions))]
     now_s = state.now / TICKS_PER_S

@@ -15,24 +15,24 @@ from lab.studies.ours.advice_budget import (
     NOBODY,
     TARGETS,
     WORLDS,
-    Cell,
+    Asked,
     difference,
     in_short,
     settings,
     worst,
 )
 from lab.studies.runner import Job, seeds_of
-from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, gate_of, sessions_of, world
+from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, gate_of, sessions_of, world
 
 CELLS = len(WORLDS) * 2 * (1 + len(ASKING) * len(ADVISORS))
 TARGETS_IN_ROWS = {name: list(pair) for name, pair in TARGETS.items()}
 
 
-def outcome(successes: int, sessions: int, helped: int = 0) -> Outcome:
+def outcome(successes: int, sessions: int, helped: int = 0) -> AdviceOutcome:
     """So many successes; the helped steps vary by one."""
     success = np.arange(sessions) < successes
     steps = np.full(sessions, helped) + np.arange(sessions) % 2
-    return Outcome(success, steps, steps)
+    return AdviceOutcome(success, steps, steps)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def found() -> Findings:
 
 
 @pytest.fixture(scope="module")
-def outcomes() -> Mapping[Cell, Outcome]:
+def outcomes() -> Mapping[Asked, AdviceOutcome]:
     """Sixty of a hundred succeed everywhere but in a few cells."""
     made = dict.fromkeys(settings(), outcome(60, 100, 20))
     made["world-1", "ccrl", "limited", True] = outcome(50, 100, 9)
@@ -117,7 +117,7 @@ def test_the_difference_of_two_shares_has_newcombes_interval() -> None:
     np.testing.assert_allclose(back, [-gap, -high, -low])
 
 
-def test_the_worst_advisor_is_held_against_nobody(outcomes: Mapping[Cell, Outcome]) -> None:
+def test_the_worst_advisor_is_held_against_nobody(outcomes: Mapping[Asked, AdviceOutcome]) -> None:
     alone, kept = worst(outcomes, "world-1")
     assert (alone["advisor"], kept["advisor"]) == ("limited", "limited")
     assert (alone["against"], kept["against"]) == ("alone", "alone, with memory")
@@ -127,7 +127,7 @@ def test_the_worst_advisor_is_held_against_nobody(outcomes: Mapping[Cell, Outcom
     assert (any_gate["gate"], any_gate["advisor"], any_gate["over"]) == ("importance", "wrong", "any gate")
 
 
-def test_targets_are_met_or_missed(outcomes: Mapping[Cell, Outcome]) -> None:
+def test_targets_are_met_or_missed(outcomes: Mapping[Asked, AdviceOutcome]) -> None:
     rows = [one for cell, made in outcomes.items() for one in advice_budget.rows_of(cell, made, "exact")]
     below = [one for place in WORLDS for one in worst(outcomes, place)]
     says = in_short(rows, below)
@@ -157,21 +157,21 @@ def test_a_verdict_needs_its_interval(ends: tuple[float, float], says: str) -> N
 
 
 def test_settings_without_memory_have_the_chances_that_they_had_before_there_was_memory() -> None:
-    before = Setting("world-1", gate="ia", tau=0.1, psi=1.0)
+    before = AdviceSetting("world-1", gate="ia", tau=0.1, psi=1.0)
     assert seeds_of(before, 2, 0).tolist() == [11525729318082079017, 15845727360063292613]
     assert before.key(500, 0) == "aaf9cb5ee215db49bcf7785f"
-    other = Setting("world-1", gate="ia", tau=0.1, psi=1.0, memory=True)
+    other = AdviceSetting("world-1", gate="ia", tau=0.1, psi=1.0, memory=True)
     assert other.key(500, 0) != before.key(500, 0)
     assert seeds_of(other, 2, 0).tolist() != seeds_of(before, 2, 0).tolist()
 
 
 def test_a_setting_says_whether_advice_is_remembered() -> None:
     gate = world("world-1").gate
-    assert gate_of(Setting("world-1", gate="ccrl", memory=True), gate).memory
-    assert not gate_of(Setting("world-1", gate="ccrl"), gate).memory
+    assert gate_of(AdviceSetting("world-1", gate="ccrl", memory=True), gate).memory
+    assert not gate_of(AdviceSetting("world-1", gate="ccrl"), gate).memory
 
 
 def test_a_wrong_advisor_never_leads_to_the_goal() -> None:
-    wrong = Setting("world-1", gate="always", tau=0.01, wrong=True, advisor_table="exact")
+    wrong = AdviceSetting("world-1", gate="always", tau=0.01, wrong=True, advisor_table="exact")
     assert not sessions_of(wrong, 5, 0).success.any()
-    assert sessions_of(Setting("world-1", gate="always", tau=0.01, advisor_table="exact"), 5, 0).success.all()
+    assert sessions_of(AdviceSetting("world-1", gate="always", tau=0.01, advisor_table="exact"), 5, 0).success.all()

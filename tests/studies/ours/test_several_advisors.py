@@ -14,8 +14,8 @@ from lab.studies.ours.several_advisors import (
     IN_TURN,
     WAYS,
     WORST,
-    Setting,
-    Tried,
+    PanelOutcome,
+    PanelSetting,
     advisors,
     in_short,
     names_in,
@@ -23,9 +23,9 @@ from lab.studies.ours.several_advisors import (
     tried,
 )
 from lab.studies.runner import Job
-from lab.studies.thesis.chapter_9_sessions import Setting as Chapter9
+from lab.studies.thesis.chapter_9_sessions import AdviceSetting
 
-EXACT = Chapter9("world-1", gate="ccrl", advisor_table="exact")
+EXACT = AdviceSetting("world-1", gate="ccrl", advisor_table="exact")
 PAIR = ("expert", "wrong")
 
 
@@ -34,35 +34,36 @@ def counts(*values: int) -> np.ndarray:
 
 
 def test_nobody_and_an_expert_alone() -> None:
-    alone = tried(Setting((), None, EXACT), sessions=3, seed=0)
-    assert alone.helped_steps.tolist() == alone.requests.tolist() == [0, 0, 0]
-    expert = tried(Setting(("expert",), None, EXACT), sessions=3, seed=0)
+    alone = tried(PanelSetting((), None, EXACT), sessions=3, seed=0)
+    assert alone.helped_steps.tolist() == [0, 0, 0]
+    expert = tried(PanelSetting(("expert",), None, EXACT), sessions=3, seed=0)
     assert (expert.helped_steps > 0).all()
     assert (expert.dropped, expert.disagreed.tolist()) == ({}, [0, 0, 0])
 
 
 def test_two_advisors_disagree_and_one_is_dropped() -> None:
-    found = tried(Setting(PAIR, IN_TURN, EXACT), sessions=2, seed=0)
+    found = tried(PanelSetting(PAIR, IN_TURN, EXACT), sessions=2, seed=0)
     assert found.disagreed.tolist() == [0, 0]  # one is asked at a time
     assert found.dropped["wrong"].tolist() == [1, 1]
-    together = tried(Setting(PAIR, "majority", EXACT), sessions=2, seed=0)
+    together = tried(PanelSetting(PAIR, "majority", EXACT), sessions=2, seed=0)
     assert (together.disagreed > 0).all()
     for way in DECISIONS:  # between two there is no majority: the more trusted one decides
-        again = tried(Setting(PAIR, way, EXACT), sessions=2, seed=0)
+        again = tried(PanelSetting(PAIR, way, EXACT), sessions=2, seed=0)
         assert again.helped_steps.tolist() == together.helped_steps.tolist()
 
 
 def test_chance_depends_on_the_seed_and_the_members() -> None:
-    one = [tried(Setting(("novice",), None, EXACT), sessions=2, seed=seed).helped_steps.tolist() for seed in (0, 0, 1)]
+    one = [
+        tried(PanelSetting(("novice",), None, EXACT), sessions=2, seed=seed).helped_steps.tolist() for seed in (0, 0, 1)
+    ]
     assert one[0] == one[1] != one[2]
 
 
 def test_rows_by_hand() -> None:
     """Two sessions: one succeeds; 10 and 30 helped steps; the second wrong one is dropped in one session, twice."""
-    found = Tried(
+    found = PanelOutcome(
         np.array([True, False]),
         counts(10, 30),
-        counts(2, 2),
         counts(5, 5),
         counts(0, 1),
         {"wrong 2": counts(0, 2), "wrong": counts(0, 0)},
@@ -126,8 +127,8 @@ def test_a_panel_behind_its_best_member_is_counted(monkeypatch: pytest.MonkeyPat
     success = {"majority": 90, "best-trusted": 97, "trust-weighted": 96, IN_TURN: 10, BEST: 98, WORST: 0}
     rows, none = [], np.zeros(100, np.int64)
     for way, times in success.items():
-        rows += rows_of(PAIR, way, "", Tried(np.arange(100) < times, none, none, none, none, {"wrong": none + 1}))
-    nothing = Tried(none > 0, none, none, none, none, {})
+        rows += rows_of(PAIR, way, "", PanelOutcome(np.arange(100) < times, none, none, none, {"wrong": none + 1}))
+    nothing = PanelOutcome(none > 0, none, none, none, {})
     says = in_short([*rows, *rows_of((), "nobody", "", nothing)])
     behind = {way: says[f"{way}: panels within 2 points of their best member"] for way in (*DECISIONS, IN_TURN)}
     assert behind == {"majority": 0, "best-trusted": 1, "trust-weighted": 1, IN_TURN: 0}

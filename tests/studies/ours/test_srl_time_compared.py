@@ -14,12 +14,12 @@ from lab.studies.ours import sequencing_speed as speed_study
 from lab.studies.ours import srl_time_compared, srl_time_sessions
 from lab.studies.ours.sequencing_speed import RATE, SECONDS, sequencing_speed
 from lab.studies.ours.srl_time_compared import rows_of, settings_of, srl_time_study, works_of
-from lab.studies.ours.srl_time_sessions import CAPS, Setting, Tried, Work, sessions_for, single, tried
+from lab.studies.ours.srl_time_sessions import CAPS, Instance, MethodOutcome, MethodSetting, sessions_for, single, tried
 from lab.studies.runner import Job
 from lab.studies.thesis.chapter_7_cells import robot_cell
 
-THREE = Work("II", 3)
-RSR = Work(order="RSR", interval_s=100.0)
+THREE = Instance("II", 3)
+RSR = Instance(order="RSR", interval_s=100.0)
 RULES = ("shortest-move", "longest-remaining-work", "most-urgent-machine", "nearest-ready")
 
 
@@ -38,7 +38,7 @@ def test_every_rival_is_asked() -> None:
     learners = {("srl", "B"), ("srl-time", None), ("random", None), ("ga", None)}
     assert asked == learners | {("srl", "A"), ("mc", None)}
     assert {one.episodes for one in settings_of(THREE)} == {None, 5, 15, 30, 60, 200}
-    many = settings_of(Work("I", 30))
+    many = settings_of(Instance("I", 30))
     assert {(one.method, one.reward_factor) for one in many if one.episodes is not None} == learners
     assert [one.episodes for one in many if one.method == "srl"] == [200]
     assert {one.episodes for one in settings_of(RSR) if one.method == "mc"} == {50, 200, 1000}
@@ -47,17 +47,17 @@ def test_every_rival_is_asked() -> None:
 @pytest.mark.parametrize(
     ("setting", "sessions"),
     [
-        (Setting(THREE, "srl", 200, "B"), 500),
-        (Setting(THREE, "srl-time", 200), CAPS["few"]["srl-time"]),
-        (Setting(THREE, "exact"), 1),
-        (Setting(Work("I", 20), "srl", 200, "B"), CAPS["many"]["compiled"]),
-        (Setting(Work("I", 30), "srl", 200, "B"), CAPS["many"]["readable"]),
-        (Setting(Work("I", 30), "random", 200), CAPS["many"]["compiled"]),
-        (Setting(RSR, "srl", 200, "B"), CAPS["order"]["compiled"]),
-        (Setting(RSR, "ga", 200), CAPS["order"]["ga"]),
+        (MethodSetting(THREE, "srl", 200, "B"), 500),
+        (MethodSetting(THREE, "srl-time", 200), CAPS["few"]["srl-time"]),
+        (MethodSetting(THREE, "exact"), 1),
+        (MethodSetting(Instance("I", 20), "srl", 200, "B"), CAPS["many"]["compiled"]),
+        (MethodSetting(Instance("I", 30), "srl", 200, "B"), CAPS["many"]["readable"]),
+        (MethodSetting(Instance("I", 30), "random", 200), CAPS["many"]["compiled"]),
+        (MethodSetting(RSR, "srl", 200, "B"), CAPS["order"]["compiled"]),
+        (MethodSetting(RSR, "ga", 200), CAPS["order"]["ga"]),
     ],
 )
-def test_what_takes_long_is_tried_less_often(setting: Setting, sessions: int) -> None:
+def test_what_takes_long_is_tried_less_often(setting: MethodSetting, sessions: int) -> None:
     assert sessions_for(setting, 500) == sessions
     assert sessions_for(setting, 1) == 1
 
@@ -67,7 +67,7 @@ def test_what_takes_long_is_tried_less_often(setting: Setting, sessions: int) ->
 )
 def test_what_sessions_come_to(method: str) -> None:
     learns = method in srl_time_sessions.LEARNING
-    setting = Setting(THREE, method, 10 if learns else None, "A" if method == "srl" else None)
+    setting = MethodSetting(THREE, method, 10 if learns else None, "A" if method == "srl" else None)
     found = tried(setting, sessions=3, seed=1)
     assert len(found.gap) == len(found.wall_s) == (3 if learns else 1)
     assert (found.gap >= 0).all()
@@ -80,15 +80,17 @@ def test_what_sessions_come_to(method: str) -> None:
 
 
 def test_seeds_are_those_of_the_study() -> None:
-    gaps = [tried(Setting(Work("II", 10), "random", 5), sessions=4, seed=seed).gap.tolist() for seed in (0, 1)]
+    gaps = [
+        tried(MethodSetting(Instance("II", 10), "random", 5), sessions=4, seed=seed).gap.tolist() for seed in (0, 1)
+    ]
     assert gaps[0] != gaps[1]
     assert len({*gaps[0]}) > 1
 
 
 def test_rows_of_a_setting() -> None:
     """Two sessions: one finds the optimum, neither ends with it; gaps of 0 and 10 %, 1 and 3 seconds."""
-    found = Tried(np.array([0.0, 0.1]), np.array([0.2, 0.1]), np.array([1.0, 3.0]))
-    rows = rows_of(Setting(THREE, "srl", 30, "B"), found)
+    found = MethodOutcome(np.array([0.0, 0.1]), np.array([0.2, 0.1]), np.array([1.0, 3.0]))
+    rows = rows_of(MethodSetting(THREE, "srl", 30, "B"), found)
     named = {"table": "3 toasts", "case": "II", "toasts": 3, "method": "srl", "reward_factor": "B", "episodes": 30}
     for one in rows:
         assert one.items() >= {**named, "sessions": 2, "thesis": None, "within": None}.items()
@@ -99,7 +101,7 @@ def test_rows_of_a_setting() -> None:
 
 
 def test_rows_of_one_sequence_have_no_interval() -> None:
-    rows = rows_of(Setting(RSR, "fifo"), Tried(np.array([0.25]), np.array([nan]), np.array([0.1])))
+    rows = rows_of(MethodSetting(RSR, "fifo"), MethodOutcome(np.array([0.25]), np.array([nan]), np.array([0.1])))
     assert {one["measure"]: (one["value"], one["ci95"]) for one in rows} == {
         "SP_percent": (0.0, None),
         "gap_percent": (25.0, None),
@@ -200,12 +202,13 @@ def test_speeds_are_measured_in_one_run() -> None:
 @pytest.mark.usefixtures("small")
 def test_what_was_not_reached_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed_study, "CP_SAT_LIMIT_S", 1e-6)
-    missed: list[str] = []
-    assert speed_study.solved_rows("I", missed, 0) == []
-    assert missed == ["CP-SAT found no sequence for 8 toasts in case I within 1e-06 s."]
-    rows = speed_study.near_rows("I", [0.5, inf])
+    found = sequencing_speed(Job(sessions=10), {})
+    missed = [f"CP-SAT found no sequence for 8 toasts in case {case} within 1e-06 s." for case in ("I", "II")]
+    assert [*found.notes[-2:]] == missed
+    assert "cp-sat" not in {one["name"] for one in found.rows}
+    rows = speed_study.rows_of_near("I", [0.5, inf])
     assert [(one["measure"], one["value"]) for one in rows] == [("near_percent", 50.0)]
-    rows = speed_study.near_rows("I", [0.5, 0.7, 0.1])
+    rows = speed_study.rows_of_near("I", [0.5, 0.7, 0.1])
     assert [(one["measure"], one["value"], one["ci95"]) for one in rows] == [
         ("near_percent", 100.0, None),
         (SECONDS, 0.5, [0.1, 0.7]),

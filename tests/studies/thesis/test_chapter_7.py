@@ -28,9 +28,9 @@ from lab.studies.thesis.chapter_7_cells import (
     DECAY_FACTORS,
     READINGS,
     SESSION_LENGTHS,
-    Cell,
     Measured,
-    Setting,
+    PrintedFigure,
+    SequencingSetting,
     printed,
     short_name,
 )
@@ -39,7 +39,7 @@ JOB = Job(sessions=10)
 LENGTHS, CELLS = 4, 4 * 4 * 3 * 2  # of sessions in some_printed, and its cells: methods, cases and environments
 
 
-def some_printed(file: str) -> tuple[Cell, ...]:
+def some_printed(file: str) -> tuple[PrintedFigure, ...]:
     """The shortest and the longest sessions only, by number of toasts; all of table IV.1."""
     return tuple(
         cell
@@ -92,13 +92,18 @@ def test_a_table_of_three_methods(tmp_path: Path, case: str, table: str) -> None
 
 def test_the_example_of_appendix_ii() -> None:
     """Case I, 30 episodes, 1000 sessions as in the thesis: Monte Carlo is worst, and F varies that much between seeds."""
-    wanted = [Setting("I", 3, "srl", 30, reward_factor="B", beta=1.0), Setting("I", 3, "mc", 30, beta=1.0)]
-    test = Measured(Job(1000), [*wanted, Setting("I", 3, "random", 30)])
+    wanted = [
+        SequencingSetting("I", 3, "srl", 30, reward_factor="B", beta=1.0),
+        SequencingSetting("I", 3, "mc", 30, beta=1.0),
+    ]
+    test = Measured(Job(1000), [*wanted, SequencingSetting("I", 3, "random", 30)])
     found = test.compared([*test.outcomes])
     assert 30 < found.f < 300  # 93.8 printed
     assert found.ranks["srl B"] == "1" < found.ranks["mc"] == max(found.ranks.values())
-    same = Setting("I", 3, "", 30)
-    (note,) = chapter_7.examples({same: found, Setting("I", 3, "", 35): found, Setting("I", 4, "", 30): found})
+    same = SequencingSetting("I", 3, "", 30)
+    (note,) = chapter_7.examples(
+        {same: found, SequencingSetting("I", 3, "", 35): found, SequencingSetting("I", 4, "", 30): found}
+    )
     assert f"here F = {found.f:.1f}, srl B {found.means['srl B']:.1f} %, mc" in note
 
 

@@ -17,10 +17,10 @@ from lab.studies.thesis.chapter_7_cells import (
     DECAY_FACTORS,
     READINGS,
     SESSION_LENGTHS,
-    Cell,
     Measured,
-    Outcome,
-    Setting,
+    PrintedFigure,
+    SequencingOutcome,
+    SequencingSetting,
     describe,
     epsilons,
     optimum_s,
@@ -31,10 +31,10 @@ from lab.studies.thesis.chapter_7_cells import (
 )
 from lab.studies.thesis.chapter_7_listing import LISTING
 
-SRL_B = Setting("I", 3, "srl", 60, reward_factor="B", beta=1.0)
+SRL_B = SequencingSetting("I", 3, "srl", 60, reward_factor="B", beta=1.0)
 SRL_A = replace(SRL_B, reward_factor="A")
-RANDOM = Setting("I", 3, "random", 60)
-MC = Setting("I", 3, "mc", 60, beta=1.0)
+RANDOM = SequencingSetting("I", 3, "random", 60)
+MC = SequencingSetting("I", 3, "mc", 60, beta=1.0)
 
 
 # ---- what is printed ----------------------------------------------------------------------------------------------
@@ -66,15 +66,24 @@ def test_what_every_figure_has() -> None:
 @pytest.mark.parametrize(
     ("file", "expected"),
     [
-        (SESSION_LENGTHS, Cell(replace(SRL_B, episodes=15), "SP_percent", 29)),
-        (SESSION_LENGTHS, Cell(replace(MC, case="III", episodes=60), "SP_percent", 64)),
-        (SESSION_LENGTHS, Cell(Setting("II", 4, "random", 400, "stochastic"), "BR_s", 910)),
-        (SESSION_LENGTHS, Cell(Setting("III", 3, "srl", 15, "stochastic", "A", 1.0), "BR_s", 1041.8)),
-        (DECAY_FACTORS, Cell(Setting("II", 3, "srl", 200, reward_factor="A", beta=1.7), "CE_episode", 72.9)),
-        (DECAY_FACTORS, Cell(Setting("III", 3, "srl", 200, reward_factor="A", beta=1.0), "SP_percent", 98)),
+        (SESSION_LENGTHS, PrintedFigure(replace(SRL_B, episodes=15), "SP_percent", 29)),
+        (SESSION_LENGTHS, PrintedFigure(replace(MC, case="III", episodes=60), "SP_percent", 64)),
+        (SESSION_LENGTHS, PrintedFigure(SequencingSetting("II", 4, "random", 400, "stochastic"), "BR_s", 910)),
+        (
+            SESSION_LENGTHS,
+            PrintedFigure(SequencingSetting("III", 3, "srl", 15, "stochastic", "A", 1.0), "BR_s", 1041.8),
+        ),
+        (
+            DECAY_FACTORS,
+            PrintedFigure(SequencingSetting("II", 3, "srl", 200, reward_factor="A", beta=1.7), "CE_episode", 72.9),
+        ),
+        (
+            DECAY_FACTORS,
+            PrintedFigure(SequencingSetting("III", 3, "srl", 200, reward_factor="A", beta=1.0), "SP_percent", 98),
+        ),
     ],
 )
-def test_printed_figures(file: str, expected: Cell) -> None:
+def test_printed_figures(file: str, expected: PrintedFigure) -> None:
     assert expected in printed(file)
 
 
@@ -97,7 +106,7 @@ def test_epsilon_falls_by_beta() -> None:
 
 @pytest.mark.parametrize("setting", [SRL_A, SRL_B, MC, RANDOM], ids=short_name)
 @pytest.mark.parametrize("reading", READINGS)
-def test_sessions_of_every_reading(setting: Setting, reading: str) -> None:
+def test_sessions_of_every_reading(setting: SequencingSetting, reading: str) -> None:
     """As many as asked for, the same again, others with another seed, and none better than the optimum."""
     asked = replace(setting, reading=reading)
     found, again, other = sessions_of(asked, 20, 1), sessions_of(asked, 20, 1), sessions_of(asked, 20, 2)
@@ -124,15 +133,17 @@ def test_what_is_read_otherwise() -> None:
         assert sum(getattr(reading, name) != getattr(LISTING, name) for name in vars(LISTING)) == 1
     assert (READINGS["listing"], READINGS[AS_PRINTED]) == (LISTING, None)
     with pytest.raises(BadInput, match=r"^unknown reading 'figure 5' \(chapter 7\): did you mean 'figure 5\.1'\?"):
-        Setting("I", 3, "mc", 15, reading="figure 5")
+        SequencingSetting("I", 3, "mc", 15, reading="figure 5")
 
 
 # ---- measured -----------------------------------------------------------------------------------------------------
 
 MADE = {
-    SRL_B: Outcome(np.array([513.0] * 15 + [520.0] * 5), np.array([513.0] * 4 + [600.0] * 16), np.arange(1, 21)),
-    MC: Outcome(np.array([513.0, 520.0] * 10), np.full(20, 600.0), np.arange(1, 21)),
-    RANDOM: Outcome(np.array([513.0, 520.0, 530.0, 540.0] * 5), np.full(20, 600.0), np.arange(1, 21)),
+    SRL_B: SequencingOutcome(
+        np.array([513.0] * 15 + [520.0] * 5), np.array([513.0] * 4 + [600.0] * 16), np.arange(1, 21)
+    ),
+    MC: SequencingOutcome(np.array([513.0, 520.0] * 10), np.full(20, 600.0), np.arange(1, 21)),
+    RANDOM: SequencingOutcome(np.array([513.0, 520.0, 530.0, 540.0] * 5), np.full(20, 600.0), np.arange(1, 21)),
 }
 DRAWN = {replace(setting, environment="stochastic"): outcome for setting, outcome in MADE.items()}
 

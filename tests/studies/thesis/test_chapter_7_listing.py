@@ -17,7 +17,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.simulate.run import simulate
 from lab.studies.thesis import chapter_7_listing_kernels as kernels
 from lab.studies.thesis.chapter_7_listing import LISTING, Listed, Reading, banned_states, run_sessions, work_of
-from lab.studies.thesis.chapter_7_listing_kernels import LATEST_S, STATE, Rules, Toasts
+from lab.studies.thesis.chapter_7_listing_kernels import LATEST_S, STATE, ListingRules, Toasts
 from lab.tasks.task_file import load_cell
 
 CASES = ("toast-case-1", "toast-case-2", "toast-case-3")
@@ -47,7 +47,7 @@ def toasts_of(cell: Cell, spread: float = 0.0, reading: Reading = LISTING) -> To
     return Listed.of(cell, "random", None, reading, spread).toasts
 
 
-def rules_of(method: str, factor: str | None, reading: Reading = LISTING) -> Rules:
+def rules_of(method: str, factor: str | None, reading: Reading = LISTING) -> ListingRules:
     return Listed.of(cell_of(3), method, factor, reading).rules
 
 

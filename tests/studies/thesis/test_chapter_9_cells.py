@@ -16,15 +16,15 @@ from lab.studies.thesis.chapter_9_cells import (
     FILES,
     TABLES,
     TAUS,
-    Cell,
     Grid,
+    PrintedLine,
     appendix,
     by_beta,
     describe,
     printed,
     table,
 )
-from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, measured
+from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, measured
 
 APPENDIX, BEST = FILES
 JOB = Job(sessions=10)
@@ -42,7 +42,7 @@ def grid() -> Grid:
     return Grid(JOB, "world-1", "full", {})
 
 
-def cell_of(grid: Grid, gate: str, tau: float | None, **parameters: float) -> Cell:
+def cell_of(grid: Grid, gate: str, tau: float | None, **parameters: float) -> PrintedLine:
     """The only line of the appendix with these parameters; tau None: that of all advisors."""
     (found,) = (
         cell
@@ -91,17 +91,29 @@ def test_what_every_line_has(file: str) -> None:
 @pytest.mark.parametrize(
     ("file", "number", "expected"),
     [
-        (APPENDIX, 1, Cell(Setting("world-1", "full", "ia", 0.01, psi=0.1), False, 67, 479.36, 0.77)),
-        (APPENDIX, 19, Cell(Setting("world-1", "full", "ia", psi=0.1), True, 65, 699.6, 0.73)),
-        (APPENDIX, 99, Cell(Setting("world-1", "full", "ccrl", 0.01, 0.05, 1), False, 99, 292.2, 0.96)),
-        (APPENDIX, 260, Cell(Setting("world-1", "full", "combined", 0.01, 0.05, 1, 0.3), False, 94, 120.51, 0.96)),
-        (APPENDIX, 401, Cell(Setting("world-2", "limited", "combined", None, 0.5, 1, 0.3), True, 35, 10.33, 0.71)),
-        (BEST, 1, Cell(Setting("world-1", "full", "ccrl", 0.01, 0.05, 1), False, 99, 292.2, 0.96, "2")),
-        (BEST, 12, Cell(Setting("world-1", "full", "combined", 1.0, 0.05, 1, 0.3), False, 61, 308.8, 0.77, "1")),
-        (BEST, 32, Cell(Setting("world-2", "full", "ia", 0.01, psi=0.7), False, 98, 522.1, 0.96, "2")),
+        (APPENDIX, 1, PrintedLine(AdviceSetting("world-1", "full", "ia", 0.01, psi=0.1), False, 67, 479.36, 0.77)),
+        (APPENDIX, 19, PrintedLine(AdviceSetting("world-1", "full", "ia", psi=0.1), True, 65, 699.6, 0.73)),
+        (APPENDIX, 99, PrintedLine(AdviceSetting("world-1", "full", "ccrl", 0.01, 0.05, 1), False, 99, 292.2, 0.96)),
+        (
+            APPENDIX,
+            260,
+            PrintedLine(AdviceSetting("world-1", "full", "combined", 0.01, 0.05, 1, 0.3), False, 94, 120.51, 0.96),
+        ),
+        (
+            APPENDIX,
+            401,
+            PrintedLine(AdviceSetting("world-2", "limited", "combined", None, 0.5, 1, 0.3), True, 35, 10.33, 0.71),
+        ),
+        (BEST, 1, PrintedLine(AdviceSetting("world-1", "full", "ccrl", 0.01, 0.05, 1), False, 99, 292.2, 0.96, "2")),
+        (
+            BEST,
+            12,
+            PrintedLine(AdviceSetting("world-1", "full", "combined", 1.0, 0.05, 1, 0.3), False, 61, 308.8, 0.77, "1"),
+        ),
+        (BEST, 32, PrintedLine(AdviceSetting("world-2", "full", "ia", 0.01, psi=0.7), False, 98, 522.1, 0.96, "2")),
     ],
 )
-def test_printed_figures(file: str, number: int, expected: Cell) -> None:
+def test_printed_figures(file: str, number: int, expected: PrintedLine) -> None:
     """A few lines, by their number in the file."""
     assert printed(file)[number - 1] == expected
 
@@ -111,7 +123,7 @@ def test_printed_figures(file: str, number: int, expected: Cell) -> None:
 
 def test_every_setting_is_measured_once(grid: Grid) -> None:
     assert (len(grid.cells), len(grid.best)) == (73, 15)
-    asked = {setting for cell in (*grid.cells, *grid.best) for setting in grid._settings(cell)}
+    asked = {setting for cell in (*grid.cells, *grid.best) for setting in grid.settings_of(cell)}
     assert grid.outcomes.keys() == asked
     assert {len(outcome.success) for outcome in grid.outcomes.values()} == {10}
     assert {(s.world, s.view, s.advisor_table) for s in asked} == {("world-1", "full", "learned")}
@@ -124,15 +136,17 @@ def test_the_ranges_are_those_of_all_combinations(grid: Grid) -> None:
     assert grid.hs_range == (min(helped), max(helped))
 
 
-def replicated(grid: Grid, outcome: Outcome) -> list[float]:
+def replicated(grid: Grid, outcome: AdviceOutcome) -> list[float]:
     """Eq. 9.4 in each of five parts of two sessions."""
     parts = [slice(2 * n, 2 * n + 2) for n in range(5)]
     return [
-        score(
-            100 * float(outcome.success[part].mean()),
-            float(outcome.helped_steps[part].mean()),
-            grid.sp_range,
-            grid.hs_range,
+        float(
+            score(
+                100 * float(outcome.success[part].mean()),
+                float(outcome.helped_steps[part].mean()),
+                grid.sp_range,
+                grid.hs_range,
+            )
         )
         for part in parts
     ]
@@ -140,7 +154,7 @@ def replicated(grid: Grid, outcome: Outcome) -> list[float]:
 
 def test_the_rows_of_a_cell(grid: Grid) -> None:
     cell = cell_of(grid, "combined", 0.1, lambda_threshold=0.3, psi=1.0)
-    (setting,) = grid._settings(cell)
+    (setting,) = grid.settings_of(cell)
     outcome = grid.outcomes[setting]
     sp, hs, points = grid.rows(cell)
     named = {"world": "world-1", "view": "full", "gate": "combined", "tau": 0.1}
@@ -175,8 +189,8 @@ class MadeUp(Job):
         return ((s, made(first.get(s.tau or 0, 5), {0.01: 100, 0.1: 300}.get(s.tau or 0, 200))) for s in items)
 
 
-def made(successes: int, helped: int) -> Outcome:
-    return Outcome(np.arange(10) < successes, np.full(10, helped), np.full(10, helped // 100))
+def made(successes: int, helped: int) -> AdviceOutcome:
+    return AdviceOutcome(np.arange(10) < successes, np.full(10, helped), np.full(10, helped // 100))
 
 
 def test_scores_of_made_up_sessions() -> None:
@@ -198,7 +212,7 @@ def test_scores_of_made_up_sessions() -> None:
 
 def test_requests_of_ccrl_come_beside(grid: Grid) -> None:
     cell = cell_of(grid, "ccrl", 0.01, lambda_threshold=0.05)
-    (setting,) = grid._settings(cell)
+    (setting,) = grid.settings_of(cell)
     *_, asked = grid.rows(cell)
     assert (asked["measure"], asked["thesis"], asked["within"]) == ("AR_requests", None, None)
     assert asked["value"] == pytest.approx(grid.outcomes[setting].requests.mean())
@@ -263,7 +277,7 @@ def test_the_printed_success_stands_at_the_best_beta(monkeypatch: pytest.MonkeyP
         *(("world-1", 0.5, None), ("world-1", 0.7, None), ("world-1", 1.3, 63.0)),
         *(("world-2", 0.5, None), ("world-2", 0.7, 37.0), ("world-2", 1.3, None)),
     ]
-    outcomes = measured(JOB, [Setting(one["world"], beta=one["beta"]) for one in rows])
+    outcomes = measured(JOB, [AdviceSetting(one["world"], beta=one["beta"]) for one in rows])
     for one, outcome in zip(rows, outcomes.values(), strict=True):
         assert (one["value"], *one["ci95"]) == proportion_interval(int(outcome.success.sum()), 10)
         assert one.keys() >= {"world", "view", "gate", "beta"} | RESULTS
@@ -276,13 +290,13 @@ def test_the_printed_success_stands_at_the_best_beta(monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize(
     ("setting", "said"),
     [
-        (Setting("world-1"), {"gate": "never", "beta": 1.3}),
-        (Setting("world-2", beta=0.5), {"gate": "never", "beta": 0.5}),
+        (AdviceSetting("world-1"), {"gate": "never", "beta": 1.3}),
+        (AdviceSetting("world-2", beta=0.5), {"gate": "never", "beta": 0.5}),
         (
-            Setting("world-1", "limited", "ccrl", 0.01, 0.0, 0),  # zeros are settings, too
+            AdviceSetting("world-1", "limited", "ccrl", 0.01, 0.0, 0),  # zeros are settings, too
             {"gate": "ccrl", "tau": 0.01, "lambda_threshold": 0.0, "omega": 0, "beta": 1.3, "advisor_table": "learned"},
         ),
     ],
 )
-def test_a_setting_is_described_by_what_applies(setting: Setting, said: dict[str, Any]) -> None:
+def test_a_setting_is_described_by_what_applies(setting: AdviceSetting, said: dict[str, Any]) -> None:
     assert describe(setting) == {"world": setting.world, "view": setting.view} | said

@@ -18,7 +18,7 @@ from lab.learning.settings import GateSettings
 from lab.mdp import optimal_values
 from lab.studies.runner import STORE, Job, seeds_of
 from lab.studies.thesis import chapter_9_sessions as chapter
-from lab.studies.thesis.chapter_9_sessions import Outcome, Setting, measured, sessions_of
+from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, measured, sessions_of
 from lab.tasks.grid_world import GridWorld
 
 # 3 x 3 x 2 cells, one of them an obstacle, which is also all that an advisor with a limited view sees of it. From one
@@ -53,10 +53,10 @@ def forget() -> None:
 
 
 @pytest.fixture
-def few() -> list[Setting]:
+def few() -> list[AdviceSetting]:
     """Six settings that come to different things."""
-    guided = Setting("world-1", gate="ia", tau=0.1, psi=1.0)
-    alone = [Setting("world-1", beta=beta) for beta in (0.3, 0.7, 1.1)]
+    guided = AdviceSetting("world-1", gate="ia", tau=0.1, psi=1.0)
+    alone = [AdviceSetting("world-1", beta=beta) for beta in (0.3, 0.7, 1.1)]
     return [*alone, guided, replace(guided, tau=1.0), replace(guided, gate="ccrl", lambda_threshold=0.9, omega=1)]
 
 
@@ -67,11 +67,11 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def computed(monkeypatch: pytest.MonkeyPatch) -> list[Setting]:
+def computed(monkeypatch: pytest.MonkeyPatch) -> list[AdviceSetting]:
     """The settings whose sessions were learned, one after another."""
-    done: list[Setting] = []
+    done: list[AdviceSetting] = []
 
-    def counted(setting: Setting, sessions: int, seed: int) -> Outcome:
+    def counted(setting: AdviceSetting, sessions: int, seed: int) -> AdviceOutcome:
         done.append(setting)
         return sessions_of(setting, sessions, seed)
 
@@ -79,7 +79,7 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[Setting]:
     return done
 
 
-def plain(outcomes: dict[Setting, Outcome]) -> dict[Setting, dict[str, list[int]]]:
+def plain(outcomes: dict[AdviceSetting, AdviceOutcome]) -> dict[AdviceSetting, dict[str, list[int]]]:
     return {setting: outcome.to_json() for setting, outcome in outcomes.items()}
 
 
@@ -105,8 +105,8 @@ CHANGES: dict[str, Any] = {
 
 
 def test_every_field_has_a_part_in_the_name() -> None:
-    assert CHANGES.keys() == {field.name for field in fields(Setting)}
-    setting = Setting("world-1", gate="combined", tau=0.1, lambda_threshold=0.05, omega=1, psi=1.0)
+    assert CHANGES.keys() == {field.name for field in fields(AdviceSetting)}
+    setting = AdviceSetting("world-1", gate="combined", tau=0.1, lambda_threshold=0.05, omega=1, psi=1.0)
     others = [replace(setting, **{name: value}) for name, value in CHANGES.items()]
     keys = [one.key(10, 0) for one in (setting, *others)] + [setting.key(11, 0), setting.key(10, 1)]
     assert len({*keys}) == len(keys) == len(CHANGES) + 3
@@ -114,7 +114,7 @@ def test_every_field_has_a_part_in_the_name() -> None:
 
 
 def test_another_world_in_the_same_file_has_another_name(small: str) -> None:
-    setting = Setting(small)
+    setting = AdviceSetting(small)
     before = setting.key(10, 0)
     for old, new in (("[[1, 1, 0]]", "[[1, 1, 1]]"), ("beta = 0.7", "beta = 0.8"), ("omega = 7", "omega = 6")):
         Path(small).write_text(SMALL.replace(old, new), encoding="utf-8")
@@ -127,13 +127,13 @@ def test_another_world_in_the_same_file_has_another_name(small: str) -> None:
 
 @pytest.mark.parametrize("constant", ["FORMAT", "LEARNED_SEED", "LEARNED_BETA", "LEARNED_EPISODES"])
 def test_another_way_of_computing_has_another_name(monkeypatch: pytest.MonkeyPatch, constant: str) -> None:
-    before = Setting("world-1").key(10, 0)
+    before = AdviceSetting("world-1").key(10, 0)
     monkeypatch.setattr(chapter, constant, getattr(chapter, constant) + 1)
-    assert Setting("world-1").key(10, 0) != before
+    assert AdviceSetting("world-1").key(10, 0) != before
 
 
 def test_seeds_belong_to_a_setting() -> None:
-    setting = Setting("world-1", tau=0.1)
+    setting = AdviceSetting("world-1", tau=0.1)
     seeds = seeds_of(setting, 20, 0)
     assert (str(seeds.dtype), seeds.shape, len({*seeds.tolist()})) == ("uint64", (20,), 20)
     np.testing.assert_array_equal(seeds, seeds_of(replace(setting), 20, 0))
@@ -146,10 +146,10 @@ def test_seeds_belong_to_a_setting() -> None:
 
 
 def test_an_outcome_comes_back_from_json() -> None:
-    outcome = Outcome(np.array([True, False, True]), np.array([12, 0, 7]), np.array([2, 0, 1]))
+    outcome = AdviceOutcome(np.array([True, False, True]), np.array([12, 0, 7]), np.array([2, 0, 1]))
     record = json.loads(json.dumps(outcome.to_json()))
     assert record == {"success": [1, 0, 1], "helped_steps": [12, 0, 7], "requests": [2, 0, 1]}
-    back = Outcome.from_json(record)
+    back = AdviceOutcome.from_json(record)
     assert [str(part.dtype) for part in (back.success, back.helped_steps, back.requests)] == ["bool", "int64", "int64"]
     assert back.to_json() == record
 
@@ -160,7 +160,7 @@ UNEVEN = {"success": [1, 1], "helped_steps": [1], "requests": [[1]]}
 @pytest.mark.parametrize("record", [{}, {"success": [1], "helped_steps": [1]}, [1], None, {"success": ["yes"]}, UNEVEN])
 def test_what_is_no_outcome(record: Any) -> None:
     with pytest.raises((KeyError, TypeError, ValueError)):
-        Outcome.from_json(record)
+        AdviceOutcome.from_json(record)
 
 
 @pytest.mark.parametrize(("success", "expected"), [("last", [True, False, False]), ("any", [True, True, False])])
@@ -171,7 +171,7 @@ def test_success_is_the_shortest_way_with_its_start(
     counts, steps = np.array([3, 2, 1]), np.array([[9, 5], [5, 9], [6, 41]], np.int32)
     made_up = Batch(steps, steps < 0, counts + 1, counts, counts, counts, counts, np.zeros(0))
     monkeypatch.setattr(compiled, "run_sessions", lambda *_, **__: made_up)
-    outcome = sessions_of(Setting(small, success=success), 3, 0)
+    outcome = sessions_of(AdviceSetting(small, success=success), 3, 0)
     assert outcome.success.tolist() == expected
     assert (outcome.helped_steps.tolist(), outcome.requests.tolist()) == ([3, 2, 1], [4, 3, 2])
 
@@ -179,14 +179,14 @@ def test_success_is_the_shortest_way_with_its_start(
 def test_any_success_is_at_least_the_last(small: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same sessions judged both ways."""
     monkeypatch.setattr(chapter, "seeds_of", lambda setting, sessions, seed: np.arange(sessions, dtype=np.uint64))
-    last, some = (sessions_of(Setting(small, beta=0.7, success=what), 40, 0).success for what in ("last", "any"))
+    last, some = (sessions_of(AdviceSetting(small, beta=0.7, success=what), 40, 0).success for what in ("last", "any"))
     assert (some >= last).all()
     assert some.sum() > last.sum() > 0
 
 
 def test_who_never_asks_is_not_helped_and_who_sees_less_helps_less() -> None:
-    full = Setting("world-1", gate="ccrl", tau=0.1, lambda_threshold=0.9, omega=7)
-    for alone in (Setting("world-1"), replace(full, gate="never")):
+    full = AdviceSetting("world-1", gate="ccrl", tau=0.1, lambda_threshold=0.9, omega=7)
+    for alone in (AdviceSetting("world-1"), replace(full, gate="never")):
         never = sessions_of(alone, 10, 0)
         assert (never.helped_steps.sum(), never.requests.sum()) == (0, 0)
     wide, narrow = (sessions_of(replace(full, view=view), 10, 0) for view in ("full", "limited"))
@@ -205,13 +205,13 @@ def test_a_setting_is_what_the_kernel_gets(small: str, monkeypatch: pytest.Monke
     monkeypatch.setattr(compiled, "run_sessions", spied)
     place = chapter.world(small)
     assert place.gate.spare_best  # of lessons in it; studies count misleads as printed
-    sessions_of(Setting(small), 2, 0)
+    sessions_of(AdviceSetting(small), 2, 0)
     mdp, learner, gate, advice, seeds = calls[0]
     printed = replace(place.gate, gate="never", spare_best=False)
     assert (mdp.n_states, learner, gate, advice) == (18, place.learner, printed, None)
-    np.testing.assert_array_equal(seeds, seeds_of(Setting(small), 2, 0))
+    np.testing.assert_array_equal(seeds, seeds_of(AdviceSetting(small), 2, 0))
 
-    setting = Setting(small, "limited", "combined", 0.2, 0.3, 2, 0.4, 1.2, "exact", "q", False)
+    setting = AdviceSetting(small, "limited", "combined", 0.2, 0.3, 2, 0.4, 1.2, "exact", "q", False)
     sessions_of(setting, 2, 0)
     _, learner, gate, advice, _ = calls[1]
     assert learner == replace(place.learner, beta=1.2, learner="q")
@@ -227,7 +227,7 @@ def test_a_setting_is_what_the_kernel_gets(small: str, monkeypatch: pytest.Monke
 def test_unhelped_episodes_count_as_misleads_unless_told_otherwise(small: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The advisor never sees the learner: it learns the same, and who is judged all the same is soon asked no more."""
     monkeypatch.setattr(chapter, "seeds_of", lambda setting, sessions, seed: np.arange(sessions, dtype=np.uint64))
-    setting = Setting(small, "limited", "ccrl", 0.01, 1.0, 1)
+    setting = AdviceSetting(small, "limited", "ccrl", 0.01, 1.0, 1)
     judged, spared = (sessions_of(replace(setting, judge_unhelped=judge), 20, 0) for judge in (True, False))
     own = sessions_of(setting, 20, 0)
     assert own.to_json() == judged.to_json()  # the world says nothing, and the default is to judge
@@ -248,11 +248,11 @@ def test_which_table_the_advisor_knows(small: str, monkeypatch: pytest.MonkeyPat
         return optimal_values(chapter.world(name).mdp(), 0.99)
 
     monkeypatch.setattr(chapter, "known_values", told)
-    setting = Setting(small, gate="always", tau=0.1)
+    setting = AdviceSetting(small, gate="always", tau=0.1)
     for table_seed in (None, 3):
         sessions_of(replace(setting, table_seed=table_seed), 1, 0)
     sessions_of(replace(setting, advisor_table="exact"), 1, 0)
-    sessions_of(Setting(small), 1, 0)
+    sessions_of(AdviceSetting(small), 1, 0)
     assert asked == [chapter.LEARNED_SEED, 3, None]
 
 
@@ -284,7 +284,7 @@ def test_an_advisor_walks_alone(small: str) -> None:
 
 
 def test_the_example_is_a_session_that_succeeds(small: str) -> None:
-    setting = Setting(small, beta=0.5)
+    setting = AdviceSetting(small, beta=0.5)
     steps, guided = chapter.example(setting, 0)
     place = chapter.world(small)
     learner, seeds = replace(place.learner, beta=0.5), seeds_of(setting, 100, 0)
@@ -298,7 +298,7 @@ def test_the_example_is_a_session_that_succeeds(small: str) -> None:
 # ---- where they run -----------------------------------------------------------------------------------------------
 
 
-def test_the_same_from_one_process_from_two_and_from_a_cluster(few: list[Setting], cluster: str) -> None:
+def test_the_same_from_one_process_from_two_and_from_a_cluster(few: list[AdviceSetting], cluster: str) -> None:
     one = measured(Job(sessions=5, seed=3), few)
     assert [*one] == few
     assert len({json.dumps(record) for record in plain(one).values()}) == len(few)
@@ -306,7 +306,7 @@ def test_the_same_from_one_process_from_two_and_from_a_cluster(few: list[Setting
     assert plain(measured(Job(sessions=5, seed=3, dask=cluster), few)) == plain(one)
 
 
-def test_a_cluster_that_is_not_there(few: list[Setting], monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+def test_a_cluster_that_is_not_there(few: list[AdviceSetting], monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
     """Nothing listens on port 9; the lab's ten seconds of patience are cut short here."""
     distributed = pytest.importorskip("distributed", reason="no Dask: install the extra 'dask'")
     client = distributed.Client
@@ -317,7 +317,7 @@ def test_a_cluster_that_is_not_there(few: list[Setting], monkeypatch: pytest.Mon
     assert not folder.exists()
 
 
-def test_without_dask(few: list[Setting], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_dask(few: list[AdviceSetting], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(BadInput, match=r"Dask is not installed: pip install 'teaching-lab\[dask\]'"):
         measured(Job(10, dask="127.0.0.1:9"), few)
@@ -326,7 +326,9 @@ def test_without_dask(few: list[Setting], monkeypatch: pytest.MonkeyPatch) -> No
 # ---- what is kept -------------------------------------------------------------------------------------------------
 
 
-def test_what_is_kept_is_not_computed_again(few: list[Setting], folder: Path, computed: list[Setting]) -> None:
+def test_what_is_kept_is_not_computed_again(
+    few: list[AdviceSetting], folder: Path, computed: list[AdviceSetting]
+) -> None:
     job = Job(5, folder=folder)
     first = measured(job, few[:3])
     lines = [json.loads(line) for line in (folder / STORE).read_text(encoding="utf-8").splitlines()]
@@ -341,7 +343,7 @@ def test_what_is_kept_is_not_computed_again(few: list[Setting], folder: Path, co
 
 
 def test_other_sessions_and_another_seed_are_computed(
-    few: list[Setting], folder: Path, computed: list[Setting]
+    few: list[AdviceSetting], folder: Path, computed: list[AdviceSetting]
 ) -> None:
     for sessions, seed in ((5, 0), (6, 0), (5, 1)):
         (outcome,) = measured(Job(sessions, seed, folder=folder), few[:1]).values()
@@ -372,7 +374,7 @@ FOREIGN = [
 ]
 
 
-def test_what_is_not_ours_is_passed_over(few: list[Setting], folder: Path, computed: list[Setting]) -> None:
+def test_what_is_not_ours_is_passed_over(few: list[AdviceSetting], folder: Path, computed: list[AdviceSetting]) -> None:
     """Lines of anything, also such as name our setting and do not hold its five sessions, before and after our own."""
     job = Job(5, folder=folder)
     found, text = measured(job, few[:1]), (folder / STORE).read_bytes()
@@ -387,7 +389,9 @@ def test_what_is_not_ours_is_passed_over(few: list[Setting], folder: Path, compu
     assert (folder / STORE).read_bytes() == foreign + text
 
 
-def test_a_line_that_was_cut_is_computed_again(few: list[Setting], folder: Path, computed: list[Setting]) -> None:
+def test_a_line_that_was_cut_is_computed_again(
+    few: list[AdviceSetting], folder: Path, computed: list[AdviceSetting]
+) -> None:
     """What comes next does not stick to it."""
     job = Job(5, folder=folder)
     found, text = measured(job, few[:2]), (folder / STORE).read_text(encoding="utf-8")
@@ -401,11 +405,11 @@ def test_a_line_that_was_cut_is_computed_again(few: list[Setting], folder: Path,
     assert len(computed) == 4
 
 
-def test_ctrl_c_keeps_what_is_done(few: list[Setting], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_keeps_what_is_done(few: list[AdviceSetting], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = measured(Job(5), few)
-    job, done = Job(5, folder=folder), list[Setting]()
+    job, done = Job(5, folder=folder), list[AdviceSetting]()
 
-    def stopped(setting: Setting, sessions: int, seed: int) -> Outcome:
+    def stopped(setting: AdviceSetting, sessions: int, seed: int) -> AdviceOutcome:
         if setting == few[2] and len(done) == 2:
             raise KeyboardInterrupt
         done.append(setting)
@@ -422,7 +426,7 @@ def test_ctrl_c_keeps_what_is_done(few: list[Setting], folder: Path, monkeypatch
 
 
 def test_without_a_folder_nothing_is_written(
-    few: list[Setting], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, computed: list[Setting]
+    few: list[AdviceSetting], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, computed: list[AdviceSetting]
 ) -> None:
     (tmp_path / "empty").mkdir()
     monkeypatch.chdir(tmp_path / "empty")
@@ -433,7 +437,7 @@ def test_without_a_folder_nothing_is_written(
 
 
 @pytest.mark.parametrize("spoil", [Path.touch, lambda folder: (folder / STORE).mkdir(parents=True)])
-def test_a_folder_that_cannot_be_written(few: list[Setting], folder: Path, spoil: Callable[[Path], None]) -> None:
+def test_a_folder_that_cannot_be_written(few: list[AdviceSetting], folder: Path, spoil: Callable[[Path], None]) -> None:
     spoil(folder)
     with pytest.raises(WorkFailed, match=r"^output folder '.+' \(--out\) cannot be written: "):
         measured(Job(5, folder=folder), few[:1])

@@ -15,8 +15,8 @@ from lab.learning.batch import Batch
 from lab.learning.settings import GateSettings
 from lab.mdp import grid, shortest_steps
 from lab.studies.thesis import world_2 as module
-from lab.studies.thesis.chapter_9_cells import BEST_BETA, Cell, printed
-from lab.studies.thesis.chapter_9_sessions import Setting, sessions_of
+from lab.studies.thesis.chapter_9_cells import BEST_BETA, PrintedLine, printed
+from lab.studies.thesis.chapter_9_sessions import AdviceSetting, sessions_of
 from lab.studies.thesis.world_2 import COMMENT, reconstruct
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.task_file import load_world
@@ -50,7 +50,7 @@ def test_the_world_that_ships(root: Path) -> None:
 def test_learning_alone_does_best_where_the_thesis_says() -> None:
     """In 500 sessions; the printed 37 % are of 500, too, with an interval of 4 points on either side."""
     beta, percent = BEST_BETA["world-2"]
-    alone = {b: 100 * sessions_of(Setting("world-2", beta=b), 500, 0).success.mean() for b in (0.5, beta, 1.3)}
+    alone = {b: 100 * sessions_of(AdviceSetting("world-2", beta=b), 500, 0).success.mean() for b in (0.5, beta, 1.3)}
     assert abs(alone[beta] - percent) <= 6
     assert alone[beta] == max(alone.values())
 
@@ -125,7 +125,7 @@ def test_the_nearest_layout_is_taken_and_the_nearest_view(small: None, monkeypat
     seen: list[GridWorld] = []
     far = [3.0, 1.0, 2.0]
 
-    def distance(world: GridWorld, table: Any, cells: list[Cell]) -> float:
+    def distance(world: GridWorld, table: Any, cells: list[PrintedLine]) -> float:
         (view,) = {cell.setting.view for cell in cells}
         if view == "full":
             seen.append(world)
@@ -180,5 +180,5 @@ def test_how_far_a_world_is(monkeypatch: pytest.MonkeyPatch, percent: int, helpe
         return Batch(steps, steps < 0, counts, counts, counts, counts, counts, np.zeros(0))
 
     monkeypatch.setattr(compiled, "run_sessions", made_up)
-    cell = Cell(Setting("world-2", "limited", "ia", 0.01, psi=0.3), False, sp=40.0, hs=100.0, score=0.5)
+    cell = PrintedLine(AdviceSetting("world-2", "limited", "ia", 0.01, psi=0.3), False, sp=40.0, hs=100.0, score=0.5)
     assert module.distance(world, np.zeros((1000, 6)), [cell] * 3) == pytest.approx(expected)

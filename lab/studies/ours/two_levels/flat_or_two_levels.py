@@ -1,6 +1,8 @@
 """One flat problem or two levels: the comparison that the thesis leaves to others (10.2.3), on the same budget of steps."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +14,7 @@ from lab.studies.charts import Look, curve, legend_below
 from lab.studies.findings import Findings, Row, agreement, mean_row, row, share_row, those
 from lab.studies.ours.two_levels.flat_learner import FlatSettings, learn_flat
 from lab.studies.ours.two_levels.kitchen import FlatWorld, Kitchen, Way, flat_world
-from lab.studies.ours.two_levels.two_level_learner import Outcome, Skill, TwoLevels, practised
+from lab.studies.ours.two_levels.two_level_learner import LearnedTransfer, TwoLevels, practised
 from lab.studies.runner import Job
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, SKY, picture_bytes
 
@@ -37,6 +39,7 @@ FLAT = {
 }
 PRACTICE, FLAT_LEARNING, SEQUENCING = 1, 2, 3  # in seeds: nothing shares its chance with anything else
 ALL_STEPS, LOW_STEPS = "all steps", "low level's steps"
+Skills = Sequence[Mapping[Way, tuple[LearnedTransfer, ...]]]  # of each session
 Method = tuple[str, str]  # method and setting of a row
 METHODS: dict[Method, Look] = {
     **{
@@ -77,23 +80,25 @@ def flat(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Makespan against budget for both, 1 to 3 toasts, beside the exact optimum; at most SESSIONS sessions of each."""
     sessions = min(job.sessions, SESSIONS)
     skills = [_skills(job.seed, session) for session in range(sessions)]
-    rows: list[Row] = []
+    found = job.in_turn([partial(_measured, toasts, job.seed, skills) for toasts in TOASTS])
+    rows = [one for some, _ in found for one in some]
     summary: Row = {"sessions": sessions}
-    for number, toasts in enumerate(TOASTS):
-        job.progress(number, len(TOASTS))
-        world = flat_world(KITCHEN, toasts)
-        exact = _exact(world, toasts)
-        best, budgets = int(exact[0]["value"]), tuple(b for b in BUDGETS if b <= LARGEST[toasts])
-        measured = _flat_rows(world, toasts, budgets, best, job.seed, sessions)
-        measured += _two_level_rows(world, toasts, budgets, best, job.seed, skills)
-        summary |= _in_short(measured, toasts, exact)
-        rows += exact + measured
-    job.progress(len(TOASTS), len(TOASTS))
+    for _, says in found:
+        summary |= says
     notes = (ABOUT, ABOUT_FLAT, ABOUT_TWO_LEVELS, ABOUT_LOSS)
     return Findings(rows, summary | agreement(rows), {CAPTION: _picture(rows)}, notes)
 
 
-def _skills(seed: int, session: int) -> dict[Way, tuple[Skill, ...]]:
+def _measured(toasts: int, seed: int, skills: Skills) -> tuple[list[Row], Row]:
+    """All rows with so many toasts, and what they say in short."""
+    world = flat_world(KITCHEN, toasts)
+    exact = _exact(world, toasts)
+    asked = _Asked(world, toasts, tuple(b for b in BUDGETS if b <= LARGEST[toasts]), int(exact[0]["value"]), seed)
+    measured = [*_flat_rows(asked, len(skills)), *_two_level_rows(asked, skills)]
+    return [*exact, *measured], _in_short(measured, toasts, exact)
+
+
+def _skills(seed: int, session: int) -> dict[Way, tuple[LearnedTransfer, ...]]:
     """All sub-tasks of one session; they are the same whatever the number of toasts."""
     empty, loaded = KITCHEN.needed(max(TOASTS))
     ways = sorted({*empty, *loaded})
@@ -114,33 +119,38 @@ def _exact(world: FlatWorld, toasts: int) -> list[Row]:
     return [row(_named(("exact", s), toasts, None), measure, v) for (s, measure), v in figures.items()]
 
 
-def _flat_rows(
-    world: FlatWorld, toasts: int, budgets: tuple[int, ...], best: int, seed: int, sessions: int
-) -> list[Row]:
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What both are asked for: the budgets, and the shortest makespan, that of `exact`."""
+
+    world: FlatWorld
+    toasts: int
+    budgets: tuple[int, ...]
+    best: int
+    seed: int
+
+
+def _flat_rows(asked: _Asked, sessions: int) -> list[Row]:
     rows: list[Row] = []
     for number, (name, settings) in enumerate(FLAT.items()):
-        chances = [np.random.default_rng([seed, session, FLAT_LEARNING, toasts, number]) for session in range(sessions)]
-        learned = np.array([learn_flat(world, settings, budgets, CAP, chance) for chance in chances])
-        for budget, makespans in zip(budgets, learned.T, strict=True):
-            rows += rows_of(_named(("flat", name), toasts, budget), makespans, best)
+        seeds = [[asked.seed, session, FLAT_LEARNING, asked.toasts, number] for session in range(sessions)]
+        chances = map(np.random.default_rng, seeds)
+        learned = np.array([learn_flat(asked.world, settings, asked.budgets, CAP, chance) for chance in chances])
+        for budget, makespans in zip(asked.budgets, learned.T, strict=True):
+            rows += rows_of(_named(("flat", name), asked.toasts, budget), makespans, asked.best)
     return rows
 
 
-def _two_level_rows(
-    world: FlatWorld,
-    toasts: int,
-    budgets: tuple[int, ...],
-    best: int,
-    seed: int,
-    skills: Sequence[Mapping[Way, tuple[Skill, ...]]],
-) -> list[Row]:
+def _two_level_rows(asked: _Asked, skills: Skills) -> list[Row]:
     rows: list[Row] = []
-    learners = [TwoLevels(KITCHEN, world, toasts, own, [seed, n, SEQUENCING, toasts]) for n, own in enumerate(skills)]
+    seeds = ([asked.seed, n, SEQUENCING, asked.toasts] for n in range(len(skills)))
+    learners = [TwoLevels(KITCHEN, asked.world, asked.toasts, *own) for own in zip(skills, seeds, strict=True)]
     for name in (ALL_STEPS, LOW_STEPS):
-        for budget in budgets:
-            found: list[Outcome] = [learner.outcome(budget, CAP, name == ALL_STEPS) for learner in learners]
-            named = _named(("two-level", name), toasts, budget)
-            rows += rows_of(named, np.array([-1 if one.makespan is None else one.makespan for one in found]), best)
+        for budget in asked.budgets:
+            found = [learner.outcome(budget, CAP, name == ALL_STEPS) for learner in learners]
+            named = _named(("two-level", name), asked.toasts, budget)
+            makespans = np.array([-1 if one.makespan is None else one.makespan for one in found])
+            rows += rows_of(named, makespans, asked.best)
             rows.append(row(named, "used_steps", float(np.mean([one.used for one in found]))))
     return rows
 

@@ -110,7 +110,7 @@ def flat_world(kitchen: Kitchen, parts: int) -> FlatWorld:
     A state is the robot's cell, what it carries, how many toasts are on the plate and in each buffer, and for each
     machine whether it is empty or how many steps it still needs; who is who does not matter.
     """
-    rules = _Rules(kitchen, parts)
+    rules = _Transitions(kitchen, parts)
     start = rules.code(rules.first)
     known = frontier = np.array([start])
     while frontier.size:
@@ -127,7 +127,7 @@ def flat_world(kitchen: Kitchen, parts: int) -> FlatWorld:
     return FlatWorld(TabularMDP(successor, reward, over, over, first, ACTIONS), carried)
 
 
-class _Rules:
+class _Transitions:
     """What an action does, to many states at once: columns robot cell, carried, plate, buffer, machine, buffer, machine.
 
     A machine: 0 is empty, 1 done, n + 1 needs n more steps.

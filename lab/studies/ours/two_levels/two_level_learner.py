@@ -25,7 +25,7 @@ Count = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Skill:
+class LearnedTransfer:
     """A sub-task after so many episodes: the steps that they took, and the moves learned; None: they do not get there."""
 
     steps: int
@@ -33,14 +33,14 @@ class Skill:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class BudgetOutcome:
     """What a budget came to: the makespan in the flat world, None when it was not brought to its end, and steps used."""
 
     makespan: int | None
     used: int
 
 
-def practised(kitchen: Kitchen, way: Way, seed: Sequence[int]) -> tuple[Skill, ...]:
+def practised(kitchen: Kitchen, way: Way, seed: Sequence[int]) -> tuple[LearnedTransfer, ...]:
     """A sub-task after each number of EPISODES.
 
     Each is the lab's own session from the same chance: a longer one goes on where a shorter one ends.
@@ -50,7 +50,7 @@ def practised(kitchen: Kitchen, way: Way, seed: Sequence[int]) -> tuple[Skill, .
         learner = replace(LEARNER, episodes=episodes)
         learned = run_session(mdp, learner, GateSettings("never"), None, np.random.default_rng(seed))
         _, moves, reached = greedy_path(learned.q, mdp, learner.max_steps)
-        skills.append(Skill(int(learned.visits.sum()), tuple(moves) if reached else None))
+        skills.append(LearnedTransfer(int(learned.visits.sum()), tuple(moves) if reached else None))
     return tuple(skills)
 
 
@@ -84,14 +84,14 @@ class TwoLevels:
         kitchen: Kitchen,
         world: FlatWorld,
         parts: int,
-        skills: Mapping[Way, tuple[Skill, ...]],
+        skills: Mapping[Way, tuple[LearnedTransfer, ...]],
         seed: Sequence[int],
     ) -> None:
         self._kitchen, self._world, self._parts, self._seed = kitchen, world, parts, seed
         self._skills = {way: skills[way] for ways in kitchen.needed(parts) for way in ways}
-        self._tried: dict[tuple[int, int], Outcome] = {}
+        self._tried: dict[tuple[int, int], BudgetOutcome] = {}
 
-    def outcome(self, budget: int, cap: int, count_simulated: bool) -> Outcome:
+    def outcome(self, budget: int, cap: int, count_simulated: bool) -> BudgetOutcome:
         """What so many steps come to; a makespan above `cap` is none.
 
         count_simulated: the sequencer's simulated steps count as well, and half of the budget is kept for them; else all
@@ -99,12 +99,12 @@ class TwoLevels:
         """
         fitting = [n for n, used in enumerate(self._low_steps) if used <= (budget // 2 if count_simulated else budget)]
         if not fitting:
-            return Outcome(None, 0)
+            return BudgetOutcome(None, 0)
         stage, tries, low = fitting[-1], TRIES, self._low_steps[fitting[-1]]
         if count_simulated:  # the policy at the end is one pass more
             tries = min(TRIES, (budget - low) // one_after_another(self._cell(stage, cap)) - 1)
         if tries < 1:
-            return Outcome(None, low)
+            return BudgetOutcome(None, low)
         if (stage, tries) not in self._tried:
             self._tried[stage, tries] = self._sequenced(stage, tries, cap)
         found = self._tried[stage, tries]
@@ -120,15 +120,15 @@ class TwoLevels:
         moves = {way: skill[stage].moves for way, skill in self._skills.items()}
         return self._kitchen.cell(self._parts, {way: cap if m is None else len(m) for way, m in moves.items()})
 
-    def _sequenced(self, stage: int, tries: int, cap: int) -> Outcome:
+    def _sequenced(self, stage: int, tries: int, cap: int) -> BudgetOutcome:
         cell = self._cell(stage, cap)
         found = srl_time(cell, Search(tries), np.random.default_rng(self._seed))
         simulated = round(sum(found.episode_costs) + found.final_cost)
         if found.cost > cap:
-            return Outcome(None, simulated)
+            return BudgetOutcome(None, simulated)
         moves = {way: skill[stage].moves or () for way, skill in self._skills.items()}
         makespan = carried_out(self._world, cell, found.sequence, moves, cap)
-        return Outcome(makespan if makespan <= cap else None, simulated)
+        return BudgetOutcome(makespan if makespan <= cap else None, simulated)
 
 
 def one_after_another(cell: Cell) -> int:

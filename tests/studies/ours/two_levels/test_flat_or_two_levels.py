@@ -22,7 +22,7 @@ from lab.studies.ours.two_levels.flat_or_two_levels import BUDGETS, CAP, FLAT, K
 from lab.studies.ours.two_levels.kitchen import ACTIONS, DROP, LETTERS, PICK, WAIT, FlatWorld, Kitchen, Way, flat_world
 from lab.studies.ours.two_levels.two_level_learner import (
     EPISODES,
-    Skill,
+    LearnedTransfer,
     TwoLevels,
     carried_out,
     one_after_another,
@@ -191,7 +191,7 @@ def test_practice_goes_on_where_it_stopped() -> None:
 
 
 @pytest.fixture(scope="module")
-def skills() -> dict[Way, tuple[Skill, ...]]:
+def skills() -> dict[Way, tuple[LearnedTransfer, ...]]:
     """Ways along the row that are learned in ten steps an episode, at once but for the one from toaster to butter."""
     empty, loaded = LINE.needed(2)
     known = {}
@@ -199,12 +199,14 @@ def skills() -> dict[Way, tuple[Skill, ...]]:
         difference = LINE.places[way[1]][1] - LINE.places[way[0]][1]
         moves = (RIGHT if difference > 0 else LEFT,) * abs(difference)
         late = way == (LETTERS["T"], LETTERS["B"])
-        known[way] = tuple(Skill(10 * n, None if late and n == EPISODES[0] else moves) for n in EPISODES)
+        known[way] = tuple(LearnedTransfer(10 * n, None if late and n == EPISODES[0] else moves) for n in EPISODES)
     return known
 
 
 @pytest.mark.parametrize("count_simulated", [True, False])
-def test_a_budget_is_kept_to(count_simulated: bool, skills: dict[Way, tuple[Skill, ...]], pair: FlatWorld) -> None:
+def test_a_budget_is_kept_to(
+    count_simulated: bool, skills: dict[Way, tuple[LearnedTransfer, ...]], pair: FlatWorld
+) -> None:
     learner = TwoLevels(LINE, pair, 2, skills, [0])
     best, ways = shortest_steps(pair.mdp), len(skills)
     first = 10 * EPISODES[0] * ways  # all sub-tasks have been tried so often
@@ -214,7 +216,7 @@ def test_a_budget_is_kept_to(count_simulated: bool, skills: dict[Way, tuple[Skil
     assert learner.outcome(50 * first, CAP, count_simulated).makespan == best
 
 
-def test_simulated_steps_count_or_not(skills: dict[Way, tuple[Skill, ...]], pair: FlatWorld) -> None:
+def test_simulated_steps_count_or_not(skills: dict[Way, tuple[LearnedTransfer, ...]], pair: FlatWorld) -> None:
     """As many steps as the sub-tasks take are not enough when half of them is kept for the sequencer."""
     learner = TwoLevels(LINE, pair, 2, skills, [0])
     low = 10 * EPISODES[-1] * len(skills)
@@ -225,7 +227,9 @@ def test_simulated_steps_count_or_not(skills: dict[Way, tuple[Skill, ...]], pair
     assert learner.outcome(10 * low, CAP, True).used > low
 
 
-def test_a_transfer_that_is_not_known_is_not_used(skills: dict[Way, tuple[Skill, ...]], line: FlatWorld) -> None:
+def test_a_transfer_that_is_not_known_is_not_used(
+    skills: dict[Way, tuple[LearnedTransfer, ...]], line: FlatWorld
+) -> None:
     """One toast has to be carried from the toaster to the butter: not before that is learned."""
     learner = TwoLevels(LINE, line, 1, skills, [0])
     ways = len({*LINE.needed(1)[0], *LINE.needed(1)[1]})

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
-from lab.cellparts import CellFields
 from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import MAX_PARTS, needed_moves
 from lab.sequencing.cell.stations import check_layout
+from lab.tasks.cell_fields import CellFields
 from lab.tasks.toml_text import Loc
 
 MAX_STAGES = 400  # of all routes together: the time to find the moves they need grows with the square

@@ -1,21 +1,18 @@
-"""Pictures: an overhead one to a grid, and reading, annotating and writing them (thesis ch. 8.3, step 3).
+"""Round coloured markers in a picture, and the grid that they make (thesis ch. 8.3, step 3).
 
 Round coloured markers are told apart by hue and saturation, never by brightness: a renderer shades flat discs like
 balls, and a room has shadows.
 """
 
-import zlib
 from dataclasses import dataclass
 from math import pi
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
-from lab.vision.overhead import Cell, GridView, Marker, View, plain_view
-
-Image = NDArray[np.uint8]  # (H, W, 3), RGB
+from lab.vision.grid_view import Cell, GridView, Marker, View, plain_view
+from lab.vision.picture_files import Image, check_picture
 
 SATURATION = 100  # of 255; wood, bread, steel and skin stay below it or have another hue
 CHROMA = 12  # of 255, largest minus smallest channel: on black, sensor noise has every hue and full saturation
@@ -23,9 +20,6 @@ MIN_PIXELS = 8.0  # a smaller spot is noise
 RIM = 1.0  # pixels from the spot's hull: the outline's points that are its edge and not a highlight's
 MAX_CELLS = 2.0  # a larger spot is no marker
 ROUNDNESS = 0.72  # of the spot's smallest circle that it fills: a disc near 1, a square 0.64
-PNG = b"\x89PNG\r\n\x1a\n"
-MAX_BYTES = 64_000_000
-MAX_PIXELS = 40_000_000
 MAX_MARKERS = 10_000  # in a picture: a grid of 100 x 100 cells; fitting an ellipse to each of more takes too long
 
 
@@ -53,7 +47,7 @@ def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
     """
     import cv2
 
-    _check(image)
+    check_picture(image)
     hsv = cv2.cvtColor(image, cv2.COLOR_RGB2HSV)
     colourful = image.max(axis=2) - image.min(axis=2) >= CHROMA
     markers, ignored = [], 0
@@ -84,7 +78,7 @@ def see(image: Image, view: View | None = None, *, shape: Cell = (12, 12), where
     Raises BadInput, naming `where`: no markers, not exactly one gripper or one toaster, a marker outside the grid, the
     start or the goal on an obstacle, a picture of another shape or dtype. Thesis ch. 8.3, fig. 8.2.
     """
-    _check(image, where)
+    check_picture(image, where)
     view = view or plain_view(image.shape[:2], shape)
     markers, ignored = find_markers(image, view)
     if not markers:
@@ -94,16 +88,13 @@ def see(image: Image, view: View | None = None, *, shape: Cell = (12, 12), where
     for marker in markers:
         if not view.holds(marker.cell):
             raise BadInput(f"{where}: {_outside(marker, view)}")
-    obstacles = {c for m in markers if m.kind == "obstacle" for c in view.covered(m.kind, m.world_m)}
+    obstacles = {m.cell for m in markers if m.kind == "obstacle"}
     for name, marker in (("start", gripper), ("goal", toaster)):
         if marker.cell in obstacles:
             raise BadInput(
                 f"{where}: the {name} {marker.cell} ({marker.kind} marker) is on a cell that an obstacle covers"
             )
-    centres = [view.centre(m.cell) for m in markers]
-    residuals = tuple((m.world_m[0] - x, m.world_m[1] - y) for m, (x, y) in zip(markers, centres, strict=True))
-    found = tuple(sorted(obstacles))
-    return GridView(view.shape, gripper.cell, toaster.cell, found, markers, residuals, ignored, view)
+    return GridView(view.shape, gripper.cell, toaster.cell, tuple(sorted(obstacles)), markers, view)
 
 
 def locate(image: Image, view: View, kind: str, *, where: str = "picture") -> Marker:
@@ -111,14 +102,8 @@ def locate(image: Image, view: View, kind: str, *, where: str = "picture") -> Ma
 
     Raises BadInput, naming `where`, when there is none or more than one, or for a picture of another shape or dtype.
     """
-    _check(image, where)
+    check_picture(image, where)
     return _single(*find_markers(image, view), kind, where)
-
-
-def _check(image: Image, where: str = "picture") -> None:
-    array = np.asarray(image)
-    if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3 or min(array.shape) < 1:
-        raise BadInput(f"{where}: an array of shape {array.shape} and {array.dtype}: wanted (H, W, 3), RGB, uint8")
 
 
 def _single(markers: tuple[Marker, ...], ignored: int, kind: str, where: str) -> Marker:
@@ -145,84 +130,11 @@ def _outside(marker: Marker, view: View) -> str:
     )
 
 
-def read_picture(path: Path) -> Image:
-    """A PNG or JPEG file as an RGB array (H, W, 3).
-
-    Raises BadInput, with the reason, when it cannot be read, is cut off, is neither, or is larger than 64 MB or 40
-    million pixels; the size is read from the header, before any memory is spent on the picture.
-    """
-    import cv2
-
-    try:
-        if path.exists() and not path.is_file():
-            raise BadInput(f"{path}: not a file: wanted a PNG or JPEG picture")
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise BadInput(f"{path}: {size} bytes: pictures up to {MAX_BYTES} bytes are read")
-        data = path.read_bytes()
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
-    width, height = _size(data, path)
-    if not 0 < width * height <= MAX_PIXELS:
-        raise BadInput(f"{path}: {width} x {height} pixels: pictures of 1 to {MAX_PIXELS} pixels are read")
-    decoded = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    if decoded is None:
-        raise BadInput(f"{path}: the picture's data are damaged")
-    return np.asarray(cv2.cvtColor(decoded, cv2.COLOR_BGR2RGB), dtype=np.uint8)
-
-
-def _size(data: bytes, path: Path) -> tuple[int, int]:
-    """Width and height from the header of a complete PNG or JPEG file."""
-    if data.startswith(PNG):
-        _check_chunks(data, path)
-        return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
-    if not data.startswith(b"\xff\xd8\xff"):
-        raise BadInput(f"{path}: not a picture that can be read: wanted a PNG or JPEG file")
-    at, size = 2, (0, 0)
-    while at + 9 <= len(data) and data[at] == 0xFF:
-        kind, length = data[at + 1], int.from_bytes(data[at + 2 : at + 4], "big")
-        if 0xC0 <= kind <= 0xCF and kind not in (0xC4, 0xC8, 0xCC):  # a frame header
-            size = int.from_bytes(data[at + 7 : at + 9], "big"), int.from_bytes(data[at + 5 : at + 7], "big")
-        if kind == 0xDA:  # the scan, up to the end mark
-            if size == (0, 0) or data.find(b"\xff\xd9", at) < 0:
-                break
-            return size
-        at += 2 + length
-    raise BadInput(f"{path}: the JPEG file is cut off")
-
-
-def _check_chunks(data: bytes, path: Path) -> None:
-    """Walk a PNG file's chunks to its end mark: libpng would write to stderr about a broken one by itself."""
-    at, kind = len(PNG), b""
-    while kind != b"IEND":
-        length, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
-        end = at + 12 + length
-        if end > len(data):
-            raise BadInput(f"{path}: the PNG file is cut off")
-        if zlib.crc32(data[at + 4 : end - 4]) != int.from_bytes(data[end - 4 : end], "big"):
-            raise BadInput(f"{path}: the picture's data are damaged")
-        at = end
-
-
-def write_picture(path: Path, image: Image) -> None:
-    """Write an RGB array (H, W, 3) as the PNG or JPEG file that the name says; raises BadInput when that cannot be."""
-    import cv2
-
-    _check(image, str(path))
-    if path.suffix.lower() not in (".png", ".jpg", ".jpeg"):
-        raise BadInput(f"{path}: pictures are written as .png, .jpg or .jpeg")
-    _, encoded = cv2.imencode(path.suffix, cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
-    try:
-        path.write_bytes(encoded.tobytes())
-    except OSError as error:
-        raise BadInput(f"{path}: cannot be written: {error.strerror}") from error
-
-
 def draw(image: Image, grid: GridView) -> Image:
     """A copy of the picture (H, W, 3) with the grid's lines, start, goal, obstacles and the markers' centres on it."""
     import cv2
 
-    _check(image)
+    check_picture(image)
     view = grid.view
     thin = max(1, round(min(image.shape[:2]) / 400))
 

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lab.cellfaults import MAX_STAGES, SHOWN, loc_of
-from lab.cellfile import CellFile
 from lab.errors import BadInput
 from lab.files import tasks_folder
 from lab.sequencing.cell.cell import Cell
+from lab.tasks.cell import CellFile
+from lab.tasks.cell_faults import MAX_STAGES, SHOWN, loc_of
 from lab.tasks.toml_text import TomlText
 
 FMS = (tasks_folder() / "fms.toml").read_text(encoding="utf-8")

@@ -5,9 +5,9 @@ import pytest
 
 from lab.errors import BadInput
 from lab.production.durations import Durations, cell_of
-from lab.production.skillset import SkillSet, route, stations
 from lab.sim.scene import is_toaster
 from lab.skills import SKILLS, Insert, Place, Transfer
+from lab.skills.skillset import SkillSet, route, stations
 from lab.skills.surveys import INSERT_START
 from lab.tasks.task_file import Stage, Task, load
 
@@ -115,3 +115,13 @@ def test_a_machine_whose_process_nobody_can_do_is_refused(task: Task) -> None:
         BadInput, match=r"unknown process 'jam' .task 'toast': station 'butter_applier'.: known: butter"
     ):
         SkillSet.of(task.model_copy(update={"stations": jam}), 1)
+
+
+def test_what_skills_make_keeps_its_names(task: Task) -> None:
+    first, *rest = task.obstacles
+    patch = task.model_copy(update={"obstacles": (first.model_copy(update={"name": "butter 1 00"}), *rest)})
+    with pytest.raises(BadInput, match="task 'toast': 'butter 1 00' is the name of what a skill makes"):
+        SkillSet.of(patch, 1)
+    made = {body.name: name for name, kind in SKILLS.items() for number in (1, 2) for body in kind.on_slice(number)}
+    assert len(made) == 18
+    assert all(body.startswith(f"{name} ") for body, name in made.items())

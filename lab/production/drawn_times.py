@@ -2,18 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from lab.planner import find_sequence
+from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
-from lab.sequencing.cell.schedule import SequenceResult
-from lab.sequencing.search import Search
-
-if TYPE_CHECKING:
-    from lab.sequencing.simulate.execution import Policy
+from lab.sequencing.search import Search, SequenceResult
 
 REPLICATIONS = 200  # drawn episodes in which a list and a policy are compared
 PLANNED = 2000  # of a policy that plans at every decision so many by parts squared, at least FEWEST: it takes its time
@@ -24,14 +20,12 @@ def stochastic(
     cell: Cell, method: str, search: Search, found: SequenceResult, chance: Chance, seed: int
 ) -> dict[str, Any]:
     """The list as it is and a policy that reacts, in the same drawn episodes; means with 95 % intervals."""
-    from lab.sequencing.methods.rules import RULES
     from lab.sequencing.simulate.execution import replicate
 
-    policy, says = _policy(cell, method, search, seed)
+    reaction = SEQUENCERS[method].react(cell, search.objective, seed)
     fixed = _planned(cell, method, search, found, seed)
-    episodes = REPLICATIONS if method == "fifo" or method in RULES else min(REPLICATIONS, PLANNED // cell.parts**2)
-    episodes = max(FEWEST, episodes)
-    costs = [replicate(cell, how, chance, episodes, seed, search.objective) for how in (fixed, policy)]
+    episodes = max(FEWEST, min(REPLICATIONS, PLANNED // cell.parts**2)) if reaction.plans else REPLICATIONS
+    costs = [replicate(cell, how, chance, episodes, seed, search.objective) for how in (fixed, reaction.policy)]
     difference = costs[0] - costs[1]
     return {
         "processing": chance.processing,
@@ -39,25 +33,9 @@ def stochastic(
         "spread": chance.spread,
         "replications": episodes,
         "fixed": _mean(costs[0]) | {"sequence": list(fixed)},
-        "reacting": _mean(costs[1]) | {"policy": says},
+        "reacting": _mean(costs[1]) | {"policy": reaction.words},
         "saved_by_reacting": _mean(difference),
     }
-
-
-def _policy(cell: Cell, method: str, search: Search, seed: int) -> "tuple[Policy, str]":
-    """What reacts in the manner of the method, and what that is."""
-    from lab.sequencing.methods.fifo import first_in_first_out
-    from lab.sequencing.methods.rules import RULES
-    from lab.sequencing.methods.srl_time_reacting import reacting
-    from lab.sequencing.simulate.execution import by_rule, replan
-
-    if method == "srl-time":
-        return reacting(cell, search.objective, seed), "it goes on learning before every decision"
-    if method in RULES:
-        return by_rule(RULES[method]), f"the rule {method}, asked at every decision"
-    if method == "fifo":
-        return first_in_first_out, "a queue of tasks as they become possible"
-    return replan(objective=search.objective), "planned anew at every decision"
 
 
 def _planned(cell: Cell, method: str, search: Search, found: SequenceResult, seed: int) -> Sequence[int]:

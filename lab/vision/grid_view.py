@@ -1,6 +1,6 @@
 """What an overhead picture shows: the camera's view of a grid, the markers in it and the grid that they make.
 
-Plain records between the camera (`lab/sim`), the reader of pictures (`lab/vision/pictures.py`) and whoever learns in the grid.
+Plain records between the camera (`lab/sim`), the reader of pictures (`markers.py`) and whoever learns in the grid.
 A marker's pixel goes back along its ray to the plane at the marker's own height, so a tall obstacle is not seen beside
 its place. Pixels are (x, y) from the centre of the top left pixel, to the right and down.
 """
@@ -8,7 +8,7 @@ its place. Pixels are (x, y) from the centre of the top left pixel, to the right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import ceil, floor
+from math import floor
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,6 @@ from lab.errors import BadInput
 
 Cell = tuple[int, int]
 
-OVERLAP = 0.1  # of a cell's side: a footprint reaching less far into a cell does not block it
-
 
 @dataclass(frozen=True, eq=False)
 class View:
@@ -28,7 +26,7 @@ class View:
     `pixel_from_world` (3, 4) takes homogeneous world points [m] to homogeneous pixels, with all of the camera's pixel
     offsets in it (`lab/sim/camera.py`). The grid has `shape` cells of `cell_m` from the corner `origin_m` on, i along x
     and j along y. By kind of marker: `heights_m` above the world's z = 0, `offsets_m` (dx, dy) from the marker to the
-    thing it stands for, `footprints_m` half the side of the square that the thing covers; 0 where a kind is missing.
+    thing it stands for; 0 where a kind is missing.
     Raises BadInput when the matrix is not finite, of another shape or flat, or when the grid is empty.
     """
 
@@ -38,7 +36,6 @@ class View:
     shape: Cell
     heights_m: Mapping[str, float] = field(default_factory=dict)
     offsets_m: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    footprints_m: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         matrix = np.asarray(self.pixel_from_world)
@@ -79,16 +76,6 @@ class View:
         """Whether `cell` lies in the grid."""
         return 0 <= cell[0] < self.shape[0] and 0 <= cell[1] < self.shape[1]
 
-    def covered(self, kind: str, place_m: tuple[float, float]) -> list[Cell]:
-        """The grid's cells that a thing of `kind` at `place_m` covers: its own and those its footprint reaches into."""
-        half = self.footprints_m.get(kind, 0.0)
-        own, spans = self.cell(place_m), []
-        for value, start, middle in zip(place_m, self.origin_m, own, strict=True):
-            first = floor((value - half - start) / self.cell_m + OVERLAP)
-            last = ceil((value + half - start) / self.cell_m - OVERLAP) - 1
-            spans.append(range(min(first, middle), max(last, middle) + 1))
-        return [(i, j) for i in spans[0] for j in spans[1] if self.holds((i, j))]
-
     @cached_property
     def cell_pixels(self) -> float:
         """The mean area of a cell in the picture [pixels], at z = 0."""
@@ -110,43 +97,32 @@ class Marker:
 
 @dataclass(frozen=True, eq=False)
 class GridView:
-    """What a picture shows: start (gripper), goal (toaster) and blocked cells of a grid of `shape`.
-
-    `residuals_m`: each marker's place minus the middle of its cell, in the order of `markers`. `ignored`: how many
-    spots of a marker's hue were large enough, yet not round or too large: nobody misses an obstacle unawares.
-    """
+    """What a picture shows: start (gripper), goal (toaster) and blocked cells of a grid of `shape`."""
 
     shape: Cell
     start: Cell
     goal: Cell
     obstacles: tuple[Cell, ...]
     markers: tuple[Marker, ...]
-    residuals_m: tuple[tuple[float, float], ...]
-    ignored: int
     view: View
 
-    @property
-    def blocked(self) -> NDArray[np.bool_]:
-        """The obstacles as an array of `shape`, as `lab.mdp.grid` takes them."""
-        blocked = np.zeros(self.shape, dtype=np.bool_)
-        for cell in self.obstacles:
-            blocked[cell] = True
-        return blocked
-
     def to_json(self) -> dict[str, Any]:
-        """The record for `lab see --json`."""
+        """The record for `lab see --json`: '.' free, 'S' start, 'G' goal, '#' an obstacle's marker."""
+        rows, columns = self.shape
+        cells = [["." for _ in range(columns)] for _ in range(rows)]
+        for i, j in self.obstacles:
+            cells[i][j] = "#"
+        cells[self.start[0]][self.start[1]], cells[self.goal[0]][self.goal[1]] = "S", "G"
         markers = [
             {"kind": m.kind, "pixel": list(m.pixel), "world_m": list(m.world_m), "cell": list(m.cell)}
             for m in self.markers
         ]
         return {
-            "grid": list(self.shape),
+            "grid": ["".join(row) for row in cells],
             "start": list(self.start),
             "goal": list(self.goal),
             "obstacles": [list(cell) for cell in self.obstacles],
             "markers": markers,
-            "residuals_m": [list(pair) for pair in self.residuals_m],
-            "ignored": self.ignored,
         }
 
 

@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from lab.errors import unknown
+from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import needed_moves
-from lab.sequencing.cell.routes import Moves
+from lab.sequencing.cell.routes import NeededMoves
 from lab.sequencing.cell.stations import Product, Route, Stage, Station
 from lab.skills import SKILLS, Skill
 from lab.tasks.task_file import Task
@@ -24,7 +24,7 @@ class SkillSet:
     """
 
     task: Task
-    moves: Moves
+    moves: NeededMoves
     skills: dict[str, Skill] = field(default_factory=dict)
     legs: dict[Pair, Skills] = field(default_factory=dict)
     travels: dict[Pair, Skills] = field(default_factory=dict)
@@ -60,20 +60,18 @@ class SkillSet:
 
 
 def check_names(task: Task) -> None:
-    """BadInput unless all sub-tasks and processes that a task names are skills."""
+    """BadInput unless all sub-tasks and processes that a task names are skills, and nothing is called as what they make."""
     for name in task.subtasks:
         if name not in SKILLS:
             raise unknown("sub-task", name, SKILLS, f"task '{task.name}': subtasks")
+    processes = [name for name, kind in SKILLS.items() if not kind.moves_arm]
     for station in task.stations:
-        if station.process is not None and not any(kind.at_machine(task, station.name) for kind in SKILLS.values()):
-            known = [name for name in SKILLS if _is_process(task, station.name, name)]
-            raise unknown("process", station.process, known, f"task '{task.name}': station '{station.name}'")
-
-
-def _is_process(task: Task, station: str, name: str) -> bool:
-    """Whether a machine would do the skill of this name, were it its process."""
-    places = tuple(s.model_copy(update={"process": name}) if s.name == station else s for s in task.stations)
-    return SKILLS[name].at_machine(task.model_copy(update={"stations": places}), station) is not None
+        if station.process is not None and station.process not in processes:
+            raise unknown("process", station.process, processes, f"task '{task.name}': station '{station.name}'")
+    makers = tuple(f"{name} " for name, kind in SKILLS.items() if kind.on_slice(1))
+    for name in (*(station.name for station in task.stations), *(obstacle.name for obstacle in task.obstacles)):
+        if name.startswith(makers):
+            raise BadInput(f"task '{task.name}': '{name}' is the name of what a skill makes: choose another")
 
 
 def stations(task: Task, process_s: Mapping[str, float]) -> tuple[Station, ...]:

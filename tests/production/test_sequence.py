@@ -13,14 +13,13 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.planner import find_sequence, search_for
-from lab.sequence import (
+from lab.production.sequence import (
     Wanted,
     reference,
     sequence_cell,
     sequence_named,
 )
-from lab.sequencing import DRAWN, SEQUENCERS
+from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES
@@ -28,11 +27,12 @@ from lab.sequencing.cell.stations import Stage, Station
 from lab.sequencing.search import Reference, Search, SrlSettings
 from lab.sequencing.simulate.execution import replicate
 from lab.sequencing.simulate.run import simulate
+from lab.tasks.sequencing import search_for
 from lab.tasks.task_file import load, load_cell
 from lab.teaching.events import Event, PhaseBegan, SequenceFound
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
-from lab.vision.pictures import read_picture
+from lab.vision import read_picture
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 CONTRACT = {  # what CLI.md promises
@@ -321,7 +321,7 @@ def test_what_cannot_be_beaten_comes_from_whom_it_can() -> None:
 
 def test_an_optimum_that_is_not_proven_is_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     cell = load_cell("oven.toml").cell()
-    monkeypatch.setattr("lab.sequence.reference", lambda *_: Reference(20.0, False, "A*"))
+    monkeypatch.setattr("lab.production.sequence.reference", lambda *_: Reference(20.0, False, "A*"))
     document, _ = sequence_cell(cell, load_cell("oven.toml").sequencing, Wanted("fifo"), NO_CHANCE)
     assert (document["optimal_s"], document["optimal_cost"], document["optimum_proven"]) == (None, None, False)
     assert (document["bound_s"], document["gap"]) == (20.0, pytest.approx(0.45))
@@ -342,7 +342,7 @@ REACTING = {
 def few(monkeypatch: pytest.MonkeyPatch, episodes: int) -> None:
     """Draw so many episodes, whatever the method and however many parts."""
     for name in ("REPLICATIONS", "FEWEST"):
-        monkeypatch.setattr(f"lab.sequence_drawn.{name}", episodes)
+        monkeypatch.setattr(f"lab.production.drawn_times.{name}", episodes)
 
 
 @pytest.mark.parametrize("method", REACTING)
@@ -370,7 +370,7 @@ def test_drawn_times(lab: Lab, monkeypatch: pytest.MonkeyPatch, method: str) -> 
     assert len(set(costs)) == 5
     assert plain["stochastic"] is None
     judged = {name: document[name] for name in ("gap", "success_percent")}
-    if method in DRAWN:  # it looked in drawn times, where the shortest is luck
+    if SEQUENCERS[method].drawn:  # it looked in drawn times, where the shortest is luck
         assert judged["success_percent"] is None
         assert document["gap"] == pytest.approx(document["cost"] / 513 - 1, abs=1e-9)
         assert document["cost"] >= 513 - 1e-6  # by the mean times
@@ -390,7 +390,7 @@ def test_who_plans_at_every_decision_is_given_fewer_episodes(
 ) -> None:
     """Here 24 by parts squared, from 2 to 30."""
     for name, number in (("REPLICATIONS", 30), ("PLANNED", 24), ("FEWEST", 2)):
-        monkeypatch.setattr(f"lab.sequence_drawn.{name}", number)
+        monkeypatch.setattr(f"lab.production.drawn_times.{name}", number)
     drawn = asked(lab, f"oven.toml --toasts {toasts} --method {method} --stochastic")["stochastic"]
     assert drawn["replications"] == episodes
 
@@ -631,7 +631,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int, int]]:
         route = (Stage("in"), Stage("hot"), Stage("out"))
         return SimpleNamespace(cell=Cell.alike(stations, route, step, 2 * step, "in", toasts))
 
-    monkeypatch.setattr("lab.production.run.prepare", prepare)
+    monkeypatch.setattr("lab.skills.prepared_scene.prepare", prepare)
     monkeypatch.setattr("lab.production.run.teach_all", cell)
     return prepared
 

@@ -7,20 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lab.cellfile import CellFile, order_from_word, toast_case
-from lab.cellparts import Sequencing
 from lab.errors import BadInput, unknown
 from lab.learning.settings import GateSettings
-from lab.planner import check_method, find_sequence, search_for
-from lab.sequence_drawn import stochastic
-from lab.sequencing import DRAWN
+from lab.production.drawn_times import stochastic
+from lab.sequencing import SEQUENCERS, check_method, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective, cost
-from lab.sequencing.cell.schedule import EpisodeSequenced, LearnedSequence, SequenceResult
-from lab.sequencing.search import SAME, Reference, Search
+from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import follow, simulate
+from lab.tasks.cell import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
+from lab.tasks.sequencing import Sequencing, search_for
 from lab.tasks.task_file import Task, load_any
 from lab.teaching.events import PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.teacher import Teacher
@@ -113,7 +111,8 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
 
 def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
-    from lab.production.run import prepare, teach_all
+    from lab.production.run import teach_all
+    from lab.skills.prepared_scene import prepare
 
     objective = wanted.objective or task.sequencing.objective
     if objective in WITH_DUE_TIMES:
@@ -138,7 +137,7 @@ def sequence_cell(
         settings,
         episodes=wanted.episodes,
         objective=wanted.objective,
-        chance=chance if wanted.stochastic and method in DRAWN else NO_CHANCE,
+        chance=chance if wanted.stochastic and SEQUENCERS[method].drawn else NO_CHANCE,
     )
     check_method(method)
     check_objective(search.objective, cell)

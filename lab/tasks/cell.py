@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr, ValidationError
 
-from lab.cellfaults import Fault, file_faults, layout_faults, loc_of, missing_times, travel_faults
-from lab.cellparts import CellFields, CellStage, Times
 from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import MAX_PARTS, Cell
 from lab.sequencing.cell.chance import Chance
 from lab.sequencing.cell.stations import Arrivals
+from lab.tasks.cell_faults import Fault, file_faults, layout_faults, loc_of, missing_times, travel_faults
+from lab.tasks.cell_fields import CellFields, CellStage, Times
 from lab.tasks.toml_text import TomlText, explain
 
 TOAST_CASES = {"I": "toast-case-1", "II": "toast-case-2", "III": "toast-case-3"}

@@ -5,11 +5,11 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from lab.errors import BadInput
-from lab.production.report import Prepared, draw_value_map
-from lab.production.run import prepare, trial_of
-from lab.production.skillset import SkillSet
 from lab.skills import Skill
+from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.skill import Problem
+from lab.skills.skillset import SkillSet
+from lab.skills.trial import trial_of
 from lab.tasks.record import Learned
 from lab.tasks.task_file import Task, check_toasts, load, names_of
 from lab.teaching.lesson import Subject
@@ -53,12 +53,14 @@ class SkillSubject(Subject):
 
     def draw(self, policy: Policy, out: Path) -> dict[str, str]:
         """The values over the picture that the problem was read from, where it was."""
+        from lab.view.plots import values_seen
+
         assert self.scene is not None
         skill = self.scene.skillset.skills[self.skill]
         photo, path = skill.photo(), out / f"{skill.subtask}-value-map.png"
         if photo is None:
             return {}
-        draw_value_map(skill.problem.mdp, photo, policy, path)
+        values_seen(policy.q, skill.problem.mdp, photo.picture, photo.seen, path)
         return {"value_map": str(path)}
 
 

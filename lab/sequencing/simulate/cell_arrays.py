@@ -1,4 +1,4 @@
-"""A cell, a run of it and a table of values as plain arrays: what the compiled simulation and sessions work on."""
+"""A cell and a run of it as plain arrays: what the compiled simulation works on."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -21,8 +21,6 @@ NO_ARRIVALS = 0
 ARRIVAL_CODES = {name: code for code, name in enumerate(ARRIVALS_AFTER, 1)}
 LAW_CODES = {name: code for code, name in enumerate(LAWS)}
 OBJECTIVE_CODES = {name: code for code, name in enumerate(OBJECTIVES)}
-LEARNER_CODES = {"random": 0, "srl": 1, "mc": 2}
-DENSE_KEYS = 2**18  # up to so many keys a table has a place for each, above it is a hash table
 
 
 class CellArrays(NamedTuple):
@@ -80,54 +78,6 @@ class RunArrays(NamedTuple):
     options: Ints
 
 
-class Memory(NamedTuple):
-    """Values by key. Rows are filled from 1; row 0 has the value of every key that is not in the table.
-
-    rows: the row by key where `dense`, else an open hash table of rows. visits: by row, for averages. used (1,): the
-    last row filled.
-    """
-
-    rows: NDArray[np.int32]
-    keys: Ints
-    values: Floats
-    visits: Ints
-    used: Ints
-    dense: bool
-
-
-class Rules(NamedTuple):
-    """What is learned by. learner: one of LEARNER_CODES; the logarithms are those of the step update's factors.
-
-    log_keep: 1 - alpha, log_take: alpha times discount. end_keep and end_add: what the last value of a finished episode
-    is multiplied by, and what is added. type_a: the reward factor. offset: see `gain`.
-    """
-
-    learner: int
-    log_keep: float
-    log_take: float
-    end_keep: float
-    end_add: float
-    type_a: bool
-    offset: float
-
-
-class Work(NamedTuple):
-    """What a session of sequences of up to L moves writes to.
-
-    values: those of the allowed decisions. trail, sequence (L,): rows and decisions of the episode under way. best (L,),
-    best_cost (1,): the best sequence so far, then zeros; inf: none. stream (1,): the state of the random numbers.
-    """
-
-    run: RunArrays
-    memory: Memory
-    values: Floats
-    trail: Ints
-    sequence: Ints
-    best: Ints
-    best_cost: Floats
-    stream: NDArray[np.uint64]
-
-
 def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANCE) -> CellArrays:
     """The cell as arrays, to be judged by an objective that it has been checked for (`check_objective`)."""
     size, places = len(cell.stations), cell.positions
@@ -176,29 +126,6 @@ def run_arrays(cell: Cell) -> RunArrays:
         allowed=np.zeros(decisions, np.int64),
         options=np.zeros(decisions, np.int64),
     )
-
-
-def memory_for(keys: int, rows: int, first: float) -> Memory:
-    """An empty table for so many keys and up to so many rows; `first`: the value of what was never visited."""
-    rows = min(rows, keys)
-    dense = keys <= DENSE_KEYS
-    values = np.zeros(rows + 1)
-    values[0] = first
-    return Memory(
-        rows=np.zeros(keys if dense else 1 << (2 * rows).bit_length(), np.int32),
-        keys=np.zeros(rows + 1, np.int64),
-        values=values,
-        visits=np.zeros(rows + 1, np.int64),
-        used=np.zeros(1, np.int64),
-        dense=dense,
-    )
-
-
-def work_for(cell: Cell, memory: Memory) -> Work:
-    """Room for a session; `episodes.advance` makes it ready."""
-    run, moves = run_arrays(cell), most_moves(cell)
-    trail, sequence, best = np.zeros((3, moves), np.int64)
-    return Work(run, memory, np.zeros(len(run.allowed)), trail, sequence, best, np.zeros(1), np.zeros(1, np.uint64))
 
 
 def most_choices(cell: Cell) -> int:

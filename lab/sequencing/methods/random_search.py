@@ -1,0 +1,19 @@
+"""Random search: the best of so many sequences drawn evenly."""
+
+import numpy as np
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import drawn_seed
+from lab.sequencing.methods.sessions import SessionLearner, learn
+from lab.sequencing.search import Search, SequenceResult
+
+
+def random_search(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
+    """The best of so many sequences, each decision drawn evenly from the allowed ones.
+
+    By chance, each sequence is judged by the times of its own episode. Raises BadInput for an objective that the cell
+    does not allow, WorkFailed when every sequence ends in a deadlock. Source: thesis 7.6, random search.
+    """
+    log = learn(cell, search, drawn_seed(rng), SessionLearner).log
+    log.check(cell)
+    return SequenceResult(log.best, log.best_cost, tuple(log.costs))

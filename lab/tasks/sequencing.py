@@ -1,0 +1,55 @@
+"""How a file wants the order of the robot's transfers to be found, and the search that it asks for."""
+
+from collections.abc import Callable, Iterator
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from lab.errors import BadInput, unknown
+from lab.sequencing.cell.chance import NO_CHANCE, Chance
+from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES
+from lab.sequencing.search import EpisodeSequenced, Search, SrlSettings
+from lab.tasks.record import Record
+
+
+class Sequencing(Record):
+    """How the order of the robot's transfers is found, and what it is judged by."""
+
+    method: str = "srl-time"
+    episodes: Annotated[int, Field(ge=1, le=1_000_000)] = 400
+    alpha: Annotated[float, Field(gt=0, le=1)] = 0.05
+    discount: Annotated[float, Field(gt=0, le=1)] = 0.9
+    beta: Annotated[float, Field(ge=0, le=100)] = 1.0
+    reward_factor: Literal["A", "B"] = "B"
+    objective: str = MAKESPAN
+    values: Literal["pairs", "states"] = "pairs"
+    state: Literal["parts", "stations"] = "parts"
+
+    def settings(self) -> SrlSettings:
+        """The parameters of SRL and Monte Carlo."""
+        return SrlSettings(self.alpha, self.discount, self.beta, self.reward_factor, self.values, self.state)
+
+    def faults(self, due: bool) -> Iterator[tuple[str, BadInput]]:
+        """Fields with a name that no table holds, or that ask for due times when there are none (`due` False), and why."""
+        from lab.sequencing import SEQUENCERS
+
+        if self.method not in SEQUENCERS:
+            yield "method", unknown("method", self.method, SEQUENCERS, "sequencing.method")
+        if self.objective not in OBJECTIVES:
+            yield "objective", unknown("objective", self.objective, OBJECTIVES, "sequencing.objective")
+        elif self.objective in WITH_DUE_TIMES and not due:
+            yield "objective", BadInput(f"sequencing.objective '{self.objective}' needs due times, and there are none")
+
+
+def search_for(
+    settings: Sequencing,
+    *,
+    episodes: int | None = None,
+    objective: str | None = None,
+    chance: Chance = NO_CHANCE,
+    on_episode: Callable[[EpisodeSequenced], None] | None = None,
+) -> Search:
+    """What a file's settings ask of a sequencer, changed where something else is given."""
+    return Search(
+        episodes or settings.episodes, objective or settings.objective, chance, settings.settings(), on_episode
+    )
