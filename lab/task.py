@@ -8,11 +8,11 @@ from lab.cellfile import CellFile
 from lab.errors import BadInput, LabError
 from lab.mdp import shortest_steps
 from lab.production.report import check_out
+from lab.production.skill_subject import fitting
 from lab.tasks.grid_world import RANDOM, GridWorld, parse_shape, random_world
 from lab.tasks.record import read_text, write_whole
 from lab.tasks.task_file import check_number, find, load_any
-from lab.teaching.lesson import fitting
-from lab.teaching.teacher import world_problem
+from lab.teaching.world_subject import world_problem
 
 AXES = """\
 Drawn at random. Cells are counted from 0; with two axes they are [row, column], row 0 on top, with three [x, y, z], y

@@ -25,13 +25,12 @@ from lab.sequencing import DRAWN, SEQUENCERS
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES
-from lab.sequencing.cell.schedule import SequenceResult
 from lab.sequencing.cell.stations import Stage, Station
 from lab.sequencing.search import Reference, Search, SrlSettings
 from lab.sequencing.simulate.execution import replicate
 from lab.sequencing.simulate.run import simulate
 from lab.tasks.task_file import load, load_cell
-from lab.teaching.listener import Listener
+from lab.teaching.events import Event, PhaseBegan, SequenceFound
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
 from lab.vision.pictures import read_picture
@@ -618,19 +617,6 @@ def test_a_deadlock_is_work_that_failed(lab: Lab) -> None:
 # ---- a task: measured in simulation, then sequenced -----------------------------------------------------------------
 
 
-class Heard(Listener):
-    """Notes what it hears."""
-
-    def __init__(self) -> None:
-        self.notes: list[object] = []
-
-    def phase(self, name: str, parts: int) -> None:
-        self.notes.append((name, parts))
-
-    def sequenced(self, best: SequenceResult, known: Reference | None) -> None:
-        self.notes.append((best.cost, known))
-
-
 @pytest.fixture
 def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int, int]]:
     """The oven of the file above as if it had been measured; what was prepared: task, toasts, seed."""
@@ -669,11 +655,13 @@ def test_a_task(lab: Lab, measured: list[tuple[str, int, int]], method: str | No
 
 @pytest.mark.usefixtures("measured")
 def test_who_listens_hears_every_session(teacher: Teacher) -> None:
-    heard = Heard()
+    heard: list[Event] = []
     wanted = Wanted("random", 4, sessions=3)
-    document = sequence_named("toast", None, 2, wanted, teacher=teacher, listener=heard, files={})
+    document = sequence_named("toast", None, 2, wanted, teacher=replace(teacher, tell=heard.append), files={})
     assert document["sessions"] == 3
-    assert heard.notes == [("sequence", 3), *[(29.0, Reference(29.0, True, "A*"))] * 3]
+    assert heard[0] == PhaseBegan("sequence", 3)
+    found = [(event.result.cost, event.reference) for event in heard if isinstance(event, SequenceFound)]
+    assert found == [(29.0, Reference(29.0, True, "A*"))] * 3
 
 
 def test_a_task_is_for_three_toasts_unless_told(lab: Lab, measured: list[tuple[str, int, int]]) -> None:

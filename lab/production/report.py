@@ -23,7 +23,7 @@ from lab.skills import Skill
 from lab.skills.skill import Photo, Problem
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Task
-from lab.teaching.teacher import Lesson
+from lab.teaching.lesson_plan import Lesson
 from lab.toolbox.policy import Policy
 
 FILES = {

@@ -170,7 +170,7 @@ def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: 
         raise KeyboardInterrupt
 
     monkeypatch.setattr("lab.production.run.prepare", stop)
-    monkeypatch.setattr("lab.teaching.lesson.load", stop)
+    monkeypatch.setattr("lab.production.skill_subject.load", stop)
     monkeypatch.setattr("lab.look.load", stop)
     ran = lab(*words.split(), "--json")
     why = f"stopped by Ctrl-C{said}"
