@@ -1,6 +1,6 @@
 """What the commands that teach share: who hears of it, the teacher and the subject of the options, a kept session."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from shlex import quote
@@ -10,7 +10,10 @@ from lab.cli.output import complain, console
 from lab.errors import BadInput, LabError
 
 if TYPE_CHECKING:
+    from lab.learning.requests import Ask
+    from lab.production.sequence import Wanted
     from lab.seat.lesson_seat import LessonSeat
+    from lab.teaching.kept_order import OrderSession
     from lab.teaching.kept_session import KeptSession
     from lab.teaching.lesson import Subject
     from lab.teaching.lesson_options import LessonOptions
@@ -39,7 +42,7 @@ def lesson_seat(
             shown = stack.enter_context(SeatPage(port, wait_s=wait_s))
             progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
         prompt = TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
-        seat = LessonSeat(progress, prompt, shown, plain=plain)
+        seat = LessonSeat(progress, prompt, shown)
         stack.callback(seat.clear_stage)
         try:
             yield seat
@@ -54,11 +57,10 @@ def teacher_of(toolbox: Path | None, options: "LessonOptions", seat: "LessonSeat
     from lab.teaching.teacher import Teacher
     from lab.toolbox.registry import Toolbox
 
-    counsel = options.counsel(seat.people())
-    counsel.check()
-    for journal in counsel.cut_records():
+    advising = options.advising(seat.people())
+    for journal in advising.cut_records():
         complain(f"journal '{journal.path}': its last line was cut off and is left out: {journal.cut[:60]!r}")
-    teacher = Teacher(Toolbox(toolbox), counsel, options.seed, seat.hear)
+    teacher = Teacher(Toolbox(toolbox), advising, options.seed, seat.hear)
     teacher.toolbox.check()
     return teacher
 
@@ -103,18 +105,40 @@ def subject_of(options: "LessonOptions", kept: "KeptSession | None" = None) -> "
     return SkillSubject.of(options)
 
 
-def say_outside(kept: "KeptSession") -> None:
-    """Says which files that are not its own a session has the lab read when it goes on or is shown again."""
-    from lab.tasks.task_file import is_path
+def wanted_of(kept: "OrderSession", people: "Mapping[str, Ask]") -> "Wanted":
+    """What a session of `lab sequence` asks for, and whom."""
+    from lab.production.sequence import Wanted
 
     options = kept.options
-    named: list[object] = [options.subtask, options.task]
-    if options.subtask.startswith(GYM):
+    return Wanted(
+        options.method,
+        options.episodes,
+        options.objective,
+        options.sessions,
+        options.seed,
+        options.stochastic,
+        options.asked,
+        options.gate,
+        people,
+        keep=lambda cell, objective: kept.keep(Path(options.task).stem, cell, objective),
+    )
+
+
+def say_outside(kept: "KeptSession | OrderSession") -> None:
+    """Says which files that are not its own a session has the lab read when it goes on or is shown again."""
+    from lab.advice.advisors import AdvisorName
+    from lab.tasks.task_file import is_path
+
+    assert kept.read is not None
+    options = kept.options
+    named: list[object] = [getattr(options, "subtask", None), options.task]
+    if str(named[0]).startswith(GYM):
         from lab.gym import parse_name
 
-        named = list(parse_name(options.subtask, kept.where).options.values())
+        named = list(parse_name(str(named[0]), kept.where).options.values())
     files = [word for word in named if isinstance(word, str) and is_path(word) and Path(word).is_file()]
-    files += [name.removeprefix("recorded:") for name in options.advisors if name.startswith("recorded:")]
+    advisors = [AdvisorName.of(name) for name in options.advisors]
+    files += [str(name.folder) for name in advisors if name.folder is not None]
     here = kept.read.path.parent.resolve()
     if outside := [name for name in files if not Path(name).resolve().is_relative_to(here)]:
         complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(outside)}")

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from lab.advice.advisors import help_text
+
 MAX_EPISODES = 1_000_000
 MAX_SESSIONS = 10_000
 
@@ -18,8 +20,7 @@ AdvisorNames = Annotated[
     list[str] | None,
     typer.Option(
         "--advisor",
-        help="Who advises: expert, moderate, limited, novice, tau=X, tau=X..Y (changing over the episodes), wrong, "
-        "terminal, web, recorded:DIR (a session's folder), none; several times for several advisors.",
+        help=f"Who advises: {help_text()}; several times for several advisors.",
     ),
 ]
 Asked = Annotated[str, typer.Option("--ask", help="Several advisors are asked: together, in-turn.")]

@@ -45,7 +45,7 @@ def run(
     check_out(folder)
     names = tuple(advisor or DEFAULT_ADVISORS)
     options = LessonOptions(task=task, advisors=names, asked=asked, decide=decide, seed=seed, toasts=toasts)
-    options.counsel().check()
+    options.advising()
     prepared = prepare(loaded, toasts, seed)
     with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
         teacher = teacher_of(toolbox, options, seat)

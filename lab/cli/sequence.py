@@ -5,13 +5,16 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.lessons import lesson_seat, teacher_of
+from lab.advice.advisors import help_text
+from lab.cli.lessons import lesson_seat, say_outside, teacher_of, wanted_of
 from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Plain, Port, Seed, ShowPage, ToolboxFolder, Wait
 from lab.cli.output import end, show
 
 
 def sequence(
-    task: Annotated[str, typer.Argument(help="A task or a cell that ships, or a .toml file.")],
+    task: Annotated[
+        str | None, typer.Argument(help="A task or a cell that ships, or a .toml file; none: with --resume.")
+    ] = None,
     case: Annotated[
         str | None,
         typer.Option("--case", help="toast: I, II or III of the thesis. A cell: its order by initials, such as RSR."),
@@ -44,10 +47,13 @@ def sequence(
         str,
         typer.Option(
             "--advisor",
-            help="Who srl may ask which part to move: expert, moderate, limited, novice, tau=X, wrong, terminal, web.",
+            help=f"Who srl may ask which part to move: {help_text()}.",
         ),
     ] = "none",
     gate: Annotated[str, typer.Option("--gate", help="When srl asks: ccrl, always, never.")] = "ccrl",
+    resume: Annotated[
+        Path | None, typer.Option("--resume", help="Go on with the advice in this folder, as it was begun.")
+    ] = None,
     plot: Annotated[
         Path | None, typer.Option("--plot", help="A .png or .svg file for the costs of the episodes.")
     ] = None,
@@ -60,17 +66,35 @@ def sequence(
     toolbox: ToolboxFolder = None,
     as_json: Json = False,
 ) -> None:
-    """The high level alone: the order of the robot's transfers, beside the proven optimum."""
-    from lab.production.sequence import Wanted, sequence_named
+    """The high level alone: the order of the robot's transfers, beside the proven optimum.
+
+    What a person advises is kept: --resume goes on with it, lab replay shows it again.
+    """
+    from lab.production.sequence import sequence_named
+    from lab.teaching.kept_order import OrderOptions, OrderSession, gone_on
     from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
+    from lab.toolbox.registry import Toolbox
     from lab.view.summary import sequence_summary
 
-    with lesson_seat([advisor], page=page, port=port, wait_s=wait, plain=plain) as seat:
-        teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=seed), seat)
-        wanted = Wanted(method, episodes, objective, sessions, seed, stochastic, advisor, gate, seat.orderers())
-        files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
-        with seat.progress:
-            document = sequence_named(task, case, toasts, wanted, teacher=teacher, files=files)
-    show(document, as_json, sequence_summary)
+    given = OrderOptions(
+        task or "", case, toasts, method, objective, episodes, sessions, stochastic, advisor, gate, seed
+    )
+    box = Toolbox(toolbox)
+    kept = OrderSession(given.complete(), box) if resume is None else gone_on(given, resume, box)
+    if resume is not None:
+        say_outside(kept)
+    options = kept.options
+    files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
+    try:
+        with lesson_seat([options.advisor], page=page, port=port, wait_s=wait, plain=plain) as seat:
+            teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
+            wanted = wanted_of(kept, seat.people())
+            with seat.progress:
+                document = sequence_named(
+                    options.task, options.case, options.toasts, wanted, teacher=teacher, files=files
+                )
+    except KeyboardInterrupt as stopped:
+        raise KeyboardInterrupt(f"{stopped or 'stopped by Ctrl-C'}{kept.resume_command()}") from None
+    show(document | kept.worth(), as_json, sequence_summary)
     if document["interrupted"]:
-        end("stopped by Ctrl-C; the best order until then is above", 130)
+        end(f"stopped by Ctrl-C; the best order until then is above{kept.resume_command()}", 130)

@@ -103,7 +103,7 @@ def teach(
     options = given.complete() if kept is None else kept.same(given)
     if kept is not None:
         say_outside(kept)
-    options.counsel().check()
+    options.advising()
     if out is not None:
         check_new(out)
     subject = subject_of(options, kept)

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.advice.advisors import Advice, TableAdvisor
 from lab.errors import BadInput
 from lab.learning import kernels, selection, splitmix
 from lab.learning.advice_memory import places
 from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.simulated_advice import Advice, TableAdvisor
 from lab.mdp import FloatArray, TabularMDP
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf
 
-from lab.learning.events import Verdict
+from lab.learning.events import Improvement, Verdict
 from lab.learning.reasons import Both, ByChance, Reason, TablesDiffer, TooLong, TooSlow, ValuesAlike, ValuesApart
 from lab.learning.selection import Draw
 from lab.learning.settings import GateSettings
@@ -15,15 +15,6 @@ from lab.learning.updates import Update
 
 Values = Sequence[float]
 Steps = Sequence[float]  # whole numbers, unless the high level compares makespans
-
-
-@dataclass(frozen=True)
-class Improvement:
-    """The last K episodes beside the K before them: rate = (previous - current) / previous (thesis eq. 6.1)."""
-
-    rate: float
-    current_mean: float
-    previous_mean: float
 
 
 def window_mean(steps: Steps, end: int, window: int) -> float:

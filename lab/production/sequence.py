@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lab.advice.advising import through
+from lab.advice.advisors import PEOPLE, AdvisorName, make_advisor
+from lab.advice.entries import Closed
+from lab.advice.journal import Again, Journal
 from lab.errors import BadInput, unknown
+from lab.learning.events import Event as SessionEvent
+from lab.learning.requests import Ask
 from lab.learning.settings import GateSettings
 from lab.production.drawn_times import stochastic
 from lab.sequencing import SEQUENCERS, check_method, find_sequence
@@ -20,21 +26,25 @@ from lab.tasks.cell import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.tasks.task_file import Task, load_any
-from lab.teaching.events import PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
+from lab.teaching.events import ORDER, LessonEvent, PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
+from lab.teaching.lesson_sessions import TellingAdvisor
 from lab.teaching.teacher import Teacher
 
 if TYPE_CHECKING:
-    from lab.sequencing.methods.srl_advised import AdvisedResult, SequenceRequest
-
-    Ask = Callable[[SequenceRequest], int | None]
+    from lab.sequencing.methods.srl_advised import AdvisedResult
 
 DEFAULT_TOASTS = 3
+NOBODY = AdvisorName.of("none")
+KeepOrder = Callable[[Cell, str], Journal]  # given the cell and the objective
 SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What `lab sequence` is asked for; None: as the file says. advisor: who may be asked which part to move next."""
+    """What `lab sequence` is asked for; None: as the file says. advisor: who may be asked which part to move next.
+
+    keep: gives the journal of what people say, by default one that is not written.
+    """
 
     method: str | None = None
     episodes: int | None = None
@@ -42,9 +52,10 @@ class Wanted:
     sessions: int = 1
     seed: int = 0
     stochastic: bool = False
-    advisor: str = "none"
+    advisor: AdvisorName = NOBODY
     gate: str = "ccrl"
-    people: "Mapping[str, Ask]" = field(default_factory=dict)
+    people: Mapping[str, Ask] = field(default_factory=dict)
+    keep: KeepOrder = lambda cell, objective: Journal()
 
 
 def sequence_named(
@@ -91,14 +102,14 @@ def sequence_named(
 
 def _check_names(wanted: Wanted, settings: Sequencing) -> None:
     """BadInput for a name that no table holds, and for advice to a method that asks for none; before any work."""
-    from lab.sequencing.methods.srl_advised import check_advice
+    from lab.sequencing.methods.srl_advised import check_gate
 
     method, objective = wanted.method or settings.method, wanted.objective or settings.objective
     check_method(method)
     if objective not in OBJECTIVES:
         raise unknown("objective", objective, OBJECTIVES, "--objective")
-    check_advice(wanted.advisor, wanted.gate)
-    if wanted.advisor != "none" and method != "srl":
+    check_gate(wanted.gate)
+    if wanted.advisor.row != "none" and method != "srl":
         raise BadInput(f"--advisor {wanted.advisor} with --method {method}: only srl asks for advice")
 
 
@@ -130,8 +141,25 @@ def sequence_cell(
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     """Sessions of one method on a cell, beside what cannot be beaten; the document of `lab sequence`, and the sessions.
 
-    BadInput for an unknown method or objective, and for an objective that the cell has no times for.
+    They are run from their beginning each time an answer is taken back. BadInput for an unknown method or objective, and
+    for an objective that the cell has no times for.
     """
+    if wanted.advisor.row not in PEOPLE:
+        return _sessions(cell, settings, wanted, chance, tell, None)
+    journal = wanted.keep(cell, wanted.objective or settings.objective)
+    try:
+        while True:
+            try:
+                return _sessions(cell, settings, wanted, chance, tell, journal)
+            except Again:
+                journal.rewind()
+    finally:
+        journal.close()
+
+
+def _sessions(
+    cell: Cell, settings: Sequencing, wanted: Wanted, chance: Chance, tell: Tell, journal: Journal | None
+) -> tuple[dict[str, Any], list[SequenceResult]]:
     method = wanted.method or settings.method
     search = search_for(
         settings,
@@ -142,25 +170,36 @@ def sequence_cell(
     check_method(method)
     check_objective(search.objective, cell)
     known = reference(cell, search.objective)
-    found = []
+    found: list[SequenceResult] = []
     interrupted = False
     shown = known if search.chance == NO_CHANCE else None
     for session in range(wanted.sessions):
         heard = _Heard(tell)
-        gate = None if wanted.advisor == "none" else GateSettings(wanted.gate, spare_best=True)
+        gate = None if wanted.advisor.row == "none" else GateSettings(wanted.gate, spare_best=True)
         tell(SequencingBegan(search.episodes, shown, gate))
         try:
-            found.append(_session(cell, method, replace(search, on_episode=heard), wanted, session))
+            if wanted.advisor.row == "none":
+                result: SequenceResult = find_sequence(
+                    cell, method, replace(search, on_episode=heard), wanted.seed, session
+                )
+            else:
+                result = _advised(cell, replace(search, on_episode=heard), wanted, session, journal, tell)
+            found.append(result)
         except KeyboardInterrupt:
             interrupted = True
             if heard.best is None and not found:
                 raise KeyboardInterrupt("stopped by Ctrl-C before an order was found") from None
             found += [] if heard.best is None else [heard.result()]
             break
-        tell(SequenceFound(found[-1], shown))
+        if journal is None or not journal.folding:
+            tell(SequenceFound(found[-1], shown))
     document = _document(cell, method, search, found, known, wanted) | {"interrupted": interrupted}
     if wanted.stochastic and not interrupted:
         document["stochastic"] = stochastic(cell, method, search, min(found, key=_cost), chance, wanted.seed)
+    if journal is not None and not interrupted:
+        proven = document["optimal_cost"]
+        is_best = proven is not None and document["gap"] == 0.0
+        journal.closes(Closed(wanted.sessions * search.episodes, document["cost"], proven, is_best, saved_as=""))
     return document, found
 
 
@@ -182,19 +221,23 @@ class _Heard:
         return SequenceResult(self.best.best, self.best.best_cost, tuple(self.costs))
 
 
-def _session(cell: Cell, method: str, search: Search, wanted: Wanted, session: int) -> SequenceResult:
-    if wanted.advisor == "none":
-        return find_sequence(cell, method, search, wanted.seed, session)
-    return _advised(cell, method, search, wanted, session)
-
-
-def _advised(cell: Cell, method: str, search: Search, wanted: Wanted, session: int) -> "AdvisedResult":
+def _advised(
+    cell: Cell, search: Search, wanted: Wanted, session: int, journal: Journal | None, tell: Tell
+) -> "AdvisedResult":
     """A session of SRL with advice."""
-    from lab.sequencing.methods.srl_advised import advised_srl, sequence_advisor
+    from lab.advice.order_level import OrderLevel, signature_of
+    from lab.sequencing.methods.srl_advised import advised_srl
 
-    rng = np.random.default_rng([wanted.seed, 2, session])
-    advisor = sequence_advisor(wanted.advisor, cell, np.random.default_rng([wanted.seed, 3, session]), wanted.people)
-    return advised_srl(cell, search, rng, GateSettings(wanted.gate, spare_best=True), advisor)
+    rng, own = (np.random.default_rng([wanted.seed, stream, session]) for stream in (2, 3))
+    people, signature = through(journal, wanted.people), signature_of(cell, search.objective)
+    advisor = make_advisor(wanted.advisor, OrderLevel(cell, own, people, search.episodes, signature))
+    if advisor is not None:
+        advisor = TellingAdvisor(advisor, tell)
+
+    def hear(event: SessionEvent) -> None:
+        tell(LessonEvent(ORDER, event, True if journal is None else journal.tell(event)))
+
+    return advised_srl(cell, search, rng, GateSettings(wanted.gate, spare_best=True), advisor, hear)
 
 
 def reference(cell: Cell, objective: str) -> Reference:
@@ -250,8 +293,8 @@ def _document(
         "final_success_percent": 100.0 * sum(finals) / len(finals) if finals and known.proven and same_times else None,
         "mean_best_s": float(np.mean([result.cost for result in found])) if timed else None,
         "mean_best_cost": float(np.mean([result.cost for result in found])),
-        "advisor": wanted.advisor,
-        "advice": _advice(found) if wanted.advisor != "none" else None,
+        "advisor": str(wanted.advisor),
+        "advice": _advice(found) if wanted.advisor.row != "none" else None,
         "stochastic": None,
         "files": {},
     }

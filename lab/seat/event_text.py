@@ -66,10 +66,11 @@ def _label(mdp: TabularMDP, action: int) -> str:
 class SessionText:
     """Words for the events of sessions, one after the other; an episode is held against the mean told when it asked.
 
-    named: what a move of a problem is called.
+    named: what a move of a problem is called; kind: "steps", or "order", whose steps are costs.
     """
 
     named: Callable[[TabularMDP, int], str] = _label
+    kind: str = "steps"
     _mean_before: float | None = None
 
     def told(self, event: SessionEvent, mdp: TabularMDP | None = None, skill: str = "") -> Told | None:
@@ -84,7 +85,7 @@ class SessionText:
             case AdviceRejected():
                 return Told(
                     f"The learner takes no more advice (episodes misled: {event.misleads}, tolerated: {event.omega}). "
-                    f"Episode {event.episode} counted {counted(event.steps, 'step')}, those before it {event.mean_before:.1f}.",
+                    f"Episode {event.episode} {self._counted(event.steps)}, those before it {event.mean_before:.1f}.",
                     "lost",
                 )
             case AdviceEnded():
@@ -100,10 +101,16 @@ class SessionText:
     def _episode(self, event: EpisodeEnded) -> Told:
         """One line on an episode with advice: its steps beside the mean before it."""
         good, judged = verdict(event, self._mean_before)
-        outcome = "reached the goal in" if event.reached else "did not reach the goal:"
-        text = f"Episode {event.episode} {outcome} {counted(event.steps, 'step')}{judged and f', {judged}'}"
+        outcome = (
+            f"{'reached the goal in' if event.reached else 'did not reach the goal:'} {counted(event.steps, 'step')}"
+        )
+        outcome = self._counted(event.steps) if self.kind == "order" else outcome
+        text = f"Episode {event.episode} {outcome}{judged and f', {judged}'}"
         tone: Tone = "" if good is None else "good" if good else "bad"
         return Told(f"{text}; moves advised: {event.helped_steps}.", tone)
+
+    def _counted(self, steps: float) -> str:
+        return f"cost {steps:.1f}" if self.kind == "order" else f"counted {counted(steps, 'step')}"
 
     def _disagreed(self, event: AdvisorsDisagreed, mdp: TabularMDP | None) -> Told:
         """Who said what, and whom the learner follows."""

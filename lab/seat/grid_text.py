@@ -168,7 +168,7 @@ class _Slices:
         mdp = self.mdp
         self.shape = mdp.coverage_shape or mdp.shape
         self.cell = mdp.state_cell(request.state)
-        self.entered = mdp.state_cell(int(mdp.successor[request.state, request.learner_action]))
+        self.entered = mdp.state_cell(int(mdp.successor[request.state, request.own]))
         self.goal = None if mdp.coverage_shape else nearest_goal(mdp, self.cell)
         self.layers, self.layer = (self.shape[2], self.cell[2]) if len(self.shape) > 2 else (1, 0)
         self.flips = is_map(mdp)
@@ -207,7 +207,7 @@ class _Slices:
         if entered == self.cell or entered[3:] != self.cell[3:] or entered[2:3] not in ((), (layer,)):
             return
         there = self._place(entered)
-        direction = direction_of(self.mdp, request.learner_action) if entered[2:] == self.cell[2:] else None
+        direction = direction_of(self.mdp, request.own) if entered[2:] == self.cell[2:] else None
         if plane[there] in (self.marks.free, "x", "g"):
             plane[there] = "*" if direction is None else self.marks.arrows[direction]
 

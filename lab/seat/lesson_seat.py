@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from lab.advice.entries import Answer
 from lab.advice.panel import Panel
 from lab.learning.events import EpisodeEnded
-from lab.learning.requests import AdviceRequest, Ask
+from lab.learning.requests import Ask, Request
 from lab.mdp import FloatArray
 from lab.seat.run_progress import RunProgress
 from lab.seat.terminal.prompt import TeachingPrompt
@@ -25,9 +25,6 @@ from lab.teaching.kept_session import known_values, receipt_of
 if TYPE_CHECKING:
     from lab.seat.page.teaching_page import SeatPage
     from lab.seat.stage import Stage
-    from lab.sequencing.methods.srl_advised import SequenceRequest
-
-    OrderAsk = Callable[[SequenceRequest], int | None]
 
 WORTH_S = 2.0  # the shortest time between two receipts of one lesson
 PAGE_S = 30.0  # how long a replay waits for a browser
@@ -40,11 +37,8 @@ class LessonSeat:
     The page shows the scene as well: the robot stands where the learner asks. `prompt` and `page`: None when not there.
     """
 
-    def __init__(
-        self, progress: RunProgress, prompt: TeachingPrompt | None, page: "SeatPage | None", *, plain: bool = False
-    ) -> None:
+    def __init__(self, progress: RunProgress, prompt: TeachingPrompt | None, page: "SeatPage | None") -> None:
         self.progress, self._prompt, self._page = progress, prompt, page
-        self._plain = plain
         self._stage: Stage | None = None
         self._pause_s: float | None = None  # between two answers of a replay
         self._asked_here = False  # the last question was put to somebody here, and was shown
@@ -98,7 +92,7 @@ class LessonSeat:
         self._worth_s = time.monotonic()
         page.receipt(worth.to_json() | {"lines": worth.lines()})
 
-    def _show_answer(self, request: AdviceRequest, action: int | None) -> None:
+    def _show_answer(self, request: Request, action: int | None) -> None:
         """Show on the page where somebody else is asked, not oftener than it can be seen; in a replay show all."""
         asked_here, self._asked_here = self._asked_here, False
         if self._page is not None and not asked_here:
@@ -137,22 +131,7 @@ class LessonSeat:
         """Who watches a run's scene live."""
         return self._page
 
-    def orderers(self) -> dict[str, "OrderAsk"]:
-        """Who can be asked which part to move next, by name."""
-        from lab.seat.terminal.order_prompt import OrderPrompt
-
-        prompt = OrderPrompt(self.progress.console, plain=self._plain)
-
-        def ask_terminal(request: "SequenceRequest") -> int | None:
-            with self._offered(request, prompt.answer_from_outside), self.progress.paused():
-                return prompt(request)
-
-        orderers: dict[str, OrderAsk] = {"terminal": ask_terminal}
-        if self._page is not None:
-            orderers["web"] = self._page.ask_order
-        return orderers
-
-    def _ask_terminal(self, request: AdviceRequest) -> int | None:
+    def _ask_terminal(self, request: Request) -> int | None:
         assert self._prompt is not None
         self._asked_here = True
         if self._page is None:
@@ -163,7 +142,7 @@ class LessonSeat:
             return self._prompt(request)
 
     @contextmanager
-    def _offered(self, request: "AdviceRequest | SequenceRequest", hear: Callable[[str], None]) -> Iterator[None]:
+    def _offered(self, request: Request, hear: Callable[[str], None]) -> Iterator[None]:
         """The page shows a question that the terminal asks, and may answer it there."""
         if self._page is None:
             yield
@@ -175,7 +154,7 @@ class LessonSeat:
         finally:
             self._page.withdraw()
 
-    def _ask_page(self, request: AdviceRequest) -> int | None:
+    def _ask_page(self, request: Request) -> int | None:
         assert self._page is not None
         self._asked_here = True
         self._show_state(request)
@@ -183,7 +162,7 @@ class LessonSeat:
 
     # ---- the scene
 
-    def _show_state(self, request: AdviceRequest) -> None:
+    def _show_state(self, request: Request) -> None:
         """Moves the robot of the page's scene to where the learner asks."""
         if self._page is not None and self._stage is not None:
             self._page.update(self._stage.frame(request.state))

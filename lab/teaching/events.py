@@ -6,13 +6,15 @@ from typing import Any
 
 from lab.advice.journal import Journal
 from lab.learning import events as session
-from lab.learning.requests import AdviceRequest, Advisor
+from lab.learning.requests import Advisor, Request
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
 from lab.skills.skill import Problem
 from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.toolbox.policy import Policy
+
+ORDER = "The order of the transfers"  # the lesson of that name in a `LessonEvent`
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class LessonEvent:
 class QuestionAnswered:
     """What an advisor said to a request; None: the step was left to the learner."""
 
-    request: AdviceRequest
+    request: Request
     action: int | None
 
 

@@ -73,14 +73,14 @@ class NewSession(_InFolder):
     def keep(self, plan: LessonPlan) -> Journal:
         """The journal of a lesson. Raises BadInput when the folder holds a session already."""
         self.plan, problem = plan, plan.problem
-        self.folder = self._claimed(problem, Path.mkdir) if self._wanted is None else self._wanted
+        self.folder = claimed(self._toolbox, problem.name, Path.mkdir) if self._wanted is None else self._wanted
         if plan.unfinished is not None:
             Toolbox(self.folder / _BEGUN).save(plan.unfinished)
         head = Session(
             self._options.to_json(),
             problem.name,
             problem.mdp.signature,
-            _version(),
+            lab_version(),
             asdict(plan.learner),
             asdict(plan.gate),
             "" if plan.unfinished is None else plan.unfinished.name,
@@ -89,23 +89,24 @@ class NewSession(_InFolder):
         if self._wanted is not None:
             target = self.folder.resolve()
             with suppress(BadInput):  # where links cannot be made, it is only not listed
-                self._claimed(problem, lambda place: place.symlink_to(target, target_is_directory=True))
+                claimed(self._toolbox, problem.name, lambda place: place.symlink_to(target, target_is_directory=True))
         return self.journal
 
-    def _claimed(self, problem: Problem, make: Callable[[Path], None]) -> Path:
-        """A new place for a session of this problem; what two commands make at a time, only one of them gets."""
-        name = slug(problem.name.lower().replace(" ", "-"))
-        for number in range(1, _MOST):
-            folder = self._toolbox.folder / SESSIONS / f"{name}-{number}"
-            try:
-                folder.parent.mkdir(parents=True, exist_ok=True)
-                make(folder)
-            except FileExistsError:
-                continue
-            except OSError as error:
-                raise BadInput(f"toolbox {self._toolbox.folder}: {folder}: {error.strerror or error}") from error
-            return folder
-        raise BadInput(f"toolbox {self._toolbox.folder}: it holds {_MOST} sessions of '{problem.name}': remove some")
+
+def claimed(toolbox: Toolbox, name: str, make: Callable[[Path], None]) -> Path:
+    """A new place for a session of this problem; what two commands make at a time, only one of them gets."""
+    plain = slug(name.lower().replace(" ", "-"))
+    for number in range(1, _MOST):
+        folder = toolbox.folder / SESSIONS / f"{plain}-{number}"
+        try:
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            make(folder)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise BadInput(f"toolbox {toolbox.folder}: {folder}: {error.strerror or error}") from error
+        return folder
+    raise BadInput(f"toolbox {toolbox.folder}: it holds {_MOST} sessions of '{name}': remove some")
 
 
 def kept_by(toolbox: Toolbox, options: LessonOptions) -> Keep:
@@ -127,6 +128,10 @@ class KeptSession(_InFolder):
     def __init__(self, folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] = ()):
         self.read: Read = read_journal(folder, where)
         self.folder = self.read.path.parent
+        if self.read.session.command != "teach":
+            raise BadInput(
+                f"journal '{self.read.path}' ({where}): it is advice on an order: wanted a session of lab teach"
+            )
         self.options = LessonOptions.from_json(self.read.session.words, f"journal '{self.read.path}' ({where})")
         self._read_only, self.where, self.trusted = read_only, where, trusted
 
@@ -188,7 +193,7 @@ def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:
         with suppress(BadInput):
             read = read_journal(path, "toolbox")
             state = "not over" if read.closed is None else "solved" if read.closed.solved else "over"
-            advisors = " + ".join(read.session.words.get("advisors", ()))
+            advisors = " + ".join(read.session.words.get("advisors") or [read.session.words.get("advisor", "")])
             row |= {"problem": read.session.problem, "advisor": advisors, "state": state}
         rows.append(row)
     return rows
@@ -207,7 +212,8 @@ def check_new(folder: Path) -> None:
     raise BadInput(f"'{folder}' (--out) holds a session that {what}: {then} ({command}), or choose another folder")
 
 
-def _version() -> str:
+def lab_version() -> str:
+    """The version of the lab that runs."""
     try:
         return version("teaching-lab")
     except PackageNotFoundError:  # run from a source folder

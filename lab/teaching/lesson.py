@@ -91,7 +91,7 @@ def one_lesson(
     check_name(name)
     problem = subject.prepare(teacher.seed)
     teacher.tell(ScenePrepared(subject.scene, problem))
-    teacher = replace(teacher, counsel=replace(teacher.counsel, region=subject.region), trial=subject.tried)
+    teacher = replace(teacher, advising=replace(teacher.advising, region=subject.region), trial=subject.tried)
     how = subject.settings
     lesson = teacher.one_session(LessonPlan(problem, how.learner, how.gate, subject.name, name=name, sessions=sessions))
     document = _document(problem, lesson, teacher) | subject.facts()
@@ -112,9 +112,9 @@ def replay(kept: KeptSession, subject: Subject, tell: Tell) -> dict[str, Any]:
     Returns the document of `lab replay --json`. Raises KeyboardInterrupt on Ctrl-C.
     """
     options, read = kept.options, kept.read
-    counsel = options.counsel(dict.fromkeys(PEOPLE, _nobody))  # the journal answers for them
+    advising = options.advising(dict.fromkeys(PEOPLE, _nobody))  # the journal answers for them
     with TemporaryDirectory() as folder:
-        teacher = Teacher(Toolbox(folder), counsel, options.seed, tell, keep=kept.keep, begun=kept.begun)
+        teacher = Teacher(Toolbox(folder), advising, options.seed, tell, keep=kept.keep, begun=kept.begun)
         try:
             one_lesson(subject, teacher, options.save, sessions=options.sessions or 1)
         except Interrupted:  # by the journal's end, when it was not over, or by Ctrl-C

@@ -7,7 +7,7 @@ from typing import Annotated, Any, TypeVar
 
 from annotated_types import Ge, Le
 
-from lab.advice.counsel import Counsel
+from lab.advice.advising import Advising
 from lab.errors import BadInput
 from lab.learning.requests import Ask
 from lab.tasks.record import Learned
@@ -51,9 +51,9 @@ class LessonOptions:
         """How something is learned, with what these options say; BadInput for an unknown learner or gate."""
         return settings.changed(self.learner, self.gate, self.episodes, self.memory)
 
-    def counsel(self, people: Mapping[str, Ask] | None = None) -> Counsel:
+    def advising(self, people: Mapping[str, Ask] | None = None) -> Advising:
         """Who advises, with the people behind such names as "terminal"."""
-        return Counsel(self.advisors, people or {}, self.asked, self.decide)
+        return Advising.of(self.advisors, people, self.asked, self.decide)
 
     def to_json(self) -> dict[str, Any]:
         """A plain dict, files by their whole paths, so that they are found from another folder."""

@@ -7,12 +7,12 @@ from zlib import crc32
 
 import numpy as np
 
-from lab.advice.counsel import Counsel
+from lab.advice.advising import Advising
 from lab.advice.journal import Again, Journal
 from lab.learning import events as session
 from lab.learning.environment import TableEnvironment, unreached
 from lab.learning.events import AdviceEnded, AdviceRejected
-from lab.learning.requests import AdviceRequest, Advisor, Walked
+from lab.learning.requests import Advisor, Request, Walked
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import LearnerSettings
 from lab.mdp import FloatArray, greedy_path
@@ -24,7 +24,7 @@ from lab.toolbox.policy import Policy
 MORE_SESSIONS = 3  # to find a shorter way once the goal is reached
 
 
-def learn(plan: LessonPlan, counsel: Counsel, seed: int, journal: Journal, tell: Tell) -> SessionResult:
+def learn(plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tell: Tell) -> SessionResult:
     """All sessions of a lesson as one, run from the beginning each time an answer is taken back.
 
     Up to `plan.sessions` are run until the greedy path is as short as can be; once it leads to the goal, at most
@@ -33,7 +33,7 @@ def learn(plan: LessonPlan, counsel: Counsel, seed: int, journal: Journal, tell:
     while True:
         tell(LessonBegan(plan, journal))
         try:
-            return _Sessions(plan, counsel, seed, journal, tell).run()
+            return _Sessions(plan, advising, seed, journal, tell).run()
         except Again:
             journal.rewind()
 
@@ -41,10 +41,10 @@ def learn(plan: LessonPlan, counsel: Counsel, seed: int, journal: Journal, tell:
 class _Sessions:
     """The sessions of a lesson under way, and who advises in them."""
 
-    def __init__(self, plan: LessonPlan, counsel: Counsel, seed: int, journal: Journal, tell: Tell):
-        self.plan, self.counsel, self.journal, self.tell = plan, counsel, journal, tell
+    def __init__(self, plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tell: Tell):
+        self.plan, self.advising, self.journal, self.tell = plan, advising, journal, tell
         self.place = plan.problem.environment or TableEnvironment(plan.problem.mdp)
-        self.gate = replace(plan.gate, judge_unhelped=False) if counsel.records else plan.gate
+        self.gate = replace(plan.gate, judge_unhelped=False) if advising.records else plan.gate
         lived = 0 if plan.unfinished is None else len(plan.unfinished.curve)  # what did not help is not drawn again
         self.rng = np.random.default_rng([seed, crc32(plan.problem.name.encode()), lived])
         self.alone = False  # the advisor left or was rejected: nobody is asked about this skill again
@@ -86,9 +86,9 @@ class _Sessions:
         )
 
     def _advisor(self) -> Advisor | None:
-        made = self.counsel.gather(self.place, self.plan.learner, self.rng, journal=self.journal, tell=self._hear)
+        made = self.advising.gather(self.place, self.plan.learner, self.rng, journal=self.journal, tell=self._hear)
         self.tell(AdvisorGathered(made))
-        return None if made is None else _Told(made, self.tell)
+        return None if made is None else TellingAdvisor(made, self.tell)
 
     def _hear(self, event: session.Event) -> None:
         left_for_good = isinstance(event, AdviceEnded) and event.reason != "converged"
@@ -96,14 +96,14 @@ class _Sessions:
         self.tell(LessonEvent(self.plan.problem.name, event, self.journal.tell(event)))
 
 
-class _Told:
+class TellingAdvisor:
     """An advisor whose answers are told."""
 
     def __init__(self, advisor: Advisor, tell: Tell):
         self._advisor, self._tell = advisor, tell
         self.followed: Callable[[Walked], None] | None = getattr(advisor, "followed", None)
 
-    def advise(self, request: AdviceRequest) -> int | None:
+    def advise(self, request: Request) -> int | None:
         """The advisor's answer."""
         action = self._advisor.advise(request)
         self._tell(QuestionAnswered(request, action))

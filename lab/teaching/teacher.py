@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 
-from lab.advice.counsel import Counsel
+from lab.advice.advising import Advising
 from lab.advice.entries import Closed
 from lab.advice.journal import Journal
 from lab.errors import BadInput, WorkFailed, counted
@@ -29,7 +29,7 @@ class Teacher:
     """
 
     toolbox: Toolbox
-    counsel: Counsel = field(default_factory=Counsel)
+    advising: Advising = field(default_factory=Advising)
     seed: int = 0
     tell: Tell = unheard
     keep: Keep = lambda plan: Journal()
@@ -39,7 +39,7 @@ class Teacher:
     @property
     def advisor(self) -> str:
         """Who advises, in words."""
-        return str(self.counsel)
+        return str(self.advising)
 
     def find_or_teach(self, plan: LessonPlan, known: Mapping[tuple[str, str], Policy]) -> Lesson:
         """A policy that reaches the goal in exactly this problem: from `known`, by (sub-task, signature), or learned now.
@@ -81,7 +81,7 @@ class Teacher:
             found = self.begun(problem)
         else:
             found = self.unfinished(problem, name)
-            if found is not None and (self.counsel.records or not self._same(found, plan)):
+            if found is not None and (self.advising.records or not self._same(found, plan)):
                 found = None  # another learner, gate or advisor begins anew, so that they can be compared
             if found is not None:
                 self.tell(LessonContinued(found))
@@ -98,10 +98,10 @@ class Teacher:
     def teach(self, plan: LessonPlan) -> Lesson:
         """Teach what is planned, and save the policy, solved or not. WorkFailed when several sessions find no way."""
         problem, unfinished = plan.problem, plan.unfinished
-        self.counsel.check_records(problem.mdp)
+        self.advising.check_records(problem.mdp)
         journal = self.keep(plan)
         try:
-            result = learn(plan, self.counsel, self.seed, journal, self.tell)
+            result = learn(plan, self.advising, self.seed, journal, self.tell)
             policy = Policy.of(
                 joined(unfinished, result),
                 problem.mdp,

@@ -73,7 +73,8 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
 def replay_summary(replay: Mapping[str, Any]) -> RenderableType:
     """The end of `lab replay`, from its JSON document."""
     closed = replay["closed"]
-    over = "it is not over: lab teach --resume goes on with it"
+    of_order = "method" in replay["words"]
+    over = f"it is not over: lab {'sequence' if of_order else 'teach'} --resume goes on with it"
     if closed is not None:
         over = f"over after {counted(closed['episodes'], 'episode')}, {'solved' if closed['solved'] else 'not solved'}"
     return Group(*map(Text, [f"{replay['problem']} in {replay['session']}: {over}", *replay["receipt"]["lines"]]))

@@ -36,20 +36,17 @@ def test_every_command_has_help_with_an_example(lab: Lab, words: str) -> None:
     assert "--json" in ran.out
 
 
-ORDER_ADVISORS = [*advisors.SKILLS, "tau=X", "wrong", *advisors.PEOPLE]
-
-
 @pytest.mark.parametrize(
     ("command", "option", "following", "members"),
     [
         ("teach", "--learner", "--gate", UPDATES),
         ("teach", "--gate", "--advisor", gates.GATES),
-        ("teach", "--advisor", "--ask", [*advisors.ADVISORS, *advisors.FORMS]),
+        ("teach", "--advisor", "--ask", advisors.ADVISORS),
         ("teach", "--ask", "--decide", panel.ASKED),
         ("teach", "--decide", "--episodes", panel.DECISIONS),
-        ("run", "--advisor", "--ask", [*advisors.ADVISORS, *advisors.FORMS]),
+        ("run", "--advisor", "--ask", advisors.ADVISORS),
         ("sequence", "--objective", "--episodes", OBJECTIVES),
-        ("sequence", "--advisor", "--gate", ORDER_ADVISORS),
+        ("sequence", "--advisor", "--gate", advisors.ADVISORS),
         ("sequence", "--gate", "--plot", FITTING),
     ],
 )

@@ -18,7 +18,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from lab.advice.advisors import make_advisor, skill
+from lab.advice.advisors import AdvisorName
+from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, LabError, WorkFailed
 from lab.gym import GymWorld, gym_world, names_environment, parse_name
 from lab.gym.found_model import Model, Worth
@@ -28,6 +29,7 @@ from lab.learning.environment import Judged
 from lab.learning.selection import Draw, uniforms
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.simulated_advice import advice_chances
 from lab.tasks.task_file import load_world
 
 
@@ -122,7 +124,9 @@ def model(word: str) -> Model:
 def learned(world: GymWorld, seed: int, advisor: str = "none", draw: Draw | None = None) -> SessionResult:
     problem, rng = world.problem(), np.random.default_rng(seed)
     assert problem.environment is not None
-    asked = make_advisor(advisor, problem.mdp, world.learner.discount, rng, values=problem.environment.values)
+    asked = TableLevel(problem.mdp, world.learner.discount, rng, values=problem.environment.values).advisor(
+        AdvisorName.of(advisor)
+    )
     place = problem.environment
     return run_session(problem.mdp, world.learner, world.gate, asked, rng, environment=place, draw=draw)
 
@@ -575,7 +579,7 @@ def test_an_expert_knows_the_lake_better_than_a_novice() -> None:
     starts, outcomes = lake.model.starts, lake.live.inside.P
 
     def reaches(tau: float) -> float:
-        chances = skill(lake.values(0.99), tau)
+        chances = advice_chances(lake.values(0.99), tau)
         mixed = {
             state: {0: [(c * chances[state, a], *rest) for a in range(4) for c, *rest in row[a]]}
             for state, row in outcomes.items()

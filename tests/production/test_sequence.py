@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from lab.advice.advisors import AdvisorName
 from lab.errors import BadInput
 from lab.production.sequence import (
     Wanted,
@@ -458,7 +459,7 @@ def test_nobody_is_asked_unless_it_is_wanted(lab: Lab) -> None:
 def test_an_advisor_has_chance_of_its_own_in_every_session() -> None:
     """Every decision is a novice's, so what differs between the sessions is what the novice says."""
     file = load_cell("toast-case-1")
-    wanted = Wanted("srl", 5, sessions=2, advisor="novice", gate="always")
+    wanted = Wanted("srl", 5, sessions=2, advisor=AdvisorName.of("novice"), gate="always")
     _, (one, other) = sequence_cell(file.cell(3), file.sequencing, wanted, NO_CHANCE)
     assert one.episode_costs != other.episode_costs
 
@@ -469,7 +470,7 @@ def test_a_person_is_asked_on_the_terminal(lab: Lab) -> None:
     ran = lab("sequence", *words.split(), "--json", stdin="2\nauto\n")
     assert ran.code == 0, ran.err
     assert ran.json["advice"] == [{"requests": 2, "helped_steps": 1, "misleads": 0, "rejected_at_episode": None}]
-    assert "Episode 1: the learner asks which part to move next." in ran.err
+    assert "Episode 1: the learner asks for advice about 'The order of the transfers'." in ran.err
 
 
 # ---- pictures -----------------------------------------------------------------------------------------------------
@@ -555,7 +556,7 @@ def test_what_is_refused_at_once(lab: Lab, folder: Path, words: str, line: str, 
             "objective 'tardy-parts': the cell has no due times (due_s); without them: makespan, robot-idle, machine-idle",
         ),
         ("--advisor exprt --method srl", "unknown advisor 'exprt' (--advisor): did you mean 'expert'? known: expert, "),
-        ("--advisor tau=0 --method srl", "unknown advisor 'tau=0' (--advisor): "),
+        ("--advisor tau=0 --method srl", "advisor 'tau=0' (--advisor): tau must be a number above 0"),
         (
             "--advisor expert --gate cclr --method srl",
             "unknown gate 'cclr' (--gate, for sequencing): did you mean 'ccrl'? known: always, ccrl, never",
@@ -729,7 +730,7 @@ def test_what_was_found_until_ctrl_c_is_told() -> None:
     def ask(request: object) -> int | None:
         raise KeyboardInterrupt
 
-    wanted = Wanted("srl", 60, advisor="terminal", people={"terminal": ask})
+    wanted = Wanted("srl", 60, advisor=AdvisorName.of("terminal"), people={"terminal": ask})
     document, found = sequence_cell(file.cell(3), file.sequencing, wanted, Chance())
     assert document["interrupted"] is True
     assert (document["episodes"], len(found)) == (29, 1)
@@ -746,6 +747,6 @@ def test_ctrl_c_before_an_order_was_found() -> None:
         sequence_cell(
             file.cell(3),
             file.sequencing,
-            Wanted("srl", 60, advisor="terminal", gate="always", people={"terminal": ask}),
+            Wanted("srl", 60, advisor=AdvisorName.of("terminal"), gate="always", people={"terminal": ask}),
             Chance(),
         )

@@ -36,7 +36,7 @@ def held(folder: Path, maze: Path, *, goes_on: bool = False) -> tuple[Any, ...]:
     kept = KeptSession(lesson_in(folder), "--resume") if goes_on else None
     new = LessonOptions(str(maze), advisors=("terminal",), seed=3, episodes=60)
     options = new if kept is None else kept.options
-    teacher = Teacher(box, options.counsel({"terminal": person}), seed=3)
+    teacher = Teacher(box, options.advising({"terminal": person}), seed=3)
     document = teach(WorldSubject.of(options), options, teacher, None, kept)
     (row,) = box.list()
     policy = box.find("world", row["signature"])

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.advice.counsel import Counsel
+from lab.advice.advising import Advising
 from lab.advice.entries import read_journal
 from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest
@@ -94,7 +94,7 @@ def test_ctrl_c_keeps_the_session(task: Task, tmp_path: Path) -> None:
     def ask(_: object) -> int:
         raise KeyboardInterrupt
 
-    teacher = Teacher(Toolbox(tmp_path), Counsel(("terminal",), {"terminal": ask}))
+    teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": ask}))
     with pytest.raises(Interrupted, match="stopped by Ctrl-C after 29 episodes of 'insert at toaster'"):
         teach_skill(task, "insert", teacher, out=tmp_path / "out")
     (row,) = teacher.toolbox.list()
@@ -108,7 +108,7 @@ def test_an_interrupted_session_is_gone_on_with(task: Task, tmp_path: Path) -> N
 
     toolbox = Toolbox(tmp_path)
     with pytest.raises(Interrupted):
-        teach_skill(task, "insert", Teacher(toolbox, Counsel(("terminal",), {"terminal": ask})))
+        teach_skill(task, "insert", Teacher(toolbox, Advising.of(("terminal",), {"terminal": ask})))
     again = teach_skill(task, "insert", Teacher(toolbox))
     assert again["episodes"] == 200
     (row,) = toolbox.list()
@@ -238,9 +238,9 @@ def test_with_a_limited_view_a_person_is_asked_inside_it_only(world: GridWorld, 
 
         def ask(request: AdviceRequest, states: set[int] = states) -> int | None:
             states.add(request.state)
-            return request.learner_action
+            return request.own
 
-        teacher = Teacher(Toolbox(tmp_path / view), Counsel(("terminal",), {"terminal": ask}))
+        teacher = Teacher(Toolbox(tmp_path / view), Advising.of(("terminal",), {"terminal": ask}))
         one_lesson(WorldSubject(world, view), teacher)
     region = set(np.flatnonzero(world.region()).tolist())
     assert world.mdp().start in asked["full"]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.advice.counsel import Counsel
+from lab.advice.advising import Advising
 from lab.errors import WorkFailed
 from lab.learning.events import AdviceRejected, EpisodeEnded, Event
 from lab.learning.requests import AdviceRequest, AdvisorLeft
@@ -188,7 +188,7 @@ def test_who_left_or_was_rejected_is_not_asked_in_further_sessions(tmp_path: Pat
         asked.append(request)
         raise AdvisorLeft
 
-    teacher = Teacher(Toolbox(tmp_path), Counsel(("terminal",), {"terminal": leave}))
+    teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": leave}))
     for times in (1, 2):  # each skill asks once
         with pytest.raises(WorkFailed):
             teacher.find_or_teach(plan(HOPELESS, GateSettings("always"), problem(columns=3 + times)), {})
@@ -202,7 +202,7 @@ def test_who_left_or_was_rejected_is_not_asked_in_further_sessions(tmp_path: Pat
     wary = GateSettings(first_episode=5, window=2, omega=0, lambda_threshold=1.0)
     short = LearnerSettings(episodes=8, max_steps=2)
     asked.clear()
-    teacher = Teacher(Toolbox(tmp_path), Counsel(("terminal",), {"terminal": stay}), tell=heard.append)
+    teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": stay}), tell=heard.append)
     with pytest.raises(WorkFailed):
         teacher.find_or_teach(plan(short, wary, problem(columns=6)), {})
     assert sum(isinstance(event, AdviceRejected) for _, event in told(heard)) == 1
@@ -224,13 +224,13 @@ class Person:
         self.left -= 1
         if self.left < 0:
             raise KeyboardInterrupt
-        return request.learner_action
+        return request.own
 
 
 def test_ctrl_c_keeps_what_was_learned_and_the_next_run_goes_on(tmp_path: Path) -> None:
     toolbox = Toolbox(tmp_path)
     with pytest.raises(Interrupted) as stopped:
-        Teacher(toolbox, Counsel(("terminal",), {"terminal": Person(50)})).teach(plan(gate=GateSettings("always")))
+        Teacher(toolbox, Advising.of(("terminal",), {"terminal": Person(50)})).teach(plan(gate=GateSettings("always")))
     assert isinstance(stopped.value, KeyboardInterrupt)
     index, _ = toolbox.index()
     (kept,) = index.values()

@@ -7,6 +7,7 @@ from lab.seat.page.page_order import bars_of
 from lab.seat.page.page_state import MOST_LINES, Known, Learning, Progress
 from lab.sequencing.search import EpisodeSequenced
 from lab.teaching.events import (
+    ORDER,
     Event,
     LessonContinued,
     MoveMade,
@@ -27,11 +28,11 @@ def hear_run(known: Known, event: Event) -> None:
             if event.name == "carry out":
                 known.moves = []
         case SequencingBegan():
-            known.work, known.advised_episodes = None, set()
+            known.work = None
             optimal = None if event.reference is None else event.reference.bound
             known.begin(
                 Learning(
-                    "The order of the transfers",
+                    ORDER,
                     "order",
                     "s",
                     gate=event.gate,
@@ -40,8 +41,9 @@ def hear_run(known: Known, event: Event) -> None:
                 )
             )
         case EpisodeSequenced():
-            known.learning.curve.add(event.cost, event.episode in known.advised_episodes)
-            known.changed("curve")
+            if known.learning.gate is None:  # else the session itself tells of it, and whether it was guided
+                known.learning.curve.add(event.cost, False)
+                known.changed("curve")
         case MoveMade():
             known.moves.append(event.move)
             known.work = bars_of(known.moves)

@@ -9,20 +9,17 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from lab.learning.gates import improvement
-from lab.learning.requests import AdviceRequest, Standing
+from lab.learning.requests import Request, Standing
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
 from lab.seat.event_text import SessionText, Told
 from lab.seat.page.page_curve import Curve
 from lab.seat.page.page_grid import place_of, slice_of, spot
-from lab.seat.page.page_order import order_of
 from lab.seat.page.page_question import question_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.methods.srl_advised import SequenceRequest
 
 Json = dict[str, Any]
-Request = AdviceRequest | SequenceRequest
 UNLIMITED = 1_000_000_000  # a budget of this many steps is none
 MOST_NOTICES = 60
 MOST_LINES = 80
@@ -44,13 +41,12 @@ class Pending:
     @property
     def words(self) -> tuple[str, ...]:
         """What may be said beside the moves."""
-        return ("skip", "auto", "quit", *["undo"] * getattr(self.request, "undoable", False))
+        return ("skip", "auto", "quit", *["undo"] * self.request.undoable)
 
     @property
     def moves(self) -> Sequence[int]:
         """The moves that may be said."""
-        request = self.request
-        return range(request.mdp.n_actions) if isinstance(request, AdviceRequest) else request.allowed
+        return self.request.allowed
 
 
 @dataclass
@@ -93,6 +89,7 @@ class Learning:
     state: int | None = None  # where it was seen last
 
     def __post_init__(self) -> None:
+        self.text.kind = self.kind
         self.lately = deque(maxlen=2 * self.gate.window if self.gate is not None else 0)
 
     def notice(self, told: Told) -> None:
@@ -124,7 +121,6 @@ class Known:
     pending: Pending | None = None
     work: Json | None = None  # bars of the order
     moves: list[Move] = field(default_factory=list)  # of the run that is carried out
-    advised_episodes: set[int] = field(default_factory=set)  # of a sequencer's session
     members: list[Json] = field(default_factory=list)
     receipt: Json | None = None
     ended: str = ""
@@ -185,9 +181,8 @@ def _question(known: Known, now_s: float) -> Json | None:
     pending = known.pending
     if pending is None:
         return None
-    made = question_of(pending.request) if isinstance(pending.request, AdviceRequest) else order_of(pending.request)
     left_s = None if pending.until_s is None else round(max(0.0, pending.until_s - now_s), 1)
-    return made | {
+    return question_of(pending.request) | {
         "number": pending.number,
         "wait_s": pending.wait_s,
         "left_s": left_s,

@@ -13,16 +13,16 @@ from typing import Any
 
 from lab.advice.journal import Undo
 from lab.errors import BadInput
-from lab.learning.requests import AdviceRequest, AdvisorLeft
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
 from lab.mdp import NoPath, shortest_steps
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_messages import Answer
-from lab.seat.page.page_order import Follower, bars_of
+from lab.seat.page.page_order import bars_of, made_until
 from lab.seat.page.page_panel import CLOSED, SeatPanel
 from lab.seat.page.page_run import hear_run
 from lab.seat.page.page_state import Learning, Pending, standing_of
-from lab.sequencing.methods.srl_advised import SequenceRequest
-from lab.teaching.events import Event, LessonBegan, LessonEvent
+from lab.sequencing.request import SequenceRequest
+from lab.teaching.events import ORDER, Event, LessonBegan, LessonEvent
 from lab.teaching.lesson_plan import LessonPlan
 from lab.view.meshcat import LiveView
 
@@ -43,7 +43,6 @@ class SeatPage(LiveView):
         super().__init__(port, title=title)
         self._wait_s = wait_s
         self._panel: SeatPanel = SeatPanel(title)
-        self._follower = Follower()
 
     @property
     def on_word(self) -> Callable[[str], None] | None:
@@ -61,30 +60,24 @@ class SeatPage(LiveView):
 
     # ---- questions
 
-    def ask(self, request: AdviceRequest) -> int | None:
-        """What the page's advisor says: an action, None for "skip". Waits until somebody answers, or the time is over.
+    def ask(self, request: Request) -> int | None:
+        """What the page's advisor says: one of `allowed`, None for "skip". Waits until somebody answers, or the time is over.
 
         Raises AdvisorLeft for "auto", after the time and when the page is closed, Undo when an answer is taken back, and
         KeyboardInterrupt for "quit".
         """
-        return self._heard(self._pose(request))
+        pending = self._pose(request)
+        try:
+            answer = self._panel.wait(pending)
+        finally:
+            self.withdraw()
+        return _said(pending, answer)
 
-    def ask_order(self, request: SequenceRequest) -> int | None:
-        """Which part to move next, asked in the same way: one of the allowed decisions, None for "skip"."""
-        self._follow(request)
-        said = self._heard(self._pose(request))
-        if said is not None:
-            self._panel.known.advised_episodes.add(request.episode)
-        self._follower.take(request.own if said is None else said)
-        return said
-
-    def offer(self, request: AdviceRequest | SequenceRequest) -> None:
+    def offer(self, request: Request) -> None:
         """Show a question that is answered elsewhere, too; an answer on the page goes to `on_word`. Returns at once."""
-        if isinstance(request, SequenceRequest):
-            self._follow(request)
         self._pose(request, offered=True)
 
-    def look(self, request: AdviceRequest) -> None:
+    def look(self, request: Request) -> None:
         """Show where the learner is and what it thinks, without a question: somebody else is asked."""
         with self._panel.lock:
             self._see(request)
@@ -95,19 +88,28 @@ class SeatPage(LiveView):
         if self._panel.close():  # an answer on the page has closed it already, and what comes of it is told next
             self._wake()
 
-    def _pose(self, request: AdviceRequest | SequenceRequest, offered: bool = False) -> Pending:
+    def _pose(self, request: Request, offered: bool = False) -> Pending:
         self._running()
         wait_s = None if offered else self._wait_s
         until_s = None if wait_s is None else time.monotonic() + wait_s
         with self._panel.lock:
-            if isinstance(request, AdviceRequest):
-                self._see(request)
+            self._see(request)
             pending = self._panel.pose(Pending(request, wait_s, until_s, offered))
         self._wake()
         return pending
 
-    def _see(self, request: AdviceRequest) -> None:
+    def _see(self, request: Request) -> None:
         """What a request shows of the learner beside the question."""
+        if isinstance(request, SequenceRequest):
+            self._see_order(request)
+        elif isinstance(request, AdviceRequest):
+            self._see_table(request)
+        learning, known = self._panel.known.learning, request.improvement
+        learning.rate = None if known is None else known.rate
+        learning.means = (None, None) if known is None else (known.current_mean, known.previous_mean)
+        standing_of(learning, request.standing)
+
+    def _see_table(self, request: AdviceRequest) -> None:
         known = self._panel.known
         if known.learning.mdp not in (None, request.mdp):
             known.begin(Learning())
@@ -116,27 +118,14 @@ class SeatPage(LiveView):
             learning.mdp = request.mdp
             known.changed("place")
         learning.q, learning.selection, learning.temperature = request.q, request.selection, request.temperature
-        learning.state, learning.rate = request.state, request.improvement_rate
-        learning.means = (request.current_mean, request.previous_mean)
-        standing_of(learning, request.standing)
+        learning.state = request.state
 
-    def _follow(self, request: SequenceRequest) -> None:
-        self._follower.follow(request)
-        with self._panel.lock:
-            known = self._panel.known
-            if known.learning.kind != "order":
-                known.begin(Learning("The order of the transfers", "order", "s"))
-            learning = known.learning
-            learning.rate, learning.means = request.improvement_rate, (request.current_mean, request.previous_mean)
-            known.work = bars_of(self._follower.moves, request.run.now_s)
-            known.changed("work", "standing")
-
-    def _heard(self, pending: Pending) -> int | None:
-        try:
-            answer = self._panel.wait(pending)
-        finally:
-            self.withdraw()
-        return _said(pending, answer)
+    def _see_order(self, request: SequenceRequest) -> None:
+        known = self._panel.known
+        if known.learning.kind != "order":
+            known.begin(Learning(ORDER, "order", "s"))
+        known.work = bars_of(made_until(request), request.run.now_s)
+        known.changed("work", "standing")
 
     # ---- what happens
 

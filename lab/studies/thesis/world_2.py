@@ -155,13 +155,13 @@ def success_alone(mdp: TabularMDP, beta: float, sessions: int) -> float:
 
 def distance(world: GridWorld, table: FloatArray, cells: Sequence[PrintedLine]) -> float:
     """How far success and helped steps are from the printed ones; 1: on average just what counts as agreeing."""
-    from lab.advice.advisors import Advice, skill
     from lab.learning.batch import run_sessions
+    from lab.learning.simulated_advice import Advice, advice_chances
 
     mdp, region, far = world.mdp(), world.region(), 0.0
     for cell in cells:
         assert cell.setting.tau is not None
-        advice = Advice.of(skill(table, cell.setting.tau), region if cell.setting.view == "limited" else None)
+        advice = Advice.of(advice_chances(table, cell.setting.tau), region if cell.setting.view == "limited" else None)
         gate = gate_of(cell.setting, world.gate)
         batch = run_sessions(mdp, LEARNER, gate, advice, np.arange(COMPARED, dtype=np.uint64))
         success = 100.0 * float((batch.steps[:, -1] == MOVES + 1).mean())

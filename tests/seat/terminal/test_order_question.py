@@ -9,11 +9,12 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from rich.console import Console
 
+from lab.learning.events import Improvement
 from lab.learning.reasons import TooSlow
 from lab.learning.requests import AdvisorLeft
 from lab.seat.terminal.line_reader import TerminalReader
-from lab.seat.terminal.order_prompt import OrderPrompt
-from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.seat.terminal.prompt import TeachingPrompt
+from lab.sequencing.request import SequenceRequest
 from lab.sequencing.simulate.run import Run
 from lab.tasks.task_file import load_cell
 
@@ -22,10 +23,19 @@ def request(own: int = 1, episode: int = 30) -> SequenceRequest:
     """At the start of the thesis's case I with 3 toasts, one of them in the toaster."""
     run = Run(load_cell("toast-case-1").cell(3))
     run.move(1)
-    return SequenceRequest(run, run.allowed(), own, episode, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
+    return SequenceRequest(
+        run=run,
+        allowed=run.allowed(),
+        own=own,
+        episode=episode,
+        reason=TooSlow(0.012, 0.05),
+        improvement=Improvement(0.012, 606.0, 613.4),
+        step=1,
+        state=0,
+    )
 
 
-def prompt(*lines: str, width: int = 100, plain: bool = False) -> tuple[OrderPrompt, StringIO]:
+def prompt(*lines: str, width: int = 100, plain: bool = False) -> tuple[TeachingPrompt, StringIO]:
     said: Iterator[str] = iter(lines)
 
     def read_line(text: str) -> str:
@@ -35,7 +45,7 @@ def prompt(*lines: str, width: int = 100, plain: bool = False) -> tuple[OrderPro
             raise EOFError from None
 
     written = StringIO()
-    return OrderPrompt(Console(file=written, width=width, height=25, no_color=True), read_line, plain), written
+    return TeachingPrompt(Console(file=written, width=width, height=25, no_color=True), read_line, plain), written
 
 
 @pytest.mark.parametrize(("line", "expected"), [("2", 2), (" 3 ", 3), ("", 1), ("skip", None), ("SKIP", None)])
@@ -55,17 +65,20 @@ def test_what_is_shown() -> None:
     ask, written = prompt("9", "?", "2", "1")
     assert ask(request()) == 2
     shown = written.getvalue()
-    assert "Episode 30: the learner asks which part to move next." in shown
     means = "its improvement is +1.2%, below 5%: the last episodes cost 606 on average, those before 613."
     assert means in " ".join(shown.split())
-    assert "57 s: the robot is at toaster." in shown  # 21 s from the buffer to the plate, 36 s to the toaster
+    assert (
+        "Episode 30, 57 s: the robot is at toaster." in shown
+    )  # 21 s from the buffer to the plate, 36 s to the toaster
     rows = [line.split() for line in shown.splitlines() if line.strip().startswith(("1 ", "2 ", "3 "))]
     assert rows[0] == ["1", "toast", "1", "toaster", "butter_applier", "60", "s", "its", "own", "choice"]
     assert rows[1] == ["2", "toast", "2", "plate", "toaster_buffer", "now"]
-    assert "'9' is none of the moves: type 1, 2, 3, enter, why, skip, auto, quit or ?" in shown
-    assert "auto: it goes on alone from here" in shown
+    assert "'9' is none of the moves: type 1, 2, 3, enter, why, undo, skip, auto, quit or ?" in shown
+    assert "asks you which part to move next" in shown
+    assert "a number" in shown
+    assert "a whole path" not in shown
     ask(request())
-    assert written.getvalue().count("Episode 30") == 1, "an episode is announced once"
+    assert " ".join(written.getvalue().split()).count(means) == 1, "why it asks is said once an episode"
 
 
 @pytest.mark.parametrize("word", ["quit", "q"])
@@ -81,7 +94,7 @@ def test_why_and_undo_are_answered_and_the_question_waits() -> None:
     shown = " ".join(written.getvalue().split())
     assert "It asks because its improvement is +1.2%, below 5%: the last episodes cost 606 on average" in shown
     assert "It would move toast 1 to butter_applier itself (1), one of 3 moves." in shown
-    assert "An order cannot be taken back here" in shown
+    assert "There is nothing to take back" in shown
     assert "'qiut' is none of the moves: did you mean 'quit'? type 1, 2, 3, enter" in shown
     assert "\x1b" not in shown
 
@@ -106,7 +119,7 @@ def test_a_page_may_answer_instead() -> None:
 
     console = Console(file=StringIO(), width=100)
     with create_pipe_input() as pipe:
-        ask = OrderPrompt(console, TerminalReader(console, pipe, Screen()))
+        ask = TeachingPrompt(console, TerminalReader(console, pipe, Screen()))
         ask.answer_from_outside("3")  # nothing waits
 
         def page() -> None:
