@@ -1,4 +1,4 @@
-"""Files written whole or not at all, and where a folder would be made."""
+"""Files written whole or not at all, where a folder would be made, and the folders that ship, in a checkout and in a wheel."""
 
 import os
 import signal
@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from lab.errors import BadInput
+from lab import files
+from lab.errors import BadInput, WorkFailed
 from lab.files import check_out, draft, nearest, write_whole
 
 
@@ -98,3 +99,39 @@ def test_output_folders(tmp_path: Path) -> None:
     for wrong in ("file", "file/below", "x" * 300):
         with pytest.raises(BadInput, match=r"output folder '.*' .--out.: "):
             check_out(tmp_path / wrong)
+
+
+# ---- the folders that ship ------------------------------------------------------------------------------------------
+
+
+def test_this_checkout_ships_its_tasks_and_assets() -> None:
+    assert (files.tasks_folder() / "toast.toml").is_file()
+    assert (files.assets_folder() / "robot.urdf").is_file()
+
+
+@pytest.mark.parametrize("name", ["tasks", "assets"])
+def test_a_wheel_carries_its_folders_inside(tmp_path: Path, name: str) -> None:
+    package = tmp_path / "site-packages" / "lab"
+    inside = package / "_data" / name
+    inside.mkdir(parents=True)
+    assert files.find(name, package) == inside
+
+
+def test_a_folder_beside_an_installed_package_is_somebody_elses(tmp_path: Path) -> None:
+    package = tmp_path / "lab"
+    (tmp_path / "tasks").mkdir()
+    with pytest.raises(WorkFailed, match=r"looked for .*_data/tasks and .*install the lab again"):
+        files.find("tasks", package)
+    (tmp_path / "pyproject.toml").touch()
+    assert files.find("tasks", package) == tmp_path / "tasks"
+
+
+def test_every_file_that_ships_has_an_expected_kind() -> None:
+    assert {p.suffix for p in files.tasks_folder().rglob("*") if p.is_file()} == {".toml"}
+    assert {p.suffix for p in files.assets_folder().rglob("*") if p.is_file()} <= {
+        ".urdf",
+        ".obj",
+        ".mtl",
+        ".png",
+        ".svg",
+    }

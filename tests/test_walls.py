@@ -21,9 +21,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.advice", "lab.tasks"),
     ("lab.sim",),
     ("lab.skills", "lab.view"),
-    ("lab.teaching",),
-    ("lab.production", "lab.gym"),
-    ("lab.seat", "lab.studies"),
+    ("lab.teaching", "lab.studies"),
+    ("lab.production", "lab.seat", "lab.gym"),
     ("lab.cli",),
 )
 ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
@@ -33,7 +32,7 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "meshcat": {"lab.view.meshcat"},
     "cv2": {"lab.vision.markers", "lab.vision.picture_files", "lab.sim.camera"},
     "PIL": set(),
-    "numba": {"lab.learning.compiled", "lab.learning.kernels"},  # what is kept of it is kept in one place
+    "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
     "ortools": {"lab.sequencing.methods.cp_sat", "lab.sequencing.methods.cp_sat_model"},
     "pymoo": {"lab.sequencing.methods.genetic"},
     "starlette": {"lab.view.server", "lab.view.server_page"},
@@ -43,10 +42,9 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "joblib": {"lab.studies.runner"},  # to work in several processes; its files are pickles, and nobody reads those
 } | {library: set() for library in ("random", "pickle", "dill", "cloudpickle", "shelve", "marshal")}
 NEVER = {  # room -> rooms that it never imports, whatever the layers say
-    "lab.mdp": ("lab.sim", "lab.view", "lab.cli"),
-    "lab.learning": ("lab.sim", "lab.view", "lab.cli"),
-    "lab.advice": ("lab.sim", "lab.view", "lab.cli"),
-    "lab.sequencing": ("lab.sim", "lab.view", "lab.cli"),
+    **dict.fromkeys(
+        ("lab.mdp", "lab.learning", "lab.advice", "lab.sequencing"), ("lab.sim", "lab.view", "lab.seat", "lab.cli")
+    ),
     "lab.sim": ("lab.learning", "lab.sequencing"),
 }
 HEAVY = (
@@ -203,9 +201,13 @@ def test_the_package_itself_imports_nothing() -> None:
     assert house()["lab"][1] == []
 
 
+def test_ctrl_c_is_heard_before_anything_is_loaded() -> None:
+    assert not [item.target for item in house()["lab.cli"][1] if item.at_load]
+
+
 def test_starting_the_command_loads_nothing_heavy() -> None:
-    """From lab.cli along module-level imports no heavy library is reached, or `lab --help` takes seconds."""
-    pending, seen = ["lab.cli"], set[str]()
+    """From lab.cli.app along module-level imports no heavy library is reached, or `lab --help` takes seconds."""
+    pending, seen = ["lab.cli.app"], set[str]()
     while pending:
         module = pending.pop()
         if module in seen or module not in house():
@@ -243,19 +245,10 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.mdp", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import lab.sim.world", "never does"),
         ("lab.mdp", "from lab.sim import world", "imports lab.sim.world: lab.mdp never does"),
         ("lab.learning.session", "from ..view import meshcat", "imports lab.view.meshcat: lab.learning never does"),
-        ("lab.learning.gates", "from lab import cli", "imports lab.cli: lab.advice never does"),
-        ("lab.learning.gates", "from lab.learning.session import x", "runs back up"),
-        ("lab.sequencing.methods.srl", "from lab.learning.gates import GATES", "runs back up"),
-        (
-            "lab.sequencing.methods.srl",
-            "def f():\n    import lab.sequencing.methods.srl_advised",
-            "runs back up",
-        ),
-        (
-            "lab.sequencing.methods.srl_advised",
-            "from lab.seat.terminal.prompt import ReadLine",
-            "lab.sequencing never does",
-        ),
+        ("lab.advice.trust", "from lab import cli", "imports lab.cli: lab.advice never does"),
+        ("lab.learning.session", "from lab.advice.trust import x", "runs back up"),
+        ("lab.sequencing.methods.srl", "def f():\n    import lab.advice.advisors", "runs back up"),
+        ("lab.sequencing.methods.srl", "from lab.seat.terminal.prompt import ReadLine", "lab.sequencing never does"),
         ("lab.sim.robot", "from ..learning import session", "imports lab.learning.session: lab.sim never does"),
         ("lab.sim.world", "from lab.sequencing.cell.cell import Cell", "lab.sim never does"),
         ("lab.production.composer", "from ..cli import main", "runs back up"),
@@ -287,10 +280,7 @@ def test_a_broken_wall_is_seen(module: str, source: str, fault: str) -> None:
         ("lab.learning.session", "from lab.learning.gates import GATES\nfrom .settings import GateSettings"),
         ("lab.sim.world", "from lab.sim.frames import Frame"),
         ("lab.mdp", "import numpy as np\ndef f(rng: np.random.Generator): return np.random.default_rng(1)"),
-        (
-            "lab.sequencing.methods.srl_advised",
-            "from lab.learning.gates import GATES\nfrom lab.sequencing.methods.srl import Srl",
-        ),
+        ("lab.sequencing.methods.srl_advised", "from lab.learning.gates import GATES"),
         ("lab.sequencing.methods.many_sessions", "from numpy.random import SeedSequence\nx = SeedSequence(1)"),
     ],
 )

@@ -9,11 +9,12 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from lab import __version__
-from lab.cli import glossary, replay, run, see, sequence, study, task, teach, toolbox, view
-from lab.cli.interrupt import ctrl_c_is_heard
+from lab.cli import replay, run, see, sequence, study, task, teach, toolbox, view
+from lab.cli.families import CommandOfFamilies
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError
 
+INTERRUPTED = 130
 STOPPED = "stopped by Ctrl-C; what was learned is kept"
 GROUPS = {
     "toolbox": "The policies that were learned.",
@@ -23,7 +24,7 @@ GROUPS = {
 
 
 class Command(NamedTuple):
-    """What a command calls, an example of its use, and what its help says below that."""
+    """What a command calls, an example of its use, and what its help says below that (see `lab.cli.families`)."""
 
     function: Callable[..., None]
     example: str
@@ -32,9 +33,11 @@ class Command(NamedTuple):
 
 COMMANDS = {  # what is typed after `lab` -> the command
     "run": Command(run.run, "lab run toast --toasts 3"),
-    "teach": Command(teach.teach, "lab teach insert --advisor terminal", glossary.help_text()),
+    "teach": Command(teach.teach, "lab teach insert --advisor terminal", "{words of teaching}"),
     "replay": Command(replay.replay, "lab replay lesson"),
-    "sequence": Command(sequence.sequence, "lab sequence toast --case II --toasts 4 --gantt order.svg"),
+    "sequence": Command(
+        sequence.sequence, "lab sequence toast --case II --toasts 4 --gantt order.svg", "{words of sequencing}"
+    ),
     "see": Command(see.see, "lab see overhead.png --task toast"),
     "view": Command(view.view, "lab view toast"),
     "toolbox list": Command(toolbox.toolbox_list, "lab toolbox list"),
@@ -61,7 +64,7 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
         except LabError as error:
             end(str(error), error.exit_code)
         except KeyboardInterrupt as stopped:
-            end(str(stopped) or STOPPED, 130)
+            end(str(stopped) or STOPPED, INTERRUPTED)
         except BrokenPipeError:
             silence()
             end("", 1)
@@ -93,26 +96,24 @@ def made() -> typer.Typer:
     for words, command in COMMANDS.items():
         group, _, name = words.rpartition(" ")
         epilog = "\n\n".join(filter(None, [f"Example: {command.example}", command.more]))
-        (groups[group] if group else app).command(name, epilog=epilog)(guarded(command.function))
+        (groups[group] if group else app).command(name, cls=CommandOfFamilies, epilog=epilog)(guarded(command.function))
     for name, group_app in groups.items():
         app.add_typer(group_app, name=name)
     return app
 
 
-def main() -> None:
-    """The `lab` command; typer's own complaints come in one line, too."""
+def called() -> int:
+    """Runs the command that `sys.argv` holds; its exit code. typer's own complaints come in one line, too."""
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: a name must not end a command
     begin()
     try:
-        with ctrl_c_is_heard():
-            code = made()(prog_name="lab", standalone_mode=False)
-    except (KeyboardInterrupt, typer.Abort):  # before any command had begun
-        fail("stopped by Ctrl-C", 130)
-        code = 130
+        code = made()(prog_name="lab", standalone_mode=False) or 0
     except Exception as error:
         code = _usage(error)
-    sys.exit(code if isinstance(code, int) else 0)
+    if code == INTERRUPTED:  # typer's word for Ctrl-C before the command had begun; a command ends by itself
+        raise KeyboardInterrupt
+    return int(code)
 
 
 def _usage(error: Exception) -> int:

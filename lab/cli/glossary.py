@@ -1,23 +1,8 @@
-"""The words of teaching that a newcomer cannot guess: one table for `lab teach --help` and for the README."""
+"""The words that a newcomer cannot guess, for help and README: the members of families by their tables, the rest here."""
 
-LEARNERS = {
-    "q": "Q-learning: what a move is worth is judged by the best move after it",
-    "sarsa": "as q, but judged by the move that is really made next",
-    "q-lambda, sarsa-lambda": "the same with traces: each step corrects the moves before it, too",
-    "monte-carlo": "moves are judged by the whole rest of the episode",
-    "afterstate": "learns what the states are worth that moves lead to, not the moves",
-}
-GATES = {
-    "ccrl": "asks for whole episodes while its improvement is below Lambda; rejects an advisor after more than Omega misleads "
-    "(the thesis's rule)",
-    "ia": "introspection: asks wherever the values of the moves lie within psi of each other, so that it is unsure",
-    "combined": "asks only where both ccrl and ia would; rejects as ccrl does",
-    "cq": "asks for whole episodes while the last ones took more steps on average than a constant",
-    "always, never": "asks about every step, about none",
-    "random": "asks about a random share of the steps",
-    "importance": "asks wherever the values of the moves lie psi or more apart: there a wrong move costs most",
-    "uncertainty": "several tables learn side by side, and it asks where they disagree",
-}
+from collections.abc import Callable, Mapping
+from typing import Any
+
 TERMS = {
     "gate": "the rule by which a learner decides when to ask",
     "improvement": "how many fewer steps the last episodes took than those before them, in percent",
@@ -33,9 +18,31 @@ TERMS = {
 }
 
 
-def help_text() -> str:
+def of_teaching() -> str:
+    """What the help of `lab teach` explains."""
+    from lab.learning.gates import GATES
+    from lab.learning.updates import UPDATES
+
+    return _lines({"Learners": _meanings(UPDATES), "Gates": _meanings(GATES), "Words": TERMS})
+
+
+def of_sequencing() -> str:
+    """What the help of `lab sequence` explains."""
+    from lab.sequencing import SEQUENCERS
+
+    return _lines({"Methods": _meanings(SEQUENCERS)})
+
+
+TEXTS: dict[str, Callable[[], str]] = {"words of teaching": of_teaching, "words of sequencing": of_sequencing}
+
+
+def _meanings(table: Mapping[str, Any]) -> dict[str, str]:
+    """The one line of help in each row."""
+    return {name: row.help for name, row in table.items()}
+
+
+def _lines(groups: Mapping[str, Mapping[str, str]]) -> str:
     """All words, one a line, as typer sets the text below a command's options."""
-    groups = {"Learners": LEARNERS, "Gates": GATES, "Words": TERMS}
     return "\n\n".join(
         "\n".join([f"{name}:", *(f"  {word}: {meaning}" for word, meaning in words.items())])
         for name, words in groups.items()
@@ -43,6 +50,8 @@ def help_text() -> str:
 
 
 def readme_table() -> str:
-    """The gates and the terms as the README shows them."""
-    rows = [f"| `{word}` | {meaning} |" for words in (TERMS, GATES) for word, meaning in words.items()]
+    """The terms and the gates as the README shows them."""
+    from lab.learning.gates import GATES
+
+    rows = [f"| `{word}` | {meaning} |" for word, meaning in (TERMS | _meanings(GATES)).items()]
     return "\n".join(["| word | what it means |", "|---|---|", *rows])

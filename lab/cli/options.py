@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from lab.advice.advisors import help_text
+from lab.cli.families import offers
 
 MAX_EPISODES = 1_000_000
 MAX_SESSIONS = 10_000
@@ -20,12 +20,17 @@ AdvisorNames = Annotated[
     list[str] | None,
     typer.Option(
         "--advisor",
-        help=f"Who advises: {help_text()}; several times for several advisors.",
+        help="Who advises: {advisors} (X..Y: changing over the episodes; DIR: a session's folder); "
+        "several times for several advisors.",
+        autocompletion=offers("advisors"),
     ),
 ]
-Asked = Annotated[str, typer.Option("--ask", help="Several advisors are asked: together, in-turn.")]
+Asked = Annotated[
+    str, typer.Option("--ask", help="Several advisors are asked: {asked}.", autocompletion=offers("asked"))
+]
 Decide = Annotated[
-    str, typer.Option("--decide", help="Whom of several to follow: majority, best-trusted, trust-weighted.")
+    str,
+    typer.Option("--decide", help="Whom of several to follow: {decisions}.", autocompletion=offers("decisions")),
 ]
 Plain = Annotated[bool, typer.Option("--plain", help="Plain sentences instead of pictures, as screen readers want.")]
 ShowPage = Annotated[

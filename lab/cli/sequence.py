@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from lab.advice.advisors import help_text
+from lab.cli.families import offers
 from lab.cli.lessons import lesson_seat, say_outside, teacher_of, wanted_of
 from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Plain, Port, Seed, ShowPage, ToolboxFolder, Wait
 from lab.cli.output import end, show
@@ -22,15 +22,11 @@ def sequence(
     toasts: Annotated[int | None, typer.Option("--toasts", "-n", help="How many parts of the only product.")] = None,
     method: Annotated[
         str | None,
-        typer.Option(
-            "--method", help="srl (as printed), srl-time, mc, random, fifo, ga, exact, ...; default: the file's."
-        ),
+        typer.Option("--method", help="{methods}; default: the file's.", autocompletion=offers("methods")),
     ] = None,
     objective: Annotated[
         str | None,
-        typer.Option(
-            "--objective", help="makespan, mean-tardiness, tardy-parts, robot-idle, machine-idle; default: the file's."
-        ),
+        typer.Option("--objective", help="{objectives}; default: the file's.", autocompletion=offers("objectives")),
     ] = None,
     episodes: Annotated[
         int | None,
@@ -47,10 +43,13 @@ def sequence(
         str,
         typer.Option(
             "--advisor",
-            help=f"Who srl may ask which part to move: {help_text()}.",
+            help="Who srl may ask which part to move: {advisors}.",
+            autocompletion=offers("advisors"),
         ),
     ] = "none",
-    gate: Annotated[str, typer.Option("--gate", help="When srl asks: ccrl, always, never.")] = "ccrl",
+    gate: Annotated[
+        str, typer.Option("--gate", help="When srl asks: {order gates}.", autocompletion=offers("order gates"))
+    ] = "ccrl",
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the advice in this folder, as it was begun.")
     ] = None,

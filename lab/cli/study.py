@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from lab.cli.families import offers
 from lab.cli.options import Json, Seed
 from lab.cli.output import console, show
 
@@ -19,7 +20,7 @@ def study_list(as_json: Json = False) -> None:
 
 
 def study_run(
-    name: Annotated[str, typer.Argument(help="A study; lab study list names them.")],
+    name: Annotated[str, typer.Argument(help="A study; lab study list names them.", autocompletion=offers("studies"))],
     sessions: Annotated[
         int, typer.Option("--sessions", min=10, max=1_000_000, help="Learning sessions for each cell of a table.")
     ] = 500,

@@ -22,7 +22,7 @@ def task_list(as_json: Json = False) -> None:
 
 def task_show(task: str, as_json: Json = False) -> None:
     """The text of a task file, of a task, a cell or a world: copy it, change it, use it."""
-    from lab.task import describe
+    from lab.tasks.task_file import describe
 
     text, document = describe(task)
     if as_json:
@@ -39,7 +39,7 @@ def task_random(
     as_json: Json = False,
 ) -> None:
     """Write a random grid world as a task file; a way always leads from its start to its goal."""
-    from lab.task import write_random
+    from lab.tasks.grid_world import write_random
 
     def told(d: dict[str, Any]) -> str:
         return (
@@ -54,11 +54,11 @@ def task_reconstruct(
     out: Annotated[Path, typer.Option("--out", help="The .toml file to write.")], seed: Seed = 0, as_json: Json = False
 ) -> None:
     """Look for a world like the thesis's world II, of which only a picture is printed; takes a few minutes."""
-    from lab.task import reconstruct_world
+    from lab.studies.thesis.world_2 import write_reconstruction
     from lab.view.progress import counting
 
     with counting(console(), "layouts and views compared") as progress:
-        document = reconstruct_world(seed, out, progress)
+        document = write_reconstruction(seed, out, progress)
     show(document, as_json, lambda d: f"{d['file']}: {d['title']}")
 
 
@@ -77,7 +77,7 @@ def task_check(
 
     Of a cell: that its order can be made, with the line of what is wrong. With --json the document comes in both cases.
     """
-    from lab.task import check_task
+    from lab.skills.prepared_scene import check_task
 
     errors = check_task(file, toasts, seed)
     if as_json or not errors:

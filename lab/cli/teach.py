@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from lab.cli.families import offers
 from lab.cli.lessons import kept_session, lesson_seat, say_outside, subject_of, teacher_of
 from lab.cli.options import (
     MAX_EPISODES,
@@ -28,8 +29,9 @@ def teach(
     subtask: Annotated[
         str | None,
         typer.Argument(
-            help="transfer, grasp, insert, butter, place, one skill by its full name; a world: its name, a .toml file, a "
-            ".txt grid, random:SHAPE:DENSITY:SEED; a Gymnasium environment: gym:ID, such as gym:FrozenLake-v1."
+            help="{skills}, one skill by its full name; a world: its name, a .toml file, a .txt grid, random:SHAPE:DENSITY:SEED; "
+            "a Gymnasium environment: gym:ID, such as gym:FrozenLake-v1.",
+            autocompletion=offers("skills"),
         ),
     ] = None,
     task: Annotated[
@@ -39,14 +41,16 @@ def teach(
         str | None,
         typer.Option(
             "--learner",
-            help="q, sarsa, q-lambda, sarsa-lambda, monte-carlo, afterstate; default: the task's.",
+            help="{learners}; default: the task's.",
+            autocompletion=offers("learners"),
         ),
     ] = None,
     gate: Annotated[
         str | None,
         typer.Option(
             "--gate",
-            help="When it asks: ccrl, ia, combined, cq, always, never, random, importance, uncertainty; default: the task's.",
+            help="When it asks: {gates}; default: the task's.",
+            autocompletion=offers("gates"),
         ),
     ] = None,
     memory: Annotated[

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lab.errors import BadInput
 from lab.gym.gym_problem import GymWorld, gym_world
-from lab.skills.skill import Problem
+from lab.learning.problem import Problem
 from lab.teaching.lesson import Subject
 from lab.teaching.lesson_options import LessonOptions
 

@@ -77,6 +77,20 @@ class Memory(NamedTuple):
     now: Now
 
 
+class Move(NamedTuple):
+    """A move: the state left, the action, where it came from (OWN, REMEMBERED, ASKED or PRACTISED), the state entered.
+
+    over: no step goes on from there; reached: it is the goal.
+    """
+
+    state: int
+    action: int
+    source: int
+    entered: int
+    over: bool
+    reached: bool
+
+
 def places(states: int, moves: int) -> int:
     """How many places a walk may need that visits no state twice."""
     return min(states, moves + 1) + 1
@@ -130,12 +144,10 @@ def starts(memory: Memory, state: int) -> None:
     memory.place[state] = 0
 
 
-def moved(memory: Memory, state: int, action: int, source: int, entered: int, over: bool, reached: bool) -> None:
-    """Takes in a move, and where it came from: OWN, REMEMBERED, ASKED or PRACTISED (rule 1).
-
-    over: no step goes on from there; reached: it is the goal.
-    """
+def moved(memory: Memory, move: Move) -> None:
+    """Takes in a move (rule 1)."""
     now, at = memory.now, memory.now.at
+    state, action, source, entered, over, reached = move
     memory.did[at] = action
     memory.own[at + 1] = memory.own[at] + (1 if source == OWN else 0)
     if source in (REMEMBERED, PRACTISED):
@@ -234,7 +246,7 @@ class Recall:
 
     def moved(self, state: int, action: int, entered: int, over: bool, reached: bool) -> None:
         """`moved`, of the move that was chosen last."""
-        moved(self.memory, state, action, self._source, entered, over, reached)
+        moved(self.memory, Move(state, action, self._source, entered, over, reached))
 
     def ended(self, moves: int | None, helped: int) -> Iterator[Event]:
         """`ended`, with what is told: moves made from memory, and, once, that the trust in the advisor is lost."""

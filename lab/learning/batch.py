@@ -9,11 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
-from lab.learning import kernels, selection, splitmix
+from lab.learning import selection, splitmix
 from lab.learning.advice_memory import places
+from lab.learning.gates import GATES
+from lab.learning.gates.rules import ASKS_WHERE_TABLES_DIFFER
+from lab.learning.kernels import records
+from lab.learning.kernels.records import LANES
+from lab.learning.kernels.sessions import run
+from lab.learning.selection import SELECTIONS
 from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, TableAdvisor
+from lab.learning.updates import UPDATES
+from lab.learning.updates.update import STATE_VALUES
 from lab.mdp import FloatArray, TabularMDP
 
 
@@ -55,44 +63,27 @@ def run_sessions(
         raise BadInput(f"advice of shape {advice.thresholds.shape}: the problem has {mdp.successor.shape}")
     if not is_compiled(mdp, learner, gate):
         return _one_by_one(mdp, learner, gate, advice, seeds, keep_tables)
-    rules, problem = _rules(learner, gate, advice is not None), _problem(mdp, learner.learner == "afterstate")
-    size = mdp.n_states if rules.afterstate else mdp.n_states * mdp.n_actions
-    sessions, episodes = len(seeds), learner.episodes
-    steps, guided = np.zeros((sessions, episodes), np.int32), np.zeros((sessions, episodes), np.bool_)
-    counts, kept = np.zeros(sessions, kernels.COUNTS), np.zeros((sessions if keep_tables else 0, size))
-    temperatures = [selection.temperature(n, learner.beta, learner.exploration) for n in range(1, episodes + 1)]
-    thresholds = np.zeros((1, 1, mdp.n_actions)) if advice is None else advice.thresholds
-    region = np.zeros(mdp.n_states, np.bool_) if advice is None else advice.region
-    others = np.zeros((kernels.LANES, rules.ensemble if kernels.GATES[rules.gate] == "uncertainty" else 0, size))
-    kernels.run(
-        problem,
-        rules,
-        thresholds,
-        region,
-        np.asarray(seeds, np.uint64),
-        1.0 / np.array(temperatures),
-        (0,) * mdp.n_actions,
-        _scratch(mdp.n_actions, episodes),
-        _memories(mdp.n_states, rules.max_moves) if gate.memory else None,
-        np.zeros((kernels.LANES, size)),
-        others,
-        steps,
-        guided,
-        counts,
-        kept,
-    )
-    return _batch(steps, guided, counts, _action_values(mdp, rules, kept))
+    found = _sessions(mdp, learner, seeds, keep_tables)
+    asking = _asking(gate, advice is not None)
+    learning, problem = _learning(mdp, learner), _problem(mdp, learner)
+    told = _nothing(mdp) if advice is None else records.Advice(advice.thresholds, advice.region)
+    ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
+    lanes = _lanes(mdp.n_actions, learner.episodes, found.kept.shape[1], ensemble)
+    memories = _memories(mdp.n_states, learning.max_moves) if gate.memory else None
+    run(records.Work(problem, learning, asking, told, found, lanes), memories)
+    return _batch(found.steps, found.guided, found.counts, _action_values(mdp, learning, found.kept))
 
 
 def _batch(steps: NDArray[np.int32], guided: NDArray[np.bool_], counts: NDArray[np.void], q: FloatArray) -> Batch:
-    return Batch(steps, guided, **{name: counts[name] for name in kernels.COUNTS.names or ()}, q=q)
+    return Batch(steps, guided, **{name: counts[name] for name in records.COUNTS.names or ()}, q=q)
 
 
 def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings) -> bool:
     """Whether the kernel knows this learner, its selection, and this gate by all of its settings."""
-    known = learner.learner in kernels.LEARNERS and learner.selection == "softmax" and gate.gate in kernels.GATES
-    as_printed = len(mdp.starts) < 2 and not gate.spare_best  # it judges by the plain counts alone
-    return known and (as_printed or gate.gate not in kernels.JUDGING)
+    rules = GATES[gate.gate].compiled
+    if UPDATES[learner.learner].compiled is None or SELECTIONS[learner.selection].compiled is None or rules is None:
+        return False
+    return not rules.judges or (len(mdp.starts) < 2 and not gate.spare_best)  # it judges by the plain counts alone
 
 
 def _one_by_one(
@@ -104,13 +95,13 @@ def _one_by_one(
     keep_tables: bool,
 ) -> Batch:
     """The same sessions, each with the draws that it would have in the kernel."""
-    steps, counts = np.zeros((len(seeds), learner.episodes), np.int32), np.zeros(len(seeds), kernels.COUNTS)
+    steps, counts = np.zeros((len(seeds), learner.episodes), np.int32), np.zeros(len(seeds), records.COUNTS)
     q = np.zeros((len(seeds) if keep_tables else 0, *mdp.successor.shape))
     found = _batch(steps, np.zeros(steps.shape, np.bool_), counts, q)
     for n, seed in enumerate(seeds):
         draw = splitmix.stream(int(seed))
         advisor = None if advice is None else TableAdvisor(advice, draw)
-        one = run_session(mdp, learner, gate, advisor, np.random.default_rng(0), draw=draw)
+        one = run_session(mdp, learner, gate, advisor, draw)
         if one.interrupted:
             raise KeyboardInterrupt
         found.steps[n], found.guided[n], found.moves[n] = one.steps, one.guided, one.visits.sum()
@@ -121,69 +112,96 @@ def _one_by_one(
     return found
 
 
-def _scratch(actions: int, episodes: int) -> kernels.Scratch:
-    lanes = np.zeros(kernels.LANES, kernels.LANE)
-    lanes["session"], lanes["episode"] = -1, episodes
-    return kernels.Scratch(
-        lanes=lanes,
-        values=np.zeros(actions * kernels.LANES),
-        widths=np.zeros(kernels.LANES),
-        per_tau=np.zeros(kernels.LANES),
-        chosen=np.zeros(kernels.LANES, np.int64),
-        moves=np.zeros(kernels.LANES, np.int64),
-        states=np.zeros(kernels.LANES, np.uint64),
-        rng=np.zeros(kernels.LANES, np.uint64),
-        fresh=np.ones(kernels.LANES, np.bool_),
-        is_open=np.zeros(kernels.LANES, np.bool_),
+def _sessions(mdp: TabularMDP, learner: LearnerSettings, seeds: NDArray[np.uint64], keep: bool) -> records.Sessions:
+    shape, size = (len(seeds), learner.episodes), mdp.n_states * (1 if _is_afterstate(learner) else mdp.n_actions)
+    warm = [selection.temperature(n, learner.beta, learner.exploration) for n in range(1, learner.episodes + 1)]
+    return records.Sessions(
+        seeds=np.asarray(seeds, np.uint64),
+        per_tau=1.0 / np.array(warm),
+        steps=np.zeros(shape, np.int32),
+        guided=np.zeros(shape, np.bool_),
+        counts=np.zeros(len(seeds), records.COUNTS),
+        kept=np.zeros((len(seeds) if keep else 0, size)),
     )
 
 
-def _memories(states: int, moves: int) -> kernels.Memories:
+def _lanes(actions: int, episodes: int, size: int, ensemble: int) -> records.Lanes:
+    lane = np.zeros(LANES, records.LANE)
+    lane["session"], lane["episode"] = -1, episodes
+    return records.Lanes(
+        lane=lane,
+        values=np.zeros(actions * LANES),
+        widths=np.zeros(LANES),
+        per_tau=np.zeros(LANES),
+        chosen=np.zeros(LANES, np.int64),
+        moves=np.zeros(LANES, np.int64),
+        states=np.zeros(LANES, np.uint64),
+        rng=np.zeros(LANES, np.uint64),
+        fresh=np.ones(LANES, np.bool_),
+        is_open=np.zeros(LANES, np.bool_),
+        tables=np.zeros((LANES, size)),
+        others=np.zeros((LANES, ensemble, size)),
+    )
+
+
+def _memories(states: int, moves: int) -> records.Memories:
     def blank(cells: int) -> NDArray[np.int32]:
-        return np.zeros((kernels.LANES, cells), np.int32)
+        return np.zeros((LANES, cells), np.int32)
 
     said, way, on_walk, place = (blank(states) for _ in range(4))
     walk, did, own = (blank(places(states, moves)) for _ in range(3))
-    return kernels.Memories(said, way, on_walk, place, walk, did, own, np.zeros(kernels.LANES, kernels.NOW))
+    return records.Memories(said, way, on_walk, place, walk, did, own, np.zeros(LANES, records.NOW))
 
 
-def _problem(mdp: TabularMDP, afterstate: bool) -> kernels.Problem:
+def _is_afterstate(learner: LearnerSettings) -> bool:
+    return bool(UPDATES[learner.learner].compiled == STATE_VALUES)
+
+
+def _nothing(mdp: TabularMDP) -> records.Advice:
+    return records.Advice(np.zeros((1, 1, mdp.n_actions)), np.zeros(mdp.n_states, np.bool_))
+
+
+def _problem(mdp: TabularMDP, learner: LearnerSettings) -> records.Problem:
     ends = np.where(mdp.goal, 1, np.where(mdp.terminal, 2, 0)).astype(np.uint8)
     starts = np.array(mdp.starts or (mdp.start,), np.int64)
-    arrival = mdp.arrival if afterstate else np.zeros(1)
-    reward = 0.0 if not afterstate else mdp.step_reward
-    return kernels.Problem(mdp.successor.copy(), mdp.reward.copy(), arrival, ends, starts, reward)
+    arrival, step_reward = (mdp.arrival, mdp.step_reward) if _is_afterstate(learner) else (np.zeros(1), 0.0)
+    return records.Problem(mdp.successor.flatten(), mdp.reward.flatten(), arrival, ends, starts, step_reward)
 
 
-def _rules(learner: LearnerSettings, gate: GateSettings, somebody: bool) -> kernels.Rules:
-    return kernels.Rules(
-        learner.learner == "afterstate",
-        float(learner.alpha),
-        float(learner.discount),
-        learner.max_steps - learner.count_start,
-        learner.max_steps,
-        int(learner.count_start),
-        kernels.GATES.index(gate.gate if somebody else "never"),
-        float(gate.lambda_threshold),
-        gate.omega,
-        gate.first_episode,
-        gate.window,
-        float(gate.psi),
-        float(gate.spread),
-        float(gate.rate),
-        float(gate.enough_steps),
-        gate.ensemble,
-        gate.budget,
-        gate.judge_unhelped and not gate.memory,
+def _learning(mdp: TabularMDP, learner: LearnerSettings) -> records.Learning:
+    return records.Learning(
+        afterstate=_is_afterstate(learner),
+        alpha=float(learner.alpha),
+        discount=float(learner.discount),
+        max_moves=learner.max_steps - learner.count_start,
+        max_steps=learner.max_steps,
+        count_start=int(learner.count_start),
+        actions=(0,) * mdp.n_actions,
     )
 
 
-def _action_values(mdp: TabularMDP, rules: kernels.Rules, tables: FloatArray) -> FloatArray:
+def _asking(gate: GateSettings, somebody: bool) -> records.Asking:
+    return records.Asking(
+        gate=GATES[gate.gate if somebody else "never"].compiled,
+        threshold=float(gate.lambda_threshold),
+        omega=gate.omega,
+        first_episode=gate.first_episode,
+        window=gate.window,
+        psi=float(gate.psi),
+        spread=float(gate.spread),
+        rate=float(gate.rate),
+        enough=float(gate.enough_steps),
+        budget=gate.budget,
+        judge_unhelped=gate.judge_unhelped and not gate.memory,
+    )
+
+
+def _action_values(mdp: TabularMDP, learning: records.Learning, tables: FloatArray) -> FloatArray:
     """Tables as (N, S, A) action values, zeros in terminal states."""
-    if not rules.afterstate:
+    if not learning.afterstate:
         return tables.reshape(-1, *mdp.successor.shape)
     q = (
-        mdp.step_reward + rules.discount * tables[:, mdp.successor]
+        mdp.step_reward + learning.discount * tables[:, mdp.successor]
         if len(tables)
         else np.zeros((0, *mdp.successor.shape))
     )

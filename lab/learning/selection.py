@@ -9,6 +9,8 @@ from math import exp
 
 import numpy as np
 
+from lab.learning.members import Member
+
 COLDEST = 1e-300  # below this a temperature is as good as 0, and dividing by it would overflow
 BELOW_ONE = 1.0 - 2.0**-52  # keeps u * total below the total whatever the rounding
 
@@ -74,10 +76,12 @@ def choose_epsilon_greedy(values: Sequence[float], epsilon: float, u: float) -> 
     return min(int(u / epsilon * len(values)), len(values) - 1)
 
 
-SELECTIONS: dict[str, Callable[[Sequence[float], float, float], int]] = {
-    "softmax": choose_softmax,
-    "epsilon-greedy": choose_epsilon_greedy,
-    "greedy": choose_greedy,
+SELECTIONS: dict[str, Member[Callable[[Sequence[float], float, float], int]]] = {
+    "softmax": Member(
+        choose_softmax, "by chance, the better a move the likelier; it grows surer with time", compiled=True
+    ),
+    "epsilon-greedy": Member(choose_epsilon_greedy, "the best move, now and then any: less and less often with time"),
+    "greedy": Member(choose_greedy, "always the best move that it knows"),
 }
 
 

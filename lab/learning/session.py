@@ -37,7 +37,7 @@ class SessionResult:
 
     q (S, A) float64, visits (S, A) int64; steps (episodes,) int64, a failed episode as max_steps + 1; guided
     (episodes,) bool: at least one advised step; requests: episodes in which the learner asked; helped_steps:
-    advised steps that were carried out; misleads and rejected_at_episode: see lab/learning/gates.py; final_steps:
+    advised steps that were carried out; misleads and rejected_at_episode: see lab/learning/gates; final_steps:
     those of the greedy path from the start, None if it does not reach the goal, optimal_steps: the fewest, None where
     nobody knows them, both counted as in `steps`; solved: see `Environment.judge`; interrupted: stopped by Ctrl-C, only
     finished episodes count.
@@ -58,74 +58,67 @@ class SessionResult:
 
 
 def run_session(
-    mdp: TabularMDP,
+    problem: TabularMDP | Environment,
     learner: LearnerSettings,
     gate: GateSettings,
     advisor: Advisor | None,
-    rng: np.random.Generator,
-    *,
-    q0: FloatArray | None = None,
+    rng: np.random.Generator | Draw,
     on_event: OnEvent | None = None,
-    draw: Draw | None = None,
-    environment: Environment | None = None,
 ) -> SessionResult:
-    """Learns one table in `learner.episodes` episodes, asking `advisor` when the gate says so (None: nobody to ask).
+    """Learns one table from zeros: see `Session`."""
+    return Session(problem, learner, gate, advisor, rng).run(on_event)
 
-    q0: (S, A) start values, default 0. draw: where uniform numbers come from, by default `rng`. environment: where the
-    steps are made, by default the table itself. An advised action is carried out and learned from as if it were the
-    learner's own choice. An advisor with a method `followed` hears after each episode what it led to.
-    KeyboardInterrupt ends the session at once; the result then holds all that was learned so far.
+
+def check_members(
+    learner: LearnerSettings, gate: GateSettings, where: tuple[str, str] = ("learner settings", "gate settings")
+) -> None:
+    """Raises BadInput for an unknown learner, selection or gate; `where`: where the learner and the gate came from."""
+    for kind, name, table, source in (
+        ("learner", learner.learner, UPDATES, where[0]),
+        ("selection", learner.selection, SELECTIONS, where[0]),
+        ("gate", gate.gate, GATES, where[1]),
+    ):
+        if name not in table:
+            raise unknown(kind, name, table, source)
+
+
+class Session:
+    """One learned table, in `learner.episodes` episodes, asking `advisor` when the gate says so (None: nobody to ask).
+
+    problem: where the steps are made; rng: a generator, or uniform numbers one after the other; q0: (S, A) start values,
+    default 0. An advised action is carried out and learned from as if it were the learner's own choice. An advisor with a
+    method `followed` hears after each episode what it led to.
     Raises BadInput for an unknown learner, selection or gate, a q0 that does not fit or an advisor that names no
     action, and NoPath.
     Source: thesis fig. 6.2 with the update rules of section 2.2 and the softmax of section 9.4.
     """
-    place = environment or TableEnvironment(mdp)
-    session = _Session(place, learner, gate, advisor, draw or uniforms(rng), q0, on_event or (lambda event: None))
-    interrupted = False
-    try:
-        for episode in range(1, learner.episodes + 1):
-            session.play(episode)
-    except KeyboardInterrupt:
-        interrupted = True
-    return session.result(interrupted)
 
-
-def check_members(learner: LearnerSettings, gate: GateSettings) -> None:
-    """Raises BadInput for an unknown learner, selection or gate."""
-    if learner.learner not in UPDATES:
-        raise unknown("learner", learner.learner, UPDATES, "learner settings")
-    if learner.selection not in SELECTIONS:
-        raise unknown("selection", learner.selection, SELECTIONS, "learner settings")
-    if gate.gate not in GATES:
-        raise unknown("gate", gate.gate, GATES, "gate settings")
-
-
-class _Session:
-    """One session under way; everything the inner loop touches is a plain list."""
-
+    # everything that the inner loop touches is a plain list
     def __init__(
         self,
-        environment: Environment,
+        problem: TabularMDP | Environment,
         learner: LearnerSettings,
         gate: GateSettings,
         advisor: Advisor | None,
-        draw: Draw,
-        q0: FloatArray | None,
-        on_event: OnEvent,
+        rng: np.random.Generator | Draw,
+        q0: FloatArray | None = None,
     ):
+        environment = TableEnvironment(problem) if isinstance(problem, TabularMDP) else problem
+        draw = uniforms(rng) if isinstance(rng, np.random.Generator) else rng
         check_members(learner, gate)
         check_solvable(environment)
         self.environment, self.mdp, self.settings, self.gate_settings = environment, environment.mdp, learner, gate
-        self.advisor, self.advised, self.tell = advisor, advisor is not None, on_event
+        self.advisor, self.advised = advisor, advisor is not None
+        self.tell: OnEvent = lambda event: None
         mdp = self.mdp
-        self.update = UPDATES[learner.learner](_start_values(mdp, q0).tolist(), learner, mdp)
+        self.update = UPDATES[learner.learner].make(_start_values(mdp, q0).tolist(), learner, mdp)
         self.q = self.update.q
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
         self.actions = range(mdp.n_actions)
-        self.choose, self.draw = SELECTIONS[learner.selection], draw
+        self.choose, self.draw = SELECTIONS[learner.selection].make, draw
         several_starts = bool(mdp.starts) or not isinstance(environment, TableEnvironment)
         around = Surroundings(draw, self._others, several_starts)
-        make = GATES[gate.gate if self.advised else "never"]
+        make = GATES[gate.gate if self.advised else "never"].make
         self.gate = make(gate, learner.episodes, learner.max_steps, around)
         self.max_moves = learner.max_steps - learner.count_start
         self.recall = Recall(mdp.n_states, self.max_moves, learner.episodes, gate.window) if gate.memory else None
@@ -141,9 +134,20 @@ class _Session:
         self.asked_now = False  # in the episode under way; booked when it has ended
         self.helped_now = 0
 
+    def run(self, on_event: OnEvent | None = None) -> SessionResult:
+        """All episodes, told to `on_event`; a KeyboardInterrupt ends them at once, and what was learned so far counts."""
+        self.tell = on_event or self.tell
+        interrupted = False
+        try:
+            for episode in range(1, self.settings.episodes + 1):
+                self.play(episode)
+        except KeyboardInterrupt:
+            interrupted = True
+        return self.result(interrupted)
+
     def _others(self, tables: int) -> list[Update]:
         """Learners like this one whose start values are drawn within +-0.5."""
-        make, (states, actions) = UPDATES[self.settings.learner], self.mdp.successor.shape
+        make, (states, actions) = UPDATES[self.settings.learner].make, self.mdp.successor.shape
         others = [make([[0.0] * actions for _ in range(states)], self.settings, self.mdp) for _ in range(tables)]
         for other in others:
             other.scatter(self.draw)

@@ -1,6 +1,7 @@
 """The settings of a learner and of its gate, with the ranges that each may take."""
 
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass
+from functools import cache
 from typing import Annotated, Any, get_type_hints
 
 from annotated_types import Ge, Gt, Le
@@ -8,32 +9,33 @@ from annotated_types import Ge, Gt, Le
 from lab.errors import BadInput
 
 COMPARE_WINDOWS = ("ccrl", "combined")
+WORDS = {"gt": "above", "ge": "at least", "le": "at most"}
+
+
+@cache
+def _checked(kind: type) -> Any:
+    """The pydantic model with the fields of a class of settings."""
+    from pydantic import ConfigDict, create_model
+
+    fields: dict[str, Any] = {name: (hint, ...) for name, hint in get_type_hints(kind, include_extras=True).items()}
+    return create_model(kind.__name__, __config__=ConfigDict(strict=True), **fields)
 
 
 def _require_allowed(settings: Any) -> None:
-    """Raises BadInput for the first field that has the wrong type or lies outside its annotated range."""
-    hints = get_type_hints(type(settings), include_extras=True)
-    for name in (field.name for field in fields(settings)):
-        hint, value = hints[name], getattr(settings, name)
-        kind = getattr(hint, "__origin__", hint)
-        allowed_types = (int, float) if kind is float else (kind,)
-        if isinstance(value, bool) != (kind is bool) or not isinstance(value, allowed_types):
-            raise BadInput(f"{type(settings).__name__}.{name} = {value!r}: it must be {kind.__name__}")
-        limits = getattr(hint, "__metadata__", ())
-        if not all(_within(value, limit) for limit in limits):
-            raise BadInput(f"{type(settings).__name__}.{name} = {value!r}: allowed {' and '.join(map(_words, limits))}")
+    """Raises BadInput for the first field that has the wrong type or lies outside its annotated range; numbers become plain."""
+    from pydantic import ValidationError
 
-
-def _within(value: Any, limit: Gt | Ge | Le) -> bool:
-    if isinstance(limit, Gt):
-        return bool(value > limit.gt)
-    return bool(value >= limit.ge if isinstance(limit, Ge) else value <= limit.le)
-
-
-def _words(limit: Gt | Ge | Le) -> str:
-    if isinstance(limit, Gt):
-        return f"above {limit.gt}"
-    return f"at least {limit.ge}" if isinstance(limit, Ge) else f"at most {limit.le}"
+    kind: Any = type(settings)
+    model = _checked(kind)
+    try:
+        vars(settings).update(vars(model.model_validate(vars(settings))))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = model.model_fields[first["loc"][0]]
+        limits = [f"{WORDS[name]} {value}" for limit in field.metadata for name, value in asdict(limit).items()]
+        is_type = first["type"].endswith("_type")
+        allowed = f"it must be {field.annotation.__name__}" if is_type else f"allowed {' and '.join(limits)}"
+        raise BadInput(f"{model.__name__}.{first['loc'][0]} = {first['input']!r}: {allowed}") from None
 
 
 @dataclass(frozen=True)

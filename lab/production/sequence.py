@@ -161,13 +161,13 @@ def _sessions(
     cell: Cell, settings: Sequencing, wanted: Wanted, chance: Chance, tell: Tell, journal: Journal | None
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     method = wanted.method or settings.method
+    check_method(method)
     search = search_for(
         settings,
         episodes=wanted.episodes,
         objective=wanted.objective,
         chance=chance if wanted.stochastic and SEQUENCERS[method].drawn else NO_CHANCE,
     )
-    check_method(method)
     check_objective(search.objective, cell)
     known = reference(cell, search.objective)
     found: list[SequenceResult] = []

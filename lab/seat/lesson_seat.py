@@ -23,8 +23,8 @@ from lab.teaching.events import (
 from lab.teaching.kept_session import known_values, receipt_of
 
 if TYPE_CHECKING:
+    from lab.seat.lesson_scene import LessonScene
     from lab.seat.page.teaching_page import SeatPage
-    from lab.seat.stage import Stage
 
 WORTH_S = 2.0  # the shortest time between two receipts of one lesson
 PAGE_S = 30.0  # how long a replay waits for a browser
@@ -39,7 +39,7 @@ class LessonSeat:
 
     def __init__(self, progress: RunProgress, prompt: TeachingPrompt | None, page: "SeatPage | None") -> None:
         self.progress, self._prompt, self._page = progress, prompt, page
-        self._stage: Stage | None = None
+        self._stage: LessonScene | None = None
         self._pause_s: float | None = None  # between two answers of a replay
         self._asked_here = False  # the last question was put to somebody here, and was shown
         self._shown_s = 0.0  # when the page was last shown a question that is not put to it
@@ -171,9 +171,9 @@ class LessonSeat:
         self.clear_stage()
         if self._page is None:
             return
-        from lab.seat.stage import stage_of
+        from lab.seat.lesson_scene import lesson_scene_of
 
-        self._stage = stage_of(event.scene, event.problem)
+        self._stage = lesson_scene_of(event.scene, event.problem)
         if self._stage is not None:
             self._page.show(self._stage.bodies(), self._stage.camera)
 

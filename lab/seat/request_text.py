@@ -11,7 +11,8 @@ from lab.learning.events import EpisodeEnded
 from lab.learning.reasons import TooSlow
 from lab.learning.requests import AdviceRequest, Standing
 from lab.mdp import TabularMDP
-from lab.seat.grid_text import Marks, Picture, is_map, nearest_goal, points_by_name
+from lab.seat.grid_text import Marks, Picture, nearest_goal, points_by_name
+from lab.view.grid_planes import is_map
 
 GOAL, OBSTACLE, DEAD_END, NOWHERE = "to the goal", "into an obstacle", "to an end that is no goal", "nowhere"
 ALIKE = 1e-9  # chances that differ by less are the same

@@ -1,9 +1,8 @@
 """The high level: in which order one robot serves the parts of a cell."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from lab.errors import unknown
@@ -106,11 +105,12 @@ def _asked(name: str, cell: "Cell", objective: str, seed: int) -> Reaction:
 class Sequencer:
     """A method; called with a cell, a search and a generator it finds a sequence.
 
-    load: imports its function. drawn: where chance is asked for it looks in drawn times; else with the means. react:
-    the policy in its manner, for a cell, an objective and a seed.
+    load: imports its function. help: what it is, in one line. drawn: where chance is asked for it looks in drawn times;
+    else with the means. react: the policy in its manner, for a cell, an objective and a seed.
     """
 
     load: Callable[[], Find]
+    help: str
     drawn: bool = False
     react: Callable[["Cell", str, int], Reaction] = _planned_anew
 
@@ -119,7 +119,7 @@ class Sequencer:
         return self.load()(cell, search, rng)
 
 
-def _rule(name: str) -> Sequencer:
+def _rule(name: str, words: str) -> Sequencer:
     """A dispatching rule: one sequence."""
 
     def load() -> Find:
@@ -127,26 +127,24 @@ def _rule(name: str) -> Sequencer:
 
         return lambda cell, search, rng: dispatched(cell, RULES[name], search)
 
-    return Sequencer(load, react=partial(_asked, name))
+    return Sequencer(load, f"a dispatching rule: {words}", react=partial(_asked, name))
 
 
-SEQUENCERS: Mapping[str, Sequencer] = MappingProxyType(
-    {
-        "srl": Sequencer(_srl, drawn=True),
-        "srl-time": Sequencer(_srl_time, react=_learned_on),
-        "mc": Sequencer(_monte_carlo, drawn=True),
-        "random": Sequencer(_random, drawn=True),
-        "fifo": Sequencer(_fifo, react=_queued),
-        "ga": Sequencer(_genetic),
-        "exact": Sequencer(_exact),
-        "cp-sat": Sequencer(_cp_sat),
-        "shortest-move": _rule("shortest-move"),
-        "longest-remaining-work": _rule("longest-remaining-work"),
-        "most-urgent-machine": _rule("most-urgent-machine"),
-        "nearest-ready": _rule("nearest-ready"),
-        "earliest-due": _rule("earliest-due"),
-    }
-)
+SEQUENCERS: dict[str, Sequencer] = {
+    "srl": Sequencer(_srl, "the thesis's: learns from the reward of whole episodes, as printed", drawn=True),
+    "srl-time": Sequencer(_srl_time, "our own: learns step by step what time still to come costs", react=_learned_on),
+    "mc": Sequencer(_monte_carlo, "Monte Carlo: averages the returns of the episodes", drawn=True),
+    "random": Sequencer(_random, "the best of so many sequences drawn evenly", drawn=True),
+    "fifo": Sequencer(_fifo, "first in, first out: a queue of tasks", react=_queued),
+    "ga": Sequencer(_genetic, "a genetic algorithm with random keys"),
+    "exact": Sequencer(_exact, "best-first search (A*) to the proven optimum"),
+    "cp-sat": Sequencer(_cp_sat, "constraint programming, for every objective"),
+    "shortest-move": _rule("shortest-move", "the shortest move"),
+    "longest-remaining-work": _rule("longest-remaining-work", "the part with the most work left"),
+    "most-urgent-machine": _rule("most-urgent-machine", "what feeds or empties the machine most behind"),
+    "nearest-ready": _rule("nearest-ready", "what can begin soonest"),
+    "earliest-due": _rule("earliest-due", "the part that is due first"),
+}
 
 
 def check_method(name: str) -> None:

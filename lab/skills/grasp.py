@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from lab.errors import BadInput
+from lab.learning.problem import Problem
 from lab.mdp import NoPath, TabularMDP, grid
+from lab.sim.blocked_cells import Survey
 from lab.sim.kinematics import ToolPose, inverse
 from lab.sim.scene import spots
-from lab.sim.survey import Survey
-from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
+from lab.skills.skill import Bench, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
 from lab.tasks.task_file import Task
 

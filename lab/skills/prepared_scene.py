@@ -5,11 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lab.errors import LabError
+from lab.learning.problem import Problem
 from lab.sim.scene import Layout, check_apart, draw_layout
-from lab.skills.skill import Problem
 from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
-from lab.tasks.task_file import Task, check_toasts
+from lab.tasks.grid_world import RANDOM, GridWorld
+from lab.tasks.task_file import Task, check_number, check_toasts, find, fitting, load_any
 
 
 @dataclass
@@ -39,3 +41,29 @@ def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prep
     surveys = Surveys(task, layout)
     problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items() if only in (None, name)}
     return Prepared(task, toasts, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
+
+
+def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
+    """What is wrong with a task file, its scene and its problems for so many toasts, or with a cell or a world; or nothing.
+
+    Without a number: a task for 3 toasts, or as many as there is room for; a cell for its own order.
+    Raises BadInput for a file that is not there, and for a number that this kind of file never takes.
+    """
+    if not file.startswith(RANDOM):
+        find(file)
+    try:
+        task = load_any(file)
+    except LabError as error:
+        return [str(error)]
+    if toasts is not None and not isinstance(task, GridWorld):
+        check_number(toasts) if isinstance(task, Task) else task.ordered(toasts)
+    try:
+        if isinstance(task, Task):
+            prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
+        elif isinstance(task, GridWorld):
+            task.check()
+        else:
+            task.cell(toasts)
+    except LabError as error:
+        return [str(error)]
+    return []

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 
+from lab.learning.problem import Problem
 from lab.sim.scene import Scene
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared
-from lab.skills.skill import SETTLE_STEPS, Bench, Problem, Skill, Status
+from lab.skills.skill import SETTLE_STEPS, Bench, Skill, Status
 from lab.toolbox.policy import Policy
 
 

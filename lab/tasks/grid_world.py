@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from lab.errors import BadInput, counted
 from lab.mdp import BoolArray, NoPath, TabularMDP, grid, shortest_steps
-from lab.tasks.record import Count, Learned, Name, Record, as_tuple, read_text
+from lab.tasks.record import Count, Learned, Name, Record, as_tuple, read_text, write_whole
 
 MAX_AXIS = 100  # cells; with 3 axes at most a million
 MAX_DENSITY = 0.6
@@ -23,6 +23,10 @@ ACTIONS = {  # of worlds with 2 and 3 axes, as `lab.mdp.grid` orders them: -axis
     2: ("up", "down", "left", "right"),  # rows run down, columns to the right
     3: ("left", "right", "backward", "forward", "down", "up"),  # x, y, z as seen from above
 }
+_AXES = """\
+Drawn at random. Cells are counted from 0; with two axes they are [row, column], row 0 on top, with three [x, y, z], y
+away from you and z up.
+"""
 _TRIES = 10  # at scattering obstacles that leave a way
 _ALONE: dict[str, Any] = {"learner": "afterstate", "beta": 1.0, "episodes": 500}
 _ROOM = 4  # an episode of a drawn world may take so many times the shortest way
@@ -30,15 +34,15 @@ _WANTED = "wanted random:SHAPE:DENSITY:SEED, such as random:10x10x10:0.06:7"
 
 Ints = NDArray[np.int_]
 Coordinates = tuple[int, ...]
-Cell = Annotated[Coordinates, BeforeValidator(as_tuple)]
-Shape = Annotated[tuple[Count, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=3)]
+GridCell = Annotated[Coordinates, BeforeValidator(as_tuple)]
+GridShape = Annotated[tuple[Count, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=3)]
 
 
-class View(Record):
+class AdvisorView(Record):
     """The block of cells in which an advisor with a limited view sees the robot, from corner to corner, both inside."""
 
-    lower: Cell
-    upper: Cell
+    lower: GridCell
+    upper: GridCell
 
 
 class GridWorld(Learned):
@@ -51,11 +55,11 @@ class GridWorld(Learned):
     kind: Literal["world"] = "world"
     name: Name
     title: str = ""
-    shape: Shape
-    start: Cell
-    goal: Cell
-    obstacles: Annotated[tuple[Cell, ...], BeforeValidator(as_tuple)] = ()
-    view: View | None = None
+    shape: GridShape
+    start: GridCell
+    goal: GridCell
+    obstacles: Annotated[tuple[GridCell, ...], BeforeValidator(as_tuple)] = ()
+    view: AdvisorView | None = None
 
     @model_validator(mode="after")
     def _cells_fit(self) -> Self:
@@ -71,18 +75,10 @@ class GridWorld(Learned):
                 raise ValueError(f"{what} {cell} is blocked by an obstacle: a free cell is wanted")
         if self.start == self.goal:
             raise ValueError(f"start and goal are the same cell {self.start}: two cells are wanted")
-        return self
-
-    @model_validator(mode="after")
-    def _view_holds_a_cell(self) -> Self:
         if self.view is not None:
             for axis, (low, high) in enumerate(zip(self.view.lower, self.view.upper, strict=True)):
                 if low > high:
                     raise ValueError(f"view.lower {low} on axis {axis} is above view.upper: allowed are 0..{high}")
-        return self
-
-    @model_validator(mode="after")
-    def _members_known(self) -> Self:
         self.check_members()
         return self
 
@@ -304,3 +300,24 @@ def _fitted(world: GridWorld) -> GridWorld:
         rewards = replace(rewards, collision=round(endless - 1.0, 6))
     learner = replace(learner, **_ALONE, max_steps=max(learner.max_steps, _ROOM * moves))
     return world.model_copy(update={"rewards": rewards, "learner": learner})
+
+
+def write_random(shape: str, density: float, seed: int, out: Path) -> dict[str, Any]:
+    """Writes a random world as a task file, which must not be there yet; the document of `lab task random --json`."""
+    if out.suffix != ".toml":
+        raise BadInput(f"task file '{out}' (--out): its name must end in .toml")
+    world = random_world(parse_shape(shape, "SHAPE"), density, seed)
+    if out.exists():
+        raise BadInput(f"task file '{out}' (--out): there is one already: choose another name, or remove it")
+    write_whole(out, world.to_toml(_AXES))
+    return {
+        "file": str(out),
+        "name": world.name,
+        "shape": list(world.shape),
+        "density": density,
+        "seed": seed,
+        "start": list(world.start),
+        "goal": list(world.goal),
+        "obstacles": len(world.obstacles),
+        "optimal_steps": shortest_steps(world.mdp()),
+    }

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, field_v
 from pydantic_core import CoreSchema
 
 from lab import files
-from lab.errors import BadInput, unknown
+from lab.errors import BadInput
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import Rewards
 
@@ -65,16 +65,9 @@ class Learned(Record):
 
     def check_members(self, where: str = "") -> None:
         """Raises BadInput for an unknown learner, selection or gate; `where` comes before the names of the tables."""
-        from lab.learning.gates import GATES
-        from lab.learning.selection import SELECTIONS
-        from lab.learning.updates import UPDATES
+        from lab.learning.session import check_members
 
-        if self.learner.learner not in UPDATES:
-            raise unknown("learner", self.learner.learner, UPDATES, f"{where}learner")
-        if self.learner.selection not in SELECTIONS:
-            raise unknown("selection", self.learner.selection, SELECTIONS, f"{where}learner")
-        if self.gate.gate not in GATES:
-            raise unknown("gate", self.gate.gate, GATES, f"{where}gate")
+        check_members(self.learner, self.gate, (f"{where}learner", f"{where}gate"))
 
     def changed(self, learner: str | None, gate: str | None, episodes: int | None, memory: bool | None = None) -> Self:
         """With what the options of a command say, None for what they leave; BadInput for an unknown learner or gate."""

@@ -6,11 +6,11 @@ from typing import Any
 
 from lab.advice.journal import Journal
 from lab.learning import events as session
+from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Request
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
-from lab.skills.skill import Problem
 from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.toolbox.policy import Policy
 

@@ -14,8 +14,8 @@ from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment
+from lab.learning.problem import Problem
 from lab.mdp import FloatArray
-from lab.skills.skill import Problem
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.lesson_plan import MAX_SESSIONS, Keep, LessonPlan
 from lab.toolbox.policy import Policy

@@ -10,9 +10,9 @@ from typing import Any, Protocol
 from lab.advice.advisors import PEOPLE
 from lab.advice.entries import line_of
 from lab.errors import BadInput
+from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.mdp import BoolArray
-from lab.skills.skill import Problem
 from lab.tasks.record import Learned, write_whole
 from lab.teaching.events import ScenePrepared, Tell
 from lab.teaching.kept_session import KeptSession, NewSession, check_new

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from lab.advice.journal import Journal
+from lab.learning.problem import Problem
 from lab.learning.session import SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.skills.skill import Problem
 from lab.toolbox.policy import Policy
 
 MAX_SESSIONS = 20  # to reach the goal at all; further sessions go on from the table of the one before

@@ -12,11 +12,11 @@ from lab.advice.journal import Again, Journal
 from lab.learning import events as session
 from lab.learning.environment import TableEnvironment, unreached
 from lab.learning.events import AdviceEnded, AdviceRejected
+from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Request, Walked
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session, SessionResult
 from lab.learning.settings import LearnerSettings
 from lab.mdp import FloatArray, greedy_path
-from lab.skills.skill import Problem
 from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, Tell
 from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.policy import Policy
@@ -74,16 +74,7 @@ class _Sessions:
 
     def _session(self, q0: FloatArray | None) -> SessionResult:
         plan, advisor = self.plan, None if self.alone else self._advisor()
-        return run_session(
-            plan.problem.mdp,
-            plan.learner,
-            self.gate,
-            advisor,
-            self.rng,
-            q0=q0,
-            on_event=self._hear,
-            environment=self.place,
-        )
+        return Session(self.place, plan.learner, self.gate, advisor, self.rng, q0).run(self._hear)
 
     def _advisor(self) -> Advisor | None:
         made = self.advising.gather(self.place, self.plan.learner, self.rng, journal=self.journal, tell=self._hear)

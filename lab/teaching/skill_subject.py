@@ -5,13 +5,13 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from lab.errors import BadInput
+from lab.learning.problem import Problem
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared, prepare
-from lab.skills.skill import Problem
 from lab.skills.skillset import SkillSet
 from lab.skills.trial import trial_of
 from lab.tasks.record import Learned
-from lab.tasks.task_file import Task, check_toasts, load, names_of
+from lab.tasks.task_file import Task, check_toasts, fitting, load, names_of
 from lab.teaching.lesson import Subject
 from lab.teaching.lesson_options import LessonOptions
 from lab.toolbox.policy import Policy
@@ -78,8 +78,3 @@ def find_skill(skills: "dict[str, Skill]", name: str) -> "Skill":
     allowed = f"{', '.join(subtasks)}, or one skill's full name, such as '{next(iter(skills))}'"
     allowed += f", or a world: {', '.join(worlds)}"
     raise BadInput(f"unknown sub-task '{name}' (SUBTASK):{hint} known: {allowed}")
-
-
-def fitting(task: Task, wanted: int) -> int:
-    """As many toasts as wanted, or as both ends of the route hold."""
-    return min(wanted, *(task.station(stage.station).capacity for stage in (task.route[0], task.route[-1])))

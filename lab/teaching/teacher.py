@@ -8,12 +8,12 @@ from lab.advice.advising import Advising
 from lab.advice.entries import Closed
 from lab.advice.journal import Journal
 from lab.errors import BadInput, WorkFailed, counted
+from lab.learning.problem import Problem
 from lab.mdp import TabularMDP
-from lab.skills.skill import Problem
 from lab.teaching.events import LessonContinued, Tell, unheard
 from lab.teaching.lesson_plan import Interrupted, Keep, Lesson, LessonPlan, Trial
 from lab.teaching.lesson_sessions import fits, joined, learn
-from lab.toolbox.policy import MAX_NAME_LENGTH, Policy, is_name
+from lab.toolbox.policy import MAX_NAME_LENGTH, Origin, Policy, is_name
 from lab.toolbox.registry import Toolbox
 
 _UNFINISHED = " unfinished"
@@ -102,17 +102,9 @@ class Teacher:
         journal = self.keep(plan)
         try:
             result = learn(plan, self.advising, self.seed, journal, self.tell)
-            policy = Policy.of(
-                joined(unfinished, result),
-                problem.mdp,
-                name=plan.name or self._free_name(problem, result.solved),
-                subtask=problem.subtask,
-                task=plan.task,
-                learner=plan.learner,
-                gate=plan.gate,
-                advisor=self.advisor,
-                seed=self.seed,
-            )
+            name = plan.name or self._free_name(problem, result.solved)
+            origin = Origin(name, problem.subtask, plan.task, self.advisor, self.seed)
+            policy = Policy.of(joined(unfinished, result), problem.mdp, plan.learner, plan.gate, origin)
             failure = None
             if not (result.interrupted or journal.read_only):
                 policy, failure = self._tried(problem, policy)

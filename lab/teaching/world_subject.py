@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from lab.errors import BadInput, unknown
+from lab.learning.problem import Problem
 from lab.mdp import greedy_path
-from lab.skills.skill import Problem
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.task_file import load_world
 from lab.teaching.lesson import Subject
@@ -61,7 +61,7 @@ class WorldSubject(Subject):
         """The values of a world with two axes, and the learned way through it."""
         if len(self.world.shape) != 2:
             return {}
-        from lab.view.plots import value_map
+        from lab.view.plots import Places, value_map
 
         world, mdp, path = self.world, self.world.mdp(), out / "value-map.png"
         states, _, _ = greedy_path(policy.q, mdp, mdp.n_states)
@@ -69,9 +69,11 @@ class WorldSubject(Subject):
             policy.q.max(axis=1).reshape(world.shape),
             None,
             path,
-            route=[(row, column) for row, column in map(mdp.state_cell, states)],
-            blocked=world.blocked(),
-            start=(world.start[0], world.start[1]),
-            goal=(world.goal[0], world.goal[1]),
+            places=Places(
+                route=[(row, column) for row, column in map(mdp.state_cell, states)],
+                blocked=world.blocked(),
+                start=(world.start[0], world.start[1]),
+                goal=(world.goal[0], world.goal[1]),
+            ),
         )
         return {"value_map": str(path)}

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from math import prod
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -19,6 +19,16 @@ if TYPE_CHECKING:
 
 MAX_NAME_LENGTH = 100
 _SIGNATURE = re.compile(r"[0-9a-f]{16}")
+
+
+class Origin(NamedTuple):
+    """What a policy is called, what it was learned for, who advised, and with which seed."""
+
+    name: str
+    subtask: str
+    task: str
+    advisor: str
+    seed: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,20 +101,13 @@ class Policy:
         cls,
         result: "SessionResult",
         mdp: TabularMDP,
-        *,
-        name: str,
-        subtask: str,
-        task: str,
         learner: "LearnerSettings",
         gate: "GateSettings",
-        advisor: str,
-        seed: int,
+        origin: Origin,
     ) -> Self:
         """The policy that a session learned in a problem, stamped with the time and the versions of now."""
         return cls(
-            name=name,
-            subtask=subtask,
-            task=task,
+            **origin._asdict(),
             q=result.q,
             visits=result.visits,
             action_labels=mdp.action_labels,
@@ -113,8 +116,6 @@ class Policy:
             signature=mdp.signature,
             learner=asdict(learner),
             gate=asdict(gate),
-            advisor=advisor,
-            seed=seed,
             curve=result.steps.tolist(),
             guided=result.guided.tolist(),
             helped_steps=result.helped_steps,

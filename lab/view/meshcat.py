@@ -19,7 +19,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.sim.frames import Body, Camera, Frame, Recording
+from lab.sim.frames import Body, Frame, Recording, Viewpoint
 
 if TYPE_CHECKING:
     from lab.view.keyframes import Motion, Track
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from lab.view.server_page import Panel
 
 HERE = Path(__file__).parent
-TEACHING = HERE.parent / "seat" / "page"  # the panel's own files
 # meshcat's viewer, and dat.gui in it, bring their styles as elements of their own: nothing else may be inline when served
 SERVED = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "
@@ -75,24 +74,21 @@ class LiveView:
         """The page and what it loads, each by an address with the token in it."""
         from lab.view.server import File
 
-        panel = self._panel is not None
-        scripts = [
-            "main.min.js",
-            *(["teaching_draw.js", "teaching_side.js", "teaching_map.js", "teaching.js"] if panel else []),
-            "page.js",
-        ]
-        styles = ["page.css", *(["teaching.css"] if panel else [])]
+        brought = () if self._panel is None else self._panel.files
+        styles = [HERE / "page.css", *(path for path in brought if path.suffix == ".css")]
+        scripts = [viewer_script(), *(path for path in brought if path.suffix == ".js"), HERE / "page.js"]
         ask = f"?token={self._token}"
-        viewer = "\n".join(f'<script src="{name}{ask}"></script>' for name in scripts)
-        looks = "\n".join(f'<link rel="stylesheet" href="{name}{ask}">' for name in styles)
-        seat = (TEACHING / "teaching.html").read_text(encoding="utf-8") if panel else ""
-        page = _page(self._title, {}, styles=looks, scripts=viewer, panel=seat)
+        page = _page(
+            self._title,
+            {},
+            styles="\n".join(f'<link rel="stylesheet" href="{path.name}{ask}">' for path in styles),
+            scripts="\n".join(f'<script src="{path.name}{ask}"></script>' for path in scripts),
+            panel="".join(path.read_text(encoding="utf-8") for path in brought if path.suffix == ".html"),
+        )
         files = {"": File(page.encode(), "text/html", SERVED)}
-        for kind, names in (("text/css", styles), ("text/javascript", scripts[1:])):
-            for name in names:
-                folder = TEACHING if name.startswith("teaching") else HERE
-                files[name] = File((folder / name).read_bytes(), kind)
-        return files | {"main.min.js": File(viewer_script().read_bytes(), "text/javascript")}
+        for kind, paths in (("text/css", styles), ("text/javascript", scripts)):
+            files |= {path.name: File(path.read_bytes(), kind) for path in paths}
+        return files
 
     @property
     def port(self) -> int:
@@ -113,7 +109,7 @@ class LiveView:
             user = "user"
         return f"ssh -L {self.port}:127.0.0.1:{self.port} {user}@{gethostname()}"
 
-    def show(self, bodies: Sequence[Body], camera: Camera | None = None) -> None:
+    def show(self, bodies: Sequence[Body], camera: Viewpoint | None = None) -> None:
         """Show these bodies, at the origin until a frame places them; replaces what was shown.
 
         Raises BadInput for a mesh that cannot be read and for two bodies of one name.
@@ -121,7 +117,7 @@ class LiveView:
         from lab.view.scene_data import describe
         from lab.view.server_page import News
 
-        scene = describe(bodies, camera or Camera())
+        scene = describe(bodies, camera or Viewpoint())
         self._shown = {body.name: None for body in bodies}
         self._running().send(News(scene=scene))
 
@@ -184,7 +180,9 @@ def replay_html(recording: Recording, path: Path, speed: float = 8.0, title: str
     scripts = f"<script>{script.read_text(encoding='utf-8')}</script>\n<script>{own}</script>"
     styles = f"<style>{(HERE / 'page.css').read_text(encoding='utf-8')}</style>"
     notice = script.with_name(f"{script.name}.LICENSE.txt")
-    licences = notice.read_text(encoding="utf-8") if notice.is_file() else ""
+    licences = notice.read_text(encoding="utf-8").replace("--", "- -") if notice.is_file() else ""
+    if licences:
+        licences = f"<!-- meshcat, (c) 2018 Robin Deits, MIT licence, with:\n{licences}\n-->"
     text = _page(title, data, styles=styles, scripts=scripts, policy=OFFLINE, licences=licences)
     _write(Path(path), text)
     return Path(path)
@@ -217,29 +215,14 @@ def viewer_script() -> Path:
     )
 
 
-def _page(
-    title: str,
-    data: Mapping[str, Any],
-    *,
-    styles: str,
-    scripts: str,
-    panel: str = "",
-    policy: str = "",
-    licences: str = "",
-) -> str:
-    """page.html with its places filled; the title is text, and data cannot end the script element that holds it."""
-    parts = {
-        "title": html.escape(title),
-        "data": json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
-        "styles": styles,
-        "scripts": scripts,
-        "panel": panel,
-        "policy": policy,
-        "licences": f"<!-- meshcat, (c) 2018 Robin Deits, MIT licence, with:\n{licences.replace('--', '- -')}\n-->"
-        if licences
-        else "",
-    }
-    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], (HERE / "page.html").read_text(encoding="utf-8"))
+def _page(title: str, data: Mapping[str, Any], **parts: str) -> str:
+    """page.html with its places filled (styles, scripts, panel, policy, licences; what is not given stays empty).
+
+    The title is text, and data cannot end the script element that holds it.
+    """
+    parts |= {"title": html.escape(title), "data": json.dumps(data, allow_nan=False).replace("<", "\\u003c")}
+    text = (HERE / "page.html").read_text(encoding="utf-8")
+    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts.get(place[1], ""), text)
 
 
 def _read(path: Path) -> str:

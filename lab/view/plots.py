@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Curve",
+    "Places",
     "cell_corners",
     "gantt",
     "learning_curves",
@@ -29,6 +30,18 @@ __all__ = [
     "value_map",
     "values_seen",
 ]
+
+
+class Places(NamedTuple):
+    """What stands in the cells (row, column) of a map: the greedy path, what is blocked (rows, columns) bool, both ends."""
+
+    route: Sequence[tuple[int, int]] = ()
+    blocked: ArrayLike | None = None
+    start: tuple[int, int] | None = None
+    goal: tuple[int, int] | None = None
+
+
+NOTHING = Places()
 
 
 class Curve(Protocol):
@@ -70,36 +83,23 @@ def value_map(
     path: Path,
     *,
     corners: ArrayLike | None = None,
-    route: Sequence[tuple[int, int]] = (),
-    blocked: ArrayLike | None = None,
-    start: tuple[int, int] | None = None,
-    goal: tuple[int, int] | None = None,
+    places: Places = NOTHING,
     title: str = "What each cell is worth",
 ) -> None:
     """Values (rows, columns) of grid cells, such as max_a Q, half-transparent over a picture (H, W, 3) RGB, or alone.
 
     `corners` (rows + 1, columns + 1, 2): pixel (x, y) of the grid lines' crossings, see `cell_corners`; without: row
-    down, column right. `route`: cells of the greedy path; `blocked` (rows, columns) bool. The goal has no
-    value, an episode ends there. Raises BadInput when the shapes do not fit, and for a path that is no PNG file.
+    down, column right. The goal has no value, an episode ends there. Raises BadInput when the shapes do not fit, and
+    for a path that is no PNG file.
     """
     check_png(path)
     table = np.array(values, dtype=np.float64)
-    if table.ndim != 2:
-        raise BadInput(f"value map: values have shape {table.shape}; a grid of cells is needed")
-    rows, columns = table.shape
-    if corners is None:
-        corners = np.stack(np.meshgrid(np.arange(columns + 1) - 0.5, np.arange(rows + 1) - 0.5), axis=-1)
-    crossings = np.asarray(corners, dtype=np.float64)
-    walls = np.zeros(table.shape, dtype=np.bool_) if blocked is None else np.asarray(blocked, dtype=np.bool_)
-    if crossings.shape != (rows + 1, columns + 1, 2) or walls.shape != table.shape:
-        raise BadInput(
-            f"value map: corners {crossings.shape} and blocked {walls.shape} do not fit values {table.shape}"
-        )
+    crossings, walls = _fitting(table, corners, places.blocked)
     across, down = crossings[..., 0], crossings[..., 1]
     tall = np.ptp(down) / np.ptp(across) if picture is None else picture.shape[0] / picture.shape[1]
     hidden = walls | ~np.isfinite(table)
-    if goal is not None:
-        hidden[goal] = True
+    if places.goal is not None:
+        hidden[places.goal] = True
     with picture_file(path, 6.8, 1.0 + 5.5 * tall) as figure:
         axes = figure.add_subplot()
         if picture is not None:
@@ -107,7 +107,7 @@ def value_map(
         shown = np.ma.masked_where(hidden, table)
         tint = axes.pcolormesh(across, down, shown, cmap="viridis", alpha=0.5, edgecolors="#FFFFFF60", linewidth=0.4)
         figure.colorbar(tint, ax=axes, shrink=0.9, label="value of the best action, max Q")
-        _draw_places(axes, (crossings[:-1, :-1] + crossings[1:, 1:]) / 2, crossings, walls, route, start, goal)
+        _draw_places(axes, crossings, walls, places)
         axes.set_aspect("equal")
         if picture is None:
             axes.set(ylim=(down.max(), down.min()), xlabel="column", ylabel="row")
@@ -119,6 +119,24 @@ def value_map(
             figure.legend(loc="outside lower center", ncols=4)
 
 
+def _fitting(
+    table: NDArray[np.float64], corners: ArrayLike | None, blocked: ArrayLike | None
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """The crossings (rows + 1, columns + 1, 2) of the grid lines and the blocked cells of a table of values."""
+    if table.ndim != 2:
+        raise BadInput(f"value map: values have shape {table.shape}; a grid of cells is needed")
+    rows, columns = table.shape
+    if corners is None:
+        corners = np.stack(np.meshgrid(np.arange(columns + 1) - 0.5, np.arange(rows + 1) - 0.5), axis=-1)
+    crossings = np.asarray(corners, dtype=np.float64)
+    walls = np.zeros(table.shape, dtype=np.bool_) if blocked is None else np.asarray(blocked, dtype=np.bool_)
+    if crossings.shape != (rows + 1, columns + 1, 2) or walls.shape != table.shape:
+        raise BadInput(
+            f"value map: corners {crossings.shape} and blocked {walls.shape} do not fit values {table.shape}"
+        )
+    return crossings, walls
+
+
 def values_seen(q: FloatArray, mdp: TabularMDP, picture: NDArray[np.uint8], seen: "GridView", path: Path) -> None:
     """The values (states, actions) of a problem over the picture (H, W, 3) that it was read from, with the learned way."""
     cells = [mdp.state_cell(state) for state in greedy_path(q, mdp, mdp.n_states)[0]]
@@ -127,10 +145,12 @@ def values_seen(q: FloatArray, mdp: TabularMDP, picture: NDArray[np.uint8], seen
         picture,
         path,
         corners=cell_corners(seen.view),
-        route=[(cell[0], cell[1]) for cell in cells],
-        blocked=(mdp.terminal & ~mdp.goal).reshape(mdp.shape),
-        start=seen.start,
-        goal=seen.goal,
+        places=Places(
+            route=[(cell[0], cell[1]) for cell in cells],
+            blocked=(mdp.terminal & ~mdp.goal).reshape(mdp.shape),
+            start=seen.start,
+            goal=seen.goal,
+        ),
     )
 
 
@@ -167,28 +187,24 @@ def _draw_curve(axes: "Axes", policy: Curve) -> None:
     axes.grid()
 
 
-def _draw_places(
-    axes: "Axes",
-    middles: NDArray[np.float64],
-    crossings: NDArray[np.float64],
-    walls: NDArray[np.bool_],
-    route: Sequence[tuple[int, int]],
-    start: tuple[int, int] | None,
-    goal: tuple[int, int] | None,
-) -> None:
+def _draw_places(axes: "Axes", crossings: NDArray[np.float64], walls: NDArray[np.bool_], places: Places) -> None:
     """Blocked cells, the greedy path, start and goal on a value map."""
     from matplotlib.collections import PolyCollection
 
+    middles = (crossings[:-1, :-1] + crossings[1:, 1:]) / 2
     outlines = [crossings[[i, i, i + 1, i + 1], [j, j + 1, j + 1, j]] for i, j in np.argwhere(walls)]
     if outlines:
         hatched = PolyCollection(outlines, facecolor="#00000055", edgecolor="white", hatch="xxx", label="blocked")
         axes.add_collection(hatched)
-    if len(route):
-        rows, columns = np.asarray(route).T
+    if len(places.route):
+        rows, columns = np.asarray(places.route).T
         x, y = middles[rows, columns].T
         axes.plot(x, y, color="white", linewidth=4.5, solid_capstyle="round")
         axes.plot(x, y, color=INK, linewidth=2, marker=".", markersize=6, label="greedy path")
-    for cell, marker, size, colour, name in ((start, "o", 11, SKY, "start"), (goal, "*", 18, ORANGE, "goal")):
+    for cell, marker, size, colour, name in (
+        (places.start, "o", 11, SKY, "start"),
+        (places.goal, "*", 18, ORANGE, "goal"),
+    ):
         if cell is not None:
             look: dict[str, Any] = {"markersize": size, "color": colour, "markeredgecolor": INK, "linestyle": "none"}
             axes.plot(*middles[cell], marker=marker, label=name, **look)

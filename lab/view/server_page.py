@@ -2,8 +2,9 @@
 
 import asyncio
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Protocol
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -40,7 +41,12 @@ class News:
 
 
 class Panel(Protocol):
-    """What pages show and say beside the scene; all of it is called in the server's thread."""
+    """What pages show and say beside the scene; all of it is called in the server's thread.
+
+    files: what a page loads for it: HTML that is put into the page, style sheets, and scripts in the order they are run.
+    """
+
+    files: Sequence[Path]
 
     def joined(self, page: int) -> None:
         """A browser has opened the page; each one has a number of its own."""

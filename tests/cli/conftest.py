@@ -9,7 +9,7 @@ import pytest
 from lab.learning.session import run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import grid
-from lab.toolbox.policy import Policy
+from lab.toolbox.policy import Origin, Policy
 
 
 @pytest.fixture(autouse=True)
@@ -43,14 +43,4 @@ def made(name: str = "insert at toaster 12345678") -> Policy:
     mdp = grid((2, 3), np.zeros((2, 3), bool), (0, 0), (1, 2))
     learner, gate = LearnerSettings(episodes=8, max_steps=20), GateSettings()
     result = run_session(mdp, learner, gate, None, np.random.default_rng(0))
-    return Policy.of(
-        result,
-        mdp,
-        name=name,
-        subtask="insert",
-        task="toast",
-        learner=learner,
-        gate=gate,
-        advisor="none",
-        seed=0,
-    )
+    return Policy.of(result, mdp, learner, gate, Origin(name, "insert", "toast", "none", 0))

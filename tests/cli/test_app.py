@@ -1,25 +1,20 @@
 """Every command: exit codes, one document on stdout, one line for what is wrong, nothing written after bad input."""
 
 import os
-import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from lab import __version__
-from lab.advice import advisors, panel
 from lab.cli.app import COMMANDS, Command
+from lab.cli.families import members, offers
 from lab.cli.options import Json
 from lab.cli.output import show
 from lab.errors import WorkFailed
-from lab.learning import gates
-from lab.learning.updates import UPDATES
-from lab.sequencing.cell.objectives import OBJECTIVES
-from lab.sequencing.methods.srl_advised import FITTING
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 
@@ -36,27 +31,19 @@ def test_every_command_has_help_with_an_example(lab: Lab, words: str) -> None:
     assert "--json" in ran.out
 
 
-@pytest.mark.parametrize(
-    ("command", "option", "following", "members"),
-    [
-        ("teach", "--learner", "--gate", UPDATES),
-        ("teach", "--gate", "--advisor", gates.GATES),
-        ("teach", "--advisor", "--ask", advisors.ADVISORS),
-        ("teach", "--ask", "--decide", panel.ASKED),
-        ("teach", "--decide", "--episodes", panel.DECISIONS),
-        ("run", "--advisor", "--ask", advisors.ADVISORS),
-        ("sequence", "--objective", "--episodes", OBJECTIVES),
-        ("sequence", "--advisor", "--gate", advisors.ADVISORS),
-        ("sequence", "--gate", "--plot", FITTING),
-    ],
-)
-def test_help_names_all_members(lab: Lab, command: str, option: str, following: str, members: Iterable[str]) -> None:
-    """It is written by hand, as help loads no table: each list stands in its option's help, and nothing else does."""
-    text = " ".join(lab(command, "--help").out.replace("│", " ").split())
-    told = re.sub(r" \([^)]*\)", "", text[text.index(f" {option} ") : text.index(f" {following} ")])
-    listed = re.search(r"(\S+, )+\S+", told)
-    assert listed is not None
-    assert {name.strip(";.") for name in listed[0].split(", ")} == {*members}
+def test_help_names_all_members(lab: Lab) -> None:
+    """What is typed behind an option of a family stands in that option's help, and the shell completes it."""
+    offered = {
+        "teach": ("skills", "learners", "gates", "advisors", "asked", "decisions"),
+        "sequence": ("methods", "objectives", "advisors", "order gates"),
+        "run": ("advisors", "asked", "decisions"),
+    }
+    for command, families in offered.items():
+        text = " ".join(lab(command, "--help").out.replace("│", " ").split())
+        for family in families:
+            assert ", ".join(members(family)) in text
+    assert not {"{", "}"} & {*text}
+    assert offers("learners")("q") == ["q", "q-lambda"]
 
 
 def test_a_command_is_one_row(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -81,13 +68,22 @@ def test_the_version_is_told(lab: Lab) -> None:
     assert (ran.code, ran.out, ran.err) == (0, f"lab {__version__}\n", "")
 
 
-def test_the_shell_completes_commands(root: Path) -> None:
+@pytest.mark.parametrize(
+    ("typed", "completed"),
+    [
+        ("t", ["teach", "toolbox", "task"]),
+        ("teach --gate c", ["ccrl", "combined", "cq"]),
+        ("study run table-9.4", ["table-9.4"]),
+    ],
+)
+def test_the_shell_completes(root: Path, typed: str, completed: list[str]) -> None:
     """As the script of `lab --show-completion` asks for it."""
     code = "from lab.cli import main; main()"
-    asked = {"_LAB_COMPLETE": "complete_bash", "COMP_WORDS": "lab t", "COMP_CWORD": "1", "PYTHONPATH": str(root)}
-    env = {**os.environ, **asked}
+    words = f"lab {typed}"
+    asked = {"_LAB_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(words.count(" "))}
+    env = {**os.environ, **asked, "PYTHONPATH": str(root)}
     ran = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False)
-    assert (ran.returncode, ran.stdout.split(), ran.stderr) == (0, ["teach", "toolbox", "task"], "")
+    assert (ran.returncode, ran.stdout.split(), ran.stderr) == (0, completed, "")
 
 
 def test_a_page_is_answered_only_where_somebody_asks(lab: Lab) -> None:

@@ -1,30 +1,30 @@
-"""The glossary: all gates and learners, in the help and in the README, from one table."""
+"""The glossary: words and members of families, in the help and in the README, from one table each."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from lab.cli import glossary
 from lab.learning.gates import GATES
 from lab.learning.updates import UPDATES
+from lab.sequencing import SEQUENCERS
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 
 
-def names(words: dict[str, str]) -> set[str]:
-    return {name for entry in words for name in entry.split(", ")}
-
-
-def test_every_gate_and_learner_is_explained() -> None:
-    assert names(glossary.GATES) == set(GATES)
-    assert names(glossary.LEARNERS) == set(UPDATES)
+@pytest.mark.parametrize(("command", "table"), [("teach", UPDATES), ("teach", GATES), ("sequence", SEQUENCERS)])
+def test_help_explains_every_member(lab: Lab, command: str, table: dict[str, Any]) -> None:
+    text = " ".join(lab(command, "--help").out.split())
+    for name, row in table.items():
+        assert f"{name}: {row.help}" in text
 
 
 def test_help_explains_every_word(lab: Lab) -> None:
     text = " ".join(lab("teach", "--help").out.split())
-    for words in (glossary.LEARNERS, glossary.GATES, glossary.TERMS):
-        for word, meaning in words.items():
-            assert f"{word}: {meaning}" in text
+    for word, meaning in glossary.TERMS.items():
+        assert f"{word}: {meaning}" in text
     assert {"psi", "tau", "mislead", "helped step"} <= glossary.TERMS.keys()
 
 

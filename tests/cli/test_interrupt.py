@@ -1,6 +1,8 @@
 """Ctrl-C is heard wherever it is pressed."""
 
+import os
 import signal
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -68,3 +70,30 @@ def test_ctrl_c_that_a_library_drops_is_heard_all_the_same(
         sys.modules.pop("lab_test_ctrl_c", None)
     assert (ran.code, ran.out) == (130, "")
     assert ran.err.startswith("lab: stopped by Ctrl-C")
+
+
+EARLY = """
+import os, signal, sys
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it would be ignored
+
+
+class Presses:
+    def find_spec(self, name, path=None, target=None):
+        if name == "{module}":
+            os.kill(os.getpid(), signal.SIGINT)
+
+
+sys.meta_path.insert(0, Presses())
+from lab.cli import main
+sys.argv = ["lab", "task", "show", "world-1"]
+main()
+"""
+
+
+@pytest.mark.parametrize("module", ["lab.cli.app", "typer", "lab.errors", "lab.cli.task", "lab.cli.view"])
+def test_ctrl_c_while_the_command_is_loaded(root: Path, module: str) -> None:
+    env = {**os.environ, "PYTHONPATH": str(root)}
+    code = EARLY.format(module=module)
+    ran = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (130, "lab: stopped by Ctrl-C\n")

@@ -22,9 +22,9 @@ from lab.advice.advisors import AdvisorName
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, LabError, WorkFailed
 from lab.gym import GymWorld, gym_world, names_environment, parse_name
-from lab.gym.found_model import Model, Worth
 from lab.gym.gym_environment import ALONE, GymEnvironment
-from lab.gym.spaces import Numbering, Unsupported
+from lab.gym.space_numbering import Numbering, Unsupported
+from lab.gym.transition_model import TransitionModel, Worth
 from lab.learning.environment import Judged
 from lab.learning.selection import Draw, uniforms
 from lab.learning.session import SessionResult, run_session
@@ -115,7 +115,7 @@ def environment(word: str) -> GymEnvironment:
     return found
 
 
-def model(word: str) -> Model:
+def model(word: str) -> TransitionModel:
     found = environment(word).model
     assert found is not None
     return found
@@ -128,7 +128,7 @@ def learned(world: GymWorld, seed: int, advisor: str = "none", draw: Draw | None
         AdvisorName.of(advisor)
     )
     place = problem.environment
-    return run_session(problem.mdp, world.learner, world.gate, asked, rng, environment=place, draw=draw)
+    return run_session(place, world.learner, world.gate, asked, rng if draw is None else draw)
 
 
 # ---- names ----------------------------------------------------------------------------------------------------------
@@ -281,12 +281,12 @@ def test_cliff_and_taxi_are_known_exactly(word: str, mean_return: float, steps: 
 )
 def test_what_is_no_model_is_refused(outcomes: Any, starts: list[float]) -> None:
     with pytest.raises((ValueError, KeyError, TypeError)):
-        Model(outcomes, np.array(starts), 1)
+        TransitionModel(outcomes, np.array(starts), 1)
 
 
 def test_values_that_do_not_settle_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lab.gym.found_model.MAX_SWEEPS", 1000)
-    endless = Model({0: {0: [(1.0, 0, -1.0, False)]}}, np.ones(1), 1)
+    monkeypatch.setattr("lab.gym.transition_model.MAX_SWEEPS", 1000)
+    endless = TransitionModel({0: {0: [(1.0, 0, -1.0, False)]}}, np.ones(1), 1)
     assert endless.best == -np.inf
     with pytest.raises(WorkFailed, match=r"discount 1\.0 did not settle in 1000 sweeps"):
         endless.optimal(1.0)
@@ -318,12 +318,9 @@ def test_a_world_of_ours_is_learned_to_the_same_table(name: str) -> None:
     world = load_world(name)
     place = gym_world(f"gym:TeachingLab/World{name[-1]}-v0").problem().environment
     assert place is not None
-    rng = np.random.default_rng(0)
-    ours = run_session(
-        world.mdp(), world.learner, GateSettings(gate="never"), None, rng, draw=uniforms(np.random.default_rng(7))
-    )
+    ours = run_session(world.mdp(), world.learner, GateSettings(gate="never"), None, np.random.default_rng(7))
     draw = itertools.chain([0.5], iter(uniforms(np.random.default_rng(7)), None)).__next__
-    theirs = run_session(place.mdp, world.learner, GateSettings(gate="never"), None, rng, draw=draw, environment=place)
+    theirs = run_session(place, world.learner, GateSettings(gate="never"), None, draw)
     assert np.array_equal(ours.q, theirs.q)
     assert ours.steps.tolist() == theirs.steps.tolist()
     assert (ours.final_steps, ours.optimal_steps, ours.solved) == (
@@ -584,7 +581,7 @@ def test_an_expert_knows_the_lake_better_than_a_novice() -> None:
             state: {0: [(c * chances[state, a], *rest) for a in range(4) for c, *rest in row[a]]}
             for state, row in outcomes.items()
         }
-        return Model(mixed, starts, 1).worth(np.zeros(16, np.int64), 100).reaches
+        return TransitionModel(mixed, starts, 1).worth(np.zeros(16, np.int64), 100).reaches
 
     expert, moderate, novice = reaches(0.01), reaches(0.1), reaches(1.0)
     assert expert > 0.6

@@ -39,7 +39,7 @@ def walk(kept: Memory, episode: int, moves: list[tuple[int, int]], source: int =
     for entered, whose in moves:
         if whose == ASKED:
             kept.said[state] = 0
-        memory.moved(kept, state, 0, whose, entered, entered >= GOAL, entered == GOAL)
+        memory.moved(kept, memory.Move(state, 0, whose, entered, entered >= GOAL, entered == GOAL))
         state = entered
     helped = sum(whose == ASKED for _, whose in moves)
     memory.ended(kept, EPISODES, len(moves), state == GOAL, helped)
@@ -159,7 +159,7 @@ def test_the_way_is_practised_late_while_its_own_last_result_is_longer() -> None
         memory.starts(kept, 0)
         whose = PRACTISED if kept.now.practises else OWN
         for state, entered in ((0, 1), (1, 2), (2, 3), (3, GOAL)):
-            memory.moved(kept, state, 0, whose, entered, entered == GOAL, entered == GOAL)
+            memory.moved(kept, memory.Move(state, 0, whose, entered, entered == GOAL, entered == GOAL))
         memory.ended(kept, EPISODES, 4, True, 0)
     assert practised == [17, 18]  # as often as the way has moves; 19 is tried alone, 20 never practises
     assert kept.now.best == 2

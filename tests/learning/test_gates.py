@@ -10,6 +10,7 @@ from lab.advice.advisors import AdvisorName
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.gates import GATES, Gate, Surroundings, deviation, improvement
+from lab.learning.members import Member
 from lab.learning.reasons import TooSlow
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -22,7 +23,7 @@ SETTINGS = GateSettings(first_episode=5, window=2, omega=1, lambda_threshold=0.0
 
 
 def gate(name: str, settings: GateSettings = SETTINGS, episodes: int = 100) -> Gate:
-    return GATES[name](settings, episodes, LIMIT, None)
+    return GATES[name].make(settings, episodes, LIMIT, None)
 
 
 def opened(one: Gate, steps: Sequence[int]) -> list[int]:
@@ -115,7 +116,7 @@ def test_walks_from_different_starts_are_compared_by_how_far_the_goal_was(name: 
     several = Surroundings(lambda: 0.0, lambda count: [], several_starts=True)
 
     def made(spare_best: bool) -> Gate:
-        return GATES[name](replace(SETTINGS, spare_best=spare_best), 100, LIMIT, several)
+        return GATES[name].make(replace(SETTINGS, spare_best=spare_best), 100, LIMIT, several)
 
     # the first two waste 2 steps each; 9 cells in 10 steps are better than that, though 10 is more than 3 and 4
     assert corridor_walks(made(False), [1, 2, 9], 3, [2, 2, 1]) == ["", "", "better"]
@@ -128,7 +129,7 @@ def test_walks_from_different_starts_are_compared_by_how_far_the_goal_was(name: 
 
 def test_a_failed_episode_is_a_mislead_wherever_it_began() -> None:
     several = Surroundings(lambda: 0.0, lambda count: [], several_starts=True)
-    one = GATES["ccrl"](replace(SETTINGS, spare_best=True), 100, LIMIT, several)
+    one = GATES["ccrl"].make(replace(SETTINGS, spare_best=True), 100, LIMIT, several)
     for n in range(1, 5):
         one.begins(n)
         one.saw(n, 0, -0.1, 1.0, n, 0)
@@ -197,7 +198,7 @@ def test_importance_asks_where_the_values_lie_far_apart() -> None:
 def test_random_asks_at_its_rate() -> None:
     draws = iter([0.05, 0.5, 0.15, 0.0])
     around = Surroundings(draws.__next__, lambda count: [])
-    one = GATES["random"](GateSettings(rate=0.1), 10, LIMIT, around)
+    one = GATES["random"].make(GateSettings(rate=0.1), 10, LIMIT, around)
     assert [one.asks(0, [0.0]) for _ in range(4)] == [True, False, False, True]
 
 
@@ -211,12 +212,12 @@ def test_uncertainty_falls_where_the_learner_has_been() -> None:
     rng = np.random.default_rng(0)
 
     def tables(count: int) -> list[Update]:
-        made = [UPDATES["q"](np.zeros((6, 4)).tolist(), LearnerSettings("q"), mdp) for _ in range(count)]
+        made = [UPDATES["q"].make(np.zeros((6, 4)).tolist(), LearnerSettings("q"), mdp) for _ in range(count)]
         for table in made:
             table.scatter(rng.random)
         return made
 
-    one = GATES["uncertainty"](GateSettings(spread=0.05), 10, LIMIT, Surroundings(rng.random, tables))
+    one = GATES["uncertainty"].make(GateSettings(spread=0.05), 10, LIMIT, Surroundings(rng.random, tables))
     one.begins(3)
     assert one.asks(3, [])
     for _ in range(40):
@@ -237,11 +238,11 @@ def test_the_ensemble_learns_as_the_learner_does(learner: str, monkeypatch: pyte
     )
 
     def ensemble(of: GateSettings, episodes: int, max_steps: int, around: Surroundings | None) -> Gate:
-        tables = [UPDATES[learner](np.zeros((6, 4)).tolist(), settings, mdp) for _ in range(of.ensemble)]
+        tables = [UPDATES[learner].make(np.zeros((6, 4)).tolist(), settings, mdp) for _ in range(of.ensemble)]
         made.extend(tables)
-        return GATES["uncertainty"](of, episodes, max_steps, Surroundings(lambda: 0.0, lambda count: tables))
+        return GATES["uncertainty"].make(of, episodes, max_steps, Surroundings(lambda: 0.0, lambda count: tables))
 
-    monkeypatch.setitem(GATES, "certain", ensemble)
+    monkeypatch.setitem(GATES, "certain", Member(ensemble, "certain"))
     adviser = TableLevel(mdp, 0.99, np.random.default_rng(1)).advisor(AdvisorName.of("novice"))
     asks = GateSettings("certain", first_episode=3, spread=0.0, ensemble=2)
     result = run_session(mdp, settings, asks, adviser, np.random.default_rng(0))

@@ -9,7 +9,8 @@ import pytest
 from lab.errors import BadInput
 from lab.learning.batch import Batch, run_sessions
 from lab.learning.gates import GATES, Gate, Steps
-from lab.learning.kernels import LANES, LEARNERS
+from lab.learning.kernels.records import LANES
+from lab.learning.members import Member
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
@@ -17,6 +18,7 @@ from lab.learning.splitmix import stream
 from lab.learning.updates import UPDATES
 from lab.mdp import TabularMDP, grid, optimal_values
 
+LEARNERS = tuple(name for name, one in UPDATES.items() if one.compiled is not None)
 SHORT = LearnerSettings("afterstate", episodes=40, max_steps=40, count_start=True)
 EAGER = GateSettings(first_episode=6, window=3, omega=1, psi=0.4, spread=0.2, rate=0.3, enough_steps=12.0, budget=60)
 
@@ -37,7 +39,7 @@ def alone(
     """The interactive session with the numbers that the kernel draws for this seed."""
     draw = stream(seed)
     advisor = None if who is None else TableAdvisor(who, draw)
-    return run_session(mdp, learner, gate, advisor, np.random.default_rng(0), draw=draw)
+    return run_session(mdp, learner, gate, advisor, draw)
 
 
 def assert_same(batch: Batch, n: int, one: SessionResult) -> None:
@@ -95,7 +97,7 @@ class EveryOther(Gate):
 
 
 def test_a_gate_without_a_compiled_form_is_run_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(GATES, "every-other", EveryOther)
+    monkeypatch.setitem(GATES, "every-other", Member(EveryOther, "asks about every other episode"))
     mdp, how = board(), replace(EAGER, gate="every-other")
     batch = run_sessions(mdp, SHORT, how, advice(mdp), np.array([1, 2], np.uint64), keep_tables=True)
     for n in range(2):

@@ -22,7 +22,7 @@ from lab.learning.events import (
 from lab.learning.gates import GATES
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.selection import SELECTIONS, Draw
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session, SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES
 from lab.mdp import FloatArray, Rewards, TabularMDP, coverage, greedy_path, grid, optimal_values
@@ -291,12 +291,12 @@ def test_start_values_are_used_and_checked() -> None:
     mdp = corridor(3)
     known = np.array([[0.0, 1.4], [0.0, 1.5], [9.0, 9.0]])
     settings = LearnerSettings(episodes=1, beta=0.0)
-    result = run_session(mdp, settings, GateSettings("never"), None, np.random.default_rng(0), q0=known)
+    result = Session(mdp, settings, GateSettings("never"), None, np.random.default_rng(0), known).run()
     assert result.solved
     assert not result.q[2].any()  # a terminal state is worth nothing more
     for bad in (np.zeros((2, 2)), np.full((3, 2), np.nan)):
         with pytest.raises(BadInput, match="start values"):
-            run_session(mdp, settings, GateSettings(), None, np.random.default_rng(0), q0=bad)
+            Session(mdp, settings, GateSettings(), None, np.random.default_rng(0), bad)
 
 
 @pytest.mark.parametrize("learner", UPDATES)
@@ -393,8 +393,7 @@ class Slides:
 
 def test_memory_works_where_steps_are_left_to_chance() -> None:
     right, gate = Scripted(lambda request: 1), GateSettings("always", memory=True)
-    place = Slides()
-    result = run_session(place.mdp, SHORT, gate, right, np.random.default_rng(0), environment=place)
+    result = run_session(Slides(), SHORT, gate, right, np.random.default_rng(0))
     assert result.solved
     assert 3 <= result.helped_steps == len(right.requests) < 60
 

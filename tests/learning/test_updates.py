@@ -7,7 +7,11 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.learning.settings import LearnerSettings
-from lab.learning.updates import UPDATES, Row, afterstate_value, is_greedy, q_target, sarsa_target, towards
+from lab.learning.updates import UPDATES, Row
+from lab.learning.updates.afterstate import afterstate_value
+from lab.learning.updates.one_step import q_target, sarsa_target
+from lab.learning.updates.traces import is_greedy
+from lab.learning.updates.update import towards
 from lab.mdp import TabularMDP
 
 Table = list[Row]
@@ -27,7 +31,7 @@ Step = tuple[int, int, float, float, int, int]  # s_tm1, a_tm1, r_t, discount_t,
 
 def learned(name: str, steps: list[Step], q: Table, settings: LearnerSettings = HALF) -> Table:
     table = [list(row) for row in q]
-    update = UPDATES[name](table, settings, MDP)
+    update = UPDATES[name].make(table, settings, MDP)
     update.begin()
     for step in steps:
         update.learn(*step)
@@ -78,7 +82,7 @@ def test_q_lambda_accumulates_on_a_second_visit() -> None:
 
 def test_q_lambda_forgets_between_episodes() -> None:
     table = [[0.0, 0.0] for _ in range(3)]
-    update = UPDATES["q-lambda"](table, HALF, MDP)
+    update = UPDATES["q-lambda"].make(table, HALF, MDP)
     update.begin()
     update.learn(*WALK[0])
     update.begin()
@@ -133,7 +137,7 @@ def test_monte_carlo_learns_from_first_visits_when_the_episode_is_over() -> None
 def test_afterstate_by_hand() -> None:
     # V = 0 everywhere. 0 -> 1: V(0) = .5 (-.25 + .5*0) = -.125. 1 -> 3, whose worth shows only now:
     # V(1) = .5 (-.25 + 0) = -.125, then V(3) = 2. 1 -> 3 again: V(1) = -.125 + .5 (-.25 + .5*2 + .125) = .3125
-    update = UPDATES["afterstate"]([[0.0, 0.0] for _ in range(4)], HALF, MDP)
+    update = UPDATES["afterstate"].make([[0.0, 0.0] for _ in range(4)], HALF, MDP)
     for step in [(0, 0, -0.25, 0.5, 1, 0), (1, 1, 2.0, 0.0, 3, 0), (1, 1, 2.0, 0.0, 3, 0)]:
         update.learn(*step)
     assert update.gauge(0) == [0.3125, 0.0]
@@ -144,7 +148,7 @@ def test_afterstate_by_hand() -> None:
         [0.0] * 2,
         [0.0] * 2,
     ]
-    again = UPDATES["afterstate"]([list(row) for row in update.q], HALF, MDP)
+    again = UPDATES["afterstate"].make([list(row) for row in update.q], HALF, MDP)
     np.testing.assert_allclose(list(again.q), list(update.q))  # learned on from its own table
     assert update.q[0:2] == [update.q[0], update.q[1]]
 
@@ -154,12 +158,12 @@ def test_afterstate_needs_one_reward_for_all_ordinary_moves() -> None:
         MDP.successor, MDP.reward - [[0, 0], [1, 0], [0, 0], [0, 0]], MDP.terminal, MDP.goal, 0, ("a", "b")
     )
     with pytest.raises(BadInput, match=r"the rewards -1\.25 to -0\.25: wanted one"):
-        UPDATES["afterstate"]([[0.0, 0.0] for _ in range(4)], HALF, uneven)
+        UPDATES["afterstate"].make([[0.0, 0.0] for _ in range(4)], HALF, uneven)
 
 
 @pytest.mark.parametrize("name", UPDATES)
 def test_scattered_values_lie_within_a_half(name: str) -> None:
-    update = UPDATES[name]([[0.0, 0.0] for _ in range(4)], HALF, MDP)
+    update = UPDATES[name].make([[0.0, 0.0] for _ in range(4)], HALF, MDP)
     update.scatter(iter(np.linspace(0.0, 0.99, 8).tolist()).__next__)
     assert all(-0.5 <= value < 0.5 for state in range(2) for value in update.gauge(state))
     assert update.gauge(0) != [0.0, 0.0]

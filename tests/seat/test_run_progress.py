@@ -26,7 +26,7 @@ from lab.teaching.events import (
     SkillReady,
 )
 from lab.teaching.lesson_plan import Lesson
-from lab.toolbox.policy import Policy
+from lab.toolbox.policy import Origin, Policy
 
 LONG = "transfer butter_applier to finished_plate with slice"
 
@@ -63,9 +63,7 @@ def lesson(board: TabularMDP, source: str = "learned", requests: int = 0, helped
     result: SessionResult = run_session(board, learner, gate, None, np.random.default_rng(1))
     object.__setattr__(result, "requests", requests)
     object.__setattr__(result, "helped_steps", helped_steps)
-    policy = Policy.of(
-        result, board, name="p", subtask="transfer", task="toast", learner=learner, gate=gate, advisor="none", seed=0
-    )
+    policy = Policy.of(result, board, learner, gate, Origin("p", "transfer", "toast", "none", 0))
     return Lesson(policy, source, None if source == "reused" else result)  # type: ignore[arg-type]
 
 

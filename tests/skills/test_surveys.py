@@ -5,7 +5,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.mdp import greedy_path, optimal_values
-from lab.sim.assets import SLICE as SIZE
+from lab.sim.models import SLICE as SIZE
 from lab.sim.scene import GRASP_DEPTH, Layout, spots
 from lab.skills import Insert
 from lab.skills.skillset import SkillSet

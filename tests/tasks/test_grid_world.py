@@ -14,11 +14,24 @@ from lab.learning.settings import LearnerSettings
 from lab.mdp import NoPath, Rewards, greedy_path, optimal_values, shortest_steps
 from lab.seat.grid_text import draw
 from lab.seat.terminal.typed_answer import understand
-from lab.tasks.grid_world import MAX_DENSITY, GridWorld, View, from_text, from_words, parse_shape, random_world
+from lab.tasks.grid_world import (
+    MAX_DENSITY,
+    AdvisorView,
+    GridWorld,
+    from_text,
+    from_words,
+    parse_shape,
+    random_world,
+)
 from lab.tasks.task_file import load_world
 
 SMALL = GridWorld(
-    name="small", shape=(2, 3), start=(0, 0), goal=(0, 2), obstacles=((0, 1),), view=View(lower=(0, 1), upper=(1, 2))
+    name="small",
+    shape=(2, 3),
+    start=(0, 0),
+    goal=(0, 2),
+    obstacles=((0, 1),),
+    view=AdvisorView(lower=(0, 1), upper=(1, 2)),
 )
 
 

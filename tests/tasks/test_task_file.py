@@ -22,6 +22,7 @@ from lab.tasks.task_file import (
     RESERVED,
     Task,
     check_toasts,
+    describe,
     find,
     load,
     load_any,
@@ -486,3 +487,14 @@ def test_more_things_than_a_table_holds_are_refused(tmp_path: Path) -> None:
     assert said.startswith("obstacles: ")
     assert "at most 200 items" in said
     assert len(said) < 400
+
+
+@pytest.mark.parametrize("name", names_of("cell"))
+def test_a_cell_is_described(name: str, root: Path) -> None:
+    text, document = describe(name)
+    assert text == (root / "tasks" / f"{name}.toml").read_text(encoding="utf-8")
+    assert (document["name"], document["kind"], document["file"]) == (
+        name,
+        "cell",
+        str(root / "tasks" / f"{name}.toml"),
+    )

@@ -12,12 +12,12 @@ from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.skills import Butter, Grasp, Skill
-from lab.tasks.grid_world import GridWorld, View
-from lab.tasks.task_file import Task, load
+from lab.tasks.grid_world import AdvisorView, GridWorld
+from lab.tasks.task_file import Task, fitting, load
 from lab.teaching.lesson import one_lesson, teach
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.lesson_plan import Interrupted
-from lab.teaching.skill_subject import SkillSubject, find_skill, fitting
+from lab.teaching.skill_subject import SkillSubject, find_skill
 from lab.teaching.teacher import Teacher
 from lab.teaching.world_subject import WorldSubject
 from lab.toolbox.registry import Toolbox
@@ -205,7 +205,7 @@ def world() -> GridWorld:
         start=(0, 0),
         goal=(4, 3),
         obstacles=((1, 1), (3, 2)),
-        view=View(lower=(3, 0), upper=(4, 3)),
+        view=AdvisorView(lower=(3, 0), upper=(4, 3)),
         learner=LearnerSettings(learner="q", episodes=60, max_steps=60),
         gate=GateSettings(gate="always"),
     )

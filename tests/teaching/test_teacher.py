@@ -10,11 +10,11 @@ import pytest
 from lab.advice.advising import Advising
 from lab.errors import WorkFailed
 from lab.learning.events import AdviceRejected, EpisodeEnded, Event
+from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft
-from lab.learning.session import SessionResult, run_session
+from lab.learning.session import Session, SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, greedy_path, grid
-from lab.skills.skill import Problem
 from lab.teaching.events import Event as LessonsEvent
 from lab.teaching.events import LessonEvent
 from lab.teaching.lesson_plan import MAX_SESSIONS, Interrupted, LessonPlan
@@ -128,14 +128,17 @@ def scripted(monkeypatch: pytest.MonkeyPatch, tables: "list[np.ndarray[Any, Any]
     """Sessions that end with these tables; returns the start tables that they were given."""
     began: list[Any] = []
 
-    def run(mdp: TabularMDP, *args: Any, q0: Any, **more: Any) -> SessionResult:
-        began.append(q0)
-        result = run_session(mdp, HOPELESS, GATE, None, np.random.default_rng(0))
-        q = tables[len(began) - 1]
-        moves = greedy_path(q, mdp, 40)
-        return replace(result, q=q, final_steps=len(moves[1]) if moves[2] else None, solved=solved)
+    class Scripted(Session):
+        def __init__(self, mdp: TabularMDP, *args: Any):
+            super().__init__(mdp, HOPELESS, GATE, None, np.random.default_rng(0))
+            began.append(args[-1])
 
-    monkeypatch.setattr("lab.teaching.lesson_sessions.run_session", run)
+        def run(self, on_event: Any = None) -> SessionResult:
+            q = tables[len(began) - 1]
+            moves = greedy_path(q, self.mdp, 40)
+            return replace(super().run(), q=q, final_steps=len(moves[1]) if moves[2] else None, solved=solved)
+
+    monkeypatch.setattr("lab.teaching.lesson_sessions.Session", Scripted)
     return began
 
 

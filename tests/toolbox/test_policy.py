@@ -11,7 +11,7 @@ from lab.errors import BadInput
 from lab.learning.session import run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
-from lab.toolbox.policy import Policy
+from lab.toolbox.policy import Origin, Policy
 
 LEARNER, GATE = LearnerSettings(episodes=12, max_steps=20), GateSettings("never")
 
@@ -24,9 +24,7 @@ def problem() -> TabularMDP:
 def policy() -> Policy:
     mdp = problem()
     result = run_session(mdp, LEARNER, GATE, None, np.random.default_rng(4))
-    return Policy.of(
-        result, mdp, name="insert", subtask="insert", task="toast", learner=LEARNER, gate=GATE, advisor="none", seed=4
-    )
+    return Policy.of(result, mdp, LEARNER, GATE, Origin("insert", "insert", "toast", "none", 4))
 
 
 def test_it_keeps_what_was_learned_and_where(policy: Policy) -> None:

@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lab.errors import BadInput
 from lab.view.canvas import ORANGE, RED
-from lab.view.plots import cell_corners, learning_curves, value_map
+from lab.view.plots import Places, cell_corners, learning_curves, value_map
 from lab.vision import plain_view
 
 
@@ -34,7 +35,8 @@ def draw_values(path: Path) -> None:
     blocked = np.zeros((3, 4), dtype=np.bool_)
     blocked[1, 1] = True
     route = [(0, 0), (0, 1), (0, 2), (1, 2)]
-    value_map(np.arange(12.0).reshape(3, 4), picture, path, corners=corners, route=route, blocked=blocked, goal=(1, 2))
+    places = Places(route, blocked, goal=(1, 2))
+    value_map(np.arange(12.0).reshape(3, 4), picture, path, corners=corners, places=places)
 
 
 PLOTS: dict[str, Callable[[Path], None]] = {
@@ -113,12 +115,12 @@ def test_value_map_without_a_picture(tmp_path: Path) -> None:
     [
         (np.zeros(4), {}, r"shape \(4,\)"),
         (np.zeros((2, 2)), {"corners": np.zeros((2, 2, 2))}, r"corners \(2, 2, 2\)"),
-        (np.zeros((2, 2)), {"blocked": np.zeros((3, 2))}, r"blocked \(3, 2\)"),
+        (np.zeros((2, 2)), {"places": Places(blocked=np.zeros((3, 2)))}, r"blocked \(3, 2\)"),
     ],
 )
-def test_shapes_that_do_not_fit(tmp_path: Path, values: np.ndarray, options: dict[str, np.ndarray], says: str) -> None:
+def test_shapes_that_do_not_fit(tmp_path: Path, values: np.ndarray, options: dict[str, Any], says: str) -> None:
     with pytest.raises(BadInput, match=says):
-        value_map(values, None, tmp_path / "plot.png", **options)  # type: ignore[arg-type]
+        value_map(values, None, tmp_path / "plot.png", **options)
 
 
 def test_corners_of_a_plain_view() -> None:

@@ -3,9 +3,10 @@
 import json
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
 from lab.learning.requests import AdviceRequest, Request
@@ -36,6 +37,14 @@ class SeatPanel:
     on_word: told, in the server's thread, in a word of the terminal what was answered to a question that nobody waits
     for here.
     """
+
+    files: Sequence[Path] = tuple(
+        Path(__file__).with_name(name)
+        for name in (
+            *("teaching.html", "teaching.css"),
+            *("teaching_draw.js", "teaching_status.js", "teaching_map.js", "teaching_question.js"),
+        )
+    )
 
     def __init__(self, title: str) -> None:
         self.guard = threading.RLock()

@@ -1,7 +1,6 @@
 """What a sequence is judged by: one number of a finished run, the lower the better."""
 
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
+from collections.abc import Callable
 from typing import Protocol
 
 from lab.errors import BadInput, unknown
@@ -57,15 +56,13 @@ def machine_places(cell: Cell) -> int:
 
 
 # name -> function(run) of a finished run
-OBJECTIVES: Mapping[str, Callable[[Run], float]] = MappingProxyType(
-    {
-        MAKESPAN: _makespan,
-        "mean-tardiness": _mean_tardiness,
-        "tardy-parts": _tardy_parts,
-        "robot-idle": _robot_idle,
-        "machine-idle": _machine_idle,
-    }
-)
+OBJECTIVES: dict[str, Callable[[Run], float]] = {
+    MAKESPAN: _makespan,
+    "mean-tardiness": _mean_tardiness,
+    "tardy-parts": _tardy_parts,
+    "robot-idle": _robot_idle,
+    "machine-idle": _machine_idle,
+}
 
 
 def check_objective(name: str, cell: Cell) -> None:

@@ -12,7 +12,7 @@ from lab.learning.requests import Advisor, AdvisorLeft, Standing, allowed_words
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
-from lab.sequencing.methods.sessions import Guide, learn_readably
+from lab.sequencing.methods.session_readable import Guide, learn_readably
 from lab.sequencing.methods.srl import Srl
 from lab.sequencing.request import SequenceRequest, state_of
 from lab.sequencing.search import LearnedSequence, Search
@@ -56,7 +56,7 @@ def advised_srl(
     with fig. 6.2.
     """
     check_gate(gate.gate)
-    session = _Advised(GATES[gate.gate](gate, search.episodes, NEVER_REACHED, None), gate, advisor, tell)
+    session = _Advised(GATES[gate.gate].make(gate, search.episodes, NEVER_REACHED, None), gate, advisor, tell)
     learned = learn_readably(cell, search, drawn_seed(rng), Srl, session)
     log = learned.log
     log.check(cell)

@@ -1,8 +1,10 @@
 """Pictures of what advice costs: success against helped steps, a panel a world."""
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, Any, Literal
 
+from lab.learning.gates import GATES
 from lab.studies.charts import legend_below
 from lab.studies.findings import Row, those
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, SKY, YELLOW, picture_bytes, tip
@@ -11,16 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = {
-    "ccrl": BLUE,
-    "ia": ORANGE,
-    "combined": GREEN,
-    "cq": PURPLE,
-    "always": RED,
-    "random": SKY,
-    "importance": YELLOW,
-    "uncertainty": INK,
-}
+PALETTE = cycle((BLUE, ORANGE, GREEN, PURPLE, RED, SKY, YELLOW, INK))
+COLOURS = dict(zip((gate for gate in GATES if gate != "never"), PALETTE, strict=False))
 MARKERS = {"expert": "o", "moderate": "s", "limited": "^", "novice": "D", "wrong": "X"}
 PANEL_INCH = 5.6, 4.6
 YLABEL = "sessions that end optimal [%]"

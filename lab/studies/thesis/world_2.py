@@ -8,18 +8,22 @@ whose success and helped steps in full view come nearest to the printed ones, an
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.errors import WorkFailed
+from lab.errors import BadInput, WorkFailed
+from lab.files import check_out
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import BoolArray, FloatArray, NoPath, TabularMDP, grid, shortest_steps
 from lab.studies.runner import Progress
 from lab.studies.statistics import PERCENT_POINTS, RELATIVE
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, PrintedLine, printed
 from lab.studies.thesis.chapter_9_sessions import gate_of, learned_table
-from lab.tasks.grid_world import GridWorld, View
+from lab.tasks.grid_world import AdvisorView, GridWorld
+from lab.tasks.record import write_whole
 
 COMMENT = """\
 World II of the thesis (ch. 9, fig. 9.2 b), RECONSTRUCTED: the thesis prints only a picture of it. Like the printed one
@@ -60,6 +64,16 @@ def reconstruct(seed: int, progress: Progress = lambda done, total: None) -> Gri
     return _with(world, view)
 
 
+def write_reconstruction(seed: int, out: Path, progress: Progress) -> dict[str, Any]:
+    """Looks for a world like world II and writes it as a task file; the document of `lab task reconstruct --json`."""
+    if out.suffix != ".toml":
+        raise BadInput(f"task file '{out}' (--out): its name must end in .toml")
+    check_out(out.parent)
+    world = reconstruct(seed, progress)
+    write_whole(out, world.to_toml(COMMENT.format(seed=seed, file=out.name)))
+    return {"file": str(out), "seed": seed, **world.model_dump(mode="json")}
+
+
 def best_view(
     world: GridWorld, rng: np.random.Generator, distance: Callable[[Ints], float], progress: Progress
 ) -> Ints:
@@ -83,7 +97,7 @@ def best_view(
 
 
 def _with(world: GridWorld, view: Ints) -> GridWorld:
-    return world.model_copy(update={"view": View(lower=_tuple(view[0]), upper=_tuple(view[1]))})
+    return world.model_copy(update={"view": AdvisorView(lower=_tuple(view[0]), upper=_tuple(view[1]))})
 
 
 def is_compared(cell: PrintedLine, view: str) -> bool:

@@ -15,6 +15,7 @@ from lab.advice.advisors import Person
 from lab.advice.journal import Undo
 from lab.errors import BadInput, WorkFailed
 from lab.learning.events import EpisodeEnded, Event, Improvement
+from lab.learning.problem import Problem
 from lab.learning.reasons import Reason, TooSlow
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.session import SessionResult, run_session
@@ -25,7 +26,6 @@ from lab.sequencing.cell.schedule import Move
 from lab.sequencing.request import SequenceRequest
 from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
 from lab.sequencing.simulate.run import follow
-from lab.skills.skill import Problem
 from lab.tasks.task_file import load_cell
 from lab.teaching.events import (
     ORDER,

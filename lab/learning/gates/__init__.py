@@ -1,0 +1,52 @@
+"""When a learner asks for advice, and when it stops: the gates, one file a family."""
+
+from lab.learning.gates import rules
+from lab.learning.gates.ccrl import Ccrl, Combined
+from lab.learning.gates.chance import Random
+from lab.learning.gates.constant_performance import ConstantPerformance
+from lab.learning.gates.gate import Gate, GateClass, Never, Surroundings
+from lab.learning.gates.rules import CompiledGate, Steps, improvement
+from lab.learning.gates.uncertainty import Uncertainty, deviation
+from lab.learning.gates.values import Importance, Introspection
+from lab.learning.members import Member
+
+__all__ = ["GATES", "Gate", "Steps", "Surroundings", "deviation", "improvement"]
+
+GATES: dict[str, Member[GateClass]] = {
+    "ccrl": Member(
+        Ccrl,
+        "asks for whole episodes while its improvement is below Lambda; rejects an advisor after more than Omega misleads "
+        "(the thesis's rule)",
+        CompiledGate(rules.OPENS_WHILE_SLOW, rules.ASKS_ALWAYS, judges=True),
+    ),
+    "ia": Member(
+        Introspection,
+        "introspection: asks wherever the values of the moves lie within psi of each other, so that it is unsure",
+        CompiledGate(rules.OPENS_FROM_X, rules.ASKS_WHERE_ALIKE),
+    ),
+    "combined": Member(
+        Combined,
+        "asks only where both ccrl and ia would; rejects as ccrl does",
+        CompiledGate(rules.OPENS_WHILE_SLOW, rules.ASKS_WHERE_ALIKE, judges=True),
+    ),
+    "cq": Member(
+        ConstantPerformance,
+        "asks for whole episodes while the last ones took more steps on average than a constant",
+        CompiledGate(rules.OPENS_WHILE_LONG, rules.ASKS_ALWAYS),
+    ),
+    "always": Member(Gate, "asks about every step", CompiledGate(rules.OPENS_ALWAYS, rules.ASKS_ALWAYS)),
+    "never": Member(Never, "asks about none", CompiledGate(rules.OPENS_NEVER, rules.ASKS_ALWAYS)),
+    "random": Member(
+        Random, "asks about a random share of the steps", CompiledGate(rules.OPENS_FROM_X, rules.ASKS_BY_CHANCE)
+    ),
+    "importance": Member(
+        Importance,
+        "asks wherever the values of the moves lie psi or more apart: there a wrong move costs most",
+        CompiledGate(rules.OPENS_FROM_X, rules.ASKS_WHERE_APART),
+    ),
+    "uncertainty": Member(
+        Uncertainty,
+        "several tables learn side by side, and it asks where they disagree",
+        CompiledGate(rules.OPENS_FROM_X, rules.ASKS_WHERE_TABLES_DIFFER),
+    ),
+}

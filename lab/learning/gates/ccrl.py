@@ -1,0 +1,103 @@
+"""The thesis's gate, which compares moving averages and rejects who misleads, and its combination with introspection."""
+
+from math import inf
+
+from lab.learning.gates.gate import Gate, Surroundings, Values
+from lab.learning.gates.rules import Steps, improvement, misled, too_slow, unsure, window_mean
+from lab.learning.gates.values import width_of
+from lab.learning.reasons import Both, Reason, TooSlow, ValuesAlike
+from lab.learning.settings import GateSettings
+
+
+class Ccrl(Gate):
+    """Asks for whole episodes while improvement is too slow, and rejects an advisor that misleads (thesis fig. 6.2).
+
+    From episode X on it asks when current/previous mean > 1 - Lambda. It stops for good after more than 2K equal
+    results below the step limit, and never asks in the last episode, which shows what was learned. An episode that
+    was open for advice and is not better than the mean of the K before it is a mislead, also where the advisor's
+    limited view let it say nothing (listing); more than Omega of them reject the advisor.
+
+    Not in the thesis, whose episodes all begin in one state: where they begin in different ones, each count before is
+    moved by how much farther the goal is from where the judged episode began. How far that is, the learner knows from
+    its own walks alone: the fewest steps by which it has seen the goal reached from a state, parts of different walks
+    put together. Nobody tells it the shortest way, so that is too many at first, and where steps are left to chance, it
+    is the luckiest. A failed episode keeps its count. With one start nothing is moved. When to ask is decided by the
+    plain counts. `settings.spare_best`: an episode of the fewest steps known from its start is no mislead, for no
+    advice could have made it better; the thesis counts it.
+    """
+
+    def __init__(self, settings: GateSettings, episodes: int, max_steps: int, around: Surroundings | None = None):
+        super().__init__(settings, episodes, max_steps, around)
+        self.watches = around is not None and around.several_starts
+        self._slow = Reason()
+        self._last_result: float = 0
+        self._equal_results = 0
+        self._starts: dict[int, int] = {}  # where each episode began
+        self._start = 0
+        self._walk = [0]  # the states that this episode left; only its first one where all begin in one
+        self._fewest: dict[int, float] = {}  # known steps to the goal
+
+    def begins(self, state: int) -> None:
+        """Another walk begins."""
+        self._start, self._walk = state, [] if self.watches else [state]
+
+    def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """The walk goes on."""
+        self._walk.append(s_tm1)
+
+    def opens(self, episode: int, steps: Steps) -> bool:
+        """Whether the improvement rate is below Lambda."""
+        improved = improvement(steps, self.settings.window)
+        if self.rejected or episode < self.settings.first_episode or improved is None:
+            return False
+        self._watch_convergence(steps[-1])
+        slow = too_slow(improved.current_mean, improved.previous_mean, self.settings.lambda_threshold)
+        self.why = self._slow = TooSlow(improved.rate, self.settings.lambda_threshold)
+        return slow and not self.converged and episode < self.episodes
+
+    def _watch_convergence(self, result: float) -> None:
+        if result == self._last_result and result < self.max_steps:
+            self._equal_results += 1
+            self.converged = self.converged or self._equal_results > 2 * self.settings.window
+        else:
+            self._last_result, self._equal_results = result, 0
+
+    def judges(self, steps: Steps, opened: bool) -> None:
+        """Counts a mislead and rejects the advisor after more than Omega (eqs. 6.3 and 6.4)."""
+        n, window, result = len(steps), self.settings.window, steps[-1]
+        self._starts[n - 1] = self._start
+        self._knows(result)
+        self.verdict = ""
+        if opened and not self.rejected and n > window:
+            if not misled(result, window_mean(self._alike(steps), window, window)):
+                self.verdict = "better"
+            elif self.settings.spare_best and result <= min(self._fewest[self._start], self.max_steps):
+                self.verdict = "best"
+            else:
+                self.verdict = "misled"
+                self.misleads += 1
+            self.rejected = self.misleads > self.settings.omega
+
+    def _knows(self, result: float) -> None:
+        """Takes in how far the goal was from each state of the walk."""
+        left = result - len(self._walk) if result <= self.max_steps else inf
+        for state in reversed(self._walk):
+            left = self._fewest[state] = min(left + 1, self._fewest.get(state, inf))
+
+    def _alike(self, steps: Steps) -> Steps:
+        """The K counts before the last one, as if they had begun where it began."""
+        found, here = [], self._fewest[self._start]
+        for i in range(len(steps) - 1 - self.settings.window, len(steps) - 1):
+            start = self._starts.get(i, self._start)
+            moved = start != self._start and here < inf and steps[i] <= self.max_steps
+            found.append(steps[i] - self._fewest[start] + here if moved else steps[i])
+        return found
+
+
+class Combined(Ccrl):
+    """Asks only when both CCRL and introspection would, and rejects as CCRL does (thesis, section 9.6)."""
+
+    def asks(self, state: int, values: Values) -> bool:
+        """Whether the learner is unsure of its choice."""
+        self.why = Both(self._slow, ValuesAlike(width_of(values), self.settings.psi))
+        return unsure(width_of(values), self.settings.psi)

@@ -1,0 +1,131 @@
+"""The compiled forms of the gates, by their rules (`gates.rules.CompiledGate`), and of the advisor who is asked."""
+
+from typing import Any
+
+import numpy as np
+
+from lab.learning import advice_memory as memory
+from lab.learning.compiled import inlined, inner
+from lab.learning.gates import rules
+from lab.learning.kernels.learners import draw, gauge
+
+_OWN, _REMEMBERED, _ASKED, _PRACTISED = memory.OWN, memory.REMEMBERED, memory.ASKED, memory.PRACTISED
+_NOTHING = memory.NOTHING
+_ALWAYS, _FROM_X, _SLOW, _LONG = (
+    rules.OPENS_ALWAYS,
+    rules.OPENS_FROM_X,
+    rules.OPENS_WHILE_SLOW,
+    rules.OPENS_WHILE_LONG,
+)
+_ALIKE, _APART = rules.ASKS_WHERE_ALIKE, rules.ASKS_WHERE_APART
+_CHANCE, _DIFFER = rules.ASKS_BY_CHANCE, rules.ASKS_WHERE_TABLES_DIFFER
+_window_mean: Any = inner(rules.window_mean)
+_too_slow: Any = inner(rules.too_slow)
+_misled: Any = inner(rules.misled)
+_unsure: Any = inlined(rules.unsure)
+
+
+@inner
+def opens(asking: Any, lane: Any, steps: Any, max_steps: int, rejected: bool) -> bool:
+    """`Gate.opens`: whether the episode that begins in a lane may ask; steps (E,) are those of its session."""
+    rule, episode, window = asking.gate.opens, lane.episode, asking.window
+    if rule not in (_FROM_X, _LONG, _SLOW):
+        return bool(rule == _ALWAYS)
+    if episode < asking.first_episode:
+        return False
+    if rule == _LONG:
+        return bool(episode > window and _window_mean(steps, episode - 1, window) > asking.enough)
+    if rule == _FROM_X or rejected or episode <= 2 * window:
+        return bool(rule == _FROM_X)
+    result = steps[episode - 2]
+    if result == lane.last_result and result < max_steps:
+        lane.equal_results += 1
+        if lane.equal_results > 2 * window:
+            lane.converged = 1
+    else:
+        lane.last_result, lane.equal_results = result, 0
+    current = _window_mean(steps, episode - 1, window)
+    previous = _window_mean(steps, episode - 1 - window, window)
+    slow = _too_slow(current, previous, asking.threshold)
+    return bool(slow and lane.converged == 0 and episode < len(steps))
+
+
+@inner
+def judge(asking: Any, lane: Any, steps: Any, count: Any) -> None:
+    """`Ccrl.judges`: whether the episode that is over was misled; steps (E,) are those of its session."""
+    episode, window = lane.episode, asking.window
+    if count.rejected_at_episode > 0 or episode <= window or not (asking.judge_unhelped or lane.helped > 0):
+        return
+    if _misled(steps[episode - 1], _window_mean(steps, episode - 1, window)):
+        count.misleads += 1
+        if count.misleads > asking.omega:
+            count.rejected_at_episode = episode
+
+
+@inlined
+def _deviation(work: Any, j: int, state: Any) -> float:
+    """gates.deviation of the values of lane j's ensemble in a state."""
+    actions, tables = len(work.learning.actions), work.lanes.others[j]
+    count = len(tables)
+    total = 0.0
+    for a in range(actions):
+        summed = 0.0
+        for k in range(count):
+            summed += gauge(work, tables[k], state, a)
+        mean, squares = summed / count, 0.0
+        for k in range(count):
+            off = gauge(work, tables[k], state, a) - mean
+            squares += off * off
+        total += squares / count
+    return float((total / actions) ** 0.5)
+
+
+@inlined
+def asks(work: Any, j: int, state: Any) -> bool:
+    """`Gate.asks` in a state of lane j's open episode."""
+    asking, lanes = work.asking, work.lanes
+    rule = asking.gate.asks
+    if rule == _ALIKE:
+        return bool(_unsure(lanes.widths[j], asking.psi))
+    if rule == _APART:
+        return bool(lanes.widths[j] >= asking.psi)
+    if rule == _CHANCE:
+        return bool(draw(lanes.rng, j) < asking.rate)
+    if rule == _DIFFER:
+        return bool(_deviation(work, j, state) >= asking.spread)
+    return True
+
+
+@inlined
+def advised(work: Any, j: int, state: Any) -> Any:
+    """The action that the advisor draws for lane j: `TableAdvisor`."""
+    thresholds, last = work.advice.thresholds, len(work.learning.actions) - 1
+    row = min(work.lanes.lane[j].episode, thresholds.shape[0]) - 1
+    mark, action = draw(work.lanes.rng, j) * thresholds[row, state, last], np.uint64(0)
+    for a in range(last):
+        action += np.uint64(thresholds[row, state, a] <= mark)
+    return action
+
+
+@inlined
+def decided(work: Any, memories: Any, j: int) -> Any:
+    """The action of lane j's next step and where it comes from: its own, or what memory or the advisor says."""
+    lanes, state = work.lanes, work.lanes.states[j]
+    action, source, said = np.uint64(lanes.chosen[j]), np.int64(_OWN), np.int64(_NOTHING)
+    if memories is not None:
+        if lanes.is_open[j]:
+            said = np.int64(memories.said[j, state])
+        elif memories.now[j].practises == 1 and memories.way[j, state] != _NOTHING:
+            action, source = np.uint64(memories.way[j, state]), np.int64(_PRACTISED)
+    if lanes.is_open[j]:
+        lane = lanes.lane[j]
+        if (said != _NOTHING or lane.helped < lane.left) and asks(work, j, state):
+            if said != _NOTHING:
+                return np.uint64(said), np.int64(_REMEMBERED)
+            lane.asked = 1
+            if work.advice.region[state]:
+                lane.helped += 1
+                action, source = advised(work, j, state), np.int64(_ASKED)
+                if memories is not None:
+                    memories.said[j, state] = action
+    return action, source

@@ -1,0 +1,128 @@
+"""What the compiled sessions work on: records of arrays and plain numbers."""
+
+from dataclasses import fields
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.learning.advice_memory import Now
+from lab.learning.gates.rules import CompiledGate
+from lab.mdp import FloatArray
+
+LANES = 24
+
+
+class Problem(NamedTuple):
+    """The problem; successor, reward: (S * A,) flat; `ends`: 0 goes on, 1 goal, 2 another terminal state."""
+
+    successor: NDArray[np.int32]
+    reward: FloatArray
+    arrival: FloatArray
+    ends: NDArray[np.uint8]
+    starts: NDArray[np.int64]
+    step_reward: float
+
+
+class Learning(NamedTuple):
+    """The learner's settings; actions: a tuple of A numbers, whose length the compiler knows."""
+
+    afterstate: bool
+    alpha: float
+    discount: float
+    max_moves: int
+    max_steps: int
+    count_start: int
+    actions: tuple[int, ...]
+
+
+class Asking(NamedTuple):
+    """The gate's rules and settings."""
+
+    gate: CompiledGate
+    threshold: float
+    omega: int
+    first_episode: int
+    window: int
+    psi: float
+    spread: float
+    rate: float
+    enough: float
+    budget: int
+    judge_unhelped: bool
+
+
+class Advice(NamedTuple):
+    """As `advice.advisors.Advice`."""
+
+    thresholds: FloatArray
+    region: NDArray[np.bool_]
+
+
+# What each of the sessions under way remembers; session -1: none. `converged` as in `gates.Ccrl`.
+LANE = np.dtype(
+    [(name, np.int64) for name in ("session", "episode", "is_open", "asked", "helped", "left")]
+    + [(name, np.int64) for name in ("last_result", "equal_results", "converged")]
+)
+COUNTS = np.dtype(
+    [(name, np.int64) for name in ("requests", "helped_steps", "misleads", "rejected_at_episode", "moves")]
+)
+NOW = np.dtype([(field.name, np.int64) for field in fields(Now)])
+
+
+class Sessions(NamedTuple):
+    """What N sessions of E episodes begin with, and what came of them, as in `batch.Batch`.
+
+    seeds (N,), per_tau (E,): one over the temperature; counts (N,) of COUNTS; kept (N, size): the tables, or of none.
+    """
+
+    seeds: NDArray[np.uint64]
+    per_tau: FloatArray
+    steps: NDArray[np.int32]
+    guided: NDArray[np.bool_]
+    counts: NDArray[np.void]
+    kept: FloatArray
+
+
+class Lanes(NamedTuple):
+    """The sessions under way, (LANES,) each, but values (A * LANES,), tables (LANES, size), others (LANES, K, size).
+
+    Made by the caller and not in the kernel, where numba would compile all of np.zeros along.
+    """
+
+    lane: NDArray[np.void]
+    values: FloatArray
+    widths: FloatArray
+    per_tau: FloatArray
+    chosen: NDArray[np.int64]
+    moves: NDArray[np.int64]
+    states: NDArray[np.uint64]
+    rng: NDArray[np.uint64]
+    fresh: NDArray[np.bool_]
+    is_open: NDArray[np.bool_]
+    tables: FloatArray
+    others: FloatArray
+
+
+class Memories(NamedTuple):
+    """An `advice_memory.Memory` for each lane: the arrays are (LANES, ...), `now` (LANES,) is of NOW."""
+
+    said: NDArray[np.int32]
+    way: NDArray[np.int32]
+    on_walk: NDArray[np.int32]
+    place: NDArray[np.int32]
+    walk: NDArray[np.int32]
+    did: NDArray[np.int32]
+    own: NDArray[np.int32]
+    now: NDArray[np.void]
+
+
+class Work(NamedTuple):
+    """All of it but the memories, which are handed on by themselves: where there are none, numba leaves out what needs them."""
+
+    problem: Problem
+    learning: Learning
+    asking: Asking
+    advice: Advice
+    sessions: Sessions
+    lanes: Lanes

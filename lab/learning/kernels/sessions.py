@@ -1,0 +1,150 @@
+"""The loop of the compiled sessions, many side by side.
+
+One session alone waits for its memory and its exponentials, 24 keep the processor busy. Each has uniform numbers of its
+own (`splitmix`), so its result depends on its seed and on nothing else, and equals that of `session.run_session` with the
+same numbers.
+"""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from lab.learning import advice_memory as memory
+from lab.learning.compiled import inlined, inner, lean
+from lab.learning.kernels.asking import decided, judge, opens
+from lab.learning.kernels.learners import choose, draw, learn
+from lab.learning.kernels.records import LANES
+
+_Memory: Any = memory.Memory
+_Move: Any = memory.Move
+_clear: Any = inner(memory.clear)
+_remembers: Any = inner(memory.opens)
+_starts: Any = inlined(memory.starts)
+_moved: Any = inlined(memory.moved)
+_ended: Any = inner(memory.ended)
+
+
+@partial(lean, inline="always")  # as source: a compiled function may not return arrays that it was not handed
+def _of_lane(m: Any, j: int) -> Any:
+    """The memory of one lane."""
+    return _Memory(m.said[j], m.way[j], m.on_walk[j], m.place[j], m.walk[j], m.did[j], m.own[j], m.now[j])
+
+
+@inlined
+def _begin_session(work: Any, j: int, n: int) -> None:
+    """Clears lane j for session n."""
+    lanes = work.lanes
+    lane = lanes.lane[j]
+    lane.session, lane.episode, lanes.rng[j] = n, 0, work.sessions.seeds[n]
+    lane.last_result, lane.equal_results, lane.converged = 0, 0, 0
+    for i in range(lanes.tables.shape[1]):
+        lanes.tables[j, i] = 0.0
+    for k in range(lanes.others.shape[1]):
+        for i in range(lanes.others.shape[2]):
+            lanes.others[j, k, i] = draw(lanes.rng, j) - 0.5
+
+
+@inlined
+def _begin_episode(work: Any, memories: Any, j: int) -> None:
+    """The next episode of lane j's session: whether it may ask, how warm it is, where it starts."""
+    lanes, sessions, asking, starts = work.lanes, work.sessions, work.asking, work.problem.starts
+    lane = lanes.lane[j]
+    count, steps = sessions.counts[lane.session], sessions.steps[lane.session]
+    lane.episode, lane.asked, lane.helped = lane.episode + 1, 0, 0
+    lane.left = asking.budget - count.helped_steps
+    lane.is_open = opens(asking, lane, steps, work.learning.max_steps, count.rejected_at_episode > 0)
+    if memories is not None:
+        mine, may = _of_lane(memories, j), lane.is_open == 1
+        lane.is_open = _remembers(mine, lane.episode, len(steps), asking.window, may)
+    lanes.per_tau[j], lanes.is_open[j] = sessions.per_tau[lane.episode - 1], lane.is_open
+    if len(starts) > 1:
+        lanes.states[j] = starts[int(draw(lanes.rng, j) * len(starts))]
+    if memories is not None:
+        _starts(_of_lane(memories, j), np.int64(lanes.states[j]))
+
+
+@inlined
+def _begin(work: Any, memories: Any, started: int) -> int:
+    """Begins an episode in each lane whose last one is over, and the next session where its last one is; how many began."""
+    lanes, seeds = work.lanes, work.sessions.seeds
+    for j in range(LANES):
+        if lanes.fresh[j]:
+            lane = lanes.lane[j]
+            lanes.fresh[j], lanes.moves[j], lanes.states[j] = False, 0, work.problem.starts[0]
+            if lane.episode == len(work.sessions.per_tau):
+                lane.session = -1  # a lane without a session walks on, and nobody looks
+                if started < len(seeds):
+                    _begin_session(work, j, started)
+                    if memories is not None:
+                        _clear(_of_lane(memories, j))
+                    started += 1
+            if lane.session >= 0:
+                _begin_episode(work, memories, j)
+    return started
+
+
+@inlined
+def _step(work: Any, memories: Any, j: int) -> bool:
+    """Makes and learns one step of lane j; whether its episode is over."""
+    lanes, problem, learning = work.lanes, work.problem, work.learning
+    state = lanes.states[j]
+    action, source = decided(work, memories, j)
+    entered = np.uint64(problem.successor[state * np.uint64(len(learning.actions)) + action])
+    ends = problem.ends[entered]
+    learn(work, lanes.tables[j], state, action)
+    for k in range(lanes.others.shape[1]):
+        if draw(lanes.rng, j) < 0.5:
+            learn(work, lanes.others[j, k], state, action)
+    if memories is not None and lanes.lane[j].session >= 0:
+        mine = _of_lane(memories, j)
+        _moved(mine, _Move(np.int64(state), np.int64(action), source, np.int64(entered), ends != 0, ends == 1))
+        if mine.now.trust < 0:
+            lanes.is_open[j] = False
+    lanes.states[j] = entered
+    lanes.moves[j] += 1
+    return bool(ends != 0 or lanes.moves[j] == learning.max_moves)
+
+
+@inlined
+def _end(work: Any, memories: Any, j: int) -> int:
+    """Books the episode of lane j that is over; 1 if its session is over, too."""
+    lanes, sessions, learning = work.lanes, work.sessions, work.learning
+    lane, moves, won = lanes.lane[j], lanes.moves[j], work.problem.ends[lanes.states[j]] == 1
+    lanes.fresh[j] = True
+    if lane.session < 0:
+        return 0
+    n, episode, count = lane.session, lane.episode, sessions.counts[lane.session]
+    sessions.steps[n, episode - 1] = moves + learning.count_start if won else learning.max_steps + 1
+    sessions.guided[n, episode - 1] = lane.helped > 0
+    count.requests += lane.asked
+    count.helped_steps += lane.helped
+    count.moves += moves
+    if lane.is_open and work.asking.gate.judges:
+        judge(work.asking, lane, sessions.steps[n], count)
+    if memories is not None:
+        went = moves if won else learning.max_moves + 1
+        _ended(_of_lane(memories, j), len(sessions.per_tau), went, won, lane.helped)
+    if episode < len(sessions.per_tau):
+        return 0
+    lanes.is_open[j] = False
+    if len(sessions.kept):
+        for i in range(lanes.tables.shape[1]):
+            sessions.kept[n, i] = lanes.tables[j, i]
+    return 1
+
+
+@lean
+def run(work: Any, memories: Any) -> None:
+    """All sessions: each lane takes the next one when its own is over. memories None: nothing is remembered."""
+    started = over = 0
+    fresh = True
+    while over < len(work.sessions.seeds):
+        if fresh:
+            started = _begin(work, memories, started)
+            fresh = False
+        choose(work)
+        for j in range(LANES):
+            if _step(work, memories, j):
+                fresh = True
+                over += _end(work, memories, j)

@@ -1,0 +1,25 @@
+"""The learners: update rules on action-value tables, one file a family."""
+
+from collections.abc import Callable
+
+from lab.learning.members import Member
+from lab.learning.settings import LearnerSettings
+from lab.learning.updates.afterstate import Afterstate
+from lab.learning.updates.monte_carlo import MonteCarlo
+from lab.learning.updates.one_step import QLearning, Sarsa
+from lab.learning.updates.traces import SarsaLambda, WatkinsQLambda
+from lab.learning.updates.update import ACTION_VALUES, STATE_VALUES, Row, Table, Update
+from lab.mdp import TabularMDP
+
+__all__ = ["UPDATES", "Row", "Table", "Update"]
+
+UPDATES: dict[str, Member[Callable[[list[Row], LearnerSettings, TabularMDP], Update]]] = {
+    "q": Member(QLearning, "Q-learning: what a move is worth is judged by the best move after it", ACTION_VALUES),
+    "sarsa": Member(Sarsa, "as q, but judged by the move that is really made next"),
+    "q-lambda": Member(WatkinsQLambda, "as q, with traces: each step corrects the moves before it, too"),
+    "sarsa-lambda": Member(SarsaLambda, "as sarsa, with traces: each step corrects the moves before it, too"),
+    "monte-carlo": Member(MonteCarlo, "moves are judged by the whole rest of the episode"),
+    "afterstate": Member(
+        Afterstate, "learns what the states are worth that moves lead to, not the moves", STATE_VALUES
+    ),
+}

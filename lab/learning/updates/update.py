@@ -1,0 +1,77 @@
+"""What a session asks of a learner, and what the learners that keep action values have in common.
+
+A table is a list of rows, one list of action values per state: in plain Python much faster than an array.
+"""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from lab.learning.selection import Draw
+from lab.learning.settings import LearnerSettings
+from lab.mdp import TabularMDP
+
+Row = list[float]
+Table = Sequence[Row]
+
+ACTION_VALUES, STATE_VALUES = range(2)  # the learners' forms that the kernel knows
+
+
+def towards(value: float, target: float, alpha: float) -> float:
+    """The value moved by the share alpha towards its target."""
+    return value + alpha * (target - value)
+
+
+class Update(Protocol):
+    """What a session asks of a learner.
+
+    lookahead: learning needs the next action chosen first; chained: a step is learned from together with those before
+    or after it in the episode, so that none of them may be left out.
+    """
+
+    lookahead: bool
+    chained: bool
+
+    @property
+    def q(self) -> Table:
+        """Its action values now, q[state][action]."""
+
+    def begin(self) -> None:
+        """Starts an episode."""
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """Learns from one step; discount_t is 0 when s_t is terminal; a_t matters only with `lookahead`."""
+
+    def end(self) -> None:
+        """Ends an episode, whether it reached a terminal state or was broken off."""
+
+    def gauge(self, state: int) -> Row:
+        """The values whose width says how sure the learner is in a state (what introspection looks at)."""
+
+    def scatter(self, draw: Draw) -> None:
+        """Sets every value that it keeps to one drawn within +-0.5."""
+
+
+class OnTable:
+    """What the learners that keep a value per state and action have in common."""
+
+    lookahead = chained = False
+
+    def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
+        self.q: list[Row] = q
+        self._settings = settings
+        self._alpha = settings.alpha
+
+    def begin(self) -> None:
+        """Nothing is carried from episode to episode."""
+
+    def end(self) -> None:
+        """Nothing is left to learn."""
+
+    def gauge(self, state: int) -> Row:
+        """The action values."""
+        return self.q[state]
+
+    def scatter(self, draw: Draw) -> None:
+        """Every value of the table."""
+        for row in self.q:
+            row[:] = [draw() - 0.5 for _ in row]

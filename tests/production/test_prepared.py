@@ -1,0 +1,67 @@
+"""A task file is checked with its scene and its problems."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lab.errors import BadInput
+from lab.skills.prepared_scene import check_task
+from lab.tasks.task_file import names_of
+
+
+def test_check_finds_what_is_wrong(tmp_path: Path, root: Path) -> None:
+    text = (root / "tasks" / "toast.toml").read_text(encoding="utf-8")
+    path = tmp_path / "t.toml"
+    path.write_text(text.replace("capacity = 50", "capacity = 2"))
+    assert check_task(str(path), None, 0) == []
+    (error,) = check_task(str(path), 3, 0)
+    assert error == "3 toasts (--toasts) do not fit on 'plate': its capacity in the task file is 2"
+    path.write_text("name =")
+    (error,) = check_task(str(path), 3, 0)
+    assert error.startswith(f"{path}: not valid TOML: Invalid value (at end of document)")
+
+
+def test_check_finds_what_is_wrong_with_a_world(tmp_path: Path, root: Path) -> None:
+    text = (root / "tasks" / "world-1.toml").read_text(encoding="utf-8")
+    assert check_task("world-1", None, 0) == check_task("random:10x10x10:0.06:7", None, 0) == []
+    path = tmp_path / "w.toml"
+    path.write_text(text.replace("max_steps = 200", "max_steps = 12"))  # the start counts as a step
+    (error,) = check_task(str(path), None, 0)
+    assert error == "world 'world-1': learner.max_steps = 12: the shortest way has 12 moves and needs 13 steps"
+    path.write_text(text.replace("goal = [8, 5, 3]", "goal = [8, 5, 30]"))
+    (error,) = check_task(str(path), None, 0)
+    assert error == f"{path}: goal (8, 5, 30) is outside the world: allowed are 0..9 x 0..9 x 0..9"
+
+
+@pytest.mark.parametrize("name", names_of("cell"))
+def test_the_cells_that_ship_are_sound(name: str) -> None:
+    assert check_task(name, None, 0) == []
+
+
+def test_check_finds_what_is_wrong_with_a_cell(tmp_path: Path, root: Path) -> None:
+    text = (root / "tasks" / "toast-case-1.toml").read_text(encoding="utf-8")
+    path = tmp_path / "c.toml"
+    path.write_text(text.replace("capacity = 200", "capacity = 3"))
+    assert check_task(str(path), None, 0) == check_task(str(path), 3, 0) == []
+    (error,) = check_task(str(path), 4, 0)
+    assert error == f"{path}: line 17: station 'finished_plate': capacity 3 cannot hold all 4 parts"
+    path.write_text(text.replace('"butter_buffer" },', '"buter_buffer" },'))
+    (error,) = check_task(str(path), None, 0)
+    assert error.startswith(f"{path}: line 28: unknown station 'buter_buffer' (stage 3 of the route): did you mean")
+    with pytest.raises(BadInput, match="an order of 201 parts: allowed are 1 to 200"):
+        check_task("toast-case-1", 201, 0)
+    with pytest.raises(BadInput, match=r"cell 'fms' makes several products: give their order with --case, such as RSR"):
+        check_task("fms", 3, 0)
+
+
+def test_a_bad_cell_ends_the_command_with_2_and_one_line(tmp_path: Path, root: Path, lab: Callable[..., Any]) -> None:
+    path = tmp_path / "c.toml"
+    text = (root / "tasks" / "fms.toml").read_text(encoding="utf-8")
+    path.write_text(text.replace("service_s = 240", "service_s = nan"))
+    ran = lab("task", "check", str(path))
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith(f"lab: {path}: line 63: products.1.routes.0.2.service_s: Input should be a finite number")
+    assert ran.err.count("\n") == 1
+    assert lab("task", "check", "fms").out == "fms is sound\n"

@@ -1,0 +1,51 @@
+"""What the project says of itself: what wheel and sdist take, dependencies, version, and the README's set-up commands."""
+
+import tomllib
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import lab
+
+
+@pytest.fixture(scope="module")
+def project(root: Path) -> dict[str, Any]:
+    with (root / "pyproject.toml").open("rb") as file:
+        return tomllib.load(file)
+
+
+def test_wheel_and_sdist_take_both_folders(project: dict[str, Any], root: Path) -> None:
+    targets = project["tool"]["hatch"]["build"]["targets"]
+    into = targets["wheel"]["force-include"]
+    assert into == {name: f"lab/_data/{name}" for name in ("tasks", "assets")}
+    assert {f"/{name}" for name in into} < set(targets["sdist"]["include"])
+    assert all((root / name).is_dir() for name in into)
+
+
+def test_dependencies_have_lower_bounds_and_no_upper_ones(project: dict[str, Any]) -> None:
+    extras = project["project"]["optional-dependencies"]
+    own = project["project"]["name"]
+    for line in [*project["project"]["dependencies"], *chain.from_iterable(extras.values())]:
+        if line.startswith(own):  # the lab itself, with other extras of its own
+            name, _, others = line.removesuffix("]").partition("[")
+            assert name == own, line
+            assert {*others.split(",")} < extras.keys(), line
+        else:
+            assert line.count(">=") == 1, line
+            assert not set(line) & set("<!~,"), line
+
+
+def test_the_version_stands_once(project: dict[str, Any]) -> None:
+    assert "version" in project["project"]["dynamic"]
+    assert lab.__version__.count(".") == 2
+
+
+@pytest.mark.parametrize("mark", ["run-command", "test-command"])
+def test_the_readme_has_each_set_up_command_on_one_line(root: Path, mark: str) -> None:
+    _, found, rest = (root / "README.md").read_text(encoding="utf-8").partition(f"<!-- {mark} -->\n```sh\n")
+    assert found, f"README.md: no fenced block follows <!-- {mark} -->"
+    command = rest.partition("\n```")[0]
+    assert "\n" not in command
+    assert command.startswith("python3.11 -m venv ")
