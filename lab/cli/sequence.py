@@ -93,7 +93,9 @@ def sequence(
                     options.task, options.case, options.toasts, wanted, teacher=teacher, files=files
                 )
     except KeyboardInterrupt as stopped:
-        raise KeyboardInterrupt(f"{stopped or 'stopped by Ctrl-C'}{kept.resume_command()}") from None
+        if kept.journal is None:
+            raise
+        raise KeyboardInterrupt(f"{str(stopped) or 'stopped by Ctrl-C'}{kept.resume_command()}") from None
     show(document | kept.worth(), as_json, sequence_summary)
     if document["interrupted"]:
         end(f"stopped by Ctrl-C; the best order until then is above{kept.resume_command()}", 130)

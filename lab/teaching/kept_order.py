@@ -1,25 +1,22 @@
 """Advice on the order of the transfers, kept: its journal, and what is needed to go on with it or to look at it again."""
 
-import json
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from shlex import quote
 from typing import Annotated, Any
 
 from annotated_types import Ge
 
 from lab.advice.advisors import AdvisorName
-from lab.advice.entries import Read, Session, line_of, read_journal
+from lab.advice.entries import Read, Session, read_journal
 from lab.advice.journal import Journal
 from lab.advice.order_level import signature_of
 from lab.advice.receipt import Receipt, receipt
 from lab.errors import BadInput
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.cell import Cell
-from lab.tasks.record import write_whole
 from lab.tasks.task_file import names_file
-from lab.teaching.kept_session import claimed, lab_version
-from lab.toolbox.registry import Toolbox, default_folder
+from lab.teaching.kept_session import check_same, claimed, lab_version, replayed, resume_command, worth_of
+from lab.toolbox.registry import Toolbox
 
 
 @dataclass(frozen=True)
@@ -93,8 +90,7 @@ class OrderSession:
         """What goes on with it; "" when there is nothing to go on with."""
         if self.folder is None or self.journal is None:
             return ""
-        box = "" if self._toolbox.folder == default_folder() else f" --toolbox {quote(str(self._toolbox.folder))}"
-        return f"; go on with: lab sequence --resume {quote(str(self.folder))}{box}"
+        return f"; go on with: {resume_command(self.folder, self._toolbox, 'sequence')}"
 
     def receipt(self) -> Receipt:
         """What the advice was worth."""
@@ -105,25 +101,12 @@ class OrderSession:
         """Where it is kept, and its receipt, which is written beside the journal; nothing where nothing is kept."""
         if self.folder is None or self.journal is None:
             return {}
-        made = self.receipt()
-        write_whole(self.folder / "receipt.json", json.dumps(made.to_json(), indent=1, allow_nan=False) + "\n")
-        return {"session": str(self.folder), "receipt": made.to_json() | {"lines": made.lines()}}
+        return worth_of(self.folder, self.receipt())
 
     def replayed(self) -> dict[str, Any]:
         """The document of `lab replay --json`."""
-        read, made = self.read, self.receipt()
-        assert read is not None
-        return {
-            "session": str(self.folder),
-            "problem": read.session.problem,
-            "words": read.session.words,
-            "seed": self.options.seed,
-            "lab": read.session.lab,
-            "closed": None if read.closed is None else asdict(read.closed),
-            "cut": read.cut,
-            "events": [json.loads(line_of(entry)) for entry in read.entries],
-            "receipt": made.to_json() | {"lines": made.lines()},
-        }
+        assert self.read is not None
+        return replayed(self.read, self.options.seed, self.receipt())
 
 
 def is_order(folder: Path, where: str) -> bool:
@@ -151,10 +134,6 @@ def kept_order(folder: Path, where: str, toolbox: Toolbox, *, read_only: bool = 
 def gone_on(given: OrderOptions, folder: Path, toolbox: Toolbox) -> OrderSession:
     """The session that --resume names; BadInput when it is over, and for options beside it."""
     kept = kept_order(folder, "--resume", toolbox)
-    for name, value in asdict(given).items():
-        if value != getattr(OrderOptions(), name):
-            option = "TASK" if name == "task" else f"--{name}"
-            raise BadInput(f"{option} beside --resume {folder}: a session goes on as it was begun: leave it away")
     assert kept.read is not None
-    kept.read.check_goes_on()
+    check_same(given, kept.read, {"task": "TASK"})
     return kept

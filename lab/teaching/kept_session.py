@@ -1,7 +1,8 @@
 """Sessions kept in folders: where a journal is written, how a session goes on, and how it is looked at again."""
 
+import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from importlib.metadata import PackageNotFoundError, version
@@ -9,17 +10,18 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
-from lab.advice.entries import FILE, Read, Session, read_journal
+from lab.advice.entries import FILE, Read, Session, line_of, read_journal
 from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment
 from lab.learning.problem import Problem
 from lab.mdp import FloatArray
+from lab.tasks.record import write_whole
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.lesson_plan import MAX_SESSIONS, Keep, LessonPlan
 from lab.toolbox.policy import Policy
-from lab.toolbox.registry import Toolbox, slug
+from lab.toolbox.registry import Toolbox, default_folder, slug
 
 SESSIONS = "sessions"  # the folder in the toolbox
 _BEGUN = "begun"  # the folder in a session's folder for the policy that it went on from
@@ -161,13 +163,7 @@ class KeptSession(_InFolder):
 
     def same(self, given: LessonOptions) -> LessonOptions:
         """The options of the session; BadInput when the command names others, and when the session is over."""
-        for name, value in asdict(given).items():
-            if value != getattr(LessonOptions(), name):
-                option = _OPTIONS.get(name, f"--{name}")
-                raise BadInput(
-                    f"{option} beside --resume {self.folder}: a session goes on as it was begun: leave it away"
-                )
-        self.read.check_goes_on()
+        check_same(given, self.read, _OPTIONS)
         return self.options
 
     def begun(self, problem: Problem) -> Policy | None:
@@ -179,6 +175,46 @@ class KeptSession(_InFolder):
         if found is None:
             raise BadInput(f"session '{self.folder}': the policy that it went on from is not in '{_BEGUN}' any more")
         return found
+
+
+def check_same(given: Any, read: Read, names: Mapping[str, str]) -> None:
+    """BadInput when a command that goes on with a session names options, too, or when the session is over.
+
+    names: of options that are called otherwise than their fields.
+    """
+    for name, value in asdict(given).items():
+        if value != getattr(type(given)(), name):
+            option, folder = names.get(name, f"--{name}"), read.path.parent
+            raise BadInput(f"{option} beside --resume {folder}: a session goes on as it was begun: leave it away")
+    read.check_goes_on()
+
+
+def resume_command(folder: Path | None, toolbox: Toolbox, command: str = "teach") -> str:
+    """The command that goes on with a session."""
+    box = "" if toolbox.folder == default_folder() else f" --toolbox {quote(str(toolbox.folder))}"
+    return f"lab {command} --resume {quote(str(folder))}{box}"
+
+
+def worth_of(folder: Path | None, made: Receipt) -> dict[str, Any]:
+    """Where a session is kept, and what its advice was worth; the receipt is written beside the journal."""
+    assert folder is not None
+    write_whole(folder / "receipt.json", json.dumps(made.to_json(), indent=1, allow_nan=False) + "\n")
+    return {"session": str(folder), "receipt": made.to_json() | {"lines": made.lines()}}
+
+
+def replayed(read: Read, seed: int, made: Receipt) -> dict[str, Any]:
+    """The document of `lab replay --json`."""
+    return {
+        "session": str(read.path.parent),
+        "problem": read.session.problem,
+        "words": read.session.words,
+        "seed": seed,
+        "lab": read.session.lab,
+        "closed": None if read.closed is None else asdict(read.closed),
+        "cut": read.cut,
+        "events": [json.loads(line_of(entry)) for entry in read.entries],
+        "receipt": made.to_json() | {"lines": made.lines()},
+    }
 
 
 def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:

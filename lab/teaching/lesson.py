@@ -1,26 +1,23 @@
 """One lesson of one session in a subject, with its journal, its receipt and its pictures; and one shown again."""
 
-import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
-from shlex import quote
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 from lab.advice.advisors import PEOPLE
-from lab.advice.entries import line_of
 from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.mdp import BoolArray
-from lab.tasks.record import Learned, write_whole
+from lab.tasks.record import Learned
 from lab.teaching.events import ScenePrepared, Tell
-from lab.teaching.kept_session import KeptSession, NewSession, check_new
+from lab.teaching.kept_session import KeptSession, NewSession, check_new, replayed, resume_command, worth_of
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.lesson_plan import Interrupted, Lesson, LessonPlan
 from lab.teaching.teacher import Teacher, check_name
 from lab.toolbox.policy import Policy
-from lab.toolbox.registry import Toolbox, default_folder
+from lab.toolbox.registry import Toolbox
 
 
 class Subject(Protocol):
@@ -75,8 +72,8 @@ def teach(
         if session.journal is None:
             raise
         what = str(stopped) or "stopped by Ctrl-C; the journal has all that was said"
-        raise Interrupted(f"{what}; go on with: {_resume(session, teacher.toolbox)}") from None
-    return document | _worth(session)
+        raise Interrupted(f"{what}; go on with: {resume_command(session.folder, teacher.toolbox)}") from None
+    return document | worth_of(session.folder, session.receipt())
 
 
 def one_lesson(
@@ -100,12 +97,6 @@ def one_lesson(
     return document
 
 
-def _resume(session: NewSession | KeptSession, toolbox: Toolbox) -> str:
-    """The command that goes on with a session."""
-    box = "" if toolbox.folder == default_folder() else f" --toolbox {quote(str(toolbox.folder))}"
-    return f"lab teach --resume {quote(str(session.folder))}{box}"
-
-
 def replay(kept: KeptSession, subject: Subject, tell: Tell) -> dict[str, Any]:
     """Tells a kept session again, each question with its answer; nothing is learned or written.
 
@@ -120,31 +111,11 @@ def replay(kept: KeptSession, subject: Subject, tell: Tell) -> dict[str, Any]:
         except Interrupted:  # by the journal's end, when it was not over, or by Ctrl-C
             if kept.journal is None or kept.journal.folding:
                 raise KeyboardInterrupt from None
-    worth = kept.receipt()
-    return {
-        "session": str(kept.folder),
-        "problem": read.session.problem,
-        "words": read.session.words,
-        "seed": options.seed,
-        "lab": read.session.lab,
-        "closed": None if read.closed is None else asdict(read.closed),
-        "cut": read.cut,
-        "events": [json.loads(line_of(entry)) for entry in read.entries],
-        "receipt": worth.to_json() | {"lines": worth.lines()},
-    }
+    return replayed(read, options.seed, kept.receipt())
 
 
 def _nobody(request: AdviceRequest) -> int | None:
     raise AdvisorLeft
-
-
-def _worth(session: NewSession | KeptSession) -> dict[str, Any]:
-    """Where the session is kept, and what its advice was worth; the receipt is written beside the journal."""
-    assert session.folder is not None
-    worth = session.receipt()
-    path = session.folder / "receipt.json"
-    write_whole(path, json.dumps(worth.to_json(), indent=1, allow_nan=False) + "\n")
-    return {"session": str(session.folder), "receipt": worth.to_json() | {"lines": worth.lines()}}
 
 
 def _document(problem: Problem, lesson: Lesson, teacher: Teacher) -> dict[str, Any]:
