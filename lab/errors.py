@@ -47,6 +47,6 @@ def unknown(kind: str, value: object, known: Iterable[str], where: str) -> BadIn
     return BadInput(f"unknown {kind} '{value}' ({where}):{hint} known: {', '.join(names[:MOST_NAMES]) or 'none'}{more}")
 
 
-def counted(number: int, what: str) -> str:
+def counted(number: float, what: str) -> str:
     """How many of something: "1 step", "2 steps"."""
     return f"{number} {what}" if number == 1 else f"{number} {what}s"

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from lab.advice.advisors import ADVISORS, Workbench
+from lab.advice.advisors import ADVISORS, AdvisorKind, AdvisorName, Level
 from lab.cli.app import COMMANDS, Command
 from lab.cli.options import Json
 from lab.cli.output import show
@@ -54,9 +54,9 @@ class EveryOther(Gate):
         return episode % 2 == 0
 
 
-def wavering(bench: Workbench) -> Advisor:
+def wavering(name: AdvisorName, level: Level) -> Advisor:
     """An advisor, between a moderate and a limited one."""
-    return bench.from_table(0.2)
+    return level.simulated((0.2,), 1.0)
 
 
 class Return(Transfer):
@@ -98,7 +98,7 @@ ROWS: Tables = (
     (UPDATES, "dummy-learner", Member(Hasty, "as q, but learns each step twice")),
     (GATES, "dummy-gate", Member(EveryOther, "asks in every other episode")),
     (SELECTIONS, "dummy-selection", Member(lambda values, temperature, u: greedy(values), "the best, ties: the first")),
-    (ADVISORS, "dummy-advisor", wavering),
+    (ADVISORS, "dummy-advisor", AdvisorKind(wavering)),
     (SKILLS, "dummy-skill", Return),
     (SEQUENCERS, "dummy-method", Sequencer(lambda: queued, "as fifo")),
     (STUDIES, "dummy-study", Study("A dummy", study)),

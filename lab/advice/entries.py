@@ -31,8 +31,9 @@ MAX_LINE_BYTES = 1 << 20
 class Session:
     """What a session was: the words that began it, the problem, and whether it went on from an earlier table.
 
-    words: the options of `lab teach` by name; signature: of the problem; learner and gate: their settings by name; lab: the
-    version that wrote it; continues: the name of the policy that it went on from, "" for none.
+    words: the options of the command by name; signature: of the problem; learner and gate: their settings by name; lab: the
+    version that wrote it; continues: the name of the policy that it went on from, "" for none; command: "teach" or
+    "sequence".
     """
 
     words: dict[str, Any]
@@ -42,6 +43,7 @@ class Session:
     learner: dict[str, Any] = field(default_factory=dict)
     gate: dict[str, Any] = field(default_factory=dict)
     continues: str = ""
+    command: str = "teach"
     schema: int = SCHEMA
 
 
@@ -68,11 +70,11 @@ class Undone:
 
 @dataclass(frozen=True)
 class Closed:
-    """The session is over: its last word."""
+    """The session is over: its last word; the steps of an order are its cost and the proven optimum."""
 
     episodes: int
-    final_steps: int | None
-    optimal_steps: int | None
+    final_steps: int | float | None
+    optimal_steps: int | float | None
     solved: bool
     saved_as: str
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from lab.advice.entries import FILE, Answer, Closed, Entry, Read, Session, Undone, line_of, read_journal, undoable
 from lab.errors import BadInput, WorkFailed
 from lab.learning.events import EpisodeEnded
-from lab.learning.requests import AdviceRequest, AdvisorLeft, Ask
+from lab.learning.requests import AdvisorLeft, Ask, Request, allowed_words
 
 
 class Undo(Exception):
@@ -128,7 +128,7 @@ class Journal:
         if not self.read_only and not self.folding:
             self._append(closed)
 
-    def answer(self, by: str, request: AdviceRequest, ask: Ask) -> int | None:
+    def answer(self, by: str, request: Request, ask: Ask) -> int | None:
         """What the person `by` says to a request: from the journal, or asked now and written before it is followed.
 
         Raises AdvisorLeft, and Again when the person has taken the last answer of the episode back.
@@ -136,8 +136,8 @@ class Journal:
         if self.folding:
             before = self.entries[self._at]
             known = before if isinstance(before, Answer) else Answer(by, 0, 0, 0, None)
-            if known.action is not None and not 0 <= known.action < request.mdp.n_actions:
-                allowed = f"allowed 0..{request.mdp.n_actions - 1}"
+            if known.action is not None and known.action not in request.allowed:
+                allowed = "allowed " + allowed_words(request)
                 raise BadInput(
                     f"journal '{self.path}': {line_of(known)}: action {known.action}: {allowed}: it was edited"
                 )
@@ -148,7 +148,7 @@ class Journal:
         self._unsafe = True
         return _said(given)
 
-    def _asked(self, by: str, request: AdviceRequest, ask: Ask) -> Answer:
+    def _asked(self, by: str, request: Request, ask: Ask) -> Answer:
         if self.read_only:
             raise KeyboardInterrupt  # the replay is over
         last = undoable(self.entries, by)

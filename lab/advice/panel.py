@@ -1,7 +1,7 @@
 """Several advisors at once: who is asked, whose word counts, and who is heard no more (thesis section 10.2.4 iii)."""
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import fsum, log
 
@@ -53,7 +53,21 @@ def decided(votes: Mapping[str, int], trusts: Mapping[str, float], own: int, dec
 
 
 @dataclass(frozen=True)
-class Member:
+class PanelSettings:
+    """How a panel works: several are asked "together" or "in-turn"; decide: a row of DECISIONS. BadInput for other words."""
+
+    asked: str = "together"
+    decide: str = "trust-weighted"
+
+    def __post_init__(self) -> None:
+        if self.asked not in ASKED:
+            raise unknown("way of asking", self.asked, ASKED, "--ask")
+        if self.decide not in DECISIONS:
+            raise unknown("way of deciding", self.decide, DECISIONS, "--decide")
+
+
+@dataclass(frozen=True)
+class MemberStanding:
     """How an advisor stands: the expected share of good advice with its 95 % interval, and its judged answers."""
 
     name: str
@@ -65,8 +79,8 @@ class Member:
     bad: int
 
 
-class _Seat:
-    """A member with what it has said since it came, or was dropped or readmitted last."""
+class _Member:
+    """An advisor with what it has said since it came, or was dropped or readmitted last."""
 
     def __init__(self, advisor: Advisor):
         self.advisor = advisor
@@ -115,30 +129,25 @@ class _Seat:
 class Panel:
     """Several advisors as one. It hears after each episode what came of it, and trusts them by that (see trust.py).
 
-    decide: a row of DECISIONS; asked: "together", all about each step, or "in-turn", one an episode, and the next one
-    where it says nothing. An advisor whose advice is bad beyond doubt is dropped: it is asked about one question in ten, and
-    not followed; when these answers are good beyond doubt, it is readmitted, and only they count from then on. All chance
-    is from `draw`. Raises BadInput for no members, and for an unknown `decide` or `asked`.
+    Asked "together", all are asked about each step; "in-turn", one an episode, and the next one where it says nothing. An
+    advisor whose advice is bad beyond doubt is dropped: it is asked about one question in ten, and not followed; when these
+    answers are good beyond doubt, it is readmitted, and only they count from then on. All chance is from `draw`. Raises
+    BadInput for no members.
     """
 
     def __init__(
         self,
         members: Mapping[str, Advisor],
         states: int,
+        settings: PanelSettings,
         *,
-        decide: str,
-        asked: str,
         draw: Draw,
         tell: Callable[[Event], None],
     ):
         if not members:
             raise BadInput("a panel of advisors: it has no member")
-        if decide not in DECISIONS:
-            raise unknown("decision", decide, DECISIONS, "panel of advisors")
-        if asked not in ASKED:
-            raise unknown("order of asking", asked, ASKED, "panel of advisors")
-        self._seats = {name: _Seat(advisor) for name, advisor in members.items()}
-        self._decide, self._in_turn = DECISIONS[decide], asked == "in-turn"
+        self._members = {name: _Member(advisor) for name, advisor in members.items()}
+        self._decide, self._in_turn = DECISIONS[settings.decide], settings.asked == "in-turn"
         self._draw, self._tell = draw, tell
         self._ways = Ways(states)
         self._terminal: BoolArray | None = None
@@ -150,16 +159,18 @@ class Panel:
         self._terminal = request.mdp.terminal
         if request.episode != self._episode:
             self._episode, self._turn = request.episode, self._turn + 1
-            for seat in self._seats.values():
-                seat.begin()
+            for member in self._members.values():
+                member.begin()
         votes = self._votes(request)
         self._probe(request)
-        if not self._seats:
+        if not self._members:
             raise AdvisorLeft
         if not votes:
             return None
-        trusts = {name: seat.trust_in(request.state, self._ways) for name, seat in self._seats.items() if name in votes}
-        action = decided(votes, trusts, request.learner_action, self._decide)
+        trusts = {
+            name: member.trust_in(request.state, self._ways) for name, member in self._members.items() if name in votes
+        }
+        action = decided(votes, trusts, request.own, self._decide)
         if len({*votes.values()}) > 1:
             self._tell(
                 AdvisorsDisagreed(request.episode, request.step, request.state, tuple(votes.items()), followed=action)
@@ -168,7 +179,7 @@ class Panel:
 
     def _votes(self, request: AdviceRequest) -> dict[str, int]:
         """What those who count say, by name."""
-        heard = [name for name, seat in self._seats.items() if not seat.dropped]
+        heard = [name for name, member in self._members.items() if not member.dropped]
         if self._in_turn and heard:
             first = self._turn % len(heard)
             heard = heard[first:] + heard[:first]
@@ -179,19 +190,19 @@ class Panel:
                 votes[name] = action
                 if self._in_turn:
                     break
-        return {name: votes[name] for name in self._seats if name in votes}
+        return {name: votes[name] for name in self._members if name in votes}
 
     def _probe(self, request: AdviceRequest) -> None:
         """Asks dropped members now and then; what they say is judged later."""
-        for name in [name for name, seat in self._seats.items() if seat.dropped]:
+        for name in [name for name, member in self._members.items() if member.dropped]:
             if self._draw() < PROBED:
                 self._ask(name, request)
 
     def _ask(self, name: str, request: AdviceRequest) -> int | None:
         try:
-            return self._seats[name].ask(request)
+            return self._members[name].ask(request)
         except AdvisorLeft:
-            del self._seats[name]
+            del self._members[name]
             return None
 
     def followed(self, walked: Walked) -> None:
@@ -200,53 +211,48 @@ class Panel:
             return
         over = self._terminal is not None and bool(self._terminal[walked.trail[-1][2]])
         self._ways.walked(walked.trail, walked.reached, over)
-        for name, seat in self._seats.items():
-            seat.judge(walked.trail, self._ways)
-            if not seat.dropped and is_bad(seat.good, seat.bad):
+        for name, member in self._members.items():
+            member.judge(walked.trail, self._ways)
+            if not member.dropped and is_bad(member.good, member.bad):
                 self._drop(name, walked.episode)
-            elif seat.dropped and is_good(seat.good, seat.bad):
+            elif member.dropped and is_good(member.good, member.bad):
                 self._readmit(name, walked.episode)
 
     def _drop(self, name: str, episode: int) -> None:
-        seat = self._seats[name]
-        why = f"{seat.good} of its {seat.good + seat.bad} answers that could be judged led nearer to the goal"
-        self._tell(AdvisorDropped(episode, name, trust(seat.good, seat.bad), why))
-        seat.dropped = True
-        seat.forget()
+        member = self._members[name]
+        why = f"{member.good} of its {member.good + member.bad} answers that could be judged led nearer to the goal"
+        self._tell(AdvisorDropped(episode, name, trust(member.good, member.bad), why))
+        member.dropped = True
+        member.forget()
 
     def _readmit(self, name: str, episode: int) -> None:
-        seat = self._seats[name]
-        seat.dropped = False
-        why = f"asked now and then, {seat.good} of its {seat.good + seat.bad} answers led nearer to the goal"
-        self._tell(AdvisorReadmitted(episode, name, trust(seat.good, seat.bad), why))
+        member = self._members[name]
+        member.dropped = False
+        why = f"asked now and then, {member.good} of its {member.good + member.bad} answers led nearer to the goal"
+        self._tell(AdvisorReadmitted(episode, name, trust(member.good, member.bad), why))
 
-    def standing(self) -> list[Member]:
+    def standing(self) -> list[MemberStanding]:
         """How the members stand that have not left, in the order in which they came."""
         return [
-            Member(name, trust(seat.good, seat.bad), *bounds(seat.good, seat.bad), seat.dropped, seat.good, seat.bad)
-            for name, seat in self._seats.items()
+            MemberStanding(
+                name,
+                trust(member.good, member.bad),
+                *bounds(member.good, member.bad),
+                member.dropped,
+                member.good,
+                member.bad,
+            )
+            for name, member in self._members.items()
         ]
 
 
-def panel_of(
-    names: Sequence[str],
-    advisors: Sequence[Advisor | None],
-    states: int,
-    *,
-    decide: str,
-    asked: str,
-    draw: Draw,
-    tell: Callable[[Event], None],
-) -> Panel:
-    """A panel of advisors, those that are None left out; two of one name are "expert" and "expert 2".
-
-    Raises BadInput as `Panel` does.
-    """
+def members_of(names: Iterable[str], advisors: Iterable[Advisor | None]) -> dict[str, Advisor]:
+    """The members of a panel, those that are None left out; two of one name are "expert" and "expert 2"."""
     members: dict[str, Advisor] = {}
     for name, advisor in zip(names, advisors, strict=True):
         if advisor is not None:
             members[_free(name, members)] = advisor
-    return Panel(members, states, decide=decide, asked=asked, draw=draw, tell=tell)
+    return members
 
 
 def _free(name: str, taken: Mapping[str, Advisor]) -> str:

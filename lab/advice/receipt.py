@@ -111,7 +111,7 @@ class _Question:
 
 def receipt(
     entries: Sequence[Entry],
-    mdp: TabularMDP,
+    mdp: TabularMDP | None,
     values: Values,
     window: int = GateSettings.window,
     *,
@@ -119,13 +119,14 @@ def receipt(
 ) -> Receipt:
     """The receipt for the effective entries of a journal; values: optimal ones (S, A), None where nobody knows them.
 
-    window: K of the moving averages; certain: steps lead where the table says, so that an advisor answers for walls,
-    obstacles and circles. Entries of states and actions that the problem does not have count as answers only.
+    mdp: None for advice on the order, whose steps are costs; window: K of the moving averages; certain: steps lead where
+    the table says, so that an advisor answers for walls, obstacles and circles. Entries of states and actions that the
+    problem does not have count as answers only.
     """
     questions = list(_questions(entries))
     taken = [(one.given.state, one.given.action) for one in questions if one.given.action is not None]
     there = _there(taken, mdp)
-    led = [int(mdp.successor[pair]) for pair in there] if certain else []
+    led = [int(mdp.successor[pair]) for pair in there] if certain and mdp else []
     voices = _voices(questions, {one.by for one in entries if isinstance(one, Answer)}, mdp, values)
     wrong = None if values is None else worse(there, values)
     counted = Receipt(
@@ -136,10 +137,10 @@ def receipt(
         remembered=sum(one.steps for one in entries if isinstance(one, AdviceRemembered)),
         agreed=sum(one.given.action == one.given.own for one in questions),
         into_walls=sum(entered == state for (state, _), entered in zip(there, led, strict=False)),
-        into_obstacles=sum(bool(mdp.terminal[entered] and not mdp.goal[entered]) for entered in led),
-        sent_back=len(_sent_back(questions, mdp)) if certain else 0,
+        into_obstacles=sum(bool(mdp.terminal[entered] and not mdp.goal[entered]) for entered in led) if mdp else 0,
+        sent_back=len(_sent_back(questions, mdp)) if certain and mdp else 0,
         against_best=None if wrong is None else sum(wrong.values()),
-        differences=() if wrong is None or values is None else differences(wrong, mdp, values, LISTED),
+        differences=() if wrong is None or values is None or mdp is None else differences(wrong, mdp, values, LISTED),
         skill=None if values is None else skill_of(there, values),
         voices=voices if len(voices) > 1 else (),
         notices=tuple(_notices(entries)),
@@ -165,11 +166,13 @@ def _questions(entries: Iterable[Entry]) -> Iterator[_Question]:
             said, heard = {}, frozenset()
 
 
-def _there(pairs: Iterable[Pair], mdp: TabularMDP) -> list[Pair]:
-    return [(s, a) for s, a in pairs if 0 <= s < mdp.n_states and 0 <= a < mdp.n_actions]
+def _there(pairs: Iterable[Pair], mdp: TabularMDP | None) -> list[Pair]:
+    return [] if mdp is None else [(s, a) for s, a in pairs if 0 <= s < mdp.n_states and 0 <= a < mdp.n_actions]
 
 
-def _voices(of: Sequence[_Question], people: Collection[str], mdp: TabularMDP, values: Values) -> tuple[Voice, ...]:
+def _voices(
+    of: Sequence[_Question], people: Collection[str], mdp: TabularMDP | None, values: Values
+) -> tuple[Voice, ...]:
     found = []
     for name in dict.fromkeys(name for one in of for name in one.said):
         own = [one for one in of if name in one.said]

@@ -14,7 +14,7 @@ from math import exp, inf, log
 
 import numpy as np
 
-from lab.advice.advisors import SKILLS
+from lab.advice.advisors import SKILL_TAUS
 from lab.mdp import FloatArray, TabularMDP
 
 PRIOR = 1.0  # pseudo-answers of either kind before anything is known: an even Beta
@@ -135,7 +135,7 @@ def is_good(good: int, bad: int) -> bool:
 
 @dataclass(frozen=True)
 class Skill:
-    """An advisor's tau of thesis eq. 9.1 within TAUS, its 95 % interval, the nearest of SKILLS, and from how many answers."""
+    """An advisor's tau of thesis eq. 9.1 within TAUS, its 95 % interval, the nearest of SKILL_TAUS, and from how many answers."""
 
     tau: float
     low: float
@@ -176,7 +176,7 @@ def skill_of(answers: Sequence[Pair], values: FloatArray) -> Skill | None:
         end if likelihood(end) >= floor else float(brentq(lambda at: likelihood(at) - floor, *sorted((end, best))))
         for end in ends
     )
-    word = min(SKILLS, key=lambda name: abs(log(SKILLS[name]) - best))
+    word = min(SKILL_TAUS, key=lambda name: abs(log(SKILL_TAUS[name]) - best))
     tau, lowest, highest = (TAUS[ends.index(at)] if at in ends else exp(at) for at in (best, low, high))
     return Skill(tau, lowest, highest, word, len(below))
 

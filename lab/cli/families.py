@@ -14,20 +14,17 @@ from lab.cli import glossary
 
 
 def _of_teaching() -> dict[str, Iterable[str]]:
-    from lab.advice.advisors import ADVISORS, FORMS, PEOPLE
-    from lab.advice.advisors import SKILLS as SIMULATED
+    from lab.advice.advisors import ADVISORS
     from lab.advice.panel import ASKED, DECISIONS
     from lab.learning.gates import GATES
     from lab.learning.updates import UPDATES
     from lab.skills import SKILLS
 
-    orderers = (*SIMULATED, "tau=X", "wrong", *PEOPLE)
     return {
         "skills": SKILLS,
         "learners": UPDATES,
         "gates": GATES,
-        "advisors": (*ADVISORS, *FORMS),
-        "orderers": orderers,
+        "advisors": ADVISORS,
         "asked": ASKED,
         "decisions": DECISIONS,
     }

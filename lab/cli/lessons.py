@@ -9,7 +9,10 @@ from lab.cli.output import complain, console
 from lab.errors import LabError
 
 if TYPE_CHECKING:
+    from lab.advice.advising import Watch
+    from lab.production.sequence import Wanted
     from lab.seat.people import Classroom
+    from lab.teaching.kept_order import OrderSession
     from lab.teaching.kept_session import KeptSession
     from lab.teaching.teacher import Teacher
 
@@ -34,7 +37,7 @@ def lesson_room(
             shown = stack.enter_context(SeatPage(port, wait_s=wait_s))
             progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
         prompt = TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
-        room = Classroom(progress, prompt, shown, plain=plain)
+        room = Classroom(progress, prompt, shown)
         stack.callback(room.leave)
         try:
             yield room
@@ -53,15 +56,14 @@ def teacher_of(
     decide: str = "trust-weighted",
 ) -> "Teacher":
     """The teacher that the options describe; raises BadInput for options and folders that cannot be."""
-    from lab.advice.counsel import Counsel
+    from lab.advice.advising import Advising
     from lab.teaching.teacher import Teacher
     from lab.toolbox.registry import Toolbox
 
-    counsel = Counsel(tuple(names), room.people(), asked, decide, watch=room.passing)
-    counsel.check()
-    for journal in counsel.cut_records():
+    advising = Advising.of(names, room.people(), asked, decide, watch=room.passing)
+    for journal in advising.cut_records():
         complain(f"journal '{journal.path}': its last line was cut off and is left out: {journal.cut[:60]!r}")
-    teacher = Teacher(Toolbox(toolbox), counsel, seed, room)
+    teacher = Teacher(Toolbox(toolbox), advising, seed, room)
     teacher.toolbox.check()
     return teacher
 
@@ -78,9 +80,35 @@ def kept_session(
     return kept
 
 
-def say_outside(kept: "KeptSession") -> None:
-    """Says which files the session has the lab read that are not its own."""
-    from lab.teaching.lesson import outside
+def wanted_of(kept: "OrderSession", room: "Classroom", watch: "Watch | None") -> "Wanted":
+    """What a session of `lab sequence` asks for, with the people in the room."""
+    from lab.production.sequence import Wanted
+    from lab.seat.order_text import ORDER
 
-    if files := outside(kept):
-        complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(files)}")
+    words = kept.words
+    return Wanted(
+        words.method,
+        words.episodes,
+        words.objective,
+        words.sessions,
+        words.seed,
+        words.stochastic,
+        words.asked,
+        words.gate,
+        room.people(),
+        keep=lambda cell, objective: kept.keep(Path(words.task).stem, cell, objective),
+        hears=lambda event, is_new: room.hears(ORDER, event, is_new),
+        watch=watch,
+    )
+
+
+def say_outside(kept: "KeptSession | OrderSession") -> None:
+    """Says which files the session has the lab read that are not its own."""
+    from lab.teaching import kept_order, lesson
+
+    assert kept.folder is not None
+    files = kept_order.outside(kept) if isinstance(kept, kept_order.OrderSession) else lesson.outside(kept)
+    if files:
+        complain(
+            f"journal '{kept.folder / 'events.jsonl'}' names, outside its folder, what is read now: {', '.join(files)}"
+        )

@@ -31,11 +31,11 @@ def run(
     """Find or learn the skills, time them, find their best order, and carry them out in physics."""
     from dataclasses import replace
 
+    from lab.advice.advising import Advising
     from lab.advice.advisors import PEOPLE
-    from lab.advice.counsel import Counsel
     from lab.files import check_out
-    from lab.production.prepared import prepare
     from lab.production.run import run as run_task
+    from lab.skills.prepared_scene import prepare
     from lab.tasks import task_file as taskfile
     from lab.teaching.kept_session import Words, kept_by
     from lab.view.summary import run_summary
@@ -44,7 +44,7 @@ def run(
     folder = out or Path(f"{loaded.name}-run")
     check_out(folder)
     names = advisor or ["expert"]
-    Counsel(tuple(names), asked=asked, decide=decide).check()
+    Advising.of(names, asked=asked, decide=decide)
     prepared = prepare(loaded, toasts, seed)
     with lesson_room(names, page=page or view, port=port, wait_s=wait) as room:
         teacher = teacher_of(toolbox, names, seed, room, asked, decide)

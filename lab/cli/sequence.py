@@ -6,13 +6,15 @@ from typing import Annotated
 import typer
 
 from lab.cli.families import offers
-from lab.cli.lessons import lesson_room, teacher_of
+from lab.cli.lessons import lesson_room, say_outside, teacher_of, wanted_of
 from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Plain, Port, Seed, ShowPage, ToolboxFolder, Wait
 from lab.cli.output import end, show
 
 
 def sequence(
-    task: Annotated[str, typer.Argument(help="A task or a cell that ships, or a .toml file.")],
+    task: Annotated[
+        str | None, typer.Argument(help="A task or a cell that ships, or a .toml file; none: with --resume.")
+    ] = None,
     case: Annotated[
         str | None,
         typer.Option("--case", help="toast: I, II or III of the thesis. A cell: its order by initials, such as RSR."),
@@ -41,13 +43,16 @@ def sequence(
         str,
         typer.Option(
             "--advisor",
-            help="Who srl may ask which part to move: {orderers}.",
-            autocompletion=offers("orderers"),
+            help="Who srl may ask which part to move: {advisors}.",
+            autocompletion=offers("advisors"),
         ),
     ] = "none",
     gate: Annotated[
         str, typer.Option("--gate", help="When srl asks: {order gates}.", autocompletion=offers("order gates"))
     ] = "ccrl",
+    resume: Annotated[
+        Path | None, typer.Option("--resume", help="Go on with the advice in this folder, as it was begun.")
+    ] = None,
     plot: Annotated[
         Path | None, typer.Option("--plot", help="A .png or .svg file for the costs of the episodes.")
     ] = None,
@@ -60,16 +65,32 @@ def sequence(
     toolbox: ToolboxFolder = None,
     as_json: Json = False,
 ) -> None:
-    """The high level alone: the order of the robot's transfers, beside the proven optimum."""
-    from lab.production.sequence import Wanted, sequence_named
+    """The high level alone: the order of the robot's transfers, beside the proven optimum.
+
+    What a person advises is kept: --resume goes on with it, lab replay shows it again.
+    """
+    from lab.production.sequence import sequence_named
+    from lab.teaching.kept_order import OrderSession, OrderWords, gone_on
+    from lab.toolbox.registry import Toolbox
     from lab.view.summary import sequence_summary
 
-    with lesson_room([advisor], page=page, port=port, wait_s=wait, plain=plain) as room:
-        teacher = teacher_of(toolbox, ["expert"], seed, room)
-        wanted = Wanted(method, episodes, objective, sessions, seed, stochastic, advisor, gate, room.orderers())
-        files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
-        with room.progress:
-            document = sequence_named(task, case, toasts, wanted, teacher=teacher, listener=room.listener, files=files)
-    show(document, as_json, sequence_summary)
+    given = OrderWords(task or "", case, toasts, method, objective, episodes, sessions, stochastic, advisor, gate, seed)
+    box = Toolbox(toolbox)
+    kept = OrderSession(given.complete(), box) if resume is None else gone_on(given, resume, box)
+    if resume is not None:
+        say_outside(kept)
+    words = kept.words
+    files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
+    try:
+        with lesson_room([words.advisor], page=page, port=port, wait_s=wait, plain=plain) as room:
+            teacher = teacher_of(toolbox, ["expert"], words.seed, room)
+            wanted = wanted_of(kept, room, room.passing)
+            with room.progress:
+                document = sequence_named(
+                    words.task, words.case, words.toasts, wanted, teacher=teacher, listener=room.listener, files=files
+                )
+    except KeyboardInterrupt as stopped:
+        raise KeyboardInterrupt(f"{stopped or 'stopped by Ctrl-C'}{kept.resume_command()}") from None
+    show(document | kept.worth(), as_json, sequence_summary)
     if document["interrupted"]:
-        end("stopped by Ctrl-C; the best order until then is above", 130)
+        end(f"stopped by Ctrl-C; the best order until then is above{kept.resume_command()}", 130)

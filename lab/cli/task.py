@@ -77,7 +77,7 @@ def task_check(
 
     Of a cell: that its order can be made, with the line of what is wrong. With --json the document comes in both cases.
     """
-    from lab.production.prepared import check_task
+    from lab.skills.prepared_scene import check_task
 
     errors = check_task(file, toasts, seed)
     if as_json or not errors:

@@ -1,7 +1,7 @@
 """Gymnasium both ways: its environments as problems to teach, ours as registered environments (`import lab.gym`)."""
 
+from lab.gym.environment_name import PREFIX, names_environment, parse_name
 from lab.gym.gym_problem import GymWorld, gym_world
-from lab.gym.made import PREFIX, names_environment, parse_name
 from lab.gym.our_environments import (
     ENVIRONMENTS,
     CellEnv,

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from lab.errors import WorkFailed
-from lab.gym.found_model import SAME_REWARD, Policy, Worth
-from lab.gym.live import Live, Moved
-from lab.gym.table_of_gym import believed, table_of
+from lab.gym.gym_table import believed, table_of
+from lab.gym.numbered_environment import Moved, NumberedEnvironment
+from lab.gym.transition_model import SAME_REWARD, Actions, Worth
 from lab.learning.environment import Judged, Step
 from lab.learning.selection import Draw
 from lab.learning.session import run_session
@@ -47,7 +47,7 @@ class GymEnvironment:
     model, has had so far in the session.
     """
 
-    def __init__(self, live: Live):
+    def __init__(self, live: NumberedEnvironment):
         self.live = live
         self.model = believed(live)
         self.mdp: TabularMDP = table_of(live, self.model)
@@ -151,7 +151,7 @@ class GymEnvironment:
         top = max([own.best_end, *([known.best_end] if known is not None else [])])
         return own.worth(top), None if known is None else known.worth(top)
 
-    def _played(self, policy: Policy, horizon: int) -> Played:
+    def _played(self, policy: Actions, horizon: int) -> Played:
         """What a policy did in seeded episodes of a second environment."""
         other, actions = self.live.again(), policy.tolist()
         returned, ends = 0.0, list[tuple[int, Moved]]()

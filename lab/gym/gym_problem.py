@@ -6,11 +6,11 @@ from typing import Literal, Self
 from pydantic import PrivateAttr
 
 from lab.errors import BadInput, counted
+from lab.gym.environment_name import parse_name
 from lab.gym.gym_environment import ALONE, GymEnvironment
-from lab.gym.live import Live
-from lab.gym.made import parse_name
+from lab.gym.numbered_environment import NumberedEnvironment
+from lab.learning.problem import Problem
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.skills.skill import Problem
 from lab.tasks.record import Learned
 
 CERTAIN_EPISODES = (1000, 5000)  # eight for each entry of the table, but at least and at most so many
@@ -53,7 +53,7 @@ class GymWorld(Learned):
 
 def gym_world(word: str, where: str = "SUBTASK") -> GymWorld:
     """The environment that "gym:ID?KEYWORD=VALUE&..." means. Raises BadInput in one line for whatever it cannot be."""
-    return GymWorld.of(GymEnvironment(Live(parse_name(word, where), where)))
+    return GymWorld.of(GymEnvironment(NumberedEnvironment(parse_name(word, where), where)))
 
 
 def fitting(environment: GymEnvironment) -> tuple[LearnerSettings, GateSettings]:

@@ -16,6 +16,7 @@ from lab.sequencing.cell.routes import entry
 from lab.sequencing.simulate.run import Run
 from lab.tasks.cell import order_from_word, toast_case
 from lab.tasks.task_file import load, load_cell, load_world
+from lab.view.grid_planes import GridPlanes
 
 ROOM = 10  # an episode in a cell may take so many times the decisions that its parts need at most
 METADATA: dict[str, Any] = {"render_modes": ["ansi"], "render_fps": 4}
@@ -38,6 +39,7 @@ class TableEnv(gymnasium.Env[Any, Any]):
         self.action_labels, self.shape = mdp.action_labels, mdp.shape
         self.observation_space = spaces.Discrete(mdp.n_states)
         self.action_space = spaces.Discrete(mdp.n_actions)
+        self.starts = mdp.starts or (mdp.start,)
         self.s, self._moves = mdp.start, 0
 
     @cached_property
@@ -54,16 +56,14 @@ class TableEnv(gymnasium.Env[Any, Any]):
     @property
     def initial_state_distrib(self) -> FloatArray:
         """The chance (S,) of beginning in each state."""
-        starts = list(self.mdp.starts or (self.mdp.start,))
         chances = np.zeros(self.mdp.n_states)
-        chances[starts] = 1.0 / len(starts)
+        chances[list(self.starts)] = 1.0 / len(self.starts)
         return chances
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[int, Info]:
         """The start, or one of several."""
         super().reset(seed=seed)
-        starts = self.mdp.starts or (self.mdp.start,)
-        self.s, self._moves = starts[int(self.np_random.integers(len(starts)))], 0
+        self.s, self._moves = self.starts[int(self.np_random.integers(len(self.starts)))], 0
         return self.s, {"is_success": False}
 
     def step(self, action: int) -> tuple[int, float, bool, bool, Info]:
@@ -81,11 +81,9 @@ class TableEnv(gymnasium.Env[Any, Any]):
         mdp, cell = self.mdp, self.mdp.state_cell(self.s)
         if len(cell) < 2 or mdp.coverage_shape:
             return f"state {mdp.state_label(self.s)}\n"
-        marks = np.where(mdp.goal, "G", np.where(mdp.terminal, "#", ".")).reshape(mdp.shape)
-        marks[cell] = "R"
-        plane = marks.reshape(*mdp.shape[:2], -1)[:, :, cell[2] if len(cell) == 3 else 0]
-        if mdp.action_labels[:2] == ("left", "right"):
-            plane = plane.T[::-1]
+        planes = GridPlanes(mdp)
+        plane = planes.marks(planes.layer(cell)).copy()
+        plane[planes.place(cell)] = "R"
         below = "" if len(cell) == 2 else f"level {cell[2]} of 0..{mdp.shape[2] - 1}\n"
         return "".join(f"{' '.join(row)}\n" for row in plane) + below
 

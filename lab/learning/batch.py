@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.advice.advisors import Advice, TableAdvisor
 from lab.errors import BadInput
 from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Memory, places
@@ -20,6 +19,7 @@ from lab.learning.kernels.session_loop import run
 from lab.learning.selection import SELECTIONS
 from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.simulated_advice import Advice, TableAdvisor
 from lab.learning.updates import UPDATES
 from lab.learning.updates.update import STATE_VALUES
 from lab.mdp import FloatArray, TabularMDP

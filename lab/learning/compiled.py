@@ -5,9 +5,9 @@ user's cache, is named by a hash of its module and of all modules of the same pa
 it, and of those. Where that folder cannot be made, nothing is kept and each run compiles anew.
 """
 
-import ast
 import hashlib
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -21,6 +21,10 @@ import numba
 from platformdirs import user_cache_dir
 
 MOST_FOLDERS = 60  # of a few MB at the most each; a version of the lab has about ten
+# Without a parser, which would take longer than all else here; a word too many, such as of a comment, is no module.
+_IMPORTS = re.compile(r"^(?:from +(\.*)([\w.]*) +import +(?:\(([^)]*)\)|([^\n(]*))|import +([^\n]*))", re.MULTILINE)
+_WORD = re.compile(r"[\w.]+")
+_LEAN: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _CONFIG: Any = numba.config  # its types do not know what it holds
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -39,12 +43,17 @@ def compiled(function: Function, **options: Any) -> Function:
 
 def lean(function: Function, **options: Any) -> Function:
     """For what makes no arrays and keeps none: references need no counting, which would take most of the time."""
-    return compiled(function, error_model="numpy", _nrt=False, **options)
+    return compiled(function, **_LEAN, **options)
 
 
 def inner(function: Function, **options: Any) -> Function:
-    """For what only lean functions call: what Python would need to call it takes a third of the time to compile."""
-    return lean(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
+    """For what only lean functions call: part of these, so that it is not kept, and Python cannot call it.
+
+    What Python would need to call it takes a third of the time to compile.
+    """
+    jit: Any = numba.njit
+    jitted: Function = jit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_LEAN, **options)(function)
+    return jitted
 
 
 def inlined(function: Function) -> Function:
@@ -65,31 +74,37 @@ def key(module: str) -> str:
     sources, pending = dict[str, bytes](), [module]
     while pending:
         name = pending.pop()
-        file = getattr(sys.modules.get(name), "__file__", None)
-        if file is not None and name not in sources:
-            sources[name] = Path(file).read_bytes()
-            pending += [other for other in _imported(name, sources[name]) if _package(other) == _package(module)]
+        if name in sys.modules and name not in sources and _package(name) == _package(module):
+            sources[name], imported = source(name)
+            pending += imported
     digest = hashlib.sha256()
     for name in sorted(sources):
         digest.update(f"{name} {len(sources[name])} ".encode() + sources[name])
     return f"{module}-{digest.hexdigest()[:16]}"
 
 
+@cache
+def source(module: str) -> tuple[bytes, tuple[str, ...]]:
+    """The source of a loaded module, and the modules that it imports at its top with names in them, which may be modules."""
+    file = sys.modules[module].__file__
+    read = b"" if file is None else Path(file).read_bytes()
+    return read, tuple(_imported(module, read.decode()))
+
+
 def _package(module: str) -> str:
     return module.partition(".")[0]
 
 
-def _imported(module: str, source: bytes) -> Iterator[str]:
-    """The modules that a module imports at its top, and names in them, which may be modules."""
+def _imported(module: str, text: str) -> Iterator[str]:
     is_package = Path(sys.modules[module].__file__ or "").stem == "__init__"
     inside = module if is_package else module.rpartition(".")[0]
-    for node in ast.parse(source).body:
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = resolve_name("." * node.level + (node.module or ""), inside) if node.level else node.module or ""
-            yield base
-            yield from (f"{base}.{alias.name}" for alias in node.names)
+    for dots, base, several, one, plain in _IMPORTS.findall(text):
+        if plain:
+            yield from _WORD.findall(plain)
+            continue
+        base = resolve_name(dots + base, inside) if dots else base
+        yield base
+        yield from (f"{base}.{name}" for name in _WORD.findall(several or one))
 
 
 def _made(folder: Path) -> Path | None:

@@ -7,14 +7,23 @@ Verdict = Literal["", "better", "best", "misled"]  # of a gate on an episode tha
 
 
 @dataclass(frozen=True)
+class Improvement:
+    """The last K episodes beside the K before them: rate = (previous - current) / previous (thesis eq. 6.1)."""
+
+    rate: float
+    current_mean: float
+    previous_mean: float
+
+
+@dataclass(frozen=True)
 class EpisodeEnded:
-    """An episode is over: `steps` is max_steps + 1 when it failed; the rate is None before 2K episodes.
+    """An episode is over: `steps` is max_steps + 1 when it failed, of an order its cost; the rate is None before 2K episodes.
 
     verdict: "better" than those before it, no better but the "best" so far, or "misled"; older journals do not know it.
     """
 
     episode: int
-    steps: int
+    steps: int | float
     guided: bool
     helped_steps: int
     improvement_rate: float | None
@@ -31,6 +40,12 @@ class AdviceRequested:
     current_mean: float | None
     previous_mean: float | None
 
+    @classmethod
+    def of(cls, episode: int, known: Improvement | None) -> "AdviceRequested":
+        """From the improvement, None before 2K episodes."""
+        means = (None, None, None) if known is None else (known.rate, known.current_mean, known.previous_mean)
+        return cls(episode, *means)
+
 
 @dataclass(frozen=True)
 class AdviceRejected:
@@ -39,7 +54,7 @@ class AdviceRejected:
     episode: int
     misleads: int
     omega: int
-    steps: int
+    steps: int | float
     mean_before: float
 
 

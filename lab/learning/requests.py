@@ -1,9 +1,10 @@
 """What a learner shows when it asks, who may be asked, and what came of an episode: records below all who advise."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
+from lab.learning.events import Improvement
 from lab.learning.reasons import Reason
 from lab.learning.selection import chances
 from lab.learning.updates import Table
@@ -21,38 +22,52 @@ class Standing:
     lambda_threshold: float = 0.0
 
 
-class Place(Protocol):
-    """What a request shows of where the learner acts, beside the table."""
+class SupportsPicture(Protocol):
+    """An environment, as far as a request shows it beside the table."""
 
     def picture(self, state: int) -> str:
         """The environment's own drawing, "" when there is none."""
 
 
-@dataclass(frozen=True, slots=True)
-class AdviceRequest:
-    """What a learner shows when it asks: where it is, what it thinks, how it has been doing, and why it asks.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What a learner shows when it asks, about a table or about the order: where it is, what it would do, why it asks.
 
-    q: its live action values, q[state][action], not to be changed; step counts from 1; learner_action: what it
-    would do itself; the means are step counts over the last K episodes and the K before, None (like the rate)
-    before there are 2K; why: the gate's reason; temperature and selection: how it chooses now; place: what can
-    draw the state; undoable: an answer of this episode can be taken back.
+    episode and step count from 1; state: a number for where it is; own: what it would do itself; allowed: what may be
+    answered; improvement: of the last K episodes over the K before, None before there are 2K; reason: the gate's;
+    undoable: an answer of this episode can be taken back.
+    """
+
+    episode: int
+    step: int
+    state: int
+    own: int
+    allowed: Sequence[int]
+    improvement: Improvement | None = None
+    reason: Reason | None = None
+    standing: Standing = Standing()
+    undoable: bool = False
+
+
+def allowed_words(request: Request) -> str:
+    """What may be answered, such as "0..3" or "1, 4, 6"."""
+    known = request.allowed
+    return f"{known[0]}..{known[-1]}" if isinstance(known, range) else ", ".join(map(str, known))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdviceRequest(Request):
+    """A request about the next action in a state of a table.
+
+    q: its live action values, q[state][action], not to be changed; temperature and selection: how it chooses now;
+    environment: what can draw the state.
     """
 
     mdp: TabularMDP
     q: Table
-    state: int
-    episode: int
-    step: int
-    learner_action: int
-    improvement_rate: float | None
-    current_mean: float | None
-    previous_mean: float | None
-    why: Reason | None = None
     temperature: float = 1.0
     selection: str = "softmax"
-    standing: Standing = Standing()
-    place: Place | None = None
-    undoable: bool = False
+    environment: SupportsPicture | None = None
 
     @property
     def chances(self) -> list[float]:
@@ -62,7 +77,7 @@ class AdviceRequest:
     @property
     def picture(self) -> str:
         """The environment's own drawing of the state, "" where the problem's grid is all there is."""
-        return "" if self.place is None else self.place.picture(self.state)
+        return "" if self.environment is None else self.environment.picture(self.state)
 
 
 @dataclass(frozen=True)
@@ -84,11 +99,11 @@ class AdvisorLeft(Exception):
     """The advisor ends its advice for the session."""
 
 
-Ask = Callable[[AdviceRequest], int | None]
+Ask = Callable[[Any], int | None]  # given a kind of `Request`
 
 
 class Advisor(Protocol):
     """Whoever can be asked."""
 
-    def advise(self, request: AdviceRequest) -> int | None:
-        """The action to take; None leaves this step to the learner. Raises AdvisorLeft to end advice for good."""
+    def advise(self, request: Any) -> int | None:
+        """One of `request.allowed`; None leaves this step to the learner. Raises AdvisorLeft to end advice for good."""

@@ -9,9 +9,17 @@ from numpy.typing import NDArray
 from lab.errors import BadInput, unknown
 from lab.learning.advice_memory import Recall
 from lab.learning.environment import Environment, TableEnvironment, check_solvable
-from lab.learning.events import AdviceEnded, AdviceGiven, AdviceRejected, AdviceRequested, EpisodeEnded, Event
-from lab.learning.gates import GATES, Improvement, Surroundings, improvement
-from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked
+from lab.learning.events import (
+    AdviceEnded,
+    AdviceGiven,
+    AdviceRejected,
+    AdviceRequested,
+    EpisodeEnded,
+    Event,
+    Improvement,
+)
+from lab.learning.gates import GATES, Surroundings, improvement
+from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked, allowed_words
 from lab.learning.selection import SELECTIONS, Draw, temperature, uniforms
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES, Update
@@ -106,6 +114,7 @@ class Session:
         self.update = UPDATES[learner.learner].make(_start_values(mdp, q0).tolist(), learner, mdp)
         self.q = self.update.q
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
+        self.actions = range(mdp.n_actions)
         self.choose, self.draw = SELECTIONS[learner.selection].make, draw
         several_starts = bool(mdp.starts) or not isinstance(environment, TableEnvironment)
         around = Surroundings(draw, self._others, several_starts)
@@ -252,16 +261,23 @@ class Session:
 
     def _asks(self, advisor: Advisor, state: int, step: int, own: int) -> int | None:
         """The advisor's action, None when nothing is said."""
-        known = self.improved
-        means: tuple[float | None, float | None, float | None] = (None, None, None)
-        if known:
-            means = (known.rate, known.current_mean, known.previous_mean)
         if not self.asked_now:
             self.asked_now = True
-            self.tell(AdviceRequested(self.episode, *means))
-        why, how, place = self.gate.why, self.settings.selection, self.environment
+            self.tell(AdviceRequested.of(self.episode, self.improved))
         request = AdviceRequest(
-            self.mdp, self.q, state, self.episode, step, own, *means, why, self.tau, how, self._standing(), place
+            episode=self.episode,
+            step=step,
+            state=state,
+            own=own,
+            allowed=self.actions,
+            improvement=self.improved,
+            reason=self.gate.why,
+            standing=self._standing(),
+            mdp=self.mdp,
+            q=self.q,
+            temperature=self.tau,
+            selection=self.settings.selection,
+            environment=self.environment,
         )
         try:
             action = advisor.advise(request)
@@ -270,8 +286,8 @@ class Session:
             self.tell(AdviceEnded(self.episode, "advisor left"))
             return None
         self.tell(AdviceGiven(self.episode, step, state, action, own))
-        if action is not None and action not in range(self.mdp.n_actions):
-            raise BadInput(f"the advisor named action {action}: allowed 0..{self.mdp.n_actions - 1}")
+        if action is not None and action not in self.actions:
+            raise BadInput(f"the advisor named action {action}: allowed {allowed_words(request)}")
         return action
 
     def _standing(self) -> Standing:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from math import hypot
 
 from lab.production.floor import Floor
-from lab.production.prepared import Prepared
 from lab.production.recorder import Viewer
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Move, Schedule
@@ -14,6 +13,7 @@ from lab.sim.frames import Recording
 from lab.sim.scene import Spot, spots
 from lab.sim.world import World
 from lab.skills import Skill
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import UPRIGHT, Status
 
 MAX_TRIES = 3  # a failed step is tried again from the state reached, at most twice

@@ -13,15 +13,15 @@ import numpy as np
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.files import assets_folder
 from lab.production.floor import Floor
-from lab.production.prepared import Prepared
-from lab.production.skillset import route, stations
 from lab.production.sources import sources
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import NeededMoves
 from lab.sim.scene import Layout
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import TRIED_WITH, Status
+from lab.skills.skillset import route, stations
 from lab.tasks.task_file import Task
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox

@@ -2,16 +2,13 @@
 
 from collections.abc import Callable
 
-from lab.production.prepared import Prepared
 from lab.production.recorder import Recorder, Viewer
-from lab.production.skillset import SkillSet
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Layout, Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
-from lab.skills.skill import STAND_STEPS, Bench, Status
-
-_SETTLE_STEPS = 60
+from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, Status
+from lab.skills.skillset import SkillSet
 
 
 class Floor:
@@ -33,7 +30,7 @@ class Floor:
         self.bench = Bench(self.scene)
         self.machines: dict[str, Skill] = {}
         self.on_tick: Callable[[], None] | None = None
-        for _ in range(_SETTLE_STEPS):
+        for _ in range(SETTLE_STEPS):
             world.step()
         self.recorder = Recorder(world, toasts, viewer) if film or viewer else None
         self._zero = world.steps
@@ -74,11 +71,3 @@ class Floor:
         self.scene.robot.open_at_once()
         for _ in range(STAND_STEPS):
             self.tick()
-
-
-def try_out(prepared: Prepared, skill: Skill) -> str | None:
-    """Carry a skill out once in physics, with its policy; None when it did what it is for, else why it did not."""
-    with World() as world:
-        floor = Floor(world, prepared.skillset, prepared.surveys.layout, 0)
-        skill.begin(floor.bench)
-        return None if floor.run(skill) is Status.SUCCESS else skill.reason

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from lab.sim import assets
+from lab.sim import models
 from lab.sim.frames import Body, Frame, Recording, Shape
 from lab.sim.scene import Layout, Scene
 from lab.sim.world import TIME_STEP, World
@@ -80,7 +80,7 @@ def show_scene(task: Task, toasts: int, layout: Layout, viewer: Viewer) -> None:
 
 def _extras(number: int) -> list[Body]:
     """What may come to be seen on a slice: both sides toasted, and what skills make."""
-    width, thick, height = assets.SLICE
+    width, thick, height = models.SLICE
     toasted = Shape("box", (width - 0.022, thick + 0.0016, height - 0.022), None, TOASTED)
     made = (body for kind in SKILLS.values() for body in kind.on_slice(number))
     return [Body(f"toasted {number}", (toasted,)), *made]

@@ -9,17 +9,15 @@ from typing import Any
 
 from lab.errors import WorkFailed, counted
 from lab.files import draft
-from lab.mdp import TabularMDP, greedy_path
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
-from lab.production.prepared import Prepared
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Recording
 from lab.skills import Skill
-from lab.skills.skill import Photo
+from lab.skills.prepared_scene import Prepared
 from lab.teaching.teacher import Lesson
 from lab.toolbox.policy import Policy
 
@@ -149,7 +147,7 @@ def _photographed(prepared: Prepared) -> Skill | None:
 def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) -> None:
     """The pictures, the replay and the two JSON files."""
     from lab.view.meshcat import replay_html
-    from lab.view.plots import gantt, learning_curves
+    from lab.view.plots import gantt, learning_curves, values_seen
     from lab.vision import write_picture
 
     paths = {name: folder / file for name, file in FILES.items()}
@@ -160,7 +158,9 @@ def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) 
     skill = _photographed(prepared)
     photo = None if skill is None else skill.photo()
     if skill is not None and photo is not None:
-        draw_value_map(skill.problem.mdp, photo, taught.lessons[skill.name].policy, paths["value_map"])
+        values_seen(
+            taught.lessons[skill.name].policy.q, skill.problem.mdp, photo.picture, photo.seen, paths["value_map"]
+        )
         write_picture(paths["overhead"], photo.picture)
     title = f"{prepared.task.title or prepared.task.name}: {counted(prepared.toasts, 'toast')}"
     replay_html(report.recording, paths["replay"], title=title)
@@ -191,26 +191,6 @@ def _sequence_document(taught: Taught, report: Report) -> dict[str, Any]:
         "stations": [asdict(station) for station in taught.cell.stations],
         "predicted": simulate(taught.cell, report.sequenced.sequence).to_json(),
     }
-
-
-def draw_value_map(mdp: TabularMDP, photo: Photo, policy: Policy, path: Path) -> None:
-    """The values of a problem over the picture that it was read from, with the learned way."""
-    from lab.view.plots import Places, cell_corners, value_map
-
-    states, _, _ = greedy_path(policy.q, mdp, mdp.n_states)
-    cells = [mdp.state_cell(state) for state in states]
-    value_map(
-        policy.q.max(axis=1).reshape(mdp.shape),
-        photo.picture,
-        path,
-        corners=cell_corners(photo.seen.view),
-        places=Places(
-            route=[(cell[0], cell[1]) for cell in cells],
-            blocked=(mdp.terminal & ~mdp.goal).reshape(mdp.shape),
-            start=photo.seen.start,
-            goal=photo.seen.goal,
-        ),
-    )
 
 
 def _write_json(path: Path, document: dict[str, Any]) -> None:

@@ -7,31 +7,16 @@ from pathlib import Path
 from lab.errors import LabError
 from lab.production.composer import carry_out
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
-from lab.production.floor import try_out
-from lab.production.prepared import Prepared
 from lab.production.recorder import Viewer, show_scene
 from lab.production.report import Report, Taught, write_files
 from lab.sequencing import find_sequence
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Reference
-from lab.skills.skill import Problem
+from lab.skills.prepared_scene import Prepared
+from lab.skills.trial import trial_of
 from lab.tasks.sequencing import search_for
 from lab.teaching.listener import Listener
-from lab.teaching.teacher import Teacher, Trial
-from lab.toolbox.policy import Policy
-
-
-def trial_of(prepared: Prepared) -> Trial:
-    """What tries a learned skill in physics before it is kept: a grasp must lift its slice; most skills are not tried."""
-
-    def trial(problem: Problem, policy: Policy) -> str | None:
-        skill = prepared.skillset.skills[problem.name]
-        if not skill.tried:
-            return None
-        prepared.skillset.policies[skill.name] = policy
-        return try_out(prepared, skill)
-
-    return trial
+from lab.teaching.teacher import Teacher
 
 
 def teach_all(prepared: Prepared, teacher: Teacher, listener: Listener) -> Taught:

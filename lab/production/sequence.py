@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lab.advice.advising import Watch, Watched, through
+from lab.advice.advisors import PEOPLE, AdvisorName, make_advisor
+from lab.advice.entries import Closed
+from lab.advice.journal import Again, Journal
 from lab.errors import BadInput, unknown
+from lab.learning.events import Event
+from lab.learning.requests import Ask
 from lab.learning.settings import GateSettings
 from lab.production.drawn_times import stochastic
 from lab.sequencing import SEQUENCERS, check_method, find_sequence
@@ -24,17 +30,21 @@ from lab.teaching.listener import Listener
 from lab.teaching.teacher import Teacher
 
 if TYPE_CHECKING:
-    from lab.sequencing.methods.srl_advised import AdvisedResult, SequenceRequest
-
-    Ask = Callable[[SequenceRequest], int | None]
+    from lab.sequencing.methods.srl_advised import AdvisedResult
 
 DEFAULT_TOASTS = 3
+NOBODY = AdvisorName.of("none")
+Keep = Callable[[Cell, str], Journal]  # given the cell and the objective
 SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What `lab sequence` is asked for; None: as the file says. advisor: who may be asked which part to move next."""
+    """What `lab sequence` is asked for; None: as the file says. advisor: who may be asked which part to move next.
+
+    keep: gives the journal of what people say, by default one that is not written; hears: what the sessions tell, and
+    whether it is new; watch: is shown each question with its answer.
+    """
 
     method: str | None = None
     episodes: int | None = None
@@ -42,9 +52,12 @@ class Wanted:
     sessions: int = 1
     seed: int = 0
     stochastic: bool = False
-    advisor: str = "none"
+    advisor: AdvisorName = NOBODY
     gate: str = "ccrl"
-    people: "Mapping[str, Ask]" = field(default_factory=dict)
+    people: Mapping[str, Ask] = field(default_factory=dict)
+    keep: Keep = lambda cell, objective: Journal()
+    hears: Callable[[Event, bool], None] = lambda event, is_new: None
+    watch: Watch | None = None
 
 
 def sequence_named(
@@ -92,14 +105,14 @@ def sequence_named(
 
 def _check_names(wanted: Wanted, settings: Sequencing) -> None:
     """BadInput for a name that no table holds, and for advice to a method that asks for none; before any work."""
-    from lab.sequencing.methods.srl_advised import check_advice
+    from lab.sequencing.methods.srl_advised import check_gate
 
     method, objective = wanted.method or settings.method, wanted.objective or settings.objective
     check_method(method)
     if objective not in OBJECTIVES:
         raise unknown("objective", objective, OBJECTIVES, "--objective")
-    check_advice(wanted.advisor, wanted.gate)
-    if wanted.advisor != "none" and method != "srl":
+    check_gate(wanted.gate)
+    if wanted.advisor.row != "none" and method != "srl":
         raise BadInput(f"--advisor {wanted.advisor} with --method {method}: only srl asks for advice")
 
 
@@ -112,8 +125,8 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
 
 def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher, listener: Listener) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
-    from lab.production.prepared import prepare
     from lab.production.run import teach_all
+    from lab.skills.prepared_scene import prepare
 
     objective = wanted.objective or task.sequencing.objective
     if objective in WITH_DUE_TIMES:
@@ -131,39 +144,61 @@ def sequence_cell(
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     """Sessions of one method on a cell, beside what cannot be beaten; the document of `lab sequence`, and the sessions.
 
-    BadInput for an unknown method or objective, and for an objective that the cell has no times for.
+    They are run from their beginning each time an answer is taken back. BadInput for an unknown method or objective, and
+    for an objective that the cell has no times for.
     """
+    asks_people = wanted.advisor.row in PEOPLE
+    journal = wanted.keep(cell, wanted.objective or settings.objective) if asks_people else Journal()
+    try:
+        while True:
+            try:
+                return _sessions(
+                    cell, settings, wanted, chance, listener or Listener(), journal if asks_people else None
+                )
+            except Again:
+                journal.rewind()
+    finally:
+        journal.close()
+
+
+def _sessions(
+    cell: Cell, settings: Sequencing, wanted: Wanted, chance: Chance, listener: Listener, journal: Journal | None
+) -> tuple[dict[str, Any], list[SequenceResult]]:
     method = wanted.method or settings.method
+    check_method(method)
     search = search_for(
         settings,
         episodes=wanted.episodes,
         objective=wanted.objective,
         chance=chance if wanted.stochastic and SEQUENCERS[method].drawn else NO_CHANCE,
     )
-    check_method(method)
     check_objective(search.objective, cell)
     known = reference(cell, search.objective)
     found = []
     interrupted = False
-    listener = listener or Listener()
     shown = known if search.chance == NO_CHANCE else None
     for session in range(wanted.sessions):
         heard = _Heard(listener)
         listener.sequences(
-            search.episodes, shown, None if wanted.advisor == "none" else GateSettings(wanted.gate, spare_best=True)
+            search.episodes, shown, None if wanted.advisor.row == "none" else GateSettings(wanted.gate, spare_best=True)
         )
         try:
-            found.append(_session(cell, method, replace(search, on_episode=heard), wanted, session))
+            found.append(_session(cell, method, replace(search, on_episode=heard), wanted, session, journal))
         except KeyboardInterrupt:
             interrupted = True
             if heard.best is None and not found:
                 raise KeyboardInterrupt("stopped by Ctrl-C before an order was found") from None
             found += [] if heard.best is None else [heard.result()]
             break
-        listener.sequenced(found[-1], shown)
+        if journal is None or not journal.folding:
+            listener.sequenced(found[-1], shown)
     document = _document(cell, method, search, found, known, wanted) | {"interrupted": interrupted}
     if wanted.stochastic and not interrupted:
         document["stochastic"] = stochastic(cell, method, search, min(found, key=_cost), chance, wanted.seed)
+    if journal is not None and not interrupted:
+        proven = document["optimal_cost"]
+        is_best = proven is not None and document["gap"] == 0.0
+        journal.closes(Closed(wanted.sessions * search.episodes, document["cost"], proven, is_best, saved_as=""))
     return document, found
 
 
@@ -185,19 +220,29 @@ class _Heard:
         return SequenceResult(self.best.best, self.best.best_cost, tuple(self.costs))
 
 
-def _session(cell: Cell, method: str, search: Search, wanted: Wanted, session: int) -> SequenceResult:
-    if wanted.advisor == "none":
+def _session(
+    cell: Cell, method: str, search: Search, wanted: Wanted, session: int, journal: Journal | None
+) -> SequenceResult:
+    if wanted.advisor.row == "none":
         return find_sequence(cell, method, search, wanted.seed, session)
-    return _advised(cell, method, search, wanted, session)
+    return _advised(cell, search, wanted, session, journal)
 
 
-def _advised(cell: Cell, method: str, search: Search, wanted: Wanted, session: int) -> "AdvisedResult":
+def _advised(cell: Cell, search: Search, wanted: Wanted, session: int, journal: Journal | None) -> "AdvisedResult":
     """A session of SRL with advice."""
-    from lab.sequencing.methods.srl_advised import advised_srl, sequence_advisor
+    from lab.advice.order_level import OrderLevel, signature_of
+    from lab.sequencing.methods.srl_advised import advised_srl
 
-    rng = np.random.default_rng([wanted.seed, 2, session])
-    advisor = sequence_advisor(wanted.advisor, cell, np.random.default_rng([wanted.seed, 3, session]), wanted.people)
-    return advised_srl(cell, search, rng, GateSettings(wanted.gate, spare_best=True), advisor)
+    rng, own = (np.random.default_rng([wanted.seed, stream, session]) for stream in (2, 3))
+    people, signature = through(journal, wanted.people), signature_of(cell, search.objective)
+    advisor = make_advisor(wanted.advisor, OrderLevel(cell, own, people, search.episodes, signature))
+    if advisor is not None and wanted.watch is not None:
+        advisor = Watched(advisor, wanted.watch)
+
+    def tell(event: Event) -> None:
+        wanted.hears(event, True if journal is None else journal.tell(event))
+
+    return advised_srl(cell, search, rng, GateSettings(wanted.gate, spare_best=True), advisor, tell)
 
 
 def reference(cell: Cell, objective: str) -> Reference:
@@ -253,8 +298,8 @@ def _document(
         "final_success_percent": 100.0 * sum(finals) / len(finals) if finals and known.proven and same_times else None,
         "mean_best_s": float(np.mean([result.cost for result in found])) if timed else None,
         "mean_best_cost": float(np.mean([result.cost for result in found])),
-        "advisor": wanted.advisor,
-        "advice": _advice(found) if wanted.advisor != "none" else None,
+        "advisor": str(wanted.advisor),
+        "advice": _advice(found) if wanted.advisor.row != "none" else None,
         "stochastic": None,
         "files": {},
     }

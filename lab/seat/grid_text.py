@@ -1,8 +1,8 @@
 """The picture of where a learner is: a grid, slices of a space, or an environment's own drawing, cut to what fits."""
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from rich.text import Text
 
 from lab.learning.requests import AdviceRequest
 from lab.mdp import TabularMDP
+from lab.view.grid_planes import GridPlanes, is_map
 
 Plane = NDArray[np.str_]
 DIRECTIONS = ("up", "down", "left", "right")
@@ -19,6 +20,9 @@ ASCII_ARROWS = "^v<>"
 NAMES = {"up": 0, "north": 0, "down": 1, "south": 1, "left": 2, "west": 2, "right": 3, "east": 3}
 LEGEND = {"R": "R robot", "r": "r its shadow", "G": "G goal", "g": "g the goal's shadow", "#": "# obstacle"}
 COVERING = {"R": "R head", "x": "x covered"}
+STYLES = {"R": "bold cyan", "r": "cyan", "G": "bold green", "g": "green", "#": "red", "x": "green"} | dict.fromkeys(
+    f"*{ARROWS}{ASCII_ARROWS}", "bold magenta"
+)
 GAP = 3  # columns between two slices
 FEWEST_COLUMNS = 9  # cells of a slice that is cut so that its neighbours can be seen beside it
 UNLIMITED = 10**6
@@ -75,11 +79,6 @@ def points_by_name(mdp: TabularMDP) -> bool:
     return len(mdp.coverage_shape or mdp.shape) <= 2 and known >= {0, 1, 2, 3}
 
 
-def is_map(mdp: TabularMDP) -> bool:
-    """Whether axes 0 and 1 are the x and y of a map seen from above: the moves along axis 0 are called left and right."""
-    return len(mdp.shape) >= 2 and mdp.action_labels[:2] == ("left", "right")
-
-
 def nearest_goal(mdp: TabularMDP, cell: tuple[int, ...]) -> tuple[int, ...] | None:
     """The goal's cell with the fewest steps along the axes from a cell; None when there is no goal."""
     goals = [mdp.state_cell(int(state)) for state in np.flatnonzero(mdp.goal)]
@@ -117,7 +116,9 @@ def picture_of(request: AdviceRequest, marks: Marks, width: int, height: int) ->
         for line in lines:
             line.truncate(width)
         return Picture(lines, is_fixed=True)
-    return _Slices(request, marks).fitting(width, height) if request.mdp.shape or request.mdp.coverage_shape else None
+    return (
+        _GridDrawing(request, marks).fitting(width, height) if request.mdp.shape or request.mdp.coverage_shape else None
+    )
 
 
 def safe_ansi(drawing: str) -> Text:
@@ -156,11 +157,11 @@ def draw(request: AdviceRequest, arrows: str = ARROWS, free: str = "·") -> Text
     """
     if not (request.mdp.shape or request.mdp.coverage_shape):
         return None
-    drawn = _Slices(request, Marks(arrows, free)).fitting(UNLIMITED, UNLIMITED, most=1)
+    drawn = _GridDrawing(request, Marks(arrows, free)).fitting(UNLIMITED, UNLIMITED, most=1)
     return Text("\n").join([*drawn.lines, Text(drawn.legend)])
 
 
-class _Slices:
+class _GridDrawing:
     """The grid of one request as planes of axes 0 and 1, layer by layer of axis 2."""
 
     def __init__(self, request: AdviceRequest, marks: Marks):
@@ -168,18 +169,11 @@ class _Slices:
         mdp = self.mdp
         self.shape = mdp.coverage_shape or mdp.shape
         self.cell = mdp.state_cell(request.state)
-        self.entered = mdp.state_cell(int(mdp.successor[request.state, request.learner_action]))
+        self.entered = mdp.state_cell(int(mdp.successor[request.state, request.own]))
         self.goal = None if mdp.coverage_shape else nearest_goal(mdp, self.cell)
         self.layers, self.layer = (self.shape[2], self.cell[2]) if len(self.shape) > 2 else (1, 0)
-        self.flips = is_map(mdp)
-        rows, columns = (1, self.shape[0]) if len(self.shape) == 1 else self.shape[:2]
-        self.rows, self.columns = (columns, rows) if self.flips else (rows, columns)
-
-    def _place(self, cell: tuple[int, ...]) -> tuple[int, int]:
-        """Row and column of a cell in the picture."""
-        if len(cell) == 1:
-            return 0, cell[0]
-        return (self.rows - 1 - cell[1], cell[0]) if self.flips else (cell[0], cell[1])
+        self.grid = GridPlanes(mdp)
+        self.rows, self.columns, self._place = self.grid.rows, self.grid.columns, self.grid.place
 
     def plane(self, layer: int) -> Plane:
         """The marks of one layer, row by row as they are shown."""
@@ -187,10 +181,9 @@ class _Slices:
         if mdp.coverage_shape:
             plane = np.where(mdp.covered(self.request.state), "x", free)
         else:
-            index = (slice(None),) * min(2, len(self.shape)) + (layer, *self.cell[3:])[: len(self.shape) - 2]
-            goals, ends = (a.reshape(self.shape)[index] for a in (mdp.goal, mdp.terminal))
-            plane = np.atleast_2d(np.where(goals, "G", np.where(ends, "#", free)))
-            plane = plane.T[::-1].copy() if self.flips else plane
+            plane = self.grid.marks(
+                self.grid.layer((*self.cell[:2], layer, *self.cell[3:])[: len(self.shape)]), free
+            ).copy()
         own = layer == self.layer
         if own and self.goal is not None and plane[self._place(self.goal)] == free:
             plane[self._place(self.goal)] = "g"
@@ -207,7 +200,7 @@ class _Slices:
         if entered == self.cell or entered[3:] != self.cell[3:] or entered[2:3] not in ((), (layer,)):
             return
         there = self._place(entered)
-        direction = direction_of(self.mdp, request.learner_action) if entered[2:] == self.cell[2:] else None
+        direction = direction_of(self.mdp, request.own) if entered[2:] == self.cell[2:] else None
         if plane[there] in (self.marks.free, "x", "g"):
             plane[there] = "*" if direction is None else self.marks.arrows[direction]
 
@@ -232,19 +225,19 @@ class _Slices:
         planes = {k: self.plane(k)[rows.start : rows.stop, columns.start : columns.stop] for k in layers}
         blocks = [self._block(plane, layer if titled else None) for layer, plane in planes.items()]
         widest = max(line.cell_len for block in blocks for line in block)
-        lines = [Text(" " * GAP).join(line for line in side) for side in zip(*_padded(blocks, widest), strict=True)]
+        for line in chain.from_iterable(blocks[:-1]):
+            line.pad_right(widest - line.cell_len)
+        lines = [Text(" " * GAP).join(side) for side in zip(*blocks, strict=True)]
         seen = {str(mark) for plane in planes.values() for mark in plane.ravel()}
         hides_goal = self.goal is not None and not seen & {"G"}
         return Picture(lines, self._legend(seen), self._shown(rows, columns, layers if titled else None), hides_goal)
 
-    def _title(self, layer: int) -> str:
-        return f"[level {layer}]" if layer == self.layer else f"level {layer}"
-
     def _block(self, plane: Plane, layer: int | None) -> list[Text]:
-        styles = _styles(self.marks)
-        title = [] if layer is None else [Text(f" {self._title(layer)}", "bold" if layer == self.layer else "dim")]
-        rows = [Text.assemble(*((f" {mark}", styles.get(str(mark), "dim")) for mark in row)) for row in plane]
-        return title + rows
+        rows = [Text.assemble(*((f" {mark}", STYLES.get(str(mark), "dim")) for mark in row)) for row in plane]
+        if layer is None:
+            return rows
+        own = layer == self.layer
+        return [Text(f" [level {layer}]" if own else f" level {layer}", "bold" if own else "dim"), *rows]
 
     def _legend(self, seen: set[str]) -> str:
         words = COVERING if self.mdp.coverage_shape else LEGEND
@@ -256,31 +249,10 @@ class _Slices:
 
     def _shown(self, rows: range, columns: range, layers: range | None) -> tuple[tuple[int, int, int], ...]:
         """The axes of which a part is shown, with the first and the last cell."""
-        if self.flips:
+        if self.grid.flips:
             ranges = {0: columns, 1: range(self.rows - rows.stop, self.rows - rows.start)}
         else:
             ranges = {0: columns} if len(self.shape) == 1 else {0: rows, 1: columns}
         if layers is not None:
             ranges[2] = layers
         return tuple((a, r.start, r.stop - 1) for a, r in ranges.items() if len(r) < self.shape[a])
-
-
-def _padded(blocks: Sequence[list[Text]], width: int) -> list[list[Text]]:
-    """Blocks of lines, all but the last one filled up to a width."""
-    for block in blocks[:-1]:
-        for line in block:
-            line.pad_right(width - line.cell_len)
-    return list(blocks)
-
-
-def _styles(marks: Marks) -> dict[str, str]:
-    return {
-        "R": "bold cyan",
-        "r": "cyan",
-        "G": "bold green",
-        "g": "green",
-        "#": "red",
-        "x": "green",
-        "*": "bold magenta",
-        **dict.fromkeys(marks.arrows, "bold magenta"),
-    }

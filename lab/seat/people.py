@@ -5,18 +5,18 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
-from lab.advice.counsel import Watch, Watched
+from lab.advice.advising import Watch, Watched
 from lab.advice.entries import Answer
 from lab.advice.journal import Journal
 from lab.advice.panel import Panel
 from lab.advice.receipt import receipt
 from lab.errors import counted
 from lab.learning.events import EpisodeEnded, Event
-from lab.learning.requests import AdviceRequest, Advisor, Ask
+from lab.learning.problem import Problem
+from lab.learning.requests import Advisor, Ask, Request
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray
 from lab.seat.terminal.prompt import TeachingPrompt
-from lab.skills.skill import Problem
 from lab.teaching.kept_session import known_values
 from lab.teaching.listener import Both, Listener
 from lab.teaching.teacher import Audience
@@ -24,11 +24,8 @@ from lab.toolbox.policy import Policy
 from lab.view.progress import RunProgress
 
 if TYPE_CHECKING:
+    from lab.seat.lesson_scene import LessonScene
     from lab.seat.page.teaching_page import SeatPage
-    from lab.seat.stage import Stage
-    from lab.sequencing.methods.srl_advised import SequenceRequest
-
-    OrderAsk = Callable[[SequenceRequest], int | None]
 
 WORTH_S = 2.0  # the shortest time between two receipts of one lesson
 PAGE_S = 30.0  # how long a replay waits for a browser
@@ -41,12 +38,9 @@ class Classroom(Audience):
     The page shows the scene as well: the robot stands where the learner asks. `prompt` and `page`: None when not there.
     """
 
-    def __init__(
-        self, progress: RunProgress, prompt: TeachingPrompt | None, page: "SeatPage | None", *, plain: bool = False
-    ) -> None:
+    def __init__(self, progress: RunProgress, prompt: TeachingPrompt | None, page: "SeatPage | None") -> None:
         self.progress, self._prompt, self._page = progress, prompt, page
-        self._plain = plain
-        self._stage: Stage | None = None
+        self._stage: LessonScene | None = None
         self._pause_s: float | None = None  # between two answers of a replay
         self._asked_here = False  # the last question was put to somebody here, and was shown
         self._shown_s = 0.0  # when the page was last shown a question that is not put to it
@@ -83,22 +77,7 @@ class Classroom(Audience):
         """Who hears how a run goes on."""
         return self.progress if self._page is None else Both(self.progress, self._page.listener())
 
-    def orderers(self) -> dict[str, "OrderAsk"]:
-        """Who can be asked which part to move next, by name."""
-        from lab.seat.terminal.order_prompt import OrderPrompt
-
-        prompt = OrderPrompt(self.progress.console, plain=self._plain)
-
-        def ask_terminal(request: "SequenceRequest") -> int | None:
-            with self._offered(request, prompt.answer_from_outside), self.progress.paused():
-                return prompt(request)
-
-        orderers: dict[str, OrderAsk] = {"terminal": ask_terminal}
-        if self._page is not None:
-            orderers["web"] = self._page.ask_order
-        return orderers
-
-    def _ask_terminal(self, request: AdviceRequest) -> int | None:
+    def _ask_terminal(self, request: Request) -> int | None:
         assert self._prompt is not None
         self._asked_here = True
         if self._page is None:
@@ -109,7 +88,7 @@ class Classroom(Audience):
             return self._prompt(request)
 
     @contextmanager
-    def _offered(self, request: "AdviceRequest | SequenceRequest", hear: Callable[[str], None]) -> Iterator[None]:
+    def _offered(self, request: Request, hear: Callable[[str], None]) -> Iterator[None]:
         """The page shows a question that the terminal asks, and may answer it there."""
         if self._page is None:
             yield
@@ -121,13 +100,13 @@ class Classroom(Audience):
         finally:
             self._page.withdraw()
 
-    def _ask_page(self, request: AdviceRequest) -> int | None:
+    def _ask_page(self, request: Request) -> int | None:
         assert self._page is not None
         self._asked_here = True
         self.shows(request)
         return self._page.ask(request)
 
-    def shows(self, request: AdviceRequest) -> None:
+    def shows(self, request: Request) -> None:
         """Moves the robot of the page's scene to where the learner asks."""
         if self._page is not None and self._stage is not None:
             self._page.update(self._stage.frame(request.state))
@@ -136,9 +115,9 @@ class Classroom(Audience):
         self.leave()
         if self._page is None:
             return
-        from lab.seat.stage import stage_of
+        from lab.seat.lesson_scene import lesson_scene_of
 
-        self._stage = stage_of(where, problem)
+        self._stage = lesson_scene_of(where, problem)
         if self._stage is not None:
             self._page.show(self._stage.bodies(), self._stage.camera)
 
@@ -190,7 +169,7 @@ class Classroom(Audience):
             self._page.wait_for_page(PAGE_S)
         return self
 
-    def watch(self, request: AdviceRequest, action: int | None) -> None:
+    def watch(self, request: Request, action: int | None) -> None:
         """Shows a question of a replay and its answer."""
         self.passes(request, action)
         if self._prompt is not None:
@@ -199,7 +178,7 @@ class Classroom(Audience):
         if self._pause_s:
             time.sleep(self._pause_s)
 
-    def passes(self, request: AdviceRequest, action: int | None) -> None:
+    def passes(self, request: Request, action: int | None) -> None:
         """Shows on the page where somebody else is asked, not oftener than it can be seen."""
         asked_here, self._asked_here = self._asked_here, False
         now_s = time.monotonic()

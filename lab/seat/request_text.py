@@ -11,7 +11,8 @@ from lab.learning.events import EpisodeEnded
 from lab.learning.reasons import TooSlow
 from lab.learning.requests import AdviceRequest, Standing
 from lab.mdp import TabularMDP
-from lab.seat.grid_text import Marks, Picture, is_map, nearest_goal, points_by_name
+from lab.seat.grid_text import Marks, Picture, nearest_goal, points_by_name
+from lab.view.grid_planes import is_map
 
 GOAL, OBSTACLE, DEAD_END, NOWHERE = "to the goal", "into an obstacle", "to an end that is no goal", "nowhere"
 ALIKE = 1e-9  # chances that differ by less are the same
@@ -45,7 +46,7 @@ def outcome(request: AdviceRequest, action: int) -> str:
 
 def is_foreign(request: AdviceRequest) -> bool:
     """Whether the learner acts elsewhere than in its table, which holds the likeliest step then."""
-    return request.place is not None and not isinstance(request.place, TableEnvironment)
+    return request.environment is not None and not isinstance(request.environment, TableEnvironment)
 
 
 def leads(request: AdviceRequest, action: int) -> str:
@@ -59,7 +60,7 @@ def choice(request: AdviceRequest, marks: Marks, brief: bool = False) -> str:
 
     brief: only where that leads, "" when that is nothing special; the rest stands in the list of moves.
     """
-    chances, own = request.chances, request.learner_action
+    chances, own = request.chances, request.own
     best = max(range(len(chances)), key=chances.__getitem__)
     where = leads(request, own)
     if brief:
@@ -79,7 +80,7 @@ def moves(request: AdviceRequest, marks: Marks) -> list[Text]:
     parts = []
     for action, chance in enumerate(request.chances):
         text = f"{marks.named(request.mdp, action)} {percent(chance)}"
-        own = action == request.learner_action
+        own = action == request.own
         parts.append(Text(f"[{text}]" if own else text, "bold magenta" if own else ""))
     return parts
 
@@ -90,7 +91,7 @@ def bars(request: AdviceRequest, marks: Marks) -> list[Text]:
     widest = max(map(len, names))
     lines = []
     for action, (name, chance) in enumerate(zip(names, request.chances, strict=True)):
-        own = action == request.learner_action
+        own = action == request.own
         bar = _bar(chance, marks.bars)
         head = f"{marks.chosen if own else ' '} {name:{widest}}  "
         style = "bold magenta" if own else ""
@@ -106,16 +107,19 @@ def _bar(share: float, parts: str) -> str:
 
 def progress(request: AdviceRequest, brief: bool = False) -> list[str]:
     """Why it asks, and the moving averages beside the threshold; brief: the averages alone, in one line."""
-    rate, current, previous = request.improvement_rate, request.current_mean, request.previous_mean
+    known = request.improvement
     least = request.standing.lambda_threshold
-    reason = [f"It asks because {request.why}."] if request.why and not brief else []
-    if rate is None or current is None or previous is None:
+    reason = [f"It asks because {request.reason}."] if request.reason and not brief else []
+    if known is None:
         return [*reason, "Too few episodes for averages." if brief else "Too few episodes so far for moving averages."]
+    rate, current, previous = known.rate, known.current_mean, known.previous_mean
     if brief:
         sign = "<" if rate < least else ">="
         return [f"Steps {previous:.1f}, now {current:.1f}: {rate:+.1%} {sign} {least:.0%}"]
-    if isinstance(request.why, TooSlow):  # that is its rate and the threshold
-        return [f"It asks because {request.why}: lately {current:.1f} steps per episode, before that {previous:.1f}."]
+    if isinstance(request.reason, TooSlow):  # that is its rate and the threshold
+        return [
+            f"It asks because {request.reason}: lately {current:.1f} steps per episode, before that {previous:.1f}."
+        ]
     means = f"lately {current:.1f}, before that {previous:.1f}; improvement {rate:+.1%}, threshold {least:.0%}"
     return [*reason, f"Steps per episode: {means}."]
 
@@ -249,11 +253,12 @@ def _next(request: AdviceRequest, action: int) -> str:
 def reasons(request: AdviceRequest, marks: Marks, guided: int) -> list[str]:
     """Why it asks, with all its numbers, in plain words; guided: the episodes that were given advice until now."""
     mdp, now = request.mdp, request.standing
-    lines = [f"It asks because {request.why}." if request.why else "It asks about every step."]
-    if request.current_mean is not None and request.previous_mean is not None and request.improvement_rate is not None:
+    lines = [f"It asks because {request.reason}." if request.reason else "It asks about every step."]
+    known = request.improvement
+    if known is not None:
         lines.append(
-            f"Its last episodes took {request.current_mean:.1f} steps on average, those before them "
-            f"{request.previous_mean:.1f}: an improvement of {request.improvement_rate:+.1%}; a good one is "
+            f"Its last episodes took {known.current_mean:.1f} steps on average, those before them "
+            f"{known.previous_mean:.1f}: an improvement of {known.rate:+.1%}; a good one is "
             f"{now.lambda_threshold:.0%} or more."
         )
     else:

@@ -12,7 +12,7 @@ from typing import Literal
 
 from lab.errors import BadInput, unknown
 
-Kind = Literal["box", "cylinder", "sphere", "mesh"]
+ShapeKind = Literal["box", "cylinder", "sphere", "mesh"]
 Rgba = tuple[float, float, float, float]
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -31,7 +31,7 @@ class Shape:
     anything else.
     """
 
-    kind: Kind
+    kind: ShapeKind
     size: tuple[float, ...] = ()
     mesh: Path | None = None
     rgba: Rgba = (0.7, 0.7, 0.7, 1.0)
@@ -87,7 +87,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Camera:
+class Viewpoint:
     """Where the page looks from and to, in the world [m], z up."""
 
     eye: Vector = (2.65, -1.8, 1.65)
@@ -100,7 +100,7 @@ class Recording:
 
     bodies: tuple[Body, ...]
     frames: list[Frame] = field(default_factory=list)
-    camera: Camera = field(default_factory=Camera)
+    camera: Viewpoint = field(default_factory=Viewpoint)
 
     @property
     def duration_s(self) -> float:

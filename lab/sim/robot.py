@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from lab.errors import WorkFailed
 from lab.files import assets_folder
 from lab.sim import kinematics
-from lab.sim.assets import FINGER_OPEN
 from lab.sim.kinematics import ToolPose
+from lab.sim.models import FINGER_OPEN
 from lab.sim.world import TIME_STEP, World
 
 NAME = "robot"
@@ -170,7 +170,8 @@ class Robot:
         before = self.world.joints(NAME, kinematics.JOINTS)
         here = kinematics.forward(before)
         first = poses[0]
-        start = ToolPose(here.x, here.y, here.z, first.yaw + _turn(here.yaw - first.yaw))
+        turn = (here.yaw - first.yaw + pi) % (2 * pi) - pi
+        start = ToolPose(here.x, here.y, here.z, first.yaw + turn)
         way = plan([start, *poses], self.speed * slow, self.acceleration * slow, blend, before)
         for position, velocity in zip(way.positions, way.velocities, strict=True):
             self.world.drive(NAME, kinematics.JOINTS, position, velocity)
@@ -194,7 +195,3 @@ class Robot:
         self.world.drive(NAME, FINGERS, [FINGER_OPEN, FINGER_OPEN], force=60.0)
         self.closed = False
         yield from self.rest(_GRIP_STEPS)
-
-
-def _turn(angle: float) -> float:
-    return (angle + pi) % (2 * pi) - pi

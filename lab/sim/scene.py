@@ -9,28 +9,22 @@ import numpy as np
 
 from lab.errors import BadInput
 from lab.files import assets_folder
-from lab.sim import assets, kinematics
+from lab.sim import kinematics, models
+from lab.sim.frames import Rgba, Vector
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import Robot
 from lab.sim.world import World
 from lab.tasks.task_file import NEAREST_STATIONS_M, Obstacle, Station, Task
 
+NEAREST_M = 0.36  # [m] nearer to its own axis than this the arm would touch itself
 SLAB = 0.012  # [m] plates and buffers are slabs this thick
 GRASP_DEPTH = 0.03  # [m] how far the fingers reach below a slice's top
 COLUMN_M, ROW_M = 0.14, 0.055  # [m] between spots, along and across the slices
 COLUMNS = 4  # of a plate
-WOOD, TABLE_RGBA, PLATE_RGBA, BUFFER_RGBA = (
-    (0.72, 0.53, 0.33, 1.0),
-    (0.86, 0.85, 0.83, 1.0),
-    (0.97, 0.97, 0.98, 1.0),
-    (0.55, 0.57, 0.6, 1.0),
-)
+WOOD, TABLE_RGBA = (0.72, 0.53, 0.33, 1.0), (0.86, 0.85, 0.83, 1.0)
+PLATE_RGBA, BUFFER_RGBA = (0.97, 0.97, 0.98, 1.0), (0.55, 0.57, 0.6, 1.0)
 FOOTPRINT = (0.07, 0.05)  # [m] a slice and the gripper around it reach this far from its spot, along and across
-APPLIER_BASE = (
-    0.18,
-    0.34,
-    -0.07,
-)  # [m] of the butter applier: along and across the slice, its middle off the slice across
+APPLIER_BASE = (0.18, 0.34, -0.07)  # [m] of the applier: along and across the slice, its middle off the slice across
 MAX_DRAWS = 100  # of an obstacle's place
 MARKER_ABOVE = 0.002  # [m] a marker's centre above what it lies on
 
@@ -46,7 +40,7 @@ class Spot:
 
     def grasp(self) -> ToolPose:
         """The tool pose that holds a slice standing here."""
-        return ToolPose(self.x, self.y, self.z + assets.SLICE[2] - GRASP_DEPTH, self.yaw)
+        return ToolPose(self.x, self.y, self.z + models.SLICE[2] - GRASP_DEPTH, self.yaw)
 
 
 @dataclass(frozen=True)
@@ -99,7 +93,7 @@ def floor(station: Station) -> float:
     """How high a slice's foot is above the table at this station [m]."""
     if station.kind != "machine":
         return SLAB
-    return assets.APPLIER_FLOOR if is_applier(station) else assets.TOASTER_FLOOR
+    return models.APPLIER_FLOOR if is_applier(station) else models.TOASTER_FLOOR
 
 
 def spots(station: Station) -> list[Spot]:
@@ -113,8 +107,13 @@ def spots(station: Station) -> list[Spot]:
         grid = product(range(columns), range(rows))
         offsets = [((c - (columns - 1) / 2) * COLUMN_M, (r - (rows - 1) // 2) * ROW_M) for c, r in grid]
         offsets.sort(key=lambda at: (round(hypot(*at), 6), at))
-    c, s, z = cos(yaw), sin(yaw), floor(station)
-    return [Spot(x + c * dx - s * dy, y + s * dx + c * dy, z, yaw) for dx, dy in offsets[: station.capacity]]
+    return [Spot(*beside((x, y), yaw, off), floor(station), yaw) for off in offsets[: station.capacity]]
+
+
+def beside(at: Sequence[float], yaw: float, off: Sequence[float]) -> tuple[float, float]:
+    """The point (x, y) [m] that lies `off` along and across from `at`, by axes that are turned by `yaw` [rad]."""
+    c, s = cos(yaw), sin(yaw)
+    return at[0] + c * off[0] - s * off[1], at[1] + s * off[0] + c * off[1]
 
 
 def used_spots(station: Station, toasts: int) -> list[Spot]:
@@ -152,7 +151,7 @@ def _kept_free(task: Task, toasts: int) -> list[tuple[str, Rectangle]]:
     for station in task.stations:
         x, y, yaw = station.pose
         if station.kind == "machine":
-            length, width, off = APPLIER_BASE if is_applier(station) else (*assets.TOASTER[:2], 0.0)
+            length, width, off = APPLIER_BASE if is_applier(station) else (*models.TOASTER[:2], 0.0)
             body = Rectangle(x - sin(yaw) * off, y + cos(yaw) * off, length / 2, width / 2, yaw)
             kept.append((station.name, body))
             continue
@@ -187,26 +186,18 @@ class Scene:
             self.world.load(station.name, assets_folder() / f"{model}.urdf", (x, y, 0.0), yaw)
             self.world.friction(station.name, 0.5)
             if model == "toaster":
-                at = marker_of_toaster(station)
-                self.world.disc(
-                    f"{station.name} marker", assets.MARKER_RADIUS, assets.MARKER_THICK, at, assets.MARKER_CYAN
-                )
+                self._mark(station.name, marker_of_toaster(station), models.MARKER_CYAN)
         else:
             self._build_slab(station)
         self.solid.append(station.name)
 
     def _build_slab(self, station: Station) -> None:
-        feet = used_spots(station, self.toasts)
-        yaw = station.pose[2]
-        c, s = cos(yaw), sin(yaw)
-        along = [c * (f.x - station.pose[0]) + s * (f.y - station.pose[1]) for f in feet]
-        across = [-s * (f.x - station.pose[0]) + c * (f.y - station.pose[1]) for f in feet]
-        middle = ((max(along) + min(along)) / 2, (max(across) + min(across)) / 2)
-        size = (max(along) - min(along) + 0.18, max(across) - min(across) + 0.10, SLAB)
-        x = station.pose[0] + c * middle[0] - s * middle[1]
-        y = station.pose[1] + s * middle[0] + c * middle[1]
+        x, y, yaw = station.pose
+        feet = [beside((0.0, 0.0), -yaw, (f.x - x, f.y - y)) for f in used_spots(station, self.toasts)]
+        low, high = np.min(feet, axis=0), np.max(feet, axis=0)  # (2,) [m] along and across
+        middle, size = ((high + low) / 2).tolist(), (*(high - low + [0.18, 0.10]).tolist(), SLAB)
         rgba = PLATE_RGBA if station.kind == "storage" else BUFFER_RGBA
-        self.world.box(station.name, size, (x, y, SLAB / 2), rgba, yaw=yaw)
+        self.world.box(station.name, size, (*beside(station.pose, yaw, middle), SLAB / 2), rgba, yaw=yaw)
         self.world.friction(station.name, 0.8)
 
     def _build_obstacle(self, obstacle: Obstacle, place: tuple[float, float]) -> None:
@@ -214,19 +205,23 @@ class Scene:
         self.world.box(obstacle.name, (edge, edge, edge * obstacle.cubes), (*place, edge * obstacle.cubes / 2), WOOD)
         self.solid.append(obstacle.name)
         if in_camera_grid(self.task, place):
-            at = (*place, edge * obstacle.cubes + MARKER_ABOVE)
-            self.world.disc(
-                f"{obstacle.name} marker", assets.MARKER_RADIUS, assets.MARKER_THICK, at, assets.MARKER_GREEN
-            )
+            self._mark(obstacle.name, (*place, edge * obstacle.cubes + MARKER_ABOVE), models.MARKER_GREEN)
+
+    def _mark(self, name: str, at: Vector, rgba: Rgba) -> None:
+        self.world.disc(f"{name} marker", models.MARKER_RADIUS, models.MARKER_THICK, at, rgba)
 
     def add_slice(self, name: str, spot: Spot, off: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Stand a slice called `name` on `spot`, `off` it by x, y [m] and yaw [rad]."""
-        c, s = cos(spot.yaw), sin(spot.yaw)
-        x, y, yaw = spot.x + c * off[0] - s * off[1], spot.y + s * off[0] + c * off[1], spot.yaw + off[2]
-        height = assets.SLICE[2]
-        self.world.load(name, assets_folder() / "slice.urdf", (x, y, spot.z + height / 2 + 0.0005), yaw, fixed=False)
+        at = (*beside((spot.x, spot.y), spot.yaw, off), spot.z + models.SLICE[2] / 2 + 0.0005)
+        self.world.load(name, assets_folder() / "slice.urdf", at, spot.yaw + off[2], fixed=False)
         self.world.mass(name, self.task.slices.mass_kg)
         self.world.friction(name, self.task.slices.friction, spinning=0.001)
+
+    def put_slice(self, name: str, pose: ToolPose) -> None:
+        """Put a slice at once to where the tool at `pose` would hold it: to survey or show a scene, without physics."""
+        up = pose.z + GRASP_DEPTH - models.SLICE[2] / 2
+        turn = (0.0, 0.0, float(np.sin(pose.yaw / 2)), float(np.cos(pose.yaw / 2)))
+        self.world.put(name, (pose.x, pose.y, up), turn)
 
 
 def in_camera_grid(task: Task, place: Sequence[float]) -> bool:
@@ -238,21 +233,19 @@ def in_camera_grid(task: Task, place: Sequence[float]) -> bool:
 
 def marker_of_toaster(station: Station) -> tuple[float, float, float]:
     """Where the toaster's marker is [m]: on its body, beside the slot's middle."""
-    x, y, yaw = station.pose
-    c, s = cos(yaw), sin(yaw)
-    off = marker_offset_of_toaster()
-    return (x + c * off[0] - s * off[1], y + s * off[0] + c * off[1], assets.TOASTER[2] + MARKER_ABOVE)
+    at = beside(station.pose, station.pose[2], marker_offset_of_toaster())
+    return (*at, models.TOASTER[2] + MARKER_ABOVE)
 
 
 def marker_offset_of_toaster() -> tuple[float, float]:
     """The toaster's marker off its slot's middle, along and across the slot [m]."""
-    return (0.0, (assets.TOASTER[1] + assets.TOASTER_SLOT[1]) / 4)
+    return (0.0, (models.TOASTER[1] + models.TOASTER_SLOT[1]) / 4)
 
 
 def check_scene(task: Task) -> None:
     """BadInput when spots are out of the arm's reach, a machine holds more than a slice, or transfers would sweep slices."""
     low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
-    size = assets.SLICE
+    size = models.SLICE
     highest = max(floor(s) for s in task.stations) + size[2]
     if low - (size[2] - GRASP_DEPTH) < highest + 0.01:
         raise BadInput(
@@ -281,7 +274,7 @@ def _check_toaster(task: Task) -> None:
         raise BadInput(
             f"machines '{toasters[0]}' and '{toasters[1]}' both have processing_s: the camera's grid leads to one toaster"
         )
-    lowest = assets.TOASTER[2] + assets.SLICE[2] - GRASP_DEPTH + 0.005
+    lowest = models.TOASTER[2] + models.SLICE[2] - GRASP_DEPTH + 0.005
     if toasters and task.insert.height_m < lowest:
         raise BadInput(
             f"insert.height_m {task.insert.height_m}: a carried slice would hit the toaster, at least {lowest:.3f} needed"
@@ -298,6 +291,3 @@ def check_apart(task: Task, toasts: int) -> None:
                 f"stations '{one}' and '{other}' overlap: with {toasts} toasts, slices may stand {apart:.3f} m apart, "
                 f"at least {NEAREST_STATIONS_M} m needed"
             )
-
-
-NEAREST_M = 0.36  # [m] nearer to its own axis than this the arm would touch itself

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import WorkFailed
-from lab.sim import urdf
+from lab.sim import urdf_reader
 from lab.sim.frames import Body, Frame, Pose, Rgba, Shape
 
 TIME_STEP = 1.0 / 240.0  # [s]
@@ -106,7 +106,7 @@ class World:
         self, name: str, path: Path, position: Position = (0, 0, 0), yaw: float = 0.0, *, fixed: bool = True
     ) -> None:
         """Load a URDF, after validating it, as body `name` at `position` [m], turned by `yaw` [rad]."""
-        urdf.validate(path)
+        urdf_reader.validate(path)
         turn = self._p.getQuaternionFromEuler([0, 0, yaw])
         with _silence():
             flags = self._p.URDF_USE_INERTIA_FROM_FILE
@@ -116,7 +116,7 @@ class World:
             info = self._call("getJointInfo", number, joint)
             entry.joints[info[1].decode()] = joint
             entry.links[info[12].decode()] = joint
-        entry.looks = urdf.looks(path)
+        entry.looks = urdf_reader.looks(path)
         self._add(name, entry)
 
     def box(

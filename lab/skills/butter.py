@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from lab.learning.problem import Problem
 from lab.mdp import coverage
-from lab.sim import assets
+from lab.sim import models
 from lab.sim.frames import Body, Shape
 from lab.sim.kinematics import ToolPose
 from lab.sim.world import TIME_STEP, Array
-from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path
+from lab.skills.skill import Bench, Skill, SkillFailed, learned_path
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Task
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
 
 SHAPE = (3, 3)  # rows from the top, columns along the slice's width
-CELL_M = assets.SLICE[0] / 3
+CELL_M = models.SLICE[0] / 3
 JOINTS = ("head_x", "head_z")
 REST = (0.0, 0.0)  # where the head waits, low, out of the gripper's way
 HEAD_BEHIND_M = 0.03  # the head's frame behind the nozzle's plane
@@ -30,6 +31,7 @@ class Butter(Skill):
     """Butter the slice that stands in the applier; `covered` are the cells that the nozzle's ray has met, in order."""
 
     subtask: ClassVar[str] = "butter"
+    help: ClassVar[str] = "the applier's head covers a slice with butter, cell by cell"
     near: ClassVar[bool] = True
     moves_arm: ClassVar[bool] = False
     looks_from: ClassVar[tuple[float, float]] = (-42.0, 28.0)  # the head stands before the slice
@@ -60,7 +62,7 @@ class Butter(Skill):
         """Where the applier's head is; the arm has no part in this sub-task."""
         x, y, yaw = self.surveys.task.station(self.station).pose
         across, up = self.head(state)
-        return ToolPose(x, y, assets.APPLIER_FLOOR, yaw).local(across, assets.NOZZLE_OUT - HEAD_BEHIND_M, up)
+        return ToolPose(x, y, models.APPLIER_FLOOR, yaw).local(across, models.NOZZLE_OUT - HEAD_BEHIND_M, up)
 
     def show(self, bench: Bench, state: int) -> bool:
         """Put the head over the state's cell at once, without physics."""
@@ -119,8 +121,8 @@ class Butter(Skill):
             return None
         centre, turn = world.pose(self.slice)
         local = _unrotated(hit[1] - centre, turn)
-        row = int((assets.SLICE[2] / 2 - local[2]) // CELL_M)
-        column = int((local[0] + assets.SLICE[0] / 2) // CELL_M)
+        row = int((models.SLICE[2] / 2 - local[2]) // CELL_M)
+        column = int((local[0] + models.SLICE[0] / 2) // CELL_M)
         return (row, column) if 0 <= row < SHAPE[0] and 0 <= column < SHAPE[1] else None
 
 
@@ -130,7 +132,7 @@ def patch_name(number: int, row: int, column: int) -> str:
 
 
 def _patch(number: int, row: int, column: int) -> Body:
-    at = ((column - 1) * CELL_M * 0.9, -assets.SLICE[1] / 2 - 0.0016, (1 - row) * CELL_M * 0.9)
+    at = ((column - 1) * CELL_M * 0.9, -models.SLICE[1] / 2 - 0.0016, (1 - row) * CELL_M * 0.9)
     return Body(
         patch_name(number, row, column), (Shape("box", (CELL_M * 0.82, 0.0024, CELL_M * 0.82), None, BUTTER, at),)
     )

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from lab.errors import BadInput
+from lab.learning.problem import Problem
 from lab.mdp import NoPath, TabularMDP, grid
+from lab.sim.blocked_cells import Survey
 from lab.sim.kinematics import ToolPose, inverse
 from lab.sim.scene import spots
-from lab.sim.survey import Survey
-from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
+from lab.skills.skill import Bench, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
 from lab.tasks.task_file import Task
 
@@ -29,6 +30,7 @@ class Grasp(Skill):
     """Take a slice at one station: the table holds the tool's pose relative to the slice (x, y, z, yaw)."""
 
     subtask: ClassVar[str] = "grasp"
+    help: ClassVar[str] = "the gripper comes to a slice, closes and lifts it"
     near: ClassVar[bool] = True
     tried: ClassVar[bool] = True
     looks_from: ClassVar[tuple[float, float]] = (-60.0, 28.0)

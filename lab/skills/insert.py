@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
+from lab.learning.problem import Problem
 from lab.mdp import NoPath, grid
-from lab.sim import assets
+from lab.sim import models
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import GRASP_DEPTH, Spot, is_toaster, spots
 from lab.skills.place import let_go, release_pose
-from lab.skills.skill import Bench, Photo, Problem, Skill, SkillFailed, learned_path, no_way, over_everything
+from lab.skills.skill import Bench, Photo, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import INSERT_START, Surveys, camera_view, overhead_camera
 from lab.tasks.task_file import Obstacle, Task
 from lab.vision import Marker, find_markers, locate, see
@@ -35,6 +36,7 @@ class Insert(Skill):
     """Carry the slice in the gripper from the grid's start to the toaster's slot and let it go there."""
 
     subtask: ClassVar[str] = "insert"
+    help: ClassVar[str] = "by the overhead camera's picture to the toaster, and down into its slot"
     looks_from: ClassVar[tuple[float, float]] = (-84.0, 46.0)
     carries = True
 
@@ -172,9 +174,9 @@ class Insert(Skill):
 def _reach(task: Task, obstacle: Obstacle) -> tuple[float, float]:
     """How near along x and y [m] the tool may come to the middle of an obstacle with a slice in its fingers."""
     tall = obstacle.edge_m * obstacle.cubes
-    if tall < task.insert.height_m + GRASP_DEPTH - assets.SLICE[2] - CLEARANCE_M:
+    if tall < task.insert.height_m + GRASP_DEPTH - models.SLICE[2] - CLEARANCE_M:
         return (0.0, 0.0)  # the slice passes over it
-    across = _GRIPPER_HALF_M if tall > task.insert.height_m - CLEARANCE_M else assets.SLICE[1] / 2
+    across = _GRIPPER_HALF_M if tall > task.insert.height_m - CLEARANCE_M else models.SLICE[1] / 2
     half_cell = task.insert.cell_m / 2  # moves between free cells must not jump over an obstacle
-    x, y = (max(half + CLEARANCE_M + obstacle.edge_m / 2, half_cell) for half in (assets.SLICE[0] / 2, across))
+    x, y = (max(half + CLEARANCE_M + obstacle.edge_m / 2, half_cell) for half in (models.SLICE[0] / 2, across))
     return (x, y)

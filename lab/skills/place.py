@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from lab.learning.problem import Problem
 from lab.mdp import NoPath, grid
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Spot, is_toaster, spots
 from lab.skills.grasp import entry_cell, free_above, from_above
-from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
+from lab.skills.skill import Bench, Skill, SkillFailed, learned_path, no_way
 from lab.skills.surveys import RELEASE_ABOVE, Surveys, near_pose
 from lab.tasks.task_file import Task
 
@@ -27,6 +28,7 @@ class Place(Skill):
     """Set a slice down at one station: the table holds the tool's position relative to the spot (x, y, z)."""
 
     subtask: ClassVar[str] = "place"
+    help: ClassVar[str] = "a slice is set down at a station and let go"
     near: ClassVar[bool] = True
     looks_from: ClassVar[tuple[float, float]] = (-60.0, 28.0)
     carries = True

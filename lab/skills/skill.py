@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed
-from lab.learning.environment import Environment
+from lab.learning.problem import Problem
 from lab.mdp import NoPath, TabularMDP, greedy_path
-from lab.sim import assets
+from lab.sim import models
 from lab.sim.frames import Body
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME as ROBOT
@@ -28,6 +28,7 @@ LOST_M = 0.03  # [m] a slice farther than this from where the fingers hold it is
 UPRIGHT = 0.97  # cosine of the largest tilt of a slice that stands
 FINGERS_OFF_M = 0.0005  # [m] of a finger off a slice that is put between them
 TRIED_WITH = "slice 1"
+SETTLE_STEPS = 60  # physics steps until a new scene is at rest
 STAND_STEPS = 15  # physics steps until what was put somewhere at once is at rest
 
 
@@ -44,16 +45,6 @@ class SkillFailed(Exception):
     """A skill noticed that it did not do what it is for; the text says why."""
 
 
-@dataclass(frozen=True)
-class Problem:
-    """What one skill has to learn: its name, the sub-task, the table's problem; environment: where its steps are made."""
-
-    name: str
-    subtask: str
-    mdp: TabularMDP
-    environment: Environment | None = None
-
-
 @dataclass
 class Bench:
     """The cell in which skills are carried out, and the slice that the robot holds."""
@@ -66,20 +57,14 @@ class Bench:
         position, turn = self.scene.world.pose(name)
         yaw = 2.0 * atan2(float(turn[2]), float(turn[3]))
         half = (yaw + np.pi / 2) % np.pi - np.pi / 2
-        z = float(position[2]) + assets.SLICE[2] / 2 - GRASP_DEPTH
+        z = float(position[2]) + models.SLICE[2] / 2 - GRASP_DEPTH
         return ToolPose(float(position[0]), float(position[1]), z, float(half))
-
-    def put_slice(self, name: str, pose: ToolPose) -> None:
-        """Put a slice at once to where the tool at `pose` would hold it: to show a scene, without physics."""
-        up = pose.z + GRASP_DEPTH - assets.SLICE[2] / 2
-        turn = (0.0, 0.0, float(np.sin(pose.yaw / 2)), float(np.cos(pose.yaw / 2)))
-        self.scene.world.put(name, (pose.x, pose.y, up), turn)
 
     def hold(self, name: str, pose: ToolPose) -> None:
         """Stand a new slice between the fingers of the tool that is at `pose`, and grip it."""
         scene = self.scene
-        scene.robot.open_at_once(assets.SLICE[1] / 2 + FINGERS_OFF_M)
-        scene.add_slice(name, Spot(pose.x, pose.y, pose.z + GRASP_DEPTH - assets.SLICE[2], pose.yaw))
+        scene.robot.open_at_once(models.SLICE[1] / 2 + FINGERS_OFF_M)
+        scene.add_slice(name, Spot(pose.x, pose.y, pose.z + GRASP_DEPTH - models.SLICE[2], pose.yaw))
         for _ in scene.robot.grip():
             scene.world.step()
         self.held = name
@@ -119,6 +104,7 @@ class Skill:
     """
 
     subtask: ClassVar[str]
+    help: ClassVar[str]  # what is learned, in one line of plain words
     moves_arm: ClassVar[bool] = True  # a machine's process does not
     tried: ClassVar[bool] = False  # whether a lesson ends with a trial in physics
     looks_from: ClassVar[tuple[float, float]] = (-72.0, 36.0)  # [deg] the camera of a lesson, azimuth and elevation
@@ -185,7 +171,7 @@ class Skill:
         if not bench.scene.robot.stand(pose):
             return False
         if bench.held is not None:
-            bench.put_slice(bench.held, pose)
+            bench.scene.put_slice(bench.held, pose)
         return True
 
     @classmethod

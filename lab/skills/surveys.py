@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
-from lab.sim import assets
+from lab.sim import models
+from lab.sim.blocked_cells import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.camera import Camera
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import (
@@ -24,7 +25,6 @@ from lab.sim.scene import (
     spots,
     used_spots,
 )
-from lab.sim.survey import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.world import World
 from lab.tasks.task_file import InsertGrid, Station, Task
 from lab.vision import View
@@ -152,7 +152,7 @@ class Surveys:
         with World() as world:
             scene = Scene(world, self.task, 0, self.layout)
             scene.robot.stand(start)
-            scene.robot.open_at_once(assets.SLICE[1] / 2)
+            scene.robot.open_at_once(models.SLICE[1] / 2)
             return overhead_camera(self.task).picture(world)
 
     def grid_pose(self, cell: Cell) -> ToolPose:
@@ -180,7 +180,7 @@ class Surveys:
     def _in_sight(self, pose: ToolPose) -> bool:
         """Whether the gripper's marker lies wholly in the overhead picture when the tool is at `pose`."""
         camera = overhead_camera(self.task)
-        x, y, z = pose.x + assets.MARKER_OUT, pose.y, pose.z + assets.MARKER_UP
+        x, y, z = pose.x + models.MARKER_OUT, pose.y, pose.z + models.MARKER_UP
         edges = [(x + dx, y + dy, z, 1.0) for dx in (-_MARKER, _MARKER) for dy in (-_MARKER, _MARKER)]
         across, down, far = camera.pixel_from_world() @ np.array(edges).T
         pixels = np.concatenate([across / far, down / far])
@@ -200,7 +200,7 @@ class Surveys:
 
 INSERT_START = "insert"
 OUT_OF_SIGHT = "out of the camera's sight"
-_MARKER = assets.MARKER_RADIUS + 0.003  # [m] half of what the camera must see around the gripper's marker
+_MARKER = models.MARKER_RADIUS + 0.003  # [m] half of what the camera must see around the gripper's marker
 
 
 def overhead_camera(task: Task, pixels: int | None = None) -> Camera:
@@ -213,7 +213,7 @@ def camera_view(task: Task, pixels: int | None = None, layout: Layout | None = N
 
     Without a layout the obstacles are taken to stand where the task file has them.
     """
-    grid, upper = task.insert, assets.MARKER_THICK / 2
+    grid, upper = task.insert, models.MARKER_THICK / 2
     places = [o.position_m for o in task.obstacles] if layout is None else layout.obstacles
     stand = zip(task.obstacles, places, strict=True)
     heights = [o.edge_m * o.cubes + MARKER_ABOVE for o, place in stand if in_camera_grid(task, place)]
@@ -227,11 +227,11 @@ def camera_view(task: Task, pixels: int | None = None, layout: Layout | None = N
         cell_m=grid.cell_m,
         shape=grid.shape,
         heights_m={
-            "gripper": grid.height_m + assets.MARKER_UP + upper,
+            "gripper": grid.height_m + models.MARKER_UP + upper,
             "obstacle": (heights or [0.18])[0] + upper,
-            "toaster": assets.TOASTER[2] + MARKER_ABOVE + upper,
+            "toaster": models.TOASTER[2] + MARKER_ABOVE + upper,
         },
-        offsets_m={"gripper": (-assets.MARKER_OUT, 0.0), "toaster": _toaster_offset(task)},
+        offsets_m={"gripper": (-models.MARKER_OUT, 0.0), "toaster": _toaster_offset(task)},
     )
 
 

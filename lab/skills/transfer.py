@@ -4,10 +4,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, ClassVar
 
 from lab.errors import BadInput
+from lab.learning.problem import Problem
 from lab.mdp import NoPath, grid
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import is_toaster
-from lab.skills.skill import Bench, Problem, Skill, SkillFailed, learned_path, no_way
+from lab.skills.skill import Bench, Skill, SkillFailed, learned_path, no_way
 from lab.skills.surveys import INSERT_START, Surveys
 from lab.tasks.task_file import Task
 
@@ -22,6 +23,7 @@ class Transfer(Skill):
     """From one approach to another; a place is a station or the start of the insert grid."""
 
     subtask: ClassVar[str] = "transfer"
+    help: ClassVar[str] = "the tool's way through the workspace from one station to another"
 
     def __init__(self, origin: str, target: str, *, loaded: bool) -> None:
         super().__init__(f"transfer {origin} to {target}{' with slice' if loaded else ''}")

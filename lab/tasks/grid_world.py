@@ -34,15 +34,15 @@ _WANTED = "wanted random:SHAPE:DENSITY:SEED, such as random:10x10x10:0.06:7"
 
 Ints = NDArray[np.int_]
 Coordinates = tuple[int, ...]
-Cell = Annotated[Coordinates, BeforeValidator(as_tuple)]
-Shape = Annotated[tuple[Count, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=3)]
+GridCell = Annotated[Coordinates, BeforeValidator(as_tuple)]
+GridShape = Annotated[tuple[Count, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=3)]
 
 
-class View(Record):
+class AdvisorView(Record):
     """The block of cells in which an advisor with a limited view sees the robot, from corner to corner, both inside."""
 
-    lower: Cell
-    upper: Cell
+    lower: GridCell
+    upper: GridCell
 
 
 class GridWorld(Learned):
@@ -55,11 +55,11 @@ class GridWorld(Learned):
     kind: Literal["world"] = "world"
     name: Name
     title: str = ""
-    shape: Shape
-    start: Cell
-    goal: Cell
-    obstacles: Annotated[tuple[Cell, ...], BeforeValidator(as_tuple)] = ()
-    view: View | None = None
+    shape: GridShape
+    start: GridCell
+    goal: GridCell
+    obstacles: Annotated[tuple[GridCell, ...], BeforeValidator(as_tuple)] = ()
+    view: AdvisorView | None = None
 
     @model_validator(mode="after")
     def _cells_fit(self) -> Self:
@@ -75,18 +75,10 @@ class GridWorld(Learned):
                 raise ValueError(f"{what} {cell} is blocked by an obstacle: a free cell is wanted")
         if self.start == self.goal:
             raise ValueError(f"start and goal are the same cell {self.start}: two cells are wanted")
-        return self
-
-    @model_validator(mode="after")
-    def _view_holds_a_cell(self) -> Self:
         if self.view is not None:
             for axis, (low, high) in enumerate(zip(self.view.lower, self.view.upper, strict=True)):
                 if low > high:
                     raise ValueError(f"view.lower {low} on axis {axis} is above view.upper: allowed are 0..{high}")
-        return self
-
-    @model_validator(mode="after")
-    def _members_known(self) -> Self:
         self.check_members()
         return self
 

@@ -24,8 +24,8 @@ MOST_THINGS = 200  # stations, stages or obstacles: on one table is no room for 
 _SAYS_WORLD = re.compile(r"""^[ \t]*kind[ \t]*=[ \t]*["']world["']""", re.MULTILINE)
 NEAREST_STATIONS_M = 0.16  # two stations nearer than this overlap: a slice is 0.12 m wide
 
-Kind = Literal["task", "cell", "world"]  # of what a file holds
-Model = TypeVar("Model", bound=Record)
+FileKind = Literal["task", "cell", "world"]  # of what a file holds
+Checked = TypeVar("Checked", bound=Record)
 Size = Annotated[float, Field(ge=0.001, le=10)]  # the bounds keep a slip of the pen from taking all memory or all day
 Time = Annotated[float, Field(ge=0, le=86_400)]
 Number = Annotated[float, Field(ge=-10, le=10)]
@@ -160,7 +160,8 @@ class Task(Record):
             if twice:
                 raise ValueError(f"{label} '{min(twice)}' stands twice in the file")
             for name in names:
-                if _reserved(name) or (label == "obstacle" and name in stations):
+                reserved = name in RESERVED or name.startswith(RESERVED_STARTS) or name.endswith(RESERVED_ENDS)
+                if reserved or (label == "obstacle" and name in stations):
                     raise ValueError(f"{label} '{name}' has the name of something else in the cell: choose another")
         for stage in self.route:
             for name in filter(None, (stage.station, stage.buffer)):
@@ -188,10 +189,6 @@ class Task(Record):
         return self
 
 
-def _reserved(name: str) -> bool:
-    return name in RESERVED or name.startswith(RESERVED_STARTS) or name.endswith(RESERVED_ENDS)
-
-
 def shipped() -> dict[str, str]:
     """What ships, by name, and whether it is a "task", a "cell" or a "world"."""
     return {name: _kind(_toml(path)) for name, path in _files().items()}
@@ -201,7 +198,7 @@ def _files() -> dict[str, Path]:
     return {path.stem: path for path in sorted(tasks_folder().glob("*.toml"))}
 
 
-def names_of(wanted: Kind) -> list[str]:
+def names_of(wanted: FileKind) -> list[str]:
     """What ships of a kind, by name."""
     return [name for name, kind in shipped().items() if kind == wanted]
 
@@ -231,26 +228,20 @@ def find(task: str) -> Path:
 
 def load(task: str) -> Task:
     """Read and check a task given by name or path; BadInput names the file, the line or field, the value and what is allowed."""
-    found = load_any(task, "task")
-    assert isinstance(found, Task)
-    return found
+    return cast(Task, load_any(task, "task"))
 
 
 def load_cell(cell: str) -> CellFile:
     """As `load`: a cell for the sequencer alone, by name or by file; BadInput names file and line."""
-    found = load_any(cell, "cell")
-    assert isinstance(found, CellFile)
-    return found
+    return cast(CellFile, load_any(cell, "cell"))
 
 
 def load_world(world: str) -> GridWorld:
     """As `load`: a world by name, by file (.toml, or .txt with a text grid) or by chance ("random:10x10x10:0.06:7")."""
-    found = load_any(world, "world")
-    assert isinstance(found, GridWorld)
-    return found
+    return cast(GridWorld, load_any(world, "world"))
 
 
-def load_any(word: str, wanted: Kind | None = None) -> Task | CellFile | GridWorld:
+def load_any(word: str, wanted: FileKind | None = None) -> Task | CellFile | GridWorld:
     """A task, a cell or a world, as `load`, `load_cell` and `load_world` read it; BadInput also when another is wanted."""
     drawn = word.startswith(RANDOM)
     path = Path(word) if drawn else find(word)
@@ -274,7 +265,7 @@ def describe(word: str) -> tuple[str, dict[str, Any]]:
     return read_text(path), {"file": str(path), **found.model_dump(mode="json")}
 
 
-def _check_wanted(word: str, kind: Kind, wanted: Kind | None) -> None:
+def _check_wanted(word: str, kind: FileKind, wanted: FileKind | None) -> None:
     if wanted is None or kind == wanted:
         return
     instead = {
@@ -285,11 +276,10 @@ def _check_wanted(word: str, kind: Kind, wanted: Kind | None) -> None:
     raise BadInput(f"{word}: it is a {kind}, not a {wanted}: {instead[kind]}")
 
 
-def _kind(toml: TomlText) -> Kind:
+def _kind(toml: TomlText) -> FileKind:
     kind = toml.raw.get("kind", "task")
-    for known in get_args(Kind):
-        if kind == known:
-            return cast(Kind, known)
+    if kind in get_args(FileKind):
+        return cast(FileKind, kind)
     raise toml.refusal(("kind",), str(unknown("kind", kind, ("cell", "world"), "of task file")))
 
 
@@ -300,7 +290,7 @@ def _toml(path: Path) -> TomlText:
     return TomlText.parsed(path, text)
 
 
-def _checked(model: type[Model], toml: TomlText) -> Model:
+def _checked(model: type[Checked], toml: TomlText) -> Checked:
     try:
         return model.model_validate(toml.raw)
     except ValidationError as error:

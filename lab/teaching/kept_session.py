@@ -16,9 +16,9 @@ from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment
+from lab.learning.problem import Problem
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray
-from lab.skills.skill import Problem
 from lab.tasks.task_file import names_file
 from lab.teaching.teacher import MAX_SESSIONS, Keep
 from lab.toolbox.policy import Policy
@@ -141,14 +141,14 @@ class NewSession(_InFolder):
     ) -> Journal:
         """The journal of a lesson. Raises BadInput when the folder holds a session already."""
         self.knows(problem, learner, gate)
-        self.folder = self._claimed(problem, Path.mkdir) if self._wanted is None else self._wanted
+        self.folder = claimed(self._toolbox, problem.name, Path.mkdir) if self._wanted is None else self._wanted
         if unfinished is not None:
             Toolbox(self.folder / _BEGUN).save(unfinished)
         head = Session(
             self._words.to_json(),
             problem.name,
             problem.mdp.signature,
-            _version(),
+            lab_version(),
             asdict(learner),
             asdict(gate),
             "" if unfinished is None else unfinished.name,
@@ -157,23 +157,24 @@ class NewSession(_InFolder):
         if self._wanted is not None:
             target = self.folder.resolve()
             with suppress(BadInput):  # where links cannot be made, it is only not listed
-                self._claimed(problem, lambda place: place.symlink_to(target, target_is_directory=True))
+                claimed(self._toolbox, problem.name, lambda place: place.symlink_to(target, target_is_directory=True))
         return self.journal
 
-    def _claimed(self, problem: Problem, make: Callable[[Path], None]) -> Path:
-        """A new place for a session of this problem; what two commands make at a time, only one of them gets."""
-        name = slug(problem.name.lower().replace(" ", "-"))
-        for number in range(1, _MOST):
-            folder = self._toolbox.folder / SESSIONS / f"{name}-{number}"
-            try:
-                folder.parent.mkdir(parents=True, exist_ok=True)
-                make(folder)
-            except FileExistsError:
-                continue
-            except OSError as error:
-                raise BadInput(f"toolbox {self._toolbox.folder}: {folder}: {error.strerror or error}") from error
-            return folder
-        raise BadInput(f"toolbox {self._toolbox.folder}: it holds {_MOST} sessions of '{problem.name}': remove some")
+
+def claimed(toolbox: Toolbox, name: str, make: Callable[[Path], None]) -> Path:
+    """A new place for a session of this problem; what two commands make at a time, only one of them gets."""
+    plain = slug(name.lower().replace(" ", "-"))
+    for number in range(1, _MOST):
+        folder = toolbox.folder / SESSIONS / f"{plain}-{number}"
+        try:
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            make(folder)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise BadInput(f"toolbox {toolbox.folder}: {folder}: {error.strerror or error}") from error
+        return folder
+    raise BadInput(f"toolbox {toolbox.folder}: it holds {_MOST} sessions of '{name}': remove some")
 
 
 def kept_by(toolbox: Toolbox, words: Words) -> Keep:
@@ -195,6 +196,10 @@ class KeptSession(_InFolder):
     def __init__(self, folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] = ()):
         self.read: Read = read_journal(folder, where)
         self.folder = self.read.path.parent
+        if self.read.session.command != "teach":
+            raise BadInput(
+                f"journal '{self.read.path}' ({where}): it is advice on an order: wanted a session of lab teach"
+            )
         self.words = Words.from_json(self.read.session.words, f"journal '{self.read.path}' ({where})")
         self._read_only, self.where, self.trusted = read_only, where, trusted
 
@@ -255,7 +260,7 @@ def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:
         with suppress(BadInput):
             read = read_journal(path, "toolbox")
             state = "not over" if read.closed is None else "solved" if read.closed.solved else "over"
-            advisors = " + ".join(read.session.words.get("advisors", ()))
+            advisors = " + ".join(read.session.words.get("advisors") or [read.session.words.get("advisor", "")])
             row |= {"problem": read.session.problem, "advisor": advisors, "state": state}
         rows.append(row)
     return rows
@@ -274,7 +279,8 @@ def check_new(folder: Path) -> None:
     raise BadInput(f"'{folder}' (--out) holds a session that {what}: {then} ({command}), or choose another folder")
 
 
-def _version() -> str:
+def lab_version() -> str:
+    """The version of the lab that runs."""
     try:
         return version("teaching-lab")
     except PackageNotFoundError:  # run from a source folder

@@ -10,8 +10,8 @@ from shlex import quote
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from lab.advice.advising import Advising, Watch
 from lab.advice.advisors import PEOPLE
-from lab.advice.counsel import Counsel, Watch
 from lab.advice.entries import line_of
 from lab.errors import BadInput, unknown
 from lab.learning.requests import AdviceRequest, AdvisorLeft
@@ -25,7 +25,8 @@ from lab.toolbox.registry import Toolbox, default_folder
 
 if TYPE_CHECKING:
     from lab.gym import GymWorld
-    from lab.skills.skill import Problem, Skill
+    from lab.learning.problem import Problem
+    from lab.skills.skill import Skill
     from lab.toolbox.policy import Policy
 
 
@@ -37,7 +38,7 @@ def check(words: Words, out: Path | None = None, kept: KeptSession | None = None
 
     It is called before anybody is asked or shown anything. `kept`: where the words come from, if nobody has typed them.
     """
-    Counsel(words.advisors, asked=words.asked, decide=words.decide).check()
+    Advising.of(words.advisors, asked=words.asked, decide=words.decide)
     if out is not None:
         check_new(out)
     _subject(words, kept)
@@ -105,10 +106,10 @@ def replay(kept: KeptSession, audience: Audience, watch: Watch) -> dict[str, Any
     """
     words, read = kept.words, kept.read
     people = dict.fromkeys(PEOPLE, _nobody)  # the journal answers for them
-    counsel = Counsel(words.advisors, people, words.asked, words.decide, watch=watch)
+    advising = Advising.of(words.advisors, people, words.asked, words.decide, watch=watch)
     subject = _subject(words, kept)
     with TemporaryDirectory() as folder:
-        teacher = Teacher(Toolbox(folder), counsel, words.seed, audience, keep=kept.keep, begun=kept.begun)
+        teacher = Teacher(Toolbox(folder), advising, words.seed, audience, keep=kept.keep, begun=kept.begun)
         options = {name: getattr(words, name) for name in ("learner", "gate", "memory", "episodes")}
         try:
             subject(teacher, **options, name=words.save, out=None)
@@ -193,10 +194,10 @@ def teach_one(
     solved when that succeeds, too; `failure` says why it did not. `toasts` and `sessions`: those of the run that the lesson
     belongs to. BadInput when the policy called `name` is of another problem.
     """
-    from lab.production.prepared import prepare
-    from lab.production.report import draw_value_map
-    from lab.production.run import trial_of
-    from lab.production.skillset import SkillSet
+    from lab.skills.prepared_scene import prepare
+    from lab.skills.skillset import SkillSet
+    from lab.skills.trial import trial_of
+    from lab.view.plots import values_seen
 
     toasts = fitting(task, 2) if toasts is None else toasts
     check_toasts(toasts, task)
@@ -213,7 +214,7 @@ def teach_one(
         document["files"] = _draw_curve(problem.name, lesson.policy, out)
         photo, map_path = skill.photo(), out / f"{skill.subtask}-value-map.png"
         if photo is not None:
-            draw_value_map(problem.mdp, photo, lesson.policy, map_path)
+            values_seen(lesson.policy.q, problem.mdp, photo.picture, photo.seen, map_path)
             document["files"]["value_map"] = str(map_path)
     return document
 
@@ -241,7 +242,7 @@ def teach_world(
     settings, problem = world.changed(learner, gate, episodes, memory), world_problem(world)
     check_name(name)
     region = world.region() if view == "limited" else None
-    teacher = replace(teacher, counsel=replace(teacher.counsel, region=region))
+    teacher = replace(teacher, advising=replace(teacher.advising, region=region))
     teacher.audience.stands(world, problem)
     lesson = teacher.one_session(problem, settings, world.name, name)
     document = _document(problem, lesson, teacher) | {"view": view}

@@ -9,17 +9,17 @@ from zlib import crc32
 
 import numpy as np
 
-from lab.advice.counsel import Counsel
+from lab.advice.advising import Advising
 from lab.advice.entries import Closed
 from lab.advice.journal import Again, Journal
 from lab.errors import BadInput, WorkFailed, counted
 from lab.learning.environment import TableEnvironment, unreached
 from lab.learning.events import AdviceEnded, AdviceRejected, Event
+from lab.learning.problem import Problem
 from lab.learning.requests import Advisor
 from lab.learning.session import Session, SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray, TabularMDP, greedy_path
-from lab.skills.skill import Problem
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.record import Learned
 from lab.tasks.task_file import Subtask
@@ -81,7 +81,7 @@ class Teacher:
     """
 
     toolbox: Toolbox
-    counsel: Counsel = field(default_factory=Counsel)
+    advising: Advising = field(default_factory=Advising)
     seed: int = 0
     audience: Audience = field(default_factory=Audience)
     keep: Keep = lambda problem, learner, gate, unfinished: Journal()
@@ -91,7 +91,7 @@ class Teacher:
     @property
     def advisor(self) -> str:
         """Who advises, in words."""
-        return str(self.counsel)
+        return str(self.advising)
 
     def find_or_teach(
         self, problem: Problem, settings: Subtask, task: str, known: Mapping[tuple[str, str], Policy]
@@ -135,7 +135,7 @@ class Teacher:
             found = self.begun(problem)
         else:
             found = self.unfinished(problem, name)
-            if found is not None and (self.counsel.records or not self._same(found, settings)):
+            if found is not None and (self.advising.records or not self._same(found, settings)):
                 found = None  # another learner, gate or advisor begins anew, so that they can be compared
             if found is not None:
                 self.audience.goes_on(found)
@@ -167,7 +167,7 @@ class Teacher:
         Once the path leads to the goal, at most MORE_SESSIONS further ones look for a shorter one. A table that leads
         to the goal is never given up for a worse one. `unfinished`, a policy of this very problem, is learned on.
         """
-        self.counsel.check_records(problem.mdp)
+        self.advising.check_records(problem.mdp)
         journal = self.keep(problem, learner, gate, unfinished)
         try:
             result = self._run_through(problem, learner, gate, unfinished, sessions, journal)
@@ -225,7 +225,7 @@ class Teacher:
     ) -> SessionResult:
         """All sessions of one lesson as one, with the best table of these and of `unfinished`."""
         place = problem.environment or TableEnvironment(problem.mdp)
-        gate = replace(gate, judge_unhelped=False) if self.counsel.records else gate
+        gate = replace(gate, judge_unhelped=False) if self.advising.records else gate
         lived = 0 if unfinished is None else len(unfinished.curve)  # what did not help before is not drawn again
         rng = np.random.default_rng([self.seed, crc32(problem.name.encode()), lived])
         kept: SessionResult | Policy | None = unfinished
@@ -241,7 +241,7 @@ class Teacher:
             self.audience.hears(problem.name, event, journal.tell(event))
 
         def advisor() -> Advisor | None:
-            made = self.counsel.gather(place, learner, rng, journal=journal, tell=tell)
+            made = self.advising.gather(place, learner, rng, journal=journal, tell=tell)
             self.audience.meets(made)
             return made
 

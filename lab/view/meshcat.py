@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from lab import files
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.sim.frames import Body, Camera, Frame, Recording
+from lab.sim.frames import Body, Frame, Recording, Viewpoint
 
 if TYPE_CHECKING:
     from lab.view.keyframes import Motion, Track
@@ -109,7 +109,7 @@ class LiveView:
             user = "user"
         return f"ssh -L {self.port}:127.0.0.1:{self.port} {user}@{gethostname()}"
 
-    def show(self, bodies: Sequence[Body], camera: Camera | None = None) -> None:
+    def show(self, bodies: Sequence[Body], camera: Viewpoint | None = None) -> None:
         """Show these bodies, at the origin until a frame places them; replaces what was shown.
 
         Raises BadInput for a mesh that cannot be read and for two bodies of one name.
@@ -117,7 +117,7 @@ class LiveView:
         from lab.view.scene_data import describe
         from lab.view.server_page import News
 
-        scene = describe(bodies, camera or Camera())
+        scene = describe(bodies, camera or Viewpoint())
         self._shown = {body.name: None for body in bodies}
         self._running().send(News(scene=scene))
 

@@ -5,7 +5,7 @@
 const data = JSON.parse(document.getElementById("lab-data").textContent);
 const THREE = MeshCat.THREE;
 const LAB = "lab";
-const panel = typeof seat === "undefined" ? null : seat; // teaching.js, on pages with a teaching seat
+const panel = typeof seat === "undefined" ? null : seat; // teaching_question.js, on pages with a teaching seat
 var viewer; // a global by this name, as on meshcat's own pages
 const SLOW_MS = 40; // a picture that takes longer is made plainer
 const PLAINER = [

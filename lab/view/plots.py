@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput
+from lab.mdp import FloatArray, TabularMDP, greedy_path
 from lab.view.canvas import BLUE, INK, ORANGE, RED, SKY, check_png, picture_file
 from lab.view.gantt import gantt
 from lab.view.sequencing_plots import sequence_plot, success_picture
@@ -15,7 +16,7 @@ from lab.view.sequencing_plots import sequence_plot, success_picture
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from lab.vision import View
+    from lab.vision import GridView, View
 
 __all__ = [
     "Curve",
@@ -26,6 +27,7 @@ __all__ = [
     "sequence_plot",
     "success_picture",
     "value_map",
+    "values_seen",
 ]
 
 
@@ -132,6 +134,23 @@ def _fitting(
             f"value map: corners {crossings.shape} and blocked {walls.shape} do not fit values {table.shape}"
         )
     return crossings, walls
+
+
+def values_seen(q: FloatArray, mdp: TabularMDP, picture: NDArray[np.uint8], seen: "GridView", path: Path) -> None:
+    """The values (states, actions) of a problem over the picture (H, W, 3) that it was read from, with the learned way."""
+    cells = [mdp.state_cell(state) for state in greedy_path(q, mdp, mdp.n_states)[0]]
+    value_map(
+        q.max(axis=1).reshape(mdp.shape),
+        picture,
+        path,
+        corners=cell_corners(seen.view),
+        places=Places(
+            route=[(cell[0], cell[1]) for cell in cells],
+            blocked=(mdp.terminal & ~mdp.goal).reshape(mdp.shape),
+            start=seen.start,
+            goal=seen.goal,
+        ),
+    )
 
 
 def cell_corners(view: "View", height_m: float = 0.0) -> NDArray[np.float64]:

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
-from lab.sim.frames import Body, Camera, Shape, unique_names
+from lab.sim.frames import Body, Shape, Viewpoint, unique_names
 
 CREASE_RAD = 0.6  # faces that meet at a larger angle keep a sharp edge
 
 Json = dict[str, Any]
 
 
-def describe(bodies: Sequence[Body], camera: Camera) -> Json:
+def describe(bodies: Sequence[Body], camera: Viewpoint) -> Json:
     """The scene of `page.js`: {"camera", "geometries": [...], "bodies": [{"name", "shapes": [...]}]}.
 
     Shapes name their geometry by its place in the list. Raises BadInput for a mesh file that is missing or unreadable

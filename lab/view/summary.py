@@ -12,7 +12,6 @@ from lab.errors import counted
 from lab.view.figures import beside, gap_of
 
 _STUDY_ROWS = 30
-
 SHOWN_MOVES = 60
 
 
@@ -44,10 +43,8 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     proven = "proven optimum" if report["optimum_proven"] else "proven bound"
     table.add_row(proven, f"{bound}, gap {gap_of(report['optimality_gap'], 2)}")
     rate = report["sim_s"] / report["wall_s"] if report["wall_s"] else 0.0
-    table.add_row(
-        "time",
-        f"{report['wall_s']:.1f} s for {report['sim_s']:.0f} simulated seconds ({rate:.0f} x real time)",
-    )
+    spent = f"{report['wall_s']:.1f} s for {report['sim_s']:.0f} simulated seconds ({rate:.0f} x real time)"
+    table.add_row("time", spent)
     for name, path in report["files"].items():
         table.add_row(name.replace("_", " "), Text(path))
     return table
@@ -73,7 +70,8 @@ def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
 def replay_summary(replay: Mapping[str, Any]) -> RenderableType:
     """The end of `lab replay`, from its JSON document."""
     closed = replay["closed"]
-    over = "it is not over: lab teach --resume goes on with it"
+    of_order = "method" in replay["words"]
+    over = f"it is not over: lab {'sequence' if of_order else 'teach'} --resume goes on with it"
     if closed is not None:
         over = f"over after {counted(closed['episodes'], 'episode')}, {'solved' if closed['solved'] else 'not solved'}"
     return Group(*map(Text, [f"{replay['problem']} in {replay['session']}: {over}", *replay["receipt"]["lines"]]))
@@ -186,8 +184,6 @@ def table_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> Table
 
 def study_summary(study: Mapping[str, Any]) -> RenderableType:
     """What `lab study run` shows, from its JSON document: up to 30 rows; the report has all."""
-    from rich.console import Group
-
     shown = ("measure", "value", "ci95", "thesis", "within", "lab_version")
     settings = list(dict.fromkeys(key for row in study["rows"] for key in row if key not in shown))
     varied = [key for key in settings if len({str(row.get(key)) for row in study["rows"]}) > 1]
@@ -204,14 +200,10 @@ def study_summary(study: Mapping[str, Any]) -> RenderableType:
     ]
     more = len(study["rows"]) - len(rows)
     lines = [f"... and {counted(more, 'more row')}"] * (more > 0) + [""]
-    lines += [f"{key}: {_number(value)}" for key, value in study["summary"].items()]
+    lines += [f"{key}: {v:.4g}" if isinstance(v, float) else f"{key}: {v}" for key, v in study["summary"].items()]
     lines += [f"{key}: {path}" for key, path in study["files"].items()]
     columns = (*varied, "measure", "value", "95 %", "printed", "inside")
     return Group(table_of(rows, columns), *(Text(line) for line in (*lines, "", *study["notes"])))
-
-
-def _number(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def toolbox_summary(box: Mapping[str, Any]) -> RenderableType:

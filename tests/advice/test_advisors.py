@@ -7,21 +7,19 @@ import numpy as np
 import pytest
 
 from lab.advice.advisors import (
-    ADVISORS,
-    SKILLS,
-    Advice,
+    SKILL_TAUS,
+    AdvisorName,
     RecordedAdvisor,
-    TableAdvisor,
-    make_advisor,
-    parse_advisor,
-    skill,
+    named,
 )
 from lab.advice.entries import FILE, Session
 from lab.advice.journal import Journal
+from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.events import AdviceGiven
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft
 from lab.learning.selection import softmax
+from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.mdp import FloatArray, TabularMDP, grid, optimal_values, shortest_steps
 
 
@@ -32,7 +30,15 @@ def board() -> TabularMDP:
 
 
 def request(mdp: TabularMDP, state: int) -> AdviceRequest:
-    return AdviceRequest(mdp, [[0.0] * mdp.n_actions] * mdp.n_states, state, 1, 1, 0, None, None, None)
+    return AdviceRequest(
+        mdp=mdp,
+        q=[[0.0] * mdp.n_actions] * mdp.n_states,
+        state=state,
+        episode=1,
+        step=1,
+        own=0,
+        allowed=range(mdp.n_actions),
+    )
 
 
 def walk(mdp: TabularMDP, advisor: Advisor, limit: int = 200) -> int:
@@ -48,12 +54,12 @@ def walk(mdp: TabularMDP, advisor: Advisor, limit: int = 200) -> int:
 
 
 def made(name: str, mdp: TabularMDP, seed: int = 0) -> Advisor:
-    advisor = make_advisor(name, mdp, 0.99, np.random.default_rng(seed))
+    advisor = TableLevel(mdp, 0.99, np.random.default_rng(seed)).advisor(AdvisorName.of(name))
     assert advisor is not None
     return advisor
 
 
-@pytest.mark.parametrize("name", [*SKILLS, "tau=0.05"])
+@pytest.mark.parametrize("name", [*SKILL_TAUS, "tau=0.05"])
 def test_simulated_advisors_name_actions_and_repeat(name: str) -> None:
     mdp = board()
     asked = [request(mdp, state) for state in range(mdp.n_states)] * 5
@@ -70,7 +76,7 @@ def test_an_expert_walks_the_shortest_way() -> None:
 
 def test_less_skill_means_longer_ways() -> None:
     mdp = board()
-    means = [np.mean([walk(mdp, advisor) for _ in range(60)]) for advisor in (made(name, mdp) for name in SKILLS)]
+    means = [np.mean([walk(mdp, advisor) for _ in range(60)]) for advisor in (made(name, mdp) for name in SKILL_TAUS)]
     assert means == sorted(means)
     assert means[0] < means[-1]
 
@@ -84,7 +90,7 @@ def test_advice_follows_the_softmax_of_the_optimal_values() -> None:
 
 
 def test_a_frozen_table_never_overflows() -> None:
-    advice = Advice.of(skill(np.array([[1e9, -1e9, 1e9]]), 1e-12))
+    advice = Advice.of(advice_chances(np.array([[1e9, -1e9, 1e9]]), 1e-12))
     advisor = TableAdvisor(advice, np.random.default_rng(0).random)
     assert {advisor.advise(request(board(), 0)) for _ in range(50)} == {0, 2}
 
@@ -92,46 +98,48 @@ def test_a_frozen_table_never_overflows() -> None:
 def test_nobody_and_a_person() -> None:
     mdp = board()
     rng = np.random.default_rng(0)
-    assert make_advisor("none", mdp, 0.99, rng) is None
-    person = make_advisor("terminal", mdp, 0.99, rng, {"terminal": lambda asked: asked.state + 1})
+    assert TableLevel(mdp, 0.99, rng).advisor(AdvisorName.of("none")) is None
+    person = TableLevel(mdp, 0.99, rng, {"terminal": lambda asked: asked.state + 1}).advisor(AdvisorName.of("terminal"))
     assert person is not None
     assert person.advise(request(mdp, 2)) == 3
     for name, missing in (("terminal", "no prompt"), ("web", "no page")):
         with pytest.raises(BadInput, match=missing):
-            make_advisor(name, mdp, 0.99, rng)
+            TableLevel(mdp, 0.99, rng).advisor(AdvisorName.of(name))
 
 
 def test_a_person_may_leave() -> None:
     def leave(asked: AdviceRequest) -> int:
         raise AdvisorLeft
 
-    person = make_advisor("terminal", board(), 0.99, np.random.default_rng(0), {"terminal": leave})
+    person = TableLevel(board(), 0.99, np.random.default_rng(0), {"terminal": leave}).advisor(
+        AdvisorName.of("terminal")
+    )
     assert person is not None
     with pytest.raises(AdvisorLeft):
         person.advise(request(board(), 0))
 
 
 def test_names_are_checked() -> None:
-    for name in (*ADVISORS, "tau=0.25", "tau=1..0.01", "recorded:some/file"):
-        assert callable(parse_advisor(name))
+    for name in (*named(), "tau=0.25", "tau=1..0.01", "recorded:some/file"):
+        assert AdvisorName.of(name).text == name
     with pytest.raises(BadInput, match=r"unknown advisor 'exprt' \(--advisor\): did you mean 'expert'\?.*tau=X"):
-        parse_advisor("exprt", "--advisor")
+        AdvisorName.of("exprt", "--advisor")
     for bad in ("tau=", "tau=x", "tau=0", "tau=-1", "tau=nan", "tau=inf", "tau=1..", "tau=1..0"):
         with pytest.raises(BadInput, match="tau must be a number above 0"):
-            parse_advisor(bad)
+            AdvisorName.of(bad)
 
 
 def test_an_advisor_with_a_limited_view_says_nothing_outside_it() -> None:
     mdp = board()
     region = np.arange(16) >= 8
-    advisor = make_advisor("expert", mdp, 0.99, np.random.default_rng(0), region=region)
+    advisor = TableLevel(mdp, 0.99, np.random.default_rng(0), region=region).advisor(AdvisorName.of("expert"))
     assert advisor is not None
     assert [advisor.advise(request(mdp, state)) is None for state in (0, 7, 8, 15)] == [True, True, False, False]
 
 
 def test_an_advisor_may_learn_or_tire_over_the_episodes() -> None:
     q = np.array([[0.0, 1.0]])
-    novice_to_expert = TableAdvisor(Advice.of(skill(q, [100.0, 0.01])), np.random.default_rng(0).random)
+    novice_to_expert = TableAdvisor(Advice.of(advice_chances(q, [100.0, 0.01])), np.random.default_rng(0).random)
     asked = [replace(request(board(), 0), episode=n) for n in (1, 2, 9)]
     shares = [np.mean([novice_to_expert.advise(one) for _ in range(500)]) for one in asked]
     assert 0.4 < shares[0] < 0.6
@@ -159,7 +167,7 @@ def test_advice_is_made_of_chances(chances: FloatArray) -> None:
 @pytest.mark.parametrize("tau", [0.0, -1.0, float("nan"), float("inf"), [0.1, 0.0]])
 def test_a_skill_needs_a_tau_above_zero(tau: float | list[float]) -> None:
     with pytest.raises(BadInput, match="tau above 0"):
-        skill(np.zeros((2, 2)), tau)
+        advice_chances(np.zeros((2, 2)), tau)
 
 
 def recorded(folder: Path, mdp: TabularMDP, said: list[tuple[int, int | None]]) -> str:

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.advice.advisors import make_advisor
-from lab.advice.counsel import Counsel
+from lab.advice.advising import Advising
+from lab.advice.advisors import AdvisorName
 from lab.advice.entries import (
     FILE,
     KINDS,
@@ -28,6 +28,7 @@ from lab.advice.entries import (
     undoable,
 )
 from lab.advice.journal import Again, Journal, Undo
+from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment
 from lab.learning.events import AdviceGiven, EpisodeEnded, Event, Verdict
@@ -58,7 +59,7 @@ def lesson(journal: Journal, ask: Ask, told: list[Event] | None = None) -> Sessi
             events.append(event)
 
         rng = np.random.default_rng(5)
-        advisor = Counsel(("terminal",), {"terminal": ask}).gather(place, LEARNER, rng, journal=journal, tell=tell)
+        advisor = Advising.of(("terminal",), {"terminal": ask}).gather(place, LEARNER, rng, journal=journal, tell=tell)
         try:
             result = run_session(place.mdp, LEARNER, GATE, advisor, rng, on_event=tell)
         except Again:
@@ -276,6 +277,7 @@ def test_a_journal_that_cannot_be_read(tmp_path: Path) -> None:
 
 
 whole_numbers = st.integers(0, 10**9)
+numbers = st.one_of(whole_numbers, st.floats(allow_nan=False, allow_infinity=False))
 some_numbers = st.one_of(st.none(), st.floats(allow_nan=False, allow_infinity=False))
 BY_FIELD: dict[str, Any] = {
     **dict.fromkeys(
@@ -286,11 +288,12 @@ BY_FIELD: dict[str, Any] = {
     "action": st.one_of(st.none(), whole_numbers),
     "verdict": st.sampled_from(get_args(Verdict)),
     **dict.fromkeys(("improvement_rate", "current_mean", "previous_mean"), some_numbers),
-    **dict.fromkeys(("final_steps", "optimal_steps"), st.one_of(st.none(), whole_numbers)),
+    **dict.fromkeys(("final_steps", "optimal_steps"), st.one_of(st.none(), numbers)),
     **dict.fromkeys(("mean_before", "trust"), st.floats(allow_nan=False, allow_infinity=False)),
     **dict.fromkeys(("guided", "reached", "left", "solved"), st.booleans()),
     **dict.fromkeys(
-        ("problem", "signature", "lab", "by", "why", "reason", "advisor", "saved_as", "continues"), st.text(max_size=9)
+        ("problem", "signature", "lab", "by", "why", "reason", "advisor", "saved_as", "continues", "command"),
+        st.text(max_size=9),
     ),
 }
 
@@ -298,6 +301,8 @@ BY_FIELD: dict[str, Any] = {
 def entries() -> st.SearchStrategy[Entry]:
     def of(kind: type[Any]) -> st.SearchStrategy[Entry]:
         fields = {name: BY_FIELD.get(name, whole_numbers) for name in kind.__dataclass_fields__}
+        if kind is EpisodeEnded:
+            fields["steps"] = numbers  # of an order: its cost
         return st.builds(kind, **fields)
 
     return st.one_of(*map(of, KINDS.values()))
@@ -327,14 +332,16 @@ def test_a_recording_advises_by_state_and_only_about_its_problem(tmp_path: Path)
     journal.close()
     said = read_journal(tmp_path, "DIR").said()
     rng = np.random.default_rng(0)
-    recorded = make_advisor(f"recorded:{tmp_path}", board(), 0.99, rng)
+    recorded = TableLevel(board(), 0.99, rng).advisor(AdvisorName.of(f"recorded:{tmp_path}"))
     assert recorded is not None
     for state in range(board().n_states):
-        request = AdviceRequest(board(), [[0.0] * 4] * 12, state, 1, 1, 0, None, None, None)
+        request = AdviceRequest(
+            mdp=board(), q=[[0.0] * 4] * 12, state=state, episode=1, step=1, own=0, allowed=range(board().n_actions)
+        )
         assert recorded.advise(request) == said.get(state)
     other = grid((2, 2), np.zeros((2, 2), bool), (0, 0), (1, 1))
     with pytest.raises(BadInput, match="it is advice about another problem, 'board'"):
-        make_advisor(f"recorded:{tmp_path}", other, 0.99, rng)
+        TableLevel(other, 0.99, rng).advisor(AdvisorName.of(f"recorded:{tmp_path}"))
 
 
 def test_json_lines_hold_what_the_documentation_says(tmp_path: Path) -> None:

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.advice.advisors import make_advisor
-from lab.advice.panel import ASKED, DECISIONS, Panel, decided, panel_of
+from lab.advice.advisors import AdvisorName
+from lab.advice.panel import ASKED, DECISIONS, Panel, PanelSettings, decided, members_of
+from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.events import AdviceGiven, AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Walked
@@ -40,12 +41,15 @@ class Says:
 
 def request(state: int = 0, episode: int = 1, step: int = 1, own: int = LEFT) -> AdviceRequest:
     mdp = corridor()
-    return AdviceRequest(mdp, [[0.0] * 2] * 4, state, episode, step, own, None, None, None)
+    return AdviceRequest(
+        mdp=mdp, q=[[0.0] * 2] * 4, state=state, episode=episode, step=step, own=own, allowed=range(mdp.n_actions)
+    )
 
 
 def panel(members: dict[str, Advisor], told: list[Event] | None = None, **words: Any) -> Panel:
-    given: dict[str, Any] = {"decide": "majority", "asked": "together", "draw": lambda: 0.5} | words
-    return Panel(members, 4, tell=(told if told is not None else []).append, **given)
+    draw = words.pop("draw", lambda: 0.5)
+    settings = PanelSettings(**{"decide": "majority"} | words)
+    return Panel(members, 4, settings, draw=draw, tell=(told if told is not None else []).append)
 
 
 def to_the_goal(episode: int) -> Walked:
@@ -219,16 +223,14 @@ def test_an_episode_that_was_broken_off_does_not_count() -> None:
 def test_bad_panels_and_names() -> None:
     with pytest.raises(BadInput, match="no member"):
         panel({})
-    with pytest.raises(BadInput, match=r"unknown decision 'majorty'.*did you mean 'majority'"):
+    with pytest.raises(BadInput, match=r"unknown way of deciding 'majorty'.*did you mean 'majority'"):
         panel({"a": Says(0)}, decide="majorty")
-    with pytest.raises(BadInput, match=r"unknown order of asking 'turn'.*known: in-turn, together"):
+    with pytest.raises(BadInput, match=r"unknown way of asking 'turn'.*known: in-turn, together"):
         panel({"a": Says(0)}, asked="turn")
-    words: dict[str, Any] = {"decide": "majority", "asked": "together", "draw": lambda: 0.5, "tell": [].append}
     names = ("expert", "wrong", "expert", "none", "expert")
-    found = panel_of(names, [Says(0), Says(1), Says(2), None, Says(3)], 4, **words)
-    assert [member.name for member in found.standing()] == ["expert", "wrong", "expert 2", "expert 3"]
-    with pytest.raises(BadInput, match="no member"):
-        panel_of(("none",), [None], 4, **words)
+    found = members_of(names, [Says(0), Says(1), Says(2), None, Says(3)])
+    assert [*found] == ["expert", "wrong", "expert 2", "expert 3"]
+    assert members_of(("none",), [None]) == {}
 
 
 def board() -> TabularMDP:
@@ -240,8 +242,11 @@ def board() -> TabularMDP:
 def session(names: Sequence[str], decide: str, asked: str, seed: int) -> tuple[SessionResult, list[Event], Panel]:
     mdp, told = board(), list[Event]()
     *streams, own, last = np.random.default_rng(seed).spawn(len(names) + 2)
-    members = [make_advisor(name, mdp, 0.99, rng) for name, rng in zip(names, streams, strict=True)]
-    of = panel_of(names, members, mdp.n_states, decide=decide, asked=asked, draw=uniforms(own), tell=told.append)
+    members = [
+        TableLevel(mdp, 0.99, rng).advisor(AdvisorName.of(name)) for name, rng in zip(names, streams, strict=True)
+    ]
+    settings = PanelSettings(asked, decide)
+    of = Panel(members_of(names, members), mdp.n_states, settings, draw=uniforms(own), tell=told.append)
     learner = LearnerSettings(episodes=40, max_steps=40)
     result = run_session(mdp, learner, GateSettings("always"), of, last, on_event=told.append)
     return result, told, of

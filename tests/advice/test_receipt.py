@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.advice.advisors import Person, make_advisor
+from lab.advice.advisors import AdvisorName, Person
 from lab.advice.entries import Answer, Closed, Entry
 from lab.advice.journal import Journal
-from lab.advice.panel import panel_of
+from lab.advice.panel import Panel, PanelSettings, members_of
 from lab.advice.receipt import OVERRULED, SILENT, UNHEARD, WIDTH, Receipt, receipt
+from lab.advice.table_level import TableLevel
 from lab.learning.events import (
     AdviceEnded,
     AdviceGiven,
@@ -282,9 +283,9 @@ def lesson(*, several: bool = False, answers: int = 60) -> tuple[Receipt, Any, l
     advisor: Any = Person(lambda request: journal.answer("terminal", request, ask))
     rng = np.random.default_rng(0)
     if several:
-        wrong = make_advisor("wrong", mdp, 0.99, np.random.default_rng(1))
-        words: dict[str, Any] = {"decide": "trust-weighted", "asked": "together", "draw": rng.random}
-        advisor = panel_of(("terminal", "wrong"), (advisor, wrong), mdp.n_states, tell=tell, **words)
+        wrong = TableLevel(mdp, 0.99, np.random.default_rng(1)).advisor(AdvisorName.of("wrong"))
+        members = members_of(("terminal", "wrong"), (advisor, wrong))
+        advisor = Panel(members, mdp.n_states, PanelSettings(), draw=rng.random, tell=tell)
     learner = LearnerSettings(episodes=30, max_steps=40)
     result = run_session(mdp, learner, GateSettings("always"), advisor, rng, on_event=tell)
     return receipt(journal.entries, mdp, values), result, journal.entries

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.advice.advisors import SKILLS
-from lab.advice.advisors import skill as chances_of
+from lab.advice.advisors import SKILL_TAUS
 from lab.advice.trust import (
     EDGE,
     Ways,
@@ -22,6 +21,7 @@ from lab.advice.trust import (
     trust_there,
     worse,
 )
+from lab.learning.simulated_advice import advice_chances as chances_of
 from lab.mdp import grid, optimal_values
 from lab.studies.thesis.chapter_9_sessions import world
 
@@ -169,7 +169,7 @@ def test_too_few_answers_show_no_skill() -> None:
     assert skill_of([(0, 0)] * 5, TWO) is not None
 
 
-@pytest.mark.parametrize(("word", "tau"), SKILLS.items())
+@pytest.mark.parametrize(("word", "tau"), SKILL_TAUS.items())
 def test_the_interval_holds_the_truth(word: str, tau: float) -> None:
     """300 answers of a simulated advisor in world I, 40 times; measured with 200 seeds: 200, 190, 192 and 188 held."""
     mdp = world("world-1").mdp()

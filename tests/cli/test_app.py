@@ -35,7 +35,7 @@ def test_help_names_all_members(lab: Lab) -> None:
     """What is typed behind an option of a family stands in that option's help, and the shell completes it."""
     offered = {
         "teach": ("skills", "learners", "gates", "advisors", "asked", "decisions"),
-        "sequence": ("methods", "objectives", "orderers", "order gates"),
+        "sequence": ("methods", "objectives", "advisors", "order gates"),
         "run": ("advisors", "asked", "decisions"),
     }
     for command, families in offered.items():
@@ -151,7 +151,7 @@ def test_a_failed_piece_of_work_ends_with_1(lab: Lab, monkeypatch: pytest.Monkey
     def fail(*_: object) -> None:
         raise WorkFailed("the arm is stuck\nat the table")
 
-    monkeypatch.setattr("lab.production.prepared.prepare", fail)
+    monkeypatch.setattr("lab.skills.prepared_scene.prepare", fail)
     ran = lab("run", "--json")
     why = r"the arm is stuck\nat the table"
     assert (ran.code, ran.json, ran.err) == (1, {"error": why, "exit_code": 1}, f"lab: {why}\n")
@@ -165,7 +165,7 @@ def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: 
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lab.production.prepared.prepare", stop)
+    monkeypatch.setattr("lab.skills.prepared_scene.prepare", stop)
     monkeypatch.setattr("lab.teaching.lesson.load", stop)
     monkeypatch.setattr("lab.tasks.task_file.load", stop)
     ran = lab(*words.split(), "--json")
@@ -177,7 +177,7 @@ def test_what_the_system_refuses_is_one_line(lab: Lab, monkeypatch: pytest.Monke
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device", "x")
 
-    monkeypatch.setattr("lab.production.prepared.prepare", full)
+    monkeypatch.setattr("lab.skills.prepared_scene.prepare", full)
     ran = lab("run")
     assert (ran.code, ran.out, ran.err) == (1, "", "lab: [Errno 28] No space left on device: 'x'\n")
 

@@ -20,7 +20,7 @@ Tree = Callable[[Path], list[str]]
 SHIPPED = ", ".join(shipped())
 TASKS, METHODS = (f"known: {', '.join(sorted(names))}" for names in (shipped(), SEQUENCERS))
 ADVISORS, LEARNERS, GATES = (
-    f"known: {', '.join(sorted(names))}" for names in ([*advisors.ADVISORS, *advisors.FORMS], UPDATES, gates.GATES)
+    f"known: {', '.join(sorted(names))}" for names in (advisors.ADVISORS, UPDATES, gates.GATES)
 )
 
 

@@ -18,16 +18,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from lab.advice.advisors import make_advisor, skill
+from lab.advice.advisors import AdvisorName
+from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, LabError, WorkFailed
 from lab.gym import GymWorld, gym_world, names_environment, parse_name
-from lab.gym.found_model import Model, Worth
 from lab.gym.gym_environment import ALONE, GymEnvironment
-from lab.gym.spaces import Numbering, Unsupported
+from lab.gym.space_numbering import Numbering, Unsupported
+from lab.gym.transition_model import TransitionModel, Worth
 from lab.learning.environment import Judged
 from lab.learning.selection import Draw, uniforms
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.simulated_advice import advice_chances
 from lab.tasks.task_file import load_world
 
 
@@ -113,7 +115,7 @@ def environment(word: str) -> GymEnvironment:
     return found
 
 
-def model(word: str) -> Model:
+def model(word: str) -> TransitionModel:
     found = environment(word).model
     assert found is not None
     return found
@@ -122,7 +124,9 @@ def model(word: str) -> Model:
 def learned(world: GymWorld, seed: int, advisor: str = "none", draw: Draw | None = None) -> SessionResult:
     problem, rng = world.problem(), np.random.default_rng(seed)
     assert problem.environment is not None
-    asked = make_advisor(advisor, problem.mdp, world.learner.discount, rng, values=problem.environment.values)
+    asked = TableLevel(problem.mdp, world.learner.discount, rng, values=problem.environment.values).advisor(
+        AdvisorName.of(advisor)
+    )
     place = problem.environment
     return run_session(place, world.learner, world.gate, asked, rng if draw is None else draw)
 
@@ -277,12 +281,12 @@ def test_cliff_and_taxi_are_known_exactly(word: str, mean_return: float, steps: 
 )
 def test_what_is_no_model_is_refused(outcomes: Any, starts: list[float]) -> None:
     with pytest.raises((ValueError, KeyError, TypeError)):
-        Model(outcomes, np.array(starts), 1)
+        TransitionModel(outcomes, np.array(starts), 1)
 
 
 def test_values_that_do_not_settle_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lab.gym.found_model.MAX_SWEEPS", 1000)
-    endless = Model({0: {0: [(1.0, 0, -1.0, False)]}}, np.ones(1), 1)
+    monkeypatch.setattr("lab.gym.transition_model.MAX_SWEEPS", 1000)
+    endless = TransitionModel({0: {0: [(1.0, 0, -1.0, False)]}}, np.ones(1), 1)
     assert endless.best == -np.inf
     with pytest.raises(WorkFailed, match=r"discount 1\.0 did not settle in 1000 sweeps"):
         endless.optimal(1.0)
@@ -572,12 +576,12 @@ def test_an_expert_knows_the_lake_better_than_a_novice() -> None:
     starts, outcomes = lake.model.starts, lake.live.inside.P
 
     def reaches(tau: float) -> float:
-        chances = skill(lake.values(0.99), tau)
+        chances = advice_chances(lake.values(0.99), tau)
         mixed = {
             state: {0: [(c * chances[state, a], *rest) for a in range(4) for c, *rest in row[a]]}
             for state, row in outcomes.items()
         }
-        return Model(mixed, starts, 1).worth(np.zeros(16, np.int64), 100).reaches
+        return TransitionModel(mixed, starts, 1).worth(np.zeros(16, np.int64), 100).reaches
 
     expert, moderate, novice = reaches(0.01), reaches(0.1), reaches(1.0)
     assert expert > 0.6

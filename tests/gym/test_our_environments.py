@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.gym import ENVIRONMENTS, CellEnv, FmsEnv, TableEnv, ToastCellEnv, WorldEnv, register
 from lab.mdp import coverage, grid
-from lab.production.prepared import prepare
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.methods.exact import optimum
+from lab.skills.prepared_scene import prepare
 from lab.tasks.cell import CellFile
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.task_file import load, load_cell, load_world

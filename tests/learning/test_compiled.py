@@ -16,7 +16,7 @@ DOUBLED = (
     "from lab.learning.compiled import inner, lean\nfrom kitchen import recipe\n\nslices = inner(recipe.slices)\n\n\n"
 )
 DOUBLED += "@lean\ndef doubled(toasts):\n    return 2 * slices(toasts)\n"
-SLICES = "from kitchen.bread import PER_TOAST\n\n\ndef slices(toasts):\n    return PER_TOAST * toasts\n"
+SLICES = "from .bread import (\n    PER_TOAST,  # slices\n)\n\n\ndef slices(toasts):\n    return PER_TOAST * toasts\n"
 
 
 @pytest.fixture
@@ -37,6 +37,7 @@ def _forget() -> None:
     for name in [name for name in sys.modules if name.partition(".")[0] == "kitchen"]:
         del sys.modules[name]
     compiled.key.cache_clear()
+    compiled.source.cache_clear()
 
 
 def started() -> Any:
@@ -92,14 +93,18 @@ def test_what_was_not_used_for_longest_goes(kitchen: Path, monkeypatch: pytest.M
         os.utime(folder, (second, second))
     started().doubled(3)
     left = sorted(folder.name.partition("-")[0] for folder in compiled.cache_folder().iterdir())
-    assert left == ["kitchen.kernel", "kitchen.recipe", "old"]
+    assert left == ["kitchen.kernel", "old", "older"]
 
 
 def test_the_kernels_know_all_that_they_are_made_of(monkeypatch: pytest.MonkeyPatch) -> None:
     """A change of a rule in any of these files is a change of the kernel."""
     importlib.import_module("lab.learning.kernels.session_loop")
-    before = compiled.key.__wrapped__("lab.learning.kernels.session_loop")
+    before = compiled.key("lab.learning.kernels.session_loop")
     for name in ("gates.gate_rules", "advice_memory", "selection", "updates.update"):
         with monkeypatch.context() as patch:
             patch.setattr(sys.modules[f"lab.learning.{name}"], "__file__", __file__)
-            assert compiled.key.__wrapped__("lab.learning.kernels.session_loop") != before
+            compiled.key.cache_clear()
+            compiled.source.cache_clear()
+            assert compiled.key("lab.learning.kernels.session_loop") != before
+    compiled.key.cache_clear()
+    compiled.source.cache_clear()

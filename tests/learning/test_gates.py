@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lab.advice.advisors import make_advisor
+from lab.advice.advisors import AdvisorName
+from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.gates import GATES, Gate, Surroundings, deviation, improvement
 from lab.learning.members import Member
@@ -162,7 +163,7 @@ def taught(name: str, advisor: str, seed: int) -> SessionResult:
     blocked[1:5, 2] = blocked[2, 4] = True
     mdp = grid((6, 6), blocked, (2, 0), (3, 5))
     settings = GateSettings(name, first_episode=10, window=3, omega=2, rate=0.3)
-    adviser = make_advisor(advisor, mdp, 0.99, np.random.default_rng([seed, 1]))
+    adviser = TableLevel(mdp, 0.99, np.random.default_rng([seed, 1])).advisor(AdvisorName.of(advisor))
     return run_session(mdp, LearnerSettings("q", episodes=80), settings, adviser, np.random.default_rng(seed))
 
 
@@ -242,7 +243,7 @@ def test_the_ensemble_learns_as_the_learner_does(learner: str, monkeypatch: pyte
         return GATES["uncertainty"].make(of, episodes, max_steps, Surroundings(lambda: 0.0, lambda count: tables))
 
     monkeypatch.setitem(GATES, "certain", Member(ensemble, "certain"))
-    adviser = make_advisor("novice", mdp, 0.99, np.random.default_rng(1))
+    adviser = TableLevel(mdp, 0.99, np.random.default_rng(1)).advisor(AdvisorName.of("novice"))
     asks = GateSettings("certain", first_episode=3, spread=0.0, ensemble=2)
     result = run_session(mdp, settings, asks, adviser, np.random.default_rng(0))
     assert result.helped_steps > 0

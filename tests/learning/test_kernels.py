@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.advice.advisors import Advice, TableAdvisor, skill
 from lab.errors import BadInput
 from lab.learning.batch import Batch, run_sessions
 from lab.learning.gates import GATES, Gate, Steps
@@ -14,6 +13,7 @@ from lab.learning.kernels.records import LANES
 from lab.learning.members import Member
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.learning.splitmix import stream
 from lab.learning.updates import UPDATES
 from lab.mdp import TabularMDP, grid, optimal_values
@@ -30,7 +30,7 @@ def board() -> TabularMDP:
 
 
 def advice(mdp: TabularMDP, tau: Any = 0.2, region: Any = None) -> Advice:
-    return Advice.of(skill(optimal_values(mdp, 0.99), tau), region)
+    return Advice.of(advice_chances(optimal_values(mdp, 0.99), tau), region)
 
 
 def alone(

@@ -6,10 +6,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.advice.advisors import ADVISORS, PEOPLE, make_advisor
+from lab.advice.advisors import PEOPLE, AdvisorName, named
+from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.environment import Judged, Step, TableEnvironment
-from lab.learning.events import AdviceEnded, AdviceRejected, AdviceRemembered, AdviceRequested, EpisodeEnded, Event
+from lab.learning.events import (
+    AdviceEnded,
+    AdviceRejected,
+    AdviceRemembered,
+    AdviceRequested,
+    EpisodeEnded,
+    Event,
+    Improvement,
+)
 from lab.learning.gates import GATES
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.selection import SELECTIONS, Draw
@@ -40,7 +49,7 @@ def session(
     learner = replace(SHORT, **{k: v for k, v in changes.items() if hasattr(SHORT, k)})
     gate = replace(EARLY, **{k: v for k, v in changes.items() if hasattr(EARLY, k)})
     events: list[Event] = []
-    adviser = make_advisor(advisor, mdp, learner.discount, np.random.default_rng([seed, 1]))
+    adviser = TableLevel(mdp, learner.discount, np.random.default_rng([seed, 1])).advisor(AdvisorName.of(advisor))
     result = run_session(mdp, learner, gate, adviser, np.random.default_rng(seed), on_event=events.append)
     return result, events
 
@@ -96,7 +105,7 @@ def test_results_fit_together_and_repeat(learner: str, gate: str, memory: bool) 
     assert result.final_steps == (len(path[1]) if path[2] else None)
 
 
-@pytest.mark.parametrize("advisor", [name for name in ADVISORS if name not in PEOPLE])
+@pytest.mark.parametrize("advisor", [name for name in named() if name not in PEOPLE])
 def test_every_simulated_advisor_can_help(advisor: str) -> None:
     result, _ = session(board(3), advisor, gate="always", episodes=20)
     assert (result.helped_steps > 0) == (advisor != "none")
@@ -156,7 +165,7 @@ def test_the_gate_says_why_and_keeps_to_its_budget() -> None:
     gate = GateSettings("always", budget=4)
     result = run_session(corridor(4), LearnerSettings(episodes=5), gate, right, np.random.default_rng(0))
     assert result.helped_steps == len(right.requests) == 4
-    assert {str(request.why) for request in right.requests} == {"it asks about every step"}
+    assert {str(request.reason) for request in right.requests} == {"it asks about every step"}
 
 
 def test_an_expert_on_the_shortest_way_misleads_as_printed_but_not_where_the_best_is_spared() -> None:
@@ -179,7 +188,9 @@ def test_who_is_rejected_does_not_hang_on_where_episodes_begin(advisor: str, rej
     settings, gate = LearnerSettings(episodes=120, max_steps=60), GateSettings(spare_best=True)
     results = []
     for seed in range(8):
-        adviser = make_advisor(advisor, anywhere, settings.discount, np.random.default_rng([seed, 1]))
+        adviser = TableLevel(anywhere, settings.discount, np.random.default_rng([seed, 1])).advisor(
+            AdvisorName.of(advisor)
+        )
         results.append(run_session(anywhere, settings, gate, adviser, np.random.default_rng(seed)))
     assert all((result.rejected_at_episode is not None) == rejected for result in results)
 
@@ -197,9 +208,8 @@ def test_the_request_shows_where_the_learner_is() -> None:
     run_session(corridor(4), settings, gate, right, np.random.default_rng(0))
     first, last = right.requests[0], right.requests[-1]
     assert [(r.episode, r.step, r.state) for r in right.requests[:4]] == [(1, 1, 0), (1, 2, 1), (1, 3, 2), (2, 1, 0)]
-    assert (first.improvement_rate, first.current_mean, first.previous_mean) == (None, None, None)
-    assert (last.improvement_rate, last.current_mean, last.previous_mean) == (0.0, 3.0, 3.0)
-    assert all(request.learner_action in (0, 1) for request in right.requests)
+    assert (first.improvement, last.improvement) == (None, Improvement(0.0, 3.0, 3.0))
+    assert all(request.own in (0, 1) for request in right.requests)
     assert np.shape(first.q) == (4, 2)
 
 
@@ -413,6 +423,6 @@ def test_episodes_begin_at_each_of_several_starts() -> None:
 
 def test_the_butter_board_is_covered_in_the_fewest_moves() -> None:
     mdp = coverage((3, 3), Rewards())
-    advisor = make_advisor("expert", mdp, 0.99, np.random.default_rng(1))
+    advisor = TableLevel(mdp, 0.99, np.random.default_rng(1)).advisor(AdvisorName.of("expert"))
     result = run_session(mdp, LearnerSettings(), GateSettings(), advisor, np.random.default_rng(0))
     assert (result.solved, result.final_steps) == (True, 8)

@@ -9,9 +9,7 @@ import pytest
 from lab.errors import WorkFailed
 from lab.production.composer import MAX_TRIES, Outcome, Production, carry_out
 from lab.production.durations import Durations, cell_of, measure
-from lab.production.floor import Floor, try_out
-from lab.production.prepared import Prepared
-from lab.production.skillset import SkillSet
+from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.simulate.run import simulate
@@ -19,8 +17,11 @@ from lab.sim.frames import Body, Frame
 from lab.sim.scene import Layout, spots
 from lab.sim.world import World
 from lab.skills import Butter
+from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Status
+from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
+from lab.skills.trial import trial_of
 from lab.tasks.task_file import Stage, Task, load
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
@@ -343,8 +344,8 @@ def test_a_toast_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None
 
 
 def test_a_grasp_can_be_tried_alone(prepared: Prepared, clueless: Callable[[str], None]) -> None:
-    grasp = prepared.skillset.skills["grasp at plate"]
+    grasp, trial = prepared.skillset.skills["grasp at plate"], trial_of(prepared)
     assert grasp.tried
-    assert try_out(prepared, grasp) is None
-    clueless("grasp at plate")
-    assert "does not reach its goal" in (try_out(prepared, grasp) or "")
+    assert trial(grasp.problem, prepared.skillset.policies[grasp.name]) is None
+    clueless(grasp.name)
+    assert "does not reach its goal" in (trial(grasp.problem, prepared.skillset.policies[grasp.name]) or "")

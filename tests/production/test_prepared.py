@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from lab.errors import BadInput
-from lab.production.prepared import check_task
+from lab.skills.prepared_scene import check_task
 from lab.tasks.task_file import names_of
 
 

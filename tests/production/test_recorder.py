@@ -6,8 +6,8 @@ import pytest
 
 from lab.files import assets_folder
 from lab.production.recorder import FRAME_EVERY, Recorder
-from lab.sim.assets import SLICE
 from lab.sim.frames import Body, Frame
+from lab.sim.models import SLICE
 from lab.sim.world import TIME_STEP, World
 
 

@@ -16,13 +16,13 @@ import lab.production.run
 from lab.errors import WorkFailed
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
-from lab.production.prepared import Prepared, prepare
 from lab.production.report import FILES, Report, Taught, write_files
 from lab.production.run import teach_all
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import optimum
 from lab.sim.frames import Recording
+from lab.skills.prepared_scene import Prepared, prepare
 from lab.tasks.sequencing import search_for
 from lab.tasks.task_file import Task, load
 from lab.teaching.listener import Listener

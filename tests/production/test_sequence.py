@@ -1,18 +1,14 @@
 """The order of the transfers: what `lab sequence` answers for a cell and for a task, and what it refuses."""
 
-import re
 from collections.abc import Callable
-from dataclasses import replace
 from math import nan
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
-from lab.errors import BadInput
+from lab.advice.advisors import AdvisorName
 from lab.production.sequence import (
     Wanted,
     reference,
@@ -20,18 +16,14 @@ from lab.production.sequence import (
     sequence_named,
 )
 from lab.sequencing import SEQUENCERS, find_sequence
-from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES
-from lab.sequencing.cell.stations import Stage, Station
-from lab.sequencing.search import Reference, Search, SequenceResult, SrlSettings
-from lab.sequencing.simulate.execution import replicate
+from lab.sequencing.search import Reference, SequenceResult
 from lab.sequencing.simulate.run import simulate
 from lab.tasks.sequencing import search_for
 from lab.tasks.task_file import load, load_cell
 from lab.teaching.listener import Listener
 from lab.teaching.teacher import Teacher
-from lab.toolbox.registry import Toolbox
 from lab.vision import read_picture
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
@@ -49,61 +41,6 @@ FIELDS = (
 LEARNERS = ("srl", "srl-time", "mc")
 AT_ONCE = ("fifo", "exact", "cp-sat", "shortest-move", "longest-remaining-work", "most-urgent-machine", "nearest-ready")
 UNDUE = sorted(set(SEQUENCERS) - {"earliest-due"})  # those that need no due times
-
-# A toast takes 2 s into the oven, 10 s in it and 2 s out; the robot comes back in 1 s for the next one: 14 s, 29 s.
-OVEN = """
-name = "oven"
-kind = "cell"
-parts = 2
-stations = [
-  { name = "in", kind = "storage", capacity = 9 },
-  { name = "hot", kind = "machine", capacity = 1, processing_s = 10 },
-  { name = "out", kind = "storage", capacity = 9 },
-]
-robot = { start = "in" }
-products = [{ name = "toast", routes = [["in", "hot", "out"]] }]
-travel = { in = { hot = 1, out = 1 }, hot = { in = 1, out = 1 }, out = { in = 1, hot = 1 } }
-loaded = { in = { hot = 2 }, hot = { out = 2 } }
-"""
-LATE = "due_s = [14, 20]\n" + OVEN  # the second toast is out after 29 s, 9 s late
-
-# Two products that meet head-on: once each is in the machine that the other wants, nothing moves any more.
-CROSSING = """
-name = "crossing"
-kind = "cell"
-order = ["east", "west"]
-stations = [
-  { name = "in", kind = "storage", capacity = 2 },
-  { name = "left", kind = "machine", capacity = 1, processing_s = 5 },
-  { name = "right", kind = "machine", capacity = 1, processing_s = 5 },
-  { name = "out", kind = "storage", capacity = 2 },
-]
-robot = { start = "in" }
-products = [
-  { name = "east", routes = [["in", "left", "right", "out"]] },
-  { name = "west", routes = [["in", "right", "left", "out"]] },
-]
-[travel]
-in = { left = 1, right = 1, out = 1 }
-left = { in = 1, right = 1, out = 1 }
-right = { in = 1, left = 1, out = 1 }
-out = { in = 1, left = 1, right = 1 }
-"""
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder to run in that holds the cells of this file, with a toolbox that is not there yet."""
-    for name, text in (("oven", OVEN), ("late", LATE), ("crossing", CROSSING)):
-        (tmp_path / f"{name}.toml").write_text(text)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("LAB_TOOLBOX", str(tmp_path / "toolbox"))
-    return tmp_path
-
-
-@pytest.fixture
-def teacher(folder: Path) -> Teacher:
-    return Teacher(Toolbox(folder / "toolbox"))
 
 
 def asked(lab: Lab, words: str, **more: Any) -> dict[str, Any]:
@@ -328,103 +265,6 @@ def test_an_optimum_that_is_not_proven_is_a_bound(monkeypatch: pytest.MonkeyPatc
     assert (document["success_percent"], document["final_success_percent"]) == (None, None)
 
 
-# ---- drawn times --------------------------------------------------------------------------------------------------
-
-REACTING = {
-    "srl": "planned anew at every decision",
-    "srl-time": "it goes on learning before every decision",
-    "fifo": "a queue of tasks as they become possible",
-    "shortest-move": "the rule shortest-move, asked at every decision",
-    "exact": "planned anew at every decision",
-}
-
-
-def few(monkeypatch: pytest.MonkeyPatch, episodes: int) -> None:
-    """Draw so many episodes, whatever the method and however many parts."""
-    for name in ("REPLICATIONS", "FEWEST"):
-        monkeypatch.setattr(f"lab.production.drawn_times.{name}", episodes)
-
-
-@pytest.mark.parametrize("method", REACTING)
-def test_drawn_times(lab: Lab, monkeypatch: pytest.MonkeyPatch, method: str) -> None:
-    """The list as it is, and what reacts, in the same episodes: the document has the means of both, and of the difference."""
-    few(monkeypatch, 5)
-    words = f"toast-case-1 --toasts 3 --method {method} --episodes 40"
-    plain, document = asked(lab, words), asked(lab, f"{words} --stochastic")
-    assert tuple(document) == FIELDS
-    drawn = document["stochastic"]
-    assert list(drawn) == [
-        *("processing", "arrivals", "spread", "replications", "fixed", "reacting", "saved_by_reacting")
-    ]
-    assert (drawn["processing"], drawn["arrivals"], drawn["spread"]) == ("normal", None, 0.1)
-    assert (drawn["replications"], drawn["reacting"]["policy"]) == (5, REACTING[method])
-    for name in ("fixed", "reacting", "saved_by_reacting"):
-        low, high = drawn[name]["ci95"]
-        assert low <= drawn[name]["mean"] <= high
-    saved = drawn["fixed"]["mean"] - drawn["reacting"]["mean"]
-    assert drawn["saved_by_reacting"]["mean"] == pytest.approx(saved)
-    assert drawn["fixed"]["sequence"] == plain["sequence"]  # planned with the mean times, whatever was learned in
-    cell = load_cell("toast-case-1").cell(3)
-    costs = replicate(cell, plain["sequence"], Chance(), 5, 0)
-    assert drawn["fixed"]["mean"] == pytest.approx(costs.mean())
-    assert len(set(costs)) == 5
-    assert plain["stochastic"] is None
-    judged = {name: document[name] for name in ("gap", "success_percent")}
-    if SEQUENCERS[method].drawn:  # it looked in drawn times, where the shortest is luck
-        assert judged["success_percent"] is None
-        assert document["gap"] == pytest.approx(document["cost"] / 513 - 1, abs=1e-9)
-        assert document["cost"] >= 513 - 1e-6  # by the mean times
-        assert document["luckiest_cost"] == min(document["episode_costs"])
-        assert document["episode_costs"] != plain["episode_costs"]
-    else:
-        assert judged == {name: plain[name] for name in judged}
-        assert document["episode_costs"] == plain["episode_costs"]
-
-
-@pytest.mark.parametrize(
-    ("method", "toasts", "episodes"),
-    [("fifo", 5, 30), ("nearest-ready", 1, 30), ("exact", 1, 24), ("exact", 2, 6), ("exact", 5, 2)],
-)
-def test_who_plans_at_every_decision_is_given_fewer_episodes(
-    lab: Lab, monkeypatch: pytest.MonkeyPatch, method: str, toasts: int, episodes: int
-) -> None:
-    """Here 24 by parts squared, from 2 to 30."""
-    for name, number in (("REPLICATIONS", 30), ("PLANNED", 24), ("FEWEST", 2)):
-        monkeypatch.setattr(f"lab.production.drawn_times.{name}", number)
-    drawn = asked(lab, f"oven.toml --toasts {toasts} --method {method} --stochastic")["stochastic"]
-    assert drawn["replications"] == episodes
-
-
-def test_the_best_list_is_the_one_that_is_carried_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    few(monkeypatch, 2)
-    file = load_cell("toast-case-1")
-    wanted = Wanted("ga", 8, sessions=4, stochastic=True)
-    document, found = sequence_cell(file.cell(3), file.sequencing, wanted, file.chance())
-    best = min(found, key=lambda result: result.cost)
-    assert best.cost < found[-1].cost
-    assert document["stochastic"]["fixed"]["sequence"] == list(best.sequence)
-
-
-def test_without_spread_chance_changes_nothing(lab: Lab, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
-    few(monkeypatch, 3)
-    (folder / "sure.toml").write_text(OVEN + '[stochastic]\nprocessing = "normal"\nspread = 0\n')
-    drawn = asked(lab, "sure.toml --method srl --episodes 5 --stochastic")["stochastic"]
-    assert drawn["fixed"] == {"mean": 29.0, "ci95": [29.0, 29.0], "sequence": drawn["fixed"]["sequence"]}
-    assert drawn["saved_by_reacting"] == {"mean": 0.0, "ci95": [0.0, 0.0]}
-
-
-def test_the_file_says_what_is_drawn(lab: Lab, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
-    few(monkeypatch, 3)
-    come = (
-        '[arrivals]\ninterval_s = 30\n[stochastic]\nprocessing = "constant"\narrivals = "exponential"\nspread = 0.2\n'
-    )
-    (folder / "come.toml").write_text(OVEN + come)
-    drawn = asked(lab, "come.toml --method fifo --stochastic")["stochastic"]
-    assert (drawn["processing"], drawn["arrivals"], drawn["spread"]) == ("constant", "exponential", 0.2)
-    ran = lab("sequence", "come.toml", "--method", "fifo", "--stochastic")
-    assert ran.out.splitlines()[3].startswith("3 drawn episodes: the list as it is ")
-
-
 # ---- advice -------------------------------------------------------------------------------------------------------
 
 
@@ -458,7 +298,7 @@ def test_nobody_is_asked_unless_it_is_wanted(lab: Lab) -> None:
 def test_an_advisor_has_chance_of_its_own_in_every_session() -> None:
     """Every decision is a novice's, so what differs between the sessions is what the novice says."""
     file = load_cell("toast-case-1")
-    wanted = Wanted("srl", 5, sessions=2, advisor="novice", gate="always")
+    wanted = Wanted("srl", 5, sessions=2, advisor=AdvisorName.of("novice"), gate="always")
     _, (one, other) = sequence_cell(file.cell(3), file.sequencing, wanted, NO_CHANCE)
     assert one.episode_costs != other.episode_costs
 
@@ -469,7 +309,7 @@ def test_a_person_is_asked_on_the_terminal(lab: Lab) -> None:
     ran = lab("sequence", *words.split(), "--json", stdin="2\nauto\n")
     assert ran.code == 0, ran.err
     assert ran.json["advice"] == [{"requests": 2, "helped_steps": 1, "misleads": 0, "rejected_at_episode": None}]
-    assert "Episode 1: the learner asks which part to move next." in ran.err
+    assert "Episode 1: the learner asks for advice about 'The order of the transfers'." in ran.err
 
 
 # ---- pictures -----------------------------------------------------------------------------------------------------
@@ -498,121 +338,6 @@ def test_pictures_are_in_the_document(lab: Lab) -> None:
     assert "tardy-parts" in Path("p.svg").read_text(encoding="utf-8")
 
 
-# ---- what is refused: exit 2 before anything is done; what fails: exit 1 ----------------------------------------------
-
-KNOWN = ", ".join(sorted(SEQUENCERS))
-
-
-@pytest.mark.parametrize(
-    ("words", "line"),
-    [
-        ("world-1", "world-1: it is a world, there is nothing to sequence: learn it with lab teach world-1"),
-        ("ovn.toml", "no task file 'ovn.toml': give a file that exists, .toml or a .txt grid, or what ships: fms, "),
-        ("fsm", "unknown task 'fsm' (TASK): did you mean 'fms'? known: fms, toast, "),
-        ("fms --case RSR --toasts 3", "--case RSR and --toasts 3: an order is one or the other"),
-        ("oven.toml --case T --toasts 1", "--case T and --toasts 1: an order is one or the other"),
-        (
-            "fms --toasts 3",
-            "3 parts (--toasts): cell 'fms' makes several products: give their order with --case, such as RSR",
-        ),
-        (
-            "fms --case RXR",
-            "order 'RXR' (--case) for cell 'fms': letter 2, 'X', means no product: known: R (rook), S (sign)",
-        ),
-        ("fms --case rook,sgn", "unknown product 'sgn' (order for cell 'fms'): did you mean 'sign'? known: rook, sign"),
-        ("toast --case IV", "unknown case 'IV' (--case): did you mean 'I'? known: I, II, III"),
-        ("oven.toml --toasts 0", "an order of 0 parts: allowed are 1 to 200"),
-        ("toast --case I --toasts 201", "an order of 201 parts: allowed are 1 to 200"),
-        ("oven.toml --toasts 10", "station 'in': capacity 9 cannot hold all 10 parts"),
-        ("oven.toml --episodes 0", "invalid value for '--episodes'"),
-        ("oven.toml --sessions 0", "invalid value for '--sessions'"),
-        ("oven.toml --plot p.pdf", "picture 'p.pdf': plots are written as .png or .svg"),
-        ("oven.toml --gantt g", "picture 'g': plots are written as .png or .svg"),
-        ("oven.toml --gantt no/g.svg", "picture 'no/g.svg': there is no folder 'no'"),
-        ("toast --method srrl", f"unknown method 'srrl' (--method): did you mean 'srl'? known: {KNOWN}"),
-    ],
-)
-@pytest.mark.parametrize("json_too", [False, True], ids=["", "json"])
-def test_what_is_refused_at_once(lab: Lab, folder: Path, words: str, line: str, json_too: bool) -> None:
-    before = listed(folder)
-    ran = lab("sequence", *words.split(), *(["--json"] if json_too else []))
-    assert (ran.code, ran.gave_nothing) == (2, True)
-    assert line in ran.err
-    assert re.fullmatch(r"lab: .*\n", ran.err), "one line"
-    assert listed(folder) == before
-
-
-@pytest.mark.parametrize(
-    ("words", "line"),
-    [
-        ("--method srrl", f"unknown method 'srrl' (--method): did you mean 'srl'? known: {KNOWN}"),
-        (
-            "--objective makespn",
-            "unknown objective 'makespn' (--objective): did you mean 'makespan'? known: machine-idle, makespan, ",
-        ),
-        (
-            "--objective tardy-parts",
-            "objective 'tardy-parts': the cell has no due times (due_s); without them: makespan, robot-idle, machine-idle",
-        ),
-        ("--advisor exprt --method srl", "unknown advisor 'exprt' (--advisor): did you mean 'expert'? known: expert, "),
-        ("--advisor tau=0 --method srl", "unknown advisor 'tau=0' (--advisor): "),
-        (
-            "--advisor expert --gate cclr --method srl",
-            "unknown gate 'cclr' (--gate, for sequencing): did you mean 'ccrl'? known: always, ccrl, never",
-        ),
-        (
-            "--advisor expert --gate ia --method srl",
-            "gate 'ia' (--gate): it looks at a table of states, which sequencing has not; allowed here: ccrl, ",
-        ),
-        (
-            "--gate cclr",
-            "unknown gate 'cclr' (--gate, for sequencing): did you mean 'ccrl'? known: always, ccrl, never",
-        ),
-        ("--advisor exprt", "unknown advisor 'exprt' (--advisor): did you mean 'expert'? known: expert, "),
-        ("--advisor expert", "--advisor expert with --method srl-time: only srl asks for advice"),
-        ("--advisor expert --method exact", "--advisor expert with --method exact: only srl asks for advice"),
-        ("--advisor terminal --method mc", "--advisor terminal with --method mc: only srl asks for advice"),
-    ],
-)
-def test_what_does_not_fit_is_refused(lab: Lab, folder: Path, words: str, line: str) -> None:
-    before = listed(folder)
-    for more in ([], ["--json"]):
-        ran = lab("sequence", "oven.toml", *words.split(), *more)
-        assert (ran.code, ran.gave_nothing) == (2, True)
-        assert ran.err.startswith(f"lab: {line}")
-        assert len(ran.err.splitlines()) == 1
-    assert listed(folder) == before
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        *("--method x", "--objective x", "--objective mean-tardiness", "--gate x", "--method srl --advisor x"),
-        "--advisor expert --method fifo",
-    ],
-)
-def test_bad_names_are_known_before_a_task_is_measured(
-    lab: Lab, measured: list[tuple[str, int, int]], words: str
-) -> None:
-    ran = lab("sequence", "toast", *words.split())
-    assert (ran.code, ran.out, len(ran.err.splitlines()), measured) == (2, "", 1, [])
-
-
-def test_a_folder_for_a_picture(lab: Lab, folder: Path) -> None:
-    (folder / "p.png").mkdir()
-    ran = lab("sequence", "oven.toml", "--plot", "p.png")
-    assert (ran.code, ran.out, ran.err) == (2, "", "lab: picture 'p.png': it is a folder, a file is wanted\n")
-
-
-def test_a_deadlock_is_work_that_failed(lab: Lab) -> None:
-    """The queue puts both products into the machines at once; a search that looks further gets around it."""
-    ran = lab("sequence", "crossing.toml", "--method", "fifo", "--json")
-    assert (ran.code, ran.gave_nothing) == (1, True)
-    assert ran.err.splitlines()[-1] == "lab: no sequence for 2 parts came to its end in 1 episodes: deadlocks"
-    document = asked(lab, "crossing.toml --method random --episodes 50")
-    assert document["makespan_s"] < max(document["episode_costs"])
-
-
 # ---- a task: measured in simulation, then sequenced -----------------------------------------------------------------
 
 
@@ -627,26 +352,6 @@ class Heard(Listener):
 
     def sequenced(self, best: SequenceResult, known: Reference | None) -> None:
         self.notes.append((best.cost, known))
-
-
-@pytest.fixture
-def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int, int]]:
-    """The oven of the file above as if it had been measured; what was prepared: task, toasts, seed."""
-    prepared: list[tuple[str, int, int]] = []
-
-    def prepare(task: Any, toasts: int, seed: int) -> int:
-        prepared.append((task.name, toasts, seed))
-        return toasts
-
-    def cell(toasts: int, *_: object) -> SimpleNamespace:
-        stations = (Station("in", "storage", 9), Station("hot", "machine", 1, 10.0), Station("out", "storage", 9))
-        step = np.ones((3, 3)) - np.eye(3)
-        route = (Stage("in"), Stage("hot"), Stage("out"))
-        return SimpleNamespace(cell=Cell.alike(stations, route, step, 2 * step, "in", toasts))
-
-    monkeypatch.setattr("lab.production.prepared.prepare", prepare)
-    monkeypatch.setattr("lab.production.run.teach_all", cell)
-    return prepared
 
 
 @pytest.mark.parametrize("method", [None, "srl", "srl-time", "exact", "fifo", "random"])
@@ -679,17 +384,6 @@ def test_a_task_is_for_three_toasts_unless_told(lab: Lab, measured: list[tuple[s
     assert measured == [("toast", 3, 0)]
 
 
-@pytest.mark.usefixtures("measured")
-def test_the_times_of_a_task_are_drawn_as_the_thesis_has_it(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Normal, 10 % of the mean (section 7.6): with one machine and no buffer nothing can be saved by reacting."""
-    few(monkeypatch, 6)
-    drawn = asked(lab, "toast --toasts 2 --method exact --stochastic")["stochastic"]
-    assert (drawn["processing"], drawn["arrivals"], drawn["spread"]) == ("normal", None, 0.1)
-    assert drawn["saved_by_reacting"] == {"mean": 0.0, "ci95": [0.0, 0.0]}
-    costs = replicate(load_cell("oven.toml").cell(2), drawn["fixed"]["sequence"], Chance(), 6, 0)  # of the same times
-    assert drawn["fixed"]["mean"] == pytest.approx(costs.mean())
-
-
 def test_a_case_that_a_task_has_not(lab: Lab, folder: Path, root: Path, measured: list[tuple[str, int, int]]) -> None:
     (folder / "mine.toml").write_text((root / "tasks" / "toast.toml").read_text(encoding="utf-8"))
     ran = lab("sequence", "mine.toml", "--case", "I")
@@ -703,36 +397,6 @@ def test_a_task_with_advice(lab: Lab) -> None:
     assert (document["advisor"], document["advice"][0]["requests"]) == ("novice", 3)
 
 
-# ---- the parts ----------------------------------------------------------------------------------------------------
-
-
-def test_a_search_as_the_file_says_or_changed() -> None:
-    settings = load_cell("toast-case-2").sequencing.model_copy(
-        update={"episodes": 7, "alpha": 0.2, "discount": 0.8, "beta": 2.0, "reward_factor": "A", "state": "stations"}
-    )
-    srl = SrlSettings(0.2, 0.8, 2.0, "A", "pairs", "stations")
-    assert search_for(settings) == Search(7, "makespan", NO_CHANCE, srl)
-    told: list[object] = []
-    changed = search_for(settings, episodes=3, objective="robot-idle", chance=Chance(), on_episode=told.append)
-    assert changed == Search(3, "robot-idle", Chance(), srl, told.append)
-
-
-def test_what_is_found_is_told_and_depends_on_seed_and_session() -> None:
-    cell, told = load_cell("fms").cell(), list[object]()
-    search = Search(5, on_episode=told.append)
-    one, again = (find_sequence(cell, "random", search, 1) for _ in range(2))
-    assert one == again
-    assert len(told) == 10
-    quiet = replace(search, on_episode=None)
-    assert one != find_sequence(cell, "random", quiet, 2)
-    assert one != find_sequence(cell, "random", quiet, 1, session=1)
-
-
-def test_an_unknown_method_lists_the_known_ones() -> None:
-    with pytest.raises(BadInput, match=rf"^unknown method 'srrl' .--method.: did you mean 'srl'. known: {KNOWN}$"):
-        find_sequence(load_cell("oven.toml").cell(), "srrl", Search(5), 0)
-
-
 def test_what_was_found_until_ctrl_c_is_told() -> None:
     """A person asked from episode 30 on ends the session there."""
     file = load_cell("toast-case-1")
@@ -740,7 +404,7 @@ def test_what_was_found_until_ctrl_c_is_told() -> None:
     def ask(request: object) -> int | None:
         raise KeyboardInterrupt
 
-    wanted = Wanted("srl", 60, advisor="terminal", people={"terminal": ask})
+    wanted = Wanted("srl", 60, advisor=AdvisorName.of("terminal"), people={"terminal": ask})
     document, found = sequence_cell(file.cell(3), file.sequencing, wanted, Chance())
     assert document["interrupted"] is True
     assert (document["episodes"], len(found)) == (29, 1)
@@ -757,6 +421,6 @@ def test_ctrl_c_before_an_order_was_found() -> None:
         sequence_cell(
             file.cell(3),
             file.sequencing,
-            Wanted("srl", 60, advisor="terminal", gate="always", people={"terminal": ask}),
+            Wanted("srl", 60, advisor=AdvisorName.of("terminal"), gate="always", people={"terminal": ask}),
             Chance(),
         )

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
+from lab.learning.events import Improvement
 from lab.learning.requests import AdviceRequest
 from lab.mdp import TabularMDP, coverage, grid
 from lab.seat.grid_text import Marks, Picture, bracketed, direction_of, draw, picture_of, safe_ansi, window
@@ -19,7 +20,16 @@ SKY = ("south", "north", "east", "west", "pick up")
 
 def request(mdp: TabularMDP, action: int = 3, cell: tuple[int, ...] | None = None) -> AdviceRequest:
     state = mdp.start if cell is None else int(np.ravel_multi_index(cell, mdp.shape))
-    return AdviceRequest(mdp, [[0.0] * mdp.n_actions] * mdp.n_states, state, 31, 2, action, 0.0125, 39.5, 40.0)
+    return AdviceRequest(
+        mdp=mdp,
+        q=[[0.0] * mdp.n_actions] * mdp.n_states,
+        state=state,
+        episode=31,
+        step=2,
+        own=action,
+        improvement=Improvement(0.0125, 39.5, 40.0),
+        allowed=range(mdp.n_actions),
+    )
 
 
 def board(shape: tuple[int, ...] = (3, 4), labels: tuple[str, ...] = ("up", "down", "left", "right")) -> TabularMDP:
@@ -88,7 +98,9 @@ def test_one_axis_runs_to_the_right() -> None:
 def test_covering_shows_head_and_covered_cells() -> None:
     mdp = coverage((2, 3))
     right = int(mdp.successor[mdp.start, 3])
-    asked = AdviceRequest(mdp, [[0.0] * 4] * mdp.n_states, right, 31, 2, 1, None, None, None)
+    asked = AdviceRequest(
+        mdp=mdp, q=[[0.0] * 4] * mdp.n_states, state=right, episode=31, step=2, own=1, allowed=range(mdp.n_actions)
+    )
     assert picture(asked) == ["x R ·", "· ↓ ·", "R head, x covered, arrow: the learner's own choice"]
 
 
@@ -194,7 +206,16 @@ def test_a_drawing_takes_the_place_of_the_grid_and_is_cut_in_width() -> None:
         def picture(self, state: int) -> str:
             return "S\x1b[41mFFFFFF\x1b[0m\nHG\n"
 
-    asked = AdviceRequest(board(), [[0.0] * 4] * 12, 0, 1, 1, 0, None, None, None, place=Drawn())
+    asked = AdviceRequest(
+        mdp=board(),
+        q=[[0.0] * 4] * 12,
+        state=0,
+        episode=1,
+        step=1,
+        own=0,
+        environment=Drawn(),
+        allowed=range(board().n_actions),
+    )
     assert plain(fitting(asked, 4, 2)) == ["SFFF", "HG"]
 
 

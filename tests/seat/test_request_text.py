@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lab.learning.environment import TableEnvironment
-from lab.learning.events import EpisodeEnded, Verdict
+from lab.learning.events import EpisodeEnded, Improvement, Verdict
 from lab.learning.reasons import TooSlow, ValuesAlike
 from lab.learning.requests import AdviceRequest, Standing
 from lab.mdp import TabularMDP, coverage, grid
@@ -33,7 +33,20 @@ def request(
     table = [list(q or (0.0,) * mdp.n_actions)] * mdp.n_states
     state = mdp.start if state is None else state
     now = Standing(12, 150, 3, 7, 0.05)
-    return AdviceRequest(mdp, table, state, 31, 2, action, 0.0125, 39.5, 40.0, WHY, 1.0, "greedy", now)
+    return AdviceRequest(
+        mdp=mdp,
+        q=table,
+        state=state,
+        episode=31,
+        step=2,
+        own=action,
+        reason=WHY,
+        temperature=1.0,
+        selection="greedy",
+        standing=now,
+        improvement=Improvement(0.0125, 39.5, 40.0),
+        allowed=range(mdp.n_actions),
+    )
 
 
 @pytest.mark.parametrize(
@@ -88,13 +101,13 @@ def test_the_averages_and_the_threshold() -> None:
         "It asks because its improvement is +1.2%, below 5%: lately 39.5 steps per episode, before that 40.0."
     ]
     assert facts.progress(request(), brief=True) == ["Steps 40.0, now 39.5: +1.2% < 5%"]
-    other = replace(request(), why=ValuesAlike(0.2, 1.0))
+    other = replace(request(), reason=ValuesAlike(0.2, 1.0))
     assert facts.progress(other) == [
         "It asks because the values here span 0.20, at most 1.",
         "Steps per episode: lately 39.5, before that 40.0; improvement +1.2%, threshold 5%.",
     ]
-    assert facts.progress(replace(other, why=None))[0].startswith("Steps per episode")
-    early = replace(request(), improvement_rate=None, current_mean=None, previous_mean=None, why=None)
+    assert facts.progress(replace(other, reason=None))[0].startswith("Steps per episode")
+    early = replace(request(), improvement=None, reason=None)
     assert facts.progress(early) == ["Too few episodes so far for moving averages."]
     assert facts.progress(early, brief=True) == ["Too few episodes for averages."]
 
@@ -191,7 +204,7 @@ class Elsewhere:
 
 
 def test_a_place_left_to_chance_is_not_promised() -> None:
-    asked = replace(request(falling(), 2), place=Elsewhere())
+    asked = replace(request(falling(), 2), environment=Elsewhere())
     assert facts.leads(asked, 0) == "most likely leads nowhere"
     assert facts.sentences(asked)[2:5] == [
         "wait: most likely leads nowhere.",
@@ -199,15 +212,18 @@ def test_a_place_left_to_chance_is_not_promised() -> None:
         "fall: an end that is no goal.",
     ]
     assert (
-        facts.leads(replace(request(None, 1, 1), place=Elsewhere()), 1) == "most likely leads to an end that is no goal"
+        facts.leads(replace(request(None, 1, 1), environment=Elsewhere()), 1)
+        == "most likely leads to an end that is no goal"
     )
-    assert facts.leads(replace(request(None, 1, 1), place=TableEnvironment(board())), 1) == "leads into an obstacle"
+    assert (
+        facts.leads(replace(request(None, 1, 1), environment=TableEnvironment(board())), 1) == "leads into an obstacle"
+    )
 
 
 def test_of_a_table_that_knows_nothing_nothing_is_said() -> None:
     no = np.zeros(2, bool)
     mdp = TabularMDP(np.array([[0, 0], [1, 1]]), np.zeros((2, 2)), no, no, 0, ("wait", "go"))
-    asked = replace(request(mdp, 1), place=Elsewhere())
+    asked = replace(request(mdp, 1), environment=Elsewhere())
     assert facts.choice(asked, MARKS) == (
         "Alone the learner would now go go, drawn at random: all moves are alike to it here (50% each)."
     )
@@ -225,7 +241,7 @@ def test_why_it_asks_with_all_its_numbers() -> None:
         "Advice so far: 12 moves of 150 that it may use. It did not help in 3 of 4 episodes; the learner tolerates 7, and "
         "then asks no more.",
     ]
-    bare = replace(asked, why=None, improvement_rate=None, selection="greedy", standing=Standing(1, omega=7))
+    bare = replace(asked, reason=None, improvement=None, selection="greedy", standing=Standing(1, omega=7))
     lines = facts.reasons(replace(bare, q=[[0.0] * 4] * 12), MARKS, 0)
     assert lines[0] == "It asks about every step."
     assert lines[1] == "There are too few episodes so far for moving averages."

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.sequencing import SEQUENCERS
+from lab.sequencing import SEQUENCERS, Sequencer, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, cost
 from lab.sequencing.methods.exact import optimum
@@ -83,3 +83,36 @@ def test_smallest_and_large_job(oven_cell: CellMaker, name: str, parts: int) -> 
 def test_without_due_times(toast_cell: CellMaker, name: str) -> None:
     with pytest.raises(BadInput, match="due times"):
         found(name, toast_cell("I", 2), 0, objective="mean-tardiness")
+
+
+def test_what_is_found_is_told_and_depends_on_seed_and_session(fms_cell: CellMaker) -> None:
+    cell, told = fms_cell("RSR"), list[object]()
+    search = Search(5, on_episode=told.append)
+    one, again = (find_sequence(cell, "random", search, 1) for _ in range(2))
+    assert one == again
+    assert len(told) == 10
+    quiet = replace(search, on_episode=None)
+    assert one != find_sequence(cell, "random", quiet, 2)
+    assert one != find_sequence(cell, "random", quiet, 1, session=1)
+
+
+def test_an_unknown_method_lists_the_known_ones(oven_cell: CellMaker) -> None:
+    with pytest.raises(
+        BadInput, match=rf"^unknown method 'srrl' .--method.: did you mean 'srl'. known: {', '.join(NAMES)}$"
+    ):
+        find_sequence(oven_cell(), "srrl", Search(5), 0)
+
+
+def test_a_method_is_one_row(oven_cell: CellMaker, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A method of somebody else's, with its row: it is found, and named among the known ones."""
+
+    def one_by_one(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
+        sequence = tuple(part for part in range(1, cell.parts + 1) for _ in range(2))
+        return SequenceResult(sequence, simulate(cell, sequence).makespan_s, ())
+
+    monkeypatch.setattr(
+        "lab.sequencing.SEQUENCERS", {**SEQUENCERS, "one-by-one": Sequencer(lambda: one_by_one, "all of a part")}
+    )
+    assert find_sequence(oven_cell(2), "one-by-one", Search(1), 0).cost == 29.0
+    with pytest.raises(BadInput, match="did you mean 'one-by-one'"):
+        find_sequence(oven_cell(2), "one-by-on", Search(1), 0)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lab.sim.assets import MARKER_GREEN, MARKER_RADIUS
 from lab.sim.camera import Camera
+from lab.sim.models import MARKER_GREEN, MARKER_RADIUS
 from lab.sim.world import World
 
 RNG = np.random.default_rng(3)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from lab.errors import WorkFailed
 from lab.files import assets_folder
 from lab.sim import kinematics
-from lab.sim.assets import FINGER_OPEN, SLICE
 from lab.sim.kinematics import ToolPose, forward, inverse
+from lab.sim.models import FINGER_OPEN, SLICE
 from lab.sim.robot import FINGERS, NAME, YAW_ARM, Robot, Trajectory, plan
 from lab.sim.world import TIME_STEP, World
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.sim import assets
+from lab.sim import models
 from lab.sim.kinematics import inverse
 from lab.sim.scene import (
     APPLIER_BASE,
@@ -79,7 +79,7 @@ def test_every_station_has_as_many_spots_as_it_holds(task: Task) -> None:
         assert all(spot.z == floor(station) and spot.yaw == station.pose[2] for spot in found)
         for one, other in combinations(found, 2):
             apart = abs(one.x - other.x), abs(one.y - other.y)
-            assert apart[0] > assets.SLICE[0] + 0.01 or apart[1] > assets.SLICE[1] + 0.03
+            assert apart[0] > models.SLICE[0] + 0.01 or apart[1] > models.SLICE[1] + 0.03
         nearest = min(hypot(s.x - station.pose[0], s.y - station.pose[1]) for s in found)
         assert hypot(found[0].x - station.pose[0], found[0].y - station.pose[1]) == pytest.approx(nearest)
 
@@ -138,7 +138,7 @@ def test_a_built_scene_holds_everything_and_stays_as_it_was_put(task: Task, worl
     for number, off in enumerate(layout.slices, start=1):
         spot = spots(task.station("plate"))[number - 1]
         position, turn = world.pose(f"slice {number}")
-        at = (spot.x + off[0], spot.y + off[1], spot.z + assets.SLICE[2] / 2)
+        at = (spot.x + off[0], spot.y + off[1], spot.z + models.SLICE[2] / 2)
         assert position == pytest.approx(at, abs=1.5e-3)
         assert 2 * np.arctan2(turn[2], turn[3]) == pytest.approx(off[2], abs=5e-3)
     for obstacle, place in zip(task.obstacles, layout.obstacles, strict=True):
@@ -162,9 +162,9 @@ def test_the_toasters_marker_is_on_its_top_beside_the_slot(world: World) -> None
         name="toaster", kind="machine", pose=(0.9, 0.1, np.pi / 2), capacity=1, processing_s=1.0, process=None
     )
     x, y, z = marker_of_toaster(station)
-    assert z == pytest.approx(assets.TOASTER[2] + 0.002)
+    assert z == pytest.approx(models.TOASTER[2] + 0.002)
     assert y == pytest.approx(0.1)
-    assert assets.TOASTER_SLOT[1] / 2 + assets.MARKER_RADIUS < 0.9 - x < assets.TOASTER[1] / 2 - assets.MARKER_RADIUS
+    assert models.TOASTER_SLOT[1] / 2 + models.MARKER_RADIUS < 0.9 - x < models.TOASTER[1] / 2 - models.MARKER_RADIUS
 
 
 def test_a_second_toaster_is_refused(task: Task) -> None:

@@ -6,12 +6,13 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 
+from lab.learning.problem import Problem
 from lab.mdp import optimal_values, shortest_steps
-from lab.production.skillset import SkillSet
 from lab.sim.scene import Layout, Scene, spots
 from lab.sim.world import World
 from lab.skills import Skill
-from lab.skills.skill import Bench, Problem, Status
+from lab.skills.skill import Bench, Status
+from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Task, load
 from lab.toolbox.policy import Policy
@@ -119,7 +120,7 @@ def stage(surveys: Surveys, layout: Layout) -> Iterator[Callable[..., Bench]]:
             skill.spot = spot
             if any(off):
                 foot = spots(task.station(skill.station))[0].grasp()
-                bench.put_slice(SLICE, foot.local(off[0], off[1], 0.0, off[2]))
+                bench.scene.put_slice(SLICE, foot.local(off[0], off[1], 0.0, off[2]))
                 for _ in range(30):
                     bench.scene.world.step()
             return bench

@@ -6,11 +6,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from lab.learning.problem import Problem
 from lab.mdp import shortest_steps
 from lab.sim.world import TIME_STEP
 from lab.skills import Butter
 from lab.skills.butter import REST, SHAPE
-from lab.skills.skill import Bench, Problem, Skill, Status
+from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Task
 from lab.toolbox.policy import Policy

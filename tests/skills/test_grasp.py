@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
+from lab.learning.problem import Problem
 from lab.mdp import grid
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Layout, Spot, spots
 from lab.skills import Grasp, Place
 from lab.skills.grasp import ACTIONS, GOAL, entry_cell, from_above
-from lab.skills.skill import Bench, Problem, Skill, Status
+from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, Surveys, near_pose
 from lab.tasks.task_file import Obstacle, Task
 from lab.toolbox.policy import Policy

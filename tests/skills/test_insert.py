@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
+from lab.learning.problem import Problem
 from lab.mdp import greedy_path
-from lab.sim.assets import SLICE as SIZE
+from lab.sim.models import SLICE as SIZE
 from lab.sim.scene import Layout, spots
 from lab.skills import Insert, Place
 from lab.skills.insert import ACTIONS, IN_SLOT_M, SEEN_WITHIN_M
-from lab.skills.skill import Bench, Problem, Skill, Status
+from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Obstacle, Task
 from lab.toolbox.policy import Policy

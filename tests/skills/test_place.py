@@ -5,10 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from lab.learning.problem import Problem
 from lab.sim.scene import spots
 from lab.skills import Place
 from lab.skills.place import ACTIONS, GOAL, release_pose
-from lab.skills.skill import Bench, Problem, Skill, Status
+from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import RELEASE_ABOVE, Surveys
 from lab.tasks.task_file import Task
 from lab.toolbox.policy import Policy

@@ -5,13 +5,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from lab.learning.problem import Problem
 from lab.mdp import greedy_path
-from lab.sim import assets
+from lab.sim import models
 from lab.sim.kinematics import ToolPose, inverse
 from lab.sim.robot import NAME as ROBOT
 from lab.skills import SKILLS, Skill, Transfer
 from lab.skills.butter import SHAPE
-from lab.skills.skill import Bench, Problem, Status
+from lab.skills.skill import Bench, Status
 from lab.skills.surveys import Surveys
 from lab.toolbox.policy import Policy
 
@@ -104,7 +105,7 @@ def test_the_head_stands_before_the_cell_that_it_butters(surveys: Surveys, stage
     mdp = butter.setup(surveys).mdp
     bench = stage(butter)
     (x, y, z), _ = bench.scene.world.pose(SLICE)
-    third = assets.SLICE[0] / 3
+    third = models.SLICE[0] / 3
     for row, column in np.ndindex(*SHAPE):
         state = (row * SHAPE[1] + column) << 9
         assert mdp.state_cell(state) == (row, column)

@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 
 from lab.errors import WorkFailed
+from lab.learning.problem import Problem
 from lab.mdp import NoPath, greedy_path, grid, shortest_steps
 from lab.production.durations import measure
-from lab.production.prepared import Prepared
-from lab.production.skillset import SkillSet
-from lab.seat.stage import SkillStage
+from lab.seat.lesson_scene import SkillScene
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Layout
 from lab.skills import SKILLS, Skill
-from lab.skills.skill import Bench, Problem, SkillFailed, Status, learned_path, no_way
+from lab.skills.prepared_scene import Prepared
+from lab.skills.skill import Bench, SkillFailed, Status, learned_path, no_way
+from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Stage, Subtask, Task
 from lab.teaching.lesson import teach_one
@@ -34,6 +35,7 @@ class Hover(Skill):
     """A new skill, all of it: before it travels, the empty gripper rises from a station's approach, level by level."""
 
     subtask: ClassVar[str] = "hover"
+    help: ClassVar[str] = "the empty gripper rises before it travels"
 
     def __init__(self, station: str) -> None:
         super().__init__(f"hover at {station}")
@@ -81,6 +83,8 @@ def poses(bench: Bench) -> dict[str, tuple[float, ...]]:
 @every_skill
 def test_it_stands_in_the_table_under_its_own_name_and_the_shipped_task_needs_it(name: str, make: Make) -> None:
     assert SKILLS[name].subtask == make(name).subtask == name
+    assert SKILLS[name].help
+    assert not SKILLS[name].help.endswith(".")
     assert f" {make(name).station}" in f" {make(name).name}"
 
 
@@ -237,7 +241,7 @@ def test_a_new_skill_is_a_class_and_a_row_and_all_else_knows_it(
     assert all(way[0] in hovers for way in skillset.travels.values())
     problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items()}
     skillset.policies = {name: optimal(problem) for name, problem in problems.items()}
-    with closing(SkillStage(task, 1, Layout(surveys.layout.obstacles, ((0.0, 0.0, 0.0),)), hovers[0])) as stage:
+    with closing(SkillScene(task, 1, Layout(surveys.layout.obstacles, ((0.0, 0.0, 0.0),)), hovers[0])) as stage:
         assert stage.frame(2).poses["robot tool"][2] == pytest.approx(stage.frame(0).poses["robot tool"][2] + 0.06)
     durations = measure(Prepared(short, 1, 0, surveys.layout, surveys, skillset, problems))
     assert set(durations.empty_s) == set(skillset.moves.empty)

@@ -5,10 +5,10 @@ import pytest
 
 from lab.errors import BadInput
 from lab.mdp import greedy_path, optimal_values
-from lab.production.skillset import SkillSet
-from lab.sim.assets import SLICE as SIZE
+from lab.sim.models import SLICE as SIZE
 from lab.sim.scene import GRASP_DEPTH, Layout, spots
 from lab.skills import Insert
+from lab.skills.skillset import SkillSet
 from lab.skills.surveys import INSERT_START, NEAR_SHAPE, NEAR_YAWS, Surveys, camera_view, overhead_camera
 from lab.tasks.task_file import Obstacle, Task
 from lab.vision import see

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
+from lab.learning.problem import Problem
 from lab.sim.scene import Layout
 from lab.skills import Transfer
-from lab.skills.skill import Bench, Problem, Skill, Status
+from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import INSERT_START, Surveys
 from lab.skills.transfer import ACTIONS
 from lab.tasks.task_file import Obstacle, Task

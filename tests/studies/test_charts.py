@@ -71,7 +71,7 @@ def test_a_legend_names_everything_once() -> None:
     assert texts(picture_bytes(draw, 4, 3, "svg")).count("same") == 1
 
 
-@settings(max_examples=10)
+@settings(max_examples=4)
 @given(data=st.data(), series=st.integers(1, 6), groups=st.integers(1, 5))
 def test_any_bars(data: st.DataObject, series: int, groups: int) -> None:
     """Zeros, nothing, any number of series that has a colour."""

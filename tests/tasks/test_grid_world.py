@@ -12,12 +12,26 @@ from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest
 from lab.learning.settings import LearnerSettings
 from lab.mdp import NoPath, Rewards, greedy_path, optimal_values, shortest_steps
-from lab.seat.terminal.prompt import draw, understand
-from lab.tasks.grid_world import MAX_DENSITY, GridWorld, View, from_text, from_words, parse_shape, random_world
+from lab.seat.grid_text import draw
+from lab.seat.terminal.typed_answer import understand
+from lab.tasks.grid_world import (
+    MAX_DENSITY,
+    AdvisorView,
+    GridWorld,
+    from_text,
+    from_words,
+    parse_shape,
+    random_world,
+)
 from lab.tasks.task_file import load_world
 
 SMALL = GridWorld(
-    name="small", shape=(2, 3), start=(0, 0), goal=(0, 2), obstacles=((0, 1),), view=View(lower=(0, 1), upper=(1, 2))
+    name="small",
+    shape=(2, 3),
+    start=(0, 0),
+    goal=(0, 2),
+    obstacles=((0, 1),),
+    view=AdvisorView(lower=(0, 1), upper=(1, 2)),
 )
 
 
@@ -232,7 +246,7 @@ def request(world: GridWorld, cell: tuple[int, ...], action: int) -> AdviceReque
     mdp = world.mdp()
     state = int(np.ravel_multi_index(cell, world.shape))
     q = [[0.0] * mdp.n_actions for _ in range(mdp.n_states)]
-    return AdviceRequest(mdp, q, state, 30, 1, action, None, None, None)
+    return AdviceRequest(mdp=mdp, q=q, state=state, episode=30, step=1, own=action, allowed=range(mdp.n_actions))
 
 
 def test_a_person_sees_a_text_grid_as_it_stands() -> None:

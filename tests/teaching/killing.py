@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lab.advice.counsel import Counsel
+from lab.advice.advising import Advising
 from lab.advice.entries import FILE, read_journal
 from lab.learning.requests import AdviceRequest
 from lab.teaching.kept_session import SESSIONS, KeptSession, Words
@@ -34,7 +34,7 @@ def held(folder: Path, maze: Path, *, goes_on: bool = False) -> tuple[Any, ...]:
     box = Toolbox(folder / "toolbox")
     kept = KeptSession(lesson_in(folder), "--resume") if goes_on else None
     words = Words(str(maze), advisors=("terminal",), seed=3, episodes=60) if kept is None else kept.words
-    document = teach(words, Teacher(box, Counsel(words.advisors, {"terminal": person}), seed=3), None, kept)
+    document = teach(words, Teacher(box, Advising.of(words.advisors, {"terminal": person}), seed=3), None, kept)
     (row,) = box.list()
     policy = box.find("world", row["signature"])
     assert policy is not None

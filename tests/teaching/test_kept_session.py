@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from lab.advice.counsel import Counsel
+from lab.advice.advising import Advising
 from lab.advice.entries import FILE, Answer, Session, read_journal
 from lab.advice.journal import Journal
 from lab.advice.receipt import SILENT
@@ -47,7 +47,7 @@ def person(request: AdviceRequest) -> int:
 
 
 def teacher(folder: Path, ask: Ask = person, *names: str) -> Teacher:
-    return Teacher(Toolbox(folder / "toolbox"), Counsel(names or ("terminal",), {"terminal": ask}), seed=3)
+    return Teacher(Toolbox(folder / "toolbox"), Advising.of(names or ("terminal",), {"terminal": ask}), seed=3)
 
 
 def words(maze: Path, *names: str, **changes: Any) -> Words:

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.advice.counsel import Counsel
+from lab.advice.advising import Advising
 from lab.advice.entries import read_journal
 from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.skills import Butter, Grasp, Skill
-from lab.tasks.grid_world import GridWorld, View
+from lab.tasks.grid_world import AdvisorView, GridWorld
 from lab.tasks.task_file import Task, fitting, load
 from lab.teaching.kept_session import Words
 from lab.teaching.lesson import find_skill, teach, teach_one, teach_world
@@ -85,7 +85,7 @@ def test_ctrl_c_keeps_the_session(task: Task, tmp_path: Path) -> None:
     def ask(_: object) -> int:
         raise KeyboardInterrupt
 
-    teacher = Teacher(Toolbox(tmp_path), Counsel(("terminal",), {"terminal": ask}))
+    teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": ask}))
     with pytest.raises(Interrupted, match="stopped by Ctrl-C after 29 episodes of 'insert at toaster'"):
         teach_one(task, "insert", teacher, out=tmp_path / "out")
     (row,) = teacher.toolbox.list()
@@ -99,7 +99,7 @@ def test_an_interrupted_session_is_gone_on_with(task: Task, tmp_path: Path) -> N
 
     toolbox = Toolbox(tmp_path)
     with pytest.raises(Interrupted):
-        teach_one(task, "insert", Teacher(toolbox, Counsel(("terminal",), {"terminal": ask})))
+        teach_one(task, "insert", Teacher(toolbox, Advising.of(("terminal",), {"terminal": ask})))
     again = teach_one(task, "insert", Teacher(toolbox))
     assert again["episodes"] == 200
     (row,) = toolbox.list()
@@ -118,14 +118,14 @@ def test_a_name_of_another_problem_is_refused(task: Task, teacher: Teacher) -> N
 def test_a_grasp_that_lifts_nothing_is_not_kept_as_solved(
     task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lab.production.run.try_out", lambda *_: "slice 1 is not in the gripper")
+    monkeypatch.setattr("lab.skills.trial.try_out", lambda *_: "slice 1 is not in the gripper")
     bad = teach_one(task, "grasp", teacher)
     assert (bad["solved"], bad["failure"]) == (False, "slice 1 is not in the gripper")
     assert [(row["name"], row["solved"]) for row in teacher.toolbox.list()] == [(bad["saved_as"], False)]
     monkeypatch.undo()
     good = teach_one(task, "grasp", teacher)
     assert [(row["name"], row["solved"]) for row in teacher.toolbox.list()] == [(good["saved_as"], True)]
-    monkeypatch.setattr("lab.production.run.try_out", lambda *_: "slice 1 is not in the gripper")
+    monkeypatch.setattr("lab.skills.trial.try_out", lambda *_: "slice 1 is not in the gripper")
     worse = teach_one(task, "grasp", teacher)
     assert worse["saved_as"] == f"{good['saved_as']} unfinished"
     assert {row["name"]: row["solved"] for row in teacher.toolbox.list()} == {
@@ -155,7 +155,7 @@ def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lab.production.run.try_grasp", stop)
+    monkeypatch.setattr("lab.skills.trial.try_out", stop)
     with pytest.raises(KeyboardInterrupt):
         teach_one(task, "grasp", teacher)
     (row,) = teacher.toolbox.list()
@@ -180,7 +180,7 @@ def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
 def test_bad_words_are_refused_before_the_scene_is_surveyed(
     task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch, subtask: str, options: dict[str, Any], reason: str
 ) -> None:
-    monkeypatch.setattr("lab.production.prepared.prepare", lambda *_: pytest.fail("surveyed"))
+    monkeypatch.setattr("lab.skills.prepared_scene.prepare", lambda *_: pytest.fail("surveyed"))
     with pytest.raises(BadInput, match=reason):
         teach_one(task, subtask, teacher, **options)
     assert not teacher.toolbox.folder.exists()
@@ -198,7 +198,7 @@ def world() -> GridWorld:
         start=(0, 0),
         goal=(4, 3),
         obstacles=((1, 1), (3, 2)),
-        view=View(lower=(3, 0), upper=(4, 3)),
+        view=AdvisorView(lower=(3, 0), upper=(4, 3)),
         learner=LearnerSettings(learner="q", episodes=60, max_steps=60),
         gate=GateSettings(gate="always"),
     )
@@ -230,9 +230,9 @@ def test_with_a_limited_view_a_person_is_asked_inside_it_only(world: GridWorld, 
 
         def ask(request: AdviceRequest, states: set[int] = states) -> int | None:
             states.add(request.state)
-            return request.learner_action
+            return request.own
 
-        teach_world(world, Teacher(Toolbox(tmp_path / view), Counsel(("terminal",), {"terminal": ask})), view=view)
+        teach_world(world, Teacher(Toolbox(tmp_path / view), Advising.of(("terminal",), {"terminal": ask})), view=view)
     region = set(np.flatnonzero(world.region()).tolist())
     assert world.mdp().start in asked["full"]
     assert asked["limited"] & region == asked["limited"] != set()

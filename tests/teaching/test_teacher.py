@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.advice.counsel import Counsel
+from lab.advice.advising import Advising
 from lab.errors import WorkFailed
 from lab.learning.events import AdviceRejected, EpisodeEnded, Event
+from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.session import Session, SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, greedy_path, grid
-from lab.skills.skill import Problem
 from lab.tasks.task_file import Subtask
 from lab.teaching.teacher import MAX_SESSIONS, MORE_SESSIONS, Audience, Interrupted, Teacher, fits
 from lab.toolbox.policy import Policy
@@ -186,7 +186,7 @@ def test_who_left_or_was_rejected_is_not_asked_in_further_sessions(tmp_path: Pat
         asked.append(request)
         raise AdvisorLeft
 
-    teacher = Teacher(Toolbox(tmp_path), Counsel(("terminal",), {"terminal": leave}))
+    teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": leave}))
     slow = Subtask(learner=HOPELESS, gate=GateSettings("always"))
     for times in (1, 2):  # each skill asks once
         with pytest.raises(WorkFailed):
@@ -201,7 +201,7 @@ def test_who_left_or_was_rejected_is_not_asked_in_further_sessions(tmp_path: Pat
     wary = GateSettings(first_episode=5, window=2, omega=0, lambda_threshold=1.0)
     short = LearnerSettings(episodes=8, max_steps=2)
     asked.clear()
-    teacher = Teacher(Toolbox(tmp_path), Counsel(("terminal",), {"terminal": stay}), audience=Hearing(events))
+    teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": stay}), audience=Hearing(events))
     with pytest.raises(WorkFailed):
         teacher.find_or_teach(problem(columns=6), Subtask(learner=short, gate=wary), "toast", {})
     assert sum(isinstance(event, AdviceRejected) for _, event in events) == 1
@@ -228,13 +228,13 @@ class Person:
         self.left -= 1
         if self.left < 0:
             raise KeyboardInterrupt
-        return request.learner_action
+        return request.own
 
 
 def test_ctrl_c_keeps_what_was_learned_and_the_next_run_goes_on(tmp_path: Path) -> None:
     toolbox = Toolbox(tmp_path)
     with pytest.raises(Interrupted) as stopped:
-        Teacher(toolbox, Counsel(("terminal",), {"terminal": Person(50)})).teach(
+        Teacher(toolbox, Advising.of(("terminal",), {"terminal": Person(50)})).teach(
             problem(), QUICK, GateSettings("always"), "toast"
         )
     assert isinstance(stopped.value, KeyboardInterrupt)

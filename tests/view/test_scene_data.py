@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from lab.errors import BadInput
-from lab.sim.frames import Body, Camera, Shape
+from lab.sim.frames import Body, Shape, Viewpoint
 from lab.view.scene_data import describe, read_mesh
 
 
@@ -26,7 +26,7 @@ def test_every_kind_of_shape_is_described(cube: Path) -> None:
         Shape("sphere", (0.1,)),
         Shape("mesh", (2, 2, 2), mesh=cube),
     )
-    scene = describe([Body("a", shapes)], Camera(eye=(1, 2, 3), target=(0, 0, 1)))
+    scene = describe([Body("a", shapes)], Viewpoint(eye=(1, 2, 3), target=(0, 0, 1)))
     assert scene["camera"] == {"eye": [1, 2, 3], "target": [0, 0, 1]}
     assert [geometry["kind"] for geometry in scene["geometries"]] == ["box", "cylinder", "sphere", "mesh"]
     assert scene["geometries"][1]["size"] == [0.1, 2]
@@ -38,7 +38,7 @@ def test_every_kind_of_shape_is_described(cube: Path) -> None:
 
 def test_bodies_share_geometry(cube: Path) -> None:
     shapes = (Shape("mesh", mesh=cube), Shape("box", (1, 1, 1)))
-    scene = describe([Body(name, shapes) for name in "abc"], Camera())
+    scene = describe([Body(name, shapes) for name in "abc"], Viewpoint())
     assert len(scene["geometries"]) == 2
 
 
@@ -52,9 +52,9 @@ def test_a_cube_keeps_its_edges_sharp(cube: Path) -> None:
 
 
 def test_a_changed_file_is_read_again(cube: Path) -> None:
-    before = describe([Body("a", (Shape("mesh", mesh=cube),))], Camera())["geometries"]
+    before = describe([Body("a", (Shape("mesh", mesh=cube),))], Viewpoint())["geometries"]
     trimesh.creation.box((9, 9, 9)).export(cube)
-    after = describe([Body("a", (Shape("mesh", mesh=cube),))], Camera())["geometries"]
+    after = describe([Body("a", (Shape("mesh", mesh=cube),))], Viewpoint())["geometries"]
     assert before != after
 
 
@@ -70,9 +70,9 @@ def test_an_unreadable_mesh_is_named(name: str, tmp_path: Path) -> None:
     elif not name.startswith("missing"):
         path.touch()
     with pytest.raises(BadInput, match=name):
-        describe([Body("a", (Shape("mesh", mesh=path),))], Camera())
+        describe([Body("a", (Shape("mesh", mesh=path),))], Viewpoint())
 
 
 def test_two_bodies_of_one_name_are_refused() -> None:
     with pytest.raises(BadInput, match="used twice"):
-        describe([Body("a", ()), Body("a", ())], Camera())
+        describe([Body("a", ()), Body("a", ())], Viewpoint())

@@ -4,13 +4,13 @@ from lab.learning.gates import gate_rules as rules
 from lab.learning.gates.ccrl import Ccrl, Combined
 from lab.learning.gates.constant_performance import ConstantPerformance
 from lab.learning.gates.gate import Gate, GateClass, Never, Surroundings
-from lab.learning.gates.gate_rules import CompiledGate, Improvement, Steps, improvement
+from lab.learning.gates.gate_rules import CompiledGate, Steps, improvement
 from lab.learning.gates.random_share import Random
 from lab.learning.gates.uncertainty import Uncertainty, deviation
 from lab.learning.gates.values import Importance, Introspection
 from lab.learning.members import Member
 
-__all__ = ["GATES", "Gate", "Improvement", "Steps", "Surroundings", "deviation", "improvement"]
+__all__ = ["GATES", "Gate", "Steps", "Surroundings", "deviation", "improvement"]
 
 GATES: dict[str, Member[GateClass]] = {
     "ccrl": Member(

@@ -1,8 +1,9 @@
 """What gates decide by: plain functions of numbers and arrays, which numba compiles for the kernel as well."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
+
+from lab.learning.events import Improvement
 
 Steps = Sequence[float]  # whole numbers, unless the high level compares makespans
 
@@ -18,15 +19,6 @@ class CompiledGate(NamedTuple):
     opens: int
     asks: int
     judges: bool = False
-
-
-@dataclass(frozen=True)
-class Improvement:
-    """The last K episodes beside the K before them: rate = (previous - current) / previous (thesis eq. 6.1)."""
-
-    rate: float
-    current_mean: float
-    previous_mean: float
 
 
 def window_mean(steps: Steps, end: int, window: int) -> float:

@@ -1,7 +1,7 @@
 """The grid on the teaching page: where its cells are, and what the learner thinks of those of one layer, as plain data.
 
 The page draws; here is decided which cell is where: rows run down, columns to the right, and a map is shown as from
-above (see `lab.seat.grid_text`). Axes beyond the second are layers.
+above (see `lab.view.grid_planes`). Axes beyond the second are layers.
 """
 
 from functools import lru_cache
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from lab.learning.selection import chances
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
-from lab.seat.grid_text import direction_of, is_map
+from lab.seat.grid_text import direction_of
+from lab.view.grid_planes import GridPlanes
 
 Json = dict[str, Any]
 LOWER, HIGHER = 4, 5  # directions along the third axis, after those in the picture: up, down, left, right
@@ -24,33 +25,30 @@ MOST_GOALS = 20
 
 
 @lru_cache(maxsize=8)
+def _planes(mdp: TabularMDP) -> GridPlanes:
+    return GridPlanes(mdp)
+
+
+@lru_cache(maxsize=8)
 def place_of(mdp: TabularMDP) -> Json | None:
     """What stays of a problem's grid: rows, columns and layers, where goals are; None when its states are no grid.
 
     Not to be changed: it is kept.
     """
     shape = mdp.coverage_shape or mdp.shape
-    rows, columns, layers = _sizes(shape, is_map(mdp))
-    if not shape or rows * columns > MOST_CELLS:
+    if not shape or (planes := _planes(mdp)).rows * planes.columns > MOST_CELLS:
         return None
     goals = [] if mdp.coverage_shape else [spot(mdp, int(s)) for s in np.flatnonzero(mdp.goal)[:MOST_GOALS]]
     labels = mdp.action_labels
     along = labels[4:6] if len(labels) == 2 * len(shape) and len(shape) == 3 else ("-", "+")
-    pointing = directions(mdp)
-    return {"rows": rows, "columns": columns, "layers": layers, "along": list(along), "goals": goals} | {
-        "directions": pointing
-    }
+    sizes = {"rows": planes.rows, "columns": planes.columns, "layers": planes.layers}
+    return {**sizes, "along": list(along), "goals": goals, "directions": directions(mdp)}
 
 
 def spot(mdp: TabularMDP, state: int) -> list[int]:
     """[row, column, layer] of a state as the page draws it; [] when the states are no grid."""
-    cell, shape = mdp.state_cell(state), mdp.coverage_shape or mdp.shape
-    if not cell:
-        return []
-    if len(cell) == 1:
-        return [0, cell[0], 0]
-    layer = int(np.ravel_multi_index(cell[2:], shape[2:])) if len(cell) > 2 else 0
-    return [shape[1] - 1 - cell[1], cell[0], layer] if is_map(mdp) else [cell[0], cell[1], layer]
+    cell = mdp.state_cell(state)
+    return [*_planes(mdp).place(cell), _planes(mdp).layer(cell)] if cell else []
 
 
 def directions(mdp: TabularMDP) -> list[int | None]:
@@ -69,9 +67,8 @@ def slice_of(mdp: TabularMDP, state: int, layer: int, q: Table | None, selection
     covering, a cell is worth what the head there would be, all else as in `state`.
     """
     states = _states(mdp, state, layer)
-    marks = (
-        _marks(mdp, states) if not mdp.coverage_shape else "".join(".x"[c] for c in mdp.covered(state).ravel().tolist())
-    )
+    seen = np.where(mdp.covered(state), "x", ".") if mdp.coverage_shape else _planes(mdp).marks(layer)
+    marks = "".join(seen.ravel().tolist())
     values: list[float | None] = [None] * len(states)
     prefers: list[list[float]] = []
     if q is not None:
@@ -89,30 +86,10 @@ def slice_of(mdp: TabularMDP, state: int, layer: int, q: Table | None, selection
     return {"layer": layer, "marks": marks, "values": values, "prefers": prefers}
 
 
-def _sizes(shape: tuple[int, ...], flips: bool) -> tuple[int, int, int]:
-    if len(shape) < 2:
-        return 1, prod(shape), 1
-    rows, columns = (shape[1], shape[0]) if flips else (shape[0], shape[1])
-    return rows, columns, prod(shape[2:])
-
-
 def _states(mdp: TabularMDP, state: int, layer: int) -> NDArray[np.int64]:
     """The states of a layer's cells, row by row as they are drawn."""
     if mdp.coverage_shape:
         heads = np.arange(prod(mdp.coverage_shape))
         mask = state & ((1 << len(heads)) - 1)
         return (heads << len(heads)) | mask | (1 << heads)
-    return _layer_states(mdp.shape, is_map(mdp), layer)
-
-
-@lru_cache(maxsize=256)
-def _layer_states(shape: tuple[int, ...], flips: bool, layer: int) -> NDArray[np.int64]:
-    states = np.arange(prod(shape))
-    if len(shape) < 2:
-        return states
-    plane = states.reshape(*shape[:2], -1)[:, :, layer]
-    return (plane.T[::-1] if flips else plane).ravel()
-
-
-def _marks(mdp: TabularMDP, states: NDArray[np.int64]) -> str:
-    return "".join(np.where(mdp.goal[states], "G", np.where(mdp.terminal[states], "#", ".")).tolist())
+    return _planes(mdp).plane(np.arange(mdp.n_states), layer).ravel()

@@ -22,7 +22,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Seat:
+class Wish:
     """The page wants the seat, or gives it away."""
 
     wish: Literal["take", "give"]
@@ -35,7 +35,7 @@ class Layer:
     layer: int | None
 
 
-def understood(message: str | bytes) -> Answer | Seat | Layer:
+def understood(message: str | bytes) -> Answer | Wish | Layer:
     """What a page says. Raises Refused for anything else."""
     if isinstance(message, bytes) or len(message) > MAX_CHARS:
         raise Refused("That was no message of this page: text of at most 1024 characters is wanted.")
@@ -51,7 +51,7 @@ def understood(message: str | bytes) -> Answer | Seat | Layer:
             if not isinstance(number, bool) and word in WORDS:
                 return Answer(number, None, word)
         case {"seat": "take" | "give" as wish, **more} if not more:
-            return Seat(wish)
+            return Wish(wish)
         case {"layer": int() | None as layer, **more} if not more and not isinstance(layer, bool):
             return Layer(layer)
     raise Refused("That was no message of this page: it is ignored.")
@@ -77,9 +77,9 @@ class Chair:
         if self.holder == page:
             self.holder = None
 
-    def wish(self, page: int, seat: Seat) -> None:
+    def wish(self, page: int, wanted: Wish) -> None:
         """Give the seat away, or take it. Raises Refused when it is not free, or not the page's own."""
-        if seat.wish == "give":
+        if wanted.wish == "give":
             if self.holder != page:
                 raise Refused("This page does not answer: there is nothing to hand over.")
             self.holder = None

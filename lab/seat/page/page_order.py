@@ -1,82 +1,43 @@
 """The order of the transfers on the teaching page: which part may be moved next, and the work so far as bars."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
-from lab.seat.page.page_question import progress_of
-from lab.sequencing.cell.routes import part_of
+from lab.seat.order_text import OrderMove, move_of, title
 from lab.sequencing.cell.schedule import Move, robot_activities
 from lab.sequencing.cell.stations import ROBOT
-from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.request import SequenceRequest
 from lab.sequencing.simulate.run import Run
 
 Json = dict[str, Any]
 
 
 def order_of(request: SequenceRequest) -> Json:
-    """Where the work stands, which moves are allowed, which one the learner would make, and why it asks."""
-    run = request.run
+    """Where the work stands, and which moves are allowed."""
     return {
         "kind": "order",
-        "title": f"Episode {request.episode}, {run.now_s:.0f} s: the robot is at {run.cell.names[run.robot]}",
+        "title": title(request),
         "at": [],
-        "own": request.own,
-        "moves": [_allowed(run, decision) for decision in request.allowed],
-        "why": str(request.why),
-        "undoable": False,
+        "moves": [_allowed(move_of(request, decision)) for decision in request.allowed],
         "picture": [],
-        **progress_of(request.improvement_rate, request.current_mean, request.previous_mean),
     }
 
 
-def _allowed(run: Run, decision: int) -> Json:
-    option, part = run.option(decision), part_of(decision, run.cell.parts)
-    assert option is not None  # it is allowed
-    name = run.cell.part_name(part) + ("'s pallet" if option.carries == "pallet" else "")
-    wait_s = max(0.0, run.ready_s[part - 1] - run.now_s) if option.waits else 0.0
-    names = run.cell.names
+def _allowed(move: OrderMove) -> Json:
     return {
-        "action": decision,
-        "label": name,
-        "from": names[option.origin],
-        "to": names[option.target],
-        "ready_s": round(wait_s, 1),
+        "action": move.decision,
+        "label": move.name,
+        "from": move.origin,
+        "to": move.target,
+        "ready_s": round(move.wait_s, 1),
         "direction": None,
     }
 
 
-@dataclass
-class Follower:
-    """The moves of the episode that is asked about, made out from the questions: between two of them only one way leads.
-
-    A step that nobody is asked about is one without a choice. `moves` is [] when the way here cannot be made out.
-    """
-
-    moves: list[Move] = field(default_factory=list)
-    _run: Run | None = None
-    _episode: int = 0
-
-    def follow(self, request: SequenceRequest) -> None:
-        """Come to where the request is."""
-        if self._run is None or request.episode != self._episode:
-            self._run, self._episode, self.moves = Run(request.run.cell, request.run.times), request.episode, []
-        run = self._run
-        while not _same(run, request.run):
-            allowed = run.allowed()
-            if len(allowed) != 1:
-                self._run, self.moves = None, []
-                return
-            self.moves.append(run.move(allowed[0]))
-
-    def take(self, decision: int) -> None:
-        """The decision that followed the last request."""
-        if self._run is not None:
-            self.moves.append(self._run.move(decision))
-
-
-def _same(one: Run, other: Run) -> bool:
-    return one.now_s == other.now_s and one.locations == other.locations
+def made_until(request: SequenceRequest) -> list[Move]:
+    """The moves of the episode that is asked about, until now."""
+    run = Run(request.run.cell, request.run.times)
+    return [run.move(decision) for decision in request.made]
 
 
 def bars_of(moves: Sequence[Move], now_s: float | None = None) -> Json:

@@ -9,9 +9,9 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from lab.learning.requests import AdviceRequest
-from lab.seat.page.page_messages import Answer, Chair, Layer, Refused, Seat, understood
-from lab.seat.page.page_state import PARTS, Known, Pending, Request, layer_of
+from lab.learning.requests import AdviceRequest, Request
+from lab.seat.page.page_messages import Answer, Chair, Layer, Refused, Wish, understood
+from lab.seat.page.page_state import PARTS, Known, Pending, layer_of
 
 SLICE_EVERY_S = 0.1  # a layer's values are sent at most ten times a second,
 SLICE_SHARE = 30  # and working them out takes at most this part of the time
@@ -42,7 +42,7 @@ class SeatPanel:
         Path(__file__).with_name(name)
         for name in (
             *("teaching.html", "teaching.css"),
-            *("teaching_draw.js", "teaching_side.js", "teaching_map.js", "teaching.js"),
+            *("teaching_draw.js", "teaching_status.js", "teaching_map.js", "teaching_question.js"),
         )
     )
 
@@ -130,12 +130,12 @@ class SeatPanel:
         if word and self.on_word is not None:
             self.on_word(word)
 
-    def _do(self, page: int, meant: Answer | Seat | Layer) -> str:
+    def _do(self, page: int, meant: Answer | Wish | Layer) -> str:
         """The terminal's word for the answer to a question that was only offered, "" for everything else."""
         if isinstance(meant, Layer):
             self._pages[page].layer, self._pages[page].layer_version = meant.layer, 0
             return ""
-        if isinstance(meant, Seat):
+        if isinstance(meant, Wish):
             self.chair.wish(page, meant)
             return ""
         pending = self._checked(page, meant)

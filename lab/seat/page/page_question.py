@@ -3,10 +3,12 @@
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from lab.learning.requests import AdviceRequest
+from lab.learning.requests import AdviceRequest, Request
 from lab.mdp import TabularMDP
 from lab.seat.grid_text import safe_ansi
 from lab.seat.page.page_grid import directions, spot
+from lab.seat.page.page_order import order_of
+from lab.sequencing.request import SequenceRequest
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -14,21 +16,35 @@ if TYPE_CHECKING:
 Json = dict[str, Any]
 
 
-def question_of(request: AdviceRequest) -> Json:
-    """Where the learner is, what it may do and would do, how sure it is, and why it asks."""
+def question_of(request: Request) -> Json:
+    """Where the learner is, what may be done, what it would do, and why it asks."""
+    if isinstance(request, AdviceRequest):
+        shown = step_of(request)
+    else:
+        assert isinstance(request, SequenceRequest)
+        shown = order_of(request)
+    known = request.improvement
+    return shown | {
+        "own": request.own,
+        "why": str(request.reason or ""),
+        "undoable": request.undoable,
+        "rate": None if known is None else known.rate,
+        "current": None if known is None else known.current_mean,
+        "previous": None if known is None else known.previous_mean,
+    }
+
+
+def step_of(request: AdviceRequest) -> Json:
+    """Where in the table the learner is, what it may do, and how sure it is."""
     mdp, state = request.mdp, request.state
     return {
         "kind": "step",
         "title": f"Episode {request.episode}, step {request.step}: at {mdp.state_label(state)}",
         "at": spot(mdp, state),
-        "own": request.learner_action,
         "moves": moves_of(request),
-        "why": str(request.why or ""),
         "temperature": request.temperature,
         "selection": request.selection,
-        "undoable": request.undoable,
         "picture": picture_of(request.picture),
-        **progress_of(request.improvement_rate, request.current_mean, request.previous_mean),
     }
 
 
@@ -57,11 +73,6 @@ def leads_to(mdp: TabularMDP, state: int, action: int) -> str:
     if mdp.goal[entered]:
         return "goal"
     return "obstacle" if mdp.terminal[entered] else ""
-
-
-def progress_of(rate: float | None, current: float | None, previous: float | None) -> Json:
-    """The improvement rate and the moving averages that it comes from."""
-    return {"rate": rate, "current": current, "previous": previous}
 
 
 def picture_of(drawing: str) -> list[list[list[str]]]:

@@ -6,6 +6,7 @@ from typing import Protocol
 
 from lab.errors import counted
 from lab.learning.settings import GateSettings
+from lab.seat.order_text import ORDER
 from lab.seat.page.page_state import MOST_LINES, Progress
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
@@ -66,7 +67,7 @@ class SeatListener(Listener):
 
     def sequences(self, episodes: int, known: Reference | None, gate: GateSettings | None) -> None:
         """A sequencer begins to try orders."""
-        self._page.begin_order("The order of the transfers", episodes, gate, None if known is None else known.bound)
+        self._page.begin_order(ORDER, episodes, gate, None if known is None else known.bound)
 
     def tried(self, order: EpisodeSequenced) -> None:
         """An order was tried."""

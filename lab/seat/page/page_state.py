@@ -11,19 +11,16 @@ from typing import Any
 from lab.errors import counted
 from lab.learning.events import EpisodeEnded
 from lab.learning.gates import improvement
-from lab.learning.requests import AdviceRequest, Standing
+from lab.learning.requests import Request, Standing
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
 from lab.seat.page.page_curve import Curve
 from lab.seat.page.page_grid import place_of, slice_of, spot
-from lab.seat.page.page_order import order_of
 from lab.seat.page.page_question import question_of
 from lab.seat.request_text import VERDICTS
-from lab.sequencing.methods.srl_advised import SequenceRequest
 
 Json = dict[str, Any]
-Request = AdviceRequest | SequenceRequest
 UNLIMITED = 1_000_000_000  # a budget of this many steps is none
 MOST_NOTICES = 60
 MOST_LINES = 80
@@ -45,13 +42,12 @@ class Pending:
     @property
     def words(self) -> tuple[str, ...]:
         """What may be said beside the moves."""
-        return ("skip", "auto", "quit", *["undo"] * getattr(self.request, "undoable", False))
+        return ("skip", "auto", "quit", *["undo"] * self.request.undoable)
 
     @property
     def moves(self) -> Sequence[int]:
         """The moves that may be said."""
-        request = self.request
-        return range(request.mdp.n_actions) if isinstance(request, AdviceRequest) else request.allowed
+        return self.request.allowed
 
 
 @dataclass
@@ -63,11 +59,12 @@ class Notice:
     times: int = 1
 
     @classmethod
-    def of(cls, told: "Notice | EpisodeEnded") -> "Notice":
+    def of(cls, told: "Notice | EpisodeEnded", kind: str = "steps") -> "Notice":
         """What is said of a guided episode, in words."""
         if isinstance(told, Notice):
             return told
         outcome = f"I reached the goal in {counted(told.steps, 'step')}" if told.reached else "I did not reach the goal"
+        outcome = f"my order cost {told.steps:.1f}" if kind == "order" else outcome
         verdict = f", {VERDICTS[told.verdict]}" if told.verdict else ""
         tone = "bad" if told.verdict == "misled" else "good" * told.reached
         return cls(f"Episode {told.episode}: {outcome}{verdict}; moves advised: {told.helped_steps}.", tone)
@@ -188,9 +185,8 @@ def _question(known: Known, now_s: float) -> Json | None:
     pending = known.pending
     if pending is None:
         return None
-    made = question_of(pending.request) if isinstance(pending.request, AdviceRequest) else order_of(pending.request)
     left_s = None if pending.until_s is None else round(max(0.0, pending.until_s - now_s), 1)
-    return made | {
+    return question_of(pending.request) | {
         "number": pending.number,
         "wait_s": pending.wait_s,
         "left_s": left_s,
@@ -235,7 +231,7 @@ PARTS: dict[str, Callable[[Known, float], Any]] = {
     "question": _question,
     "curve": lambda known, now_s: known.learning.curve.document(),
     "standing": _standing,
-    "notices": lambda known, now_s: [vars(Notice.of(told)) for told in known.learning.notices],
+    "notices": lambda known, now_s: [vars(Notice.of(told, known.learning.kind)) for told in known.learning.notices],
     "progress": _progress,
     "work": lambda known, now_s: known.work,
     "members": lambda known, now_s: known.members,

@@ -190,7 +190,7 @@ const seatDraw = (() => {
     }
     svg.replaceChildren(...parts);
     const now = means.length ? `, lately ${nice(means[means.length - 1])} ${unit}` : "";
-    svg.setAttribute("aria-label", `${seatSide.count(count, "episode")}${now}, ${guided.filter(Boolean).length} ${per > 1 ? "stretches" : "episodes"} guided`);
+    svg.setAttribute("aria-label", `${seatStatus.count(count, "episode")}${now}, ${guided.filter(Boolean).length} ${per > 1 ? "stretches" : "episodes"} guided`);
   }
 
   // The improvement rate as a bar from 0, the threshold as a mark: left of it the learner asks
@@ -237,7 +237,7 @@ const seatDraw = (() => {
     parts.push(node("text", { x: Math.min(x(now_s), wide - 40), y: foot + 16, "text-anchor": "middle", fill: "#222222" }, `${Math.round(now_s)} s`));
     svg.replaceChildren(...parts);
     const moves = all.filter((bar) => ["carry", "pallet"].includes(bar[1])).length;
-    svg.setAttribute("aria-label", `${seatSide.count(moves, "move")} so far, ${Math.round(now_s)} s`);
+    svg.setAttribute("aria-label", `${seatStatus.count(moves, "move")} so far, ${Math.round(now_s)} s`);
   }
 
   return { grid, curve, rate, bars, trust, nice };

@@ -68,7 +68,7 @@ const seatMap = (() => {
   function picture(shown) {
     if (!shown) return; // the last drawing stays
     el("picture").hidden = !shown.picture.length;
-    const lines = shown.picture.flatMap((line) => [...line.map(([text, kind]) => seatSide.make("span", text, kind)), "\n"]);
+    const lines = shown.picture.flatMap((line) => [...line.map(([text, kind]) => seatStatus.make("span", text, kind)), "\n"]);
     el("picture").replaceChildren(...lines);
   }
 

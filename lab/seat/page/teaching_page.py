@@ -13,16 +13,17 @@ from typing import Any, Protocol
 from lab.advice.journal import Undo
 from lab.errors import BadInput
 from lab.learning.events import Event
-from lab.learning.requests import AdviceRequest, AdvisorLeft
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import NoPath, TabularMDP, shortest_steps
+from lab.seat.order_text import ORDER
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_messages import Answer
-from lab.seat.page.page_order import Follower, bars_of
+from lab.seat.page.page_order import bars_of, made_until
 from lab.seat.page.page_panel import CLOSED, SeatPanel
 from lab.seat.page.page_state import Learning, Pending, Progress, standing_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.request import SequenceRequest
 from lab.sequencing.search import EpisodeSequenced
 from lab.teaching.listener import Listener
 from lab.view.meshcat import LiveView
@@ -56,8 +57,6 @@ class SeatPage(LiveView):
         super().__init__(port, title=title)
         self._wait_s = wait_s
         self._panel: SeatPanel = SeatPanel(title)
-        self._follower = Follower()
-        self._advised_episodes: set[int] = set()
 
     @property
     def on_word(self) -> Callable[[str], None] | None:
@@ -75,30 +74,24 @@ class SeatPage(LiveView):
 
     # ---- questions
 
-    def ask(self, request: AdviceRequest) -> int | None:
-        """What the page's advisor says: an action, None for "skip". Waits until somebody answers, or the time is over.
+    def ask(self, request: Request) -> int | None:
+        """What the page's advisor says: one of `allowed`, None for "skip". Waits until somebody answers, or the time is over.
 
         Raises AdvisorLeft for "auto", after the time and when the page is closed, Undo when an answer is taken back, and
         KeyboardInterrupt for "quit".
         """
-        return self._heard(self._pose(request))
+        pending = self._pose(request)
+        try:
+            answer = self._panel.wait(pending)
+        finally:
+            self.withdraw()
+        return _said(pending, answer)
 
-    def ask_order(self, request: SequenceRequest) -> int | None:
-        """Which part to move next, asked in the same way: one of the allowed decisions, None for "skip"."""
-        self._follow(request)
-        said = self._heard(self._pose(request))
-        if said is not None:
-            self._advised_episodes.add(request.episode)
-        self._follower.take(request.own if said is None else said)
-        return said
-
-    def offer(self, request: AdviceRequest | SequenceRequest) -> None:
+    def offer(self, request: Request) -> None:
         """Show a question that is answered elsewhere, too; an answer on the page goes to `on_word`. Returns at once."""
-        if isinstance(request, SequenceRequest):
-            self._follow(request)
         self._pose(request, offered=True)
 
-    def look(self, request: AdviceRequest) -> None:
+    def look(self, request: Request) -> None:
         """Show where the learner is and what it thinks, without a question: somebody else is asked."""
         with self._panel.lock:
             self._see(request)
@@ -109,19 +102,28 @@ class SeatPage(LiveView):
         if self._panel.close():  # an answer on the page has closed it already, and what comes of it is told next
             self._wake()
 
-    def _pose(self, request: AdviceRequest | SequenceRequest, offered: bool = False) -> Pending:
+    def _pose(self, request: Request, offered: bool = False) -> Pending:
         self._running()
         wait_s = None if offered else self._wait_s
         until_s = None if wait_s is None else time.monotonic() + wait_s
         with self._panel.lock:
-            if isinstance(request, AdviceRequest):
-                self._see(request)
+            self._see(request)
             pending = self._panel.pose(Pending(request, wait_s, until_s, offered))
         self._wake()
         return pending
 
-    def _see(self, request: AdviceRequest) -> None:
+    def _see(self, request: Request) -> None:
         """What a request shows of the learner beside the question."""
+        if isinstance(request, SequenceRequest):
+            self._see_order(request)
+        elif isinstance(request, AdviceRequest):
+            self._see_table(request)
+        learning, known = self._panel.known.learning, request.improvement
+        learning.rate = None if known is None else known.rate
+        learning.means = (None, None) if known is None else (known.current_mean, known.previous_mean)
+        standing_of(learning, request.standing)
+
+    def _see_table(self, request: AdviceRequest) -> None:
         known = self._panel.known
         if known.learning.mdp not in (None, request.mdp):
             self._new(Learning())
@@ -130,27 +132,14 @@ class SeatPage(LiveView):
             learning.mdp = request.mdp
             known.changed("place")
         learning.q, learning.selection, learning.temperature = request.q, request.selection, request.temperature
-        learning.state, learning.rate = request.state, request.improvement_rate
-        learning.means = (request.current_mean, request.previous_mean)
-        standing_of(learning, request.standing)
+        learning.state = request.state
 
-    def _follow(self, request: SequenceRequest) -> None:
-        self._follower.follow(request)
-        with self._panel.lock:
-            known = self._panel.known
-            if known.learning.kind != "order":
-                self._new(Learning("The order of the transfers", "order", "s"))
-            learning = known.learning
-            learning.rate, learning.means = request.improvement_rate, (request.current_mean, request.previous_mean)
-            known.work = bars_of(self._follower.moves, request.run.now_s)
-            known.changed("work", "standing")
-
-    def _heard(self, pending: Pending) -> int | None:
-        try:
-            answer = self._panel.wait(pending)
-        finally:
-            self.withdraw()
-        return _said(pending, answer)
+    def _see_order(self, request: SequenceRequest) -> None:
+        known = self._panel.known
+        if known.learning.kind != "order":
+            self._new(Learning(ORDER, "order", "s"))
+        known.work = bars_of(made_until(request), request.run.now_s)
+        known.changed("work", "standing")
 
     # ---- lessons
 
@@ -167,7 +156,7 @@ class SeatPage(LiveView):
     ) -> None:
         """A session of a sequencer begins; optimal: what no order can beat."""
         with self._panel.lock:
-            self._panel.known.work, self._advised_episodes = None, set()
+            self._panel.known.work = None
             self._new(Learning(title, "order", unit, gate=gate, episodes=episodes, optimal=optimal))
 
     def on_event(self, event: Event, skill: str = "") -> None:
@@ -179,11 +168,12 @@ class SeatPage(LiveView):
             known.touched.update(hear(known.learning, event))
 
     def on_order_episode(self, event: EpisodeSequenced) -> None:
-        """An order was tried; it is guided when somebody here said something in it."""
+        """An order was tried; where somebody is asked, the session's own events say that, and whether it was guided."""
         known = self._panel.known
-        with self._panel.lock:
-            known.learning.curve.add(event.cost, event.episode in self._advised_episodes)
-            known.changed("curve")
+        if known.learning.gate is None:
+            with self._panel.lock:
+                known.learning.curve.add(event.cost, False)
+                known.changed("curve")
 
     def _new(self, learning: Learning) -> Learning:
         known = self._panel.known

@@ -1,9 +1,10 @@
-"""Teaching at a terminal: what the learner sees as text, and the person's answer as an action."""
+"""Teaching at a terminal: what the learner sees as text, and the person's answer, in a table and in the order alike."""
 
 from collections.abc import Iterable
 from itertools import groupby
+from typing import Any
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -19,23 +20,15 @@ from lab.learning.events import (
     EpisodeEnded,
     Event,
 )
-from lab.learning.requests import AdviceRequest, AdvisorLeft
-from lab.mdp import TabularMDP
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
 from lab.seat import request_text as facts
-from lab.seat.grid_text import Marks, draw
 from lab.seat.terminal.line_reader import Outside, ReadLine, default_reader
-from lab.seat.terminal.screen import folded, question, room, screen
-from lab.seat.terminal.typed_answer import explained, understand
+from lab.seat.terminal.order_question import OrderQuestion
+from lab.seat.terminal.screen import folded, room
+from lab.seat.terminal.table_question import TableQuestion
+from lab.sequencing.request import SequenceRequest
 
-__all__ = ["TeachingPrompt", "draw", "understand"]
-
-ROOMY = 18  # lines of a terminal; below, no empty line parts the questions
 MOST_DRAWN = 5  # equal moves of a path that are drawn one by one
-INTRODUCTION = (
-    "The learner is stuck and asks you where to go. It does what you say, and learns from it as if the move were its "
-    "own. When episodes with your advice are no shorter than those before, it counts that, and after a few of them it "
-    "asks no more. You can type:"
-)
 
 
 class TeachingPrompt:
@@ -50,23 +43,23 @@ class TeachingPrompt:
 
     def __init__(self, console: Console, read_line: ReadLine | None = None, plain: bool = False):
         self._console, self._read_line, self._plain = console, read_line, plain
-        self._marks = facts.WORDS_ONLY if plain else Marks.of(console)
         self._outside: Outside = getattr(read_line, "outside", None) or Outside()
         self._done = False
         self._path = _Path()
         self._wall: tuple[int, int, int] | None = None  # that was said of last: episode, state, action
-        self._mdp: TabularMDP | None = None  # that was asked about last
+        self._table, self._order = TableQuestion(console, plain), OrderQuestion(console, plain)
+        self._last: Request | None = None  # what was asked last
         self._mean_before: float | None = None
         self._guided = self._misleads = 0
 
-    def __call__(self, request: AdviceRequest) -> int | None:
+    def __call__(self, request: Request) -> int | None:
         """Shows where the learner is and returns what the person says."""
         if self._done:
             raise AdvisorLeft
         self._meet(request)
         if self._path.goes_on(request):
             return self._give(request, self._path.step())
-        self._drop_path(f"the learner is at {request.mdp.state_label(request.state)} now")
+        self._drop_path(f"the learner is at {self._way(request).where(request, request.state)} now")
         with self._outside.question():
             if self._read_line is None:
                 self._read_line = default_reader(self._console, plain=self._plain, outside=self._outside)
@@ -77,45 +70,45 @@ class TeachingPrompt:
         """Ends the question that waits with a word as if it were typed, from any thread; no effect when nothing waits."""
         self._outside.answer(word)
 
-    def show(self, request: AdviceRequest) -> None:
+    def show(self, request: Request) -> None:
         """Shows where the learner is, what it would do, and how it has been doing."""
-        width, height = room(self._console)
-        if self._plain:
-            self._print([Text(), *folded(facts.sentences(request), width)])
-            return
-        asked = question(request, self._marks, width)
-        gap = [Text()] * (height >= ROOMY)
-        self._print([*gap, *screen(request, self._marks, width, height - len(gap) - 1 - len(asked) // width)])
+        self._last = request
+        self._print(self._way(request).shown(request))
 
-    def told(self, request: AdviceRequest, action: int | None) -> None:
+    def told(self, request: Request, action: int | None) -> None:
         """Says what was answered to a request, such as "Answer: right"; None: the step was left to the learner."""
-        self._say(f"Answer: {'skip' if action is None else self._marks.named(request.mdp, action)}", "bold")
+        self._say(f"Answer: {'skip' if action is None else self._way(request).named(request, action)}", "bold")
+
+    def _way(self, request: Request | None) -> Any:
+        """How such a question is shown."""
+        return self._order if isinstance(request, SequenceRequest) else self._table
 
     # ---- what the person says ---------------------------------------------------------------------------------------
 
-    def _answer(self, request: AdviceRequest, read_line: ReadLine) -> int | None:
-        asked = question(request, self._marks, room(self._console)[0])
+    def _answer(self, request: Request, read_line: ReadLine) -> int | None:
+        way = self._way(request)
+        asked = way.asked(request)
         while True:
             try:
-                answer = understand(read_line(asked), request.mdp)
+                answer = way.understood(read_line(asked), request)
             except EOFError:
                 self._say("No more answers: the learner goes on alone.")
                 raise AdvisorLeft from None
             match answer:
                 case int():
                     return self._give(request, answer)
-                case tuple():
+                case tuple() if isinstance(request, AdviceRequest):
                     self._path = _Path(request, answer)
-                    self._say(f"A path of {counted(len(answer), 'move')}: {self._drawn(request.mdp, answer)}", "dim")
+                    self._say(f"A path of {counted(len(answer), 'move')}: {self._drawn(request, answer)}", "dim")
                     return self._give(request, self._path.step())
                 case "own":
-                    return request.learner_action
+                    return request.own
                 case "skip":
                     return None
                 case _:
                     self._command(answer, request)
 
-    def _command(self, word: str, request: AdviceRequest) -> None:
+    def _command(self, word: str, request: Request) -> None:
         """Does what a word asks for that gives no advice; what is no such word is a hint, and said."""
         match word:
             case "auto":
@@ -132,28 +125,27 @@ class TeachingPrompt:
             case "undo":
                 self._say("There is nothing to take back: you have answered nothing yet in this episode.", "yellow")
             case "why":
-                for line in facts.reasons(request, self._marks, self._guided):
+                for line in self._way(request).why(request, self._guided):
                     self._say(line)
             case "help":
-                self._help(request.mdp)
+                self._help(request)
             case _:
                 self._say(word, "yellow")
 
-    def _give(self, request: AdviceRequest, action: int) -> int:
+    def _give(self, request: Request, action: int) -> int:
         """An action as the person said it; when it leads nowhere, that is said, and it counts all the same."""
         wall = (request.episode, request.state, action)
-        if facts.outcome(request, action) in (facts.NOWHERE, facts.OBSTACLE, facts.DEAD_END):
+        if warned := self._way(request).warned(request, action):
             if wall != self._wall:  # said once, however often a path runs against it
-                named = self._marks.named(request.mdp, action)
-                self._say(f"{named}: that {facts.leads(request, action)}: given all the same.", "yellow")
+                self._say(warned, "yellow")
             self._wall = wall if self._path.left else None
         return action
 
-    def _drawn(self, mdp: TabularMDP, actions: Iterable[int]) -> str:
+    def _drawn(self, request: Request, actions: Iterable[int]) -> str:
         """Moves one after the other, as arrows where they have one; many of one kind are counted."""
         parts = []
         for action, run in groupby(actions):
-            word = mdp.action_labels[action] if self._plain else self._marks.named(mdp, action).split()[0]
+            word = self._way(request).briefly(request, action)
             times = len(list(run))
             parts += [word] * times if times <= MOST_DRAWN else [f"{times} x {word}"]
         return " ".join(parts)
@@ -162,26 +154,30 @@ class TeachingPrompt:
         request, left = self._path.request, self._path.left
         self._path = _Path()
         if request is not None and left:
-            self._say(f"The rest of your path is dropped ({self._drawn(request.mdp, left)}): {why}.", "yellow")
+            self._say(f"The rest of your path is dropped ({self._drawn(request, left)}): {why}.", "yellow")
 
-    def _meet(self, request: AdviceRequest) -> None:
+    def _meet(self, request: Request) -> None:
         """Before a question: how advice stands, when an episode with it did not help."""
         now = request.standing
-        if request.mdp is not self._mdp or now.misleads < self._misleads:  # another skill, or another session
-            self._mdp, self._guided, self._misleads = request.mdp, min(self._guided, now.misleads), now.misleads
+        before, self._last = self._last, request
+        is_same = before is not None and self._way(before).subject(before) is self._way(request).subject(request)
+        if not is_same or now.misleads < self._misleads:  # another skill, or another session
+            self._guided, self._misleads = min(self._guided, now.misleads), now.misleads
         if now.misleads > self._misleads:
             self._misleads = now.misleads
             self._say(f"{facts.misled(now.misleads, self._guided)}; it tolerates {now.omega}.", "yellow")
 
-    def _help(self, mdp: TabularMDP) -> None:
-        width = room(self._console)[0]
+    def _help(self, request: Request) -> None:
+        width, way = room(self._console)[0], self._way(request)
         if self._plain:
-            self._print(folded([INTRODUCTION, *(f"{word}: {does}." for word, does in explained(mdp))], width))
+            self._print(
+                folded([way.introduction, *(f"{word}: {does}." for word, does in way.explained(request))], width)
+            )
             return
         rows = Table.grid(padding=(0, 2))
-        for word, does in explained(mdp):
+        for word, does in way.explained(request):
             rows.add_row(Text(f"  {word}", "bold"), Text(does))
-        self._print(folded([INTRODUCTION], width))
+        self._print(folded([way.introduction], width))
         self._console.print(rows, width=width)
 
     # ---- what happens in the session --------------------------------------------------------------------------------
@@ -200,9 +196,10 @@ class TeachingPrompt:
                 if event.guided:
                     self._episode_ended(event)
             case AdviceRejected():
+                now = self._way(self._last).came_to(event.steps)
                 self._say(
                     f"The learner takes no more advice (episodes misled: {event.misleads}, tolerated: {event.omega}). "
-                    f"Episode {event.episode} counted {counted(event.steps, 'step')}, those before it {event.mean_before:.1f}.",
+                    f"Episode {event.episode} {now}, those before it {event.mean_before:.1f}.",
                     "bold red",
                 )
             case AdviceEnded(reason="converged"):
@@ -232,20 +229,17 @@ class TeachingPrompt:
         self._guided += 1
         good, verdict = facts.verdict(event, self._mean_before)
         style = {True: "green", False: "yellow", None: ""}[good]
-        outcome = "reached the goal in" if event.reached else "did not reach the goal:"
-        steps = counted(event.steps, "step")
-        self._say(
-            f"Episode {event.episode} {outcome} {steps}{verdict and f', {verdict}'}; moves advised: {event.helped_steps}.",
-            style,
-        )
+        ended = self._way(self._last).ended(event.steps, event.reached)
+        what = f"Episode {event.episode} {ended}{verdict and f', {verdict}'}; moves advised: {event.helped_steps}."
+        self._say(what, style)
 
     def _disagreed(self, event: AdvisorsDisagreed) -> None:
         """Who said what, and whom the learner follows."""
-        mdp = self._mdp
-        where = f"state {event.state}" if mdp is None else mdp.state_label(event.state)
+        last = self._last
+        where = f"state {event.state}" if last is None else self._way(last).where(last, event.state)
 
         def named(action: int) -> str:
-            return f"move {action}" if mdp is None else self._marks.named(mdp, action)
+            return f"move {action}" if last is None else str(self._way(last).named(last, action))
 
         said = ", ".join(f"{who} says {named(action)}" for who, action in event.said)
         followed = [who for who, action in event.said if action == event.followed]
@@ -256,10 +250,13 @@ class TeachingPrompt:
         clean = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
         self._print(folded([clean], room(self._console)[0], style))
 
-    def _print(self, lines: Iterable[Text]) -> None:
+    def _print(self, lines: Iterable[RenderableType]) -> None:
         for line in lines:
-            line.rstrip()
-            self._console.print(line, no_wrap=True, crop=False, overflow="ignore")
+            if isinstance(line, Text):
+                line.rstrip()
+                self._console.print(line, no_wrap=True, crop=False, overflow="ignore")
+            else:
+                self._console.print(line)
 
 
 class _Path:
@@ -269,10 +266,12 @@ class _Path:
         self.request, self.left = request, list(moves)
         self._state, self._step = (-1, 0) if request is None else (request.state, request.step)
 
-    def goes_on(self, request: AdviceRequest) -> bool:
+    def goes_on(self, request: Request) -> bool:
         """Whether this question comes where the path leads; where no table says that, whether it is the next one."""
         begun = self.request
-        if not self.left or begun is None or begun.mdp is not request.mdp or begun.episode != request.episode:
+        if not self.left or begun is None or not isinstance(request, AdviceRequest):
+            return False
+        if begun.mdp is not request.mdp or begun.episode != request.episode:
             return False
         return request.state == self._state if facts.is_known(request.mdp) else request.step == self._step
 

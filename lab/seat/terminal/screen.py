@@ -48,7 +48,7 @@ def packed(parts: Sequence[Text], width: int, gap: str = "  ") -> list[Text]:
 
 def question(request: AdviceRequest, marks: Marks, width: int) -> str:
     """The words before the cursor, as many as leave room to type."""
-    own = marks.named(request.mdp, request.learner_action)
+    own = marks.named(request.mdp, request.own)
     forms = (f"Which way? [enter = {own}, ? explains] ", f"Which way? [enter = {own}] ", f"Which way? [{own}] ")
     return next((form for form in forms if len(form) + 12 <= width), "Which way? ")
 

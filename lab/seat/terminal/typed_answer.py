@@ -129,9 +129,16 @@ def _unknown(word: str, mdp: TabularMDP) -> str:
 def explained(mdp: TabularMDP) -> list[tuple[str, str]]:
     """What can be typed, and what it does, one row each."""
     known = letters(mdp)
-    words = {"example": example(mdp), "letter": next(iter(known), ARROWS[0])}
-    rows = [("enter" if typed == "" else typed, text.format(**words)) for typed, (_, text) in COMMANDS.items() if text]
     move = "a word from the list of moves, or its beginning; arrow keys follow the picture"
     if known:
         move += f"; {_known_letters(known, mdp)}"
-    return [("a move", move), *rows]
+    return [("a move", move), *explained_words(example=example(mdp), letter=next(iter(known), ARROWS[0]))]
+
+
+def explained_words(**examples: str) -> list[tuple[str, str]]:
+    """The prompt's own words, and what they do; that for a path only with examples of one."""
+    return [
+        (typed or "enter", text.format(**examples))
+        for typed, (_, text) in COMMANDS.items()
+        if text and (examples or typed != "path")
+    ]

@@ -1,4 +1,4 @@
-"""What chance does to a cell: processing times and arrivals drawn around their means.
+"""What chance does to a cell: processing times and arrivals drawn around their means. Laws are compiled as they are.
 
 A draw depends on the episode's seed, the part and the position only, not on the order of events: two policies in the
 same episode meet the same times.
@@ -16,22 +16,24 @@ from lab.learning.splitmix import uniform
 from lab.sequencing.cell.cell import Cell
 
 
-def _constant(mean_s: float, spread: float, u: float, v: float) -> float:
+def constant(mean_s: float, spread: float, u: float, v: float) -> float:
+    """The mean itself."""
     return mean_s
 
 
-def _normal(mean_s: float, spread: float, u: float, v: float) -> float:
+def normal(mean_s: float, spread: float, u: float, v: float) -> float:
     """Standard deviation `spread` times the mean, never below 0. Source: Box and Muller 1958."""
     return max(0.0, mean_s * (1.0 + spread * sqrt(-2.0 * log(1.0 - u)) * cos(2.0 * pi * v)))
 
 
-def _exponential(mean_s: float, spread: float, u: float, v: float) -> float:
+def exponential(mean_s: float, spread: float, u: float, v: float) -> float:
+    """Of that mean."""
     return -mean_s * log(1.0 - u)
 
 
 # name -> function(mean [s], spread, two uniform numbers in [0, 1)) -> seconds
 LAWS: Mapping[str, Callable[[float, float, float, float], float]] = MappingProxyType(
-    {"constant": _constant, "normal": _normal, "exponential": _exponential}
+    {"constant": constant, "normal": normal, "exponential": exponential}
 )
 
 

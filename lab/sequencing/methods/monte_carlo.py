@@ -6,15 +6,15 @@ import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
-from lab.sequencing.methods.sessions import GreedyLearner, Table, Values, learn
+from lab.sequencing.methods.session_readable import GreedyLearner, Table, Values, learn
+from lab.sequencing.methods.session_updates import average, gain
 from lab.sequencing.methods.state_keys import Key
-from lab.sequencing.methods.updates import average, gain
 from lab.sequencing.search import LearnedSequence, Search
 
 
 @dataclass(frozen=True)
 class MonteCarloResult(LearnedSequence):
-    """A sequencer's result, and what was learned: `q` by state and decision (see `keys.key_of`), where visited."""
+    """A sequencer's result, and what was learned: `q` by state and decision (see `state_keys.key_of`), where visited."""
 
     q: Table
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
-from lab.sequencing.methods.sessions import SessionLearner, learn
+from lab.sequencing.methods.session_readable import SessionLearner, learn
 from lab.sequencing.search import Search, SequenceResult
 
 

@@ -1,7 +1,7 @@
 """Dispatching rules: which of the allowed decisions to take next, by one number; ties go to the lowest decision.
 
 A rule looks at a run as it stands and never ahead, so it plans (by a cell's own times) as well as it reacts (see
-`execute`). Every rule may end in a deadlock where a cell has one.
+`simulate.execution`). Every rule may end in a deadlock where a cell has one.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""Sessions that learn in the simulation of `kernels`, compiled with numba; held equal to `sessions`."""
+"""Sessions that learn in the simulation of `kernels`, compiled with numba; held equal to `session_readable`."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from lab.learning import splitmix
 from lab.learning.compiled import inner, lean
-from lab.sequencing.methods import updates
+from lab.sequencing.methods import session_updates as updates
 from lab.sequencing.methods.session_arrays import LEARNER_CODES
 from lab.sequencing.simulate.kernels import cost, fraction, list_allowed, mixed, move, reset, uniform
 
@@ -25,7 +25,7 @@ def _next_uniform(stream: Any) -> float:
 
 @inner
 def _episode_seed(seed: Any, episode: int) -> Any:
-    """`sessions.episode_seed`."""
+    """`session_readable.episode_seed`."""
     return np.uint64(uniform(~seed, episode) * 2.0**53)
 
 
@@ -88,7 +88,7 @@ def _state_number(keys: Any, run: Any) -> int:
 
 @inner
 def _key(cell: Any, keys: Any, run: Any, state: int, i: int) -> Any:
-    """`keys.key_of`: of the i-th allowed decision in a state of this number."""
+    """`state_keys.key_of`: of the i-th allowed decision in a state of this number."""
     part, o = (run.allowed[i] - 1) % len(run.locations), run.options[i]
     here, there = run.locations[part], cell.to[o]
     if keys.pairs:
@@ -104,7 +104,7 @@ def _key(cell: Any, keys: Any, run: Any, state: int, i: int) -> Any:
 
 @inner
 def _choose(cell: Any, keys: Any, work: Any, state: int, count: int, epsilon: float) -> int:
-    """`sessions.choose`: which of the allowed decisions; no number is drawn where there is only one."""
+    """`session_readable.choose`: which of the allowed decisions; no number is drawn where there is only one."""
     if count == 1:
         return 0
     u = _next_uniform(work.stream)
@@ -117,7 +117,7 @@ def _choose(cell: Any, keys: Any, work: Any, state: int, count: int, epsilon: fl
 
 @inner
 def _episode(cell: Any, method: Any, work: Any, epsilon: float, seed: Any, learns: bool) -> int:
-    """`sessions.walk`: one pass through a cell with the step update of SRL where it learns; how many moves were made."""
+    """`session_readable.walk`: one pass through a cell with the step update of SRL where it learns; how many moves were made."""
     run, memory, keys, rules = work.run, work.memory, method.keys, method.rules
     reset(cell, run, seed)
     moves, row, state = 0, 0, 0

@@ -7,9 +7,9 @@ import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
-from lab.sequencing.methods.sessions import GreedyLearner, Table, Values, learn
+from lab.sequencing.methods.session_readable import GreedyLearner, Table, Values, learn
+from lab.sequencing.methods.session_updates import log_factor, log_sum
 from lab.sequencing.methods.state_keys import Key
-from lab.sequencing.methods.updates import log_factor, log_sum
 from lab.sequencing.search import LearnedSequence, Search
 
 
@@ -18,7 +18,7 @@ class SrlResult(LearnedSequence):
     """A sequencer's result, and what SRL learned.
 
     `cost` and `sequence` are the best found in any episode; `final_cost` is the greedy policy's at the end, with the
-    cell's own times. `log_q`: natural logarithm of Q by state and decision (see `keys.key_of`; decision 0: of the
+    cell's own times. `log_q`: natural logarithm of Q by state and decision (see `state_keys.key_of`; decision 0: of the
     state itself), for what was visited.
     """
 

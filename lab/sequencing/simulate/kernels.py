@@ -1,12 +1,12 @@
-"""The simulation of a cell, compiled with numba; held equal to `run`, `chance` and `objectives`. `episodes` learns in it."""
+"""The simulation of a cell, compiled with numba; held equal to `run`, `chance` and `objectives`. Sessions learn in it."""
 
-from math import cos, log, pi, sqrt
 from typing import Any
 
 import numpy as np
 
 from lab.learning import splitmix
 from lab.learning.compiled import inner, lean
+from lab.sequencing.cell import chance
 from lab.sequencing.simulate.cell_arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES
 
 CLOCK, PICK = ARRIVAL_CODES["clock"], ARRIVAL_CODES["pick"]
@@ -18,6 +18,7 @@ MAKESPAN, TARDINESS, ROBOT_IDLE, MACHINE_IDLE = (
 mixed: Any = inner(splitmix.mixed, inline="always")
 fraction: Any = inner(splitmix.fraction, inline="always")
 _state_at: Any = inner(splitmix.state_at, inline="always")
+_normal, _exponential = inner(chance.normal), inner(chance.exponential)
 
 
 @lean
@@ -33,8 +34,8 @@ def _drawn(law: int, spread: float, mean_s: float, seed: Any, number: int) -> fl
         return mean_s
     u, v = uniform(seed, 2 * number), uniform(seed, 2 * number + 1)
     if law == NORMAL:
-        return max(0.0, mean_s * (1.0 + spread * sqrt(-2.0 * log(1.0 - u)) * cos(2.0 * pi * v)))
-    return -mean_s * log(1.0 - u)
+        return _normal(mean_s, spread, u, v)
+    return _exponential(mean_s, spread, u, v)
 
 
 @inner

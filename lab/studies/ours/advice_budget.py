@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lab.advice.advisors import SKILLS
+from lab.advice.advisors import SKILL_TAUS
 from lab.learning.gates import GATES
 from lab.studies.findings import Findings, Row, mean_row, row, share_row, those
 from lab.studies.ours.advice_budget_figures import of_ccrl, of_gates
@@ -18,7 +18,7 @@ from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, 
 
 WORLDS = ("world-1", "world-2")
 WRONG, NOBODY = "wrong", "nobody"
-ADVISORS = (*SKILLS, WRONG)
+ADVISORS = (*SKILL_TAUS, WRONG)
 CCRL = ("ccrl",)
 ASKING = tuple(gate for gate in GATES if gate != "never")
 AGAINST = {False: "alone", True: "alone, with memory"}
@@ -81,7 +81,7 @@ def settings() -> dict[Asked, AdviceSetting]:
             cells[place, "never", NOBODY, memory] = alone
             for gate in ASKING:
                 for name in ADVISORS:
-                    tau = SKILLS["expert" if name == WRONG else name]
+                    tau = SKILL_TAUS["expert" if name == WRONG else name]
                     cells[place, gate, name, memory] = replace(alone, gate=gate, tau=tau, wrong=name == WRONG)
     return cells
 
@@ -91,7 +91,7 @@ def rows_of(cell: Asked, outcome: AdviceOutcome, table: str) -> list[Row]:
     place, gate, name, memory = cell
     named: Row = {"world": place, "view": "full", "gate": gate, "memory": memory, "advisor": name}
     if name != NOBODY:
-        named |= {"tau": SKILLS.get(name, SKILLS["expert"]), "advisor_table": table}
+        named |= {"tau": SKILL_TAUS.get(name, SKILL_TAUS["expert"]), "advisor_table": table}
     rows = [
         share_row(named, "SP_percent", outcome.success),
         mean_row(named, "HS_steps", outcome.helped_steps),
@@ -146,7 +146,7 @@ def in_short(rows: Sequence[Row], below: Sequence[Row]) -> Row:
         1.0 - cell(place, gate, name, True)[1] / cell(place, gate, name, False)[1]
         for place in WORLDS
         for gate in ASKING
-        for name in SKILLS
+        for name in SKILL_TAUS
         if cell(place, gate, name, False)[1] > 0
     ]
     says["helped steps that memory saves, median over gates and skills [%]"] = round(100 * float(np.median(saved)), 1)

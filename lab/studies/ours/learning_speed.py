@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from lab.advice.advisors import Advice, skill
 from lab.learning.batch import run_sessions
 from lab.learning.settings import GateSettings
+from lab.learning.simulated_advice import Advice, advice_chances
 from lab.studies.findings import Findings, Row, agreement, median_row
 from lab.studies.ours.learning_speed_rivals import RIVALS
 from lab.studies.ours.learning_speed_session import Measured, Missing
@@ -32,7 +32,7 @@ def speed(job: Job, reading: Mapping[str, Any]) -> Findings:
     """Million environment steps a second in world I, median of five runs; the reading changes nothing here."""
     place = world("world-1")
     mdp, learner = place.mdp(), place.learner
-    advice = Advice.of(skill(learned_table(place), 0.1))
+    advice = Advice.of(advice_chances(learned_table(place), 0.1))
     seeds = np.arange(job.seed, job.seed + job.sessions, dtype=np.uint64)
 
     def learned(*gates: GateSettings) -> Measured:

@@ -7,7 +7,6 @@ V(s)), and a terminal state gets its own value when it is entered. Each runs on 
 
 import ctypes
 import subprocess
-from itertools import pairwise
 from pathlib import Path
 from shutil import which
 from tempfile import TemporaryDirectory
@@ -19,6 +18,7 @@ import numpy as np
 from lab.learning.settings import LearnerSettings
 from lab.mdp import TabularMDP
 from lab.studies.ours.learning_speed_jax import jax_lock_step
+from lab.studies.ours.learning_speed_numpy import numpy_lock_step
 from lab.studies.ours.learning_speed_session import (
     MOVES,
     Measured,
@@ -26,14 +26,11 @@ from lab.studies.ours.learning_speed_session import (
     Rival,
     Session,
     session_of,
-    shared_out,
 )
 
 if TYPE_CHECKING:
     from gymnasium import Env
 
-NUMPY_LANES = 2000  # sessions side by side: more of them share the price of a call
-NUMPY_BLOCK = 64  # moves after which sessions that are over leave
 C_SOURCE = Path(__file__).with_name("learning_speed_rival.c")
 C_FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")
 
@@ -96,79 +93,6 @@ def _tutorial_session(env: "Env[int, int]", job: Session, rng: np.random.Generat
             state, over = entered, terminated or truncated
             moves += 1
     return moves, bool(job.goal[state]) and moves - first == job.optimal
-
-
-def numpy_lock_step(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
-    """All sessions side by side in numpy arrays, one move of each at a time; a session is reset as its episode ends."""
-    job, rng = session_of(mdp, settings, sessions), np.random.default_rng(seed)
-    began = perf_counter()
-    batches = [_numpy_batch(job, lanes, rng) for lanes in shared_out(sessions, NUMPY_LANES)]
-    seconds = perf_counter() - began
-    return Measured(sum(moves for moves, _ in batches), seconds, 100.0 * sum(won for _, won in batches) / sessions)
-
-
-def _numpy_batch(job: Session, n: int, rng: np.random.Generator) -> tuple[int, int]:
-    """The moves and the won sessions of n lanes. A session that is over walks on unseen until the end of the block."""
-    neighbours = np.ascontiguousarray(job.successor.T, np.intp)  # (6, S)
-    sharpness_in = np.pad(job.sharpness, (0, NUMPY_BLOCK), "edge")
-    table, base = np.zeros(n * job.states), np.arange(n) * job.states
-    state, episode, begun = np.full(n, job.start), np.zeros(n, np.intp), np.zeros(n, np.intp)
-    sharpness = np.full(n, job.sharpness[0])
-    now = oldest = moves = won = 0  # oldest: no episode under way began before
-    while n:
-        near, lane = np.empty((MOVES, n), np.intp), np.arange(n)
-        value, weight = np.empty((MOVES, n)), np.empty((MOVES, n))
-        top, old, new = np.empty((3, n))
-        here, entered, picked = np.empty((3, n), np.intp)
-        beyond, action = np.empty((MOVES - 1, n), np.bool_), np.empty(n, np.int8)
-        beyond_bytes, sums, total = beyond.view(np.int8), weight[:-1], weight[-1]
-        steps_of_sum = list(pairwise(weight))
-        for mark in rng.random((NUMPY_BLOCK, n)):
-            np.take(neighbours, state, axis=1, out=near, mode="clip")
-            np.add(near, base, out=near)
-            np.take(table, near, out=value, mode="clip")
-            np.maximum.reduce(value, axis=0, out=top)
-            np.subtract(value, top, out=weight)
-            np.multiply(weight, sharpness, out=weight)
-            np.maximum(weight, -700.0, out=weight)  # exp is slow where it underflows
-            np.exp(weight, out=weight)
-            for below, above in steps_of_sum:  # much faster than cumsum along this axis
-                np.add(below, above, out=above)
-            np.multiply(mark, total, out=mark)
-            np.less_equal(sums, mark, out=beyond)
-            np.add.reduce(beyond_bytes, axis=0, dtype=np.int8, out=action)
-            np.multiply(action, n, out=picked, dtype=np.intp)
-            np.add(picked, lane, out=picked)
-            near.take(picked, out=entered, mode="clip")
-            value.take(picked, out=new, mode="clip")
-            np.add(state, base, out=here)
-            table.take(here, out=old, mode="clip")
-            np.multiply(new, job.alpha * job.discount, out=new)
-            np.add(new, job.alpha * job.loss, out=new)
-            np.multiply(old, 1.0 - job.alpha, out=old)
-            np.add(new, old, out=new)
-            table[here] = new
-            np.subtract(entered, base, out=state)
-            now += 1
-            over = job.terminal.take(state).nonzero()[0]
-            table[entered.take(over)] = job.arrival.take(state.take(over))
-            if now == oldest + job.max_moves:
-                over = np.union1d(over, (begun == oldest).nonzero()[0])
-            following = episode.take(over) + 1
-            ended = following == job.episodes
-            if np.count_nonzero(ended):
-                last = over[ended]
-                moves += now * len(last)  # a lane never pauses
-                won += int(np.count_nonzero(job.goal[state[last]] & (now - begun[last] == job.optimal)))
-            episode[over], sharpness[over] = following, sharpness_in.take(following)
-            state[over], begun[over] = job.start, now
-            if now == oldest + job.max_moves:
-                oldest = int(begun.min())
-        going = episode < job.episodes
-        if not going.all():
-            state, base, episode, begun, sharpness = (x[going] for x in (state, base, episode, begun, sharpness))
-            n = len(state)
-    return moves, won
 
 
 def c_scalar(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:

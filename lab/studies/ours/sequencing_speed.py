@@ -13,7 +13,7 @@ from lab.sequencing import SEQUENCERS
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.many_sessions import run_sessions
-from lab.sequencing.methods.sessions import learn_readably
+from lab.sequencing.methods.session_readable import learn_readably
 from lab.sequencing.methods.srl import Srl
 from lab.sequencing.search import EpisodeSequenced, Search, SrlSettings
 from lab.studies.findings import Findings, Row, agreement, median_row, row, those

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.advice.advisors import SKILLS, Advice, TableAdvisor, skill
-from lab.advice.panel import DECISIONS, panel_of
+from lab.advice.advisors import SKILL_TAUS
+from lab.advice.panel import DECISIONS, Panel, PanelSettings, members_of
 from lab.learning.events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.learning.requests import Advisor
 from lab.learning.selection import uniforms
 from lab.learning.session import run_session
+from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, share_row, those, varying_row
 from lab.studies.runner import Job, seeds_of
@@ -142,12 +143,10 @@ def one_session(setting: PanelSetting, seed: int) -> tuple[bool, int, list[Event
     advisor: Advisor | None = members[0] if members else None
     if setting.way is not None:
         in_turn = setting.way == IN_TURN
-        advisor = panel_of(
-            setting.members,
-            members,
+        advisor = Panel(
+            members_of(setting.members, members),
             mdp.n_states,
-            decide="best-trusted" if in_turn else setting.way,
-            asked="in-turn" if in_turn else "together",
+            PanelSettings("in-turn", "best-trusted") if in_turn else PanelSettings(decide=setting.way),
             draw=uniforms(streams[-2]),
             tell=told.append,
         )
@@ -160,7 +159,7 @@ def one_session(setting: PanelSetting, seed: int) -> tuple[bool, int, list[Event
 @lru_cache(maxsize=64)
 def _advice(name: str, lesson: AdviceSetting) -> Advice:
     wrong, values = name == "wrong", table_of(lesson)
-    return Advice.of(skill(-values if wrong else values, SKILLS["expert" if wrong else name]))
+    return Advice.of(advice_chances(-values if wrong else values, SKILL_TAUS["expert" if wrong else name]))
 
 
 def rows_of(panel: Sequence[str], way: str, who: str, found: PanelOutcome) -> list[Row]:

@@ -7,7 +7,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from lab.advice.advisors import SKILLS
+from lab.advice.advisors import SKILL_TAUS
 from lab.mdp import FloatArray
 from lab.studies.findings import Row, mean_row, row, share_row
 from lab.studies.runner import Job
@@ -26,7 +26,7 @@ TABLES: dict[str, tuple[str, View]] = {
     "table-9.4": ("world-2", "full"),
     "table-9.5": ("world-2", "limited"),
 }
-TAUS = tuple(SKILLS.values())
+TAUS = tuple(SKILL_TAUS.values())
 BETAS = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5)
 BEST_BETA = {"world-1": (1.3, 63.0), "world-2": (0.7, 37.0)}  # section 9.9.1: beta, success percentage
 REPLICATIONS = 5  # section 9.8: five of 100 sessions each

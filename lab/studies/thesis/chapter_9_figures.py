@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.advice.advisors import SKILLS
+from lab.advice.advisors import SKILL_TAUS
 from lab.errors import BadInput
 from lab.learning.gates import improvement
 from lab.studies.charts import PRINTED, bars, curve, legend_below
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ADVISORS = tuple(f"{name} ({tau:g})" for name, tau in SKILLS.items())
+ADVISORS = tuple(f"{name} ({tau:g})" for name, tau in SKILL_TAUS.items())
 METHODS = {"ccrl": "CCRL", "ia": "IA", "combined": "combined"}
 NEVER_REJECTS = 1_000_000  # Omega: nobody misleads so often
 OPTIMUM = 13  # steps in world I

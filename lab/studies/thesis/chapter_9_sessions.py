@@ -172,11 +172,11 @@ def learned_table(place: GridWorld, seed: int = LEARNED_SEED) -> FloatArray:
 
 def walk_of_advisor(place: GridWorld, table: FloatArray, tau: float, walks: int = 1000) -> NDArray[np.int32]:
     """The steps (walks,) of an advisor who walks by own advice alone; max_steps + 1 where it does not arrive (fig. 9.1)."""
-    from lab.advice.advisors import Advice, skill
     from lab.learning.batch import run_sessions
+    from lab.learning.simulated_advice import Advice, advice_chances
 
     learner = replace(place.learner, episodes=1)
-    advice = Advice.of(skill(table, tau))
+    advice = Advice.of(advice_chances(table, tau))
     seeds = np.arange(walks, dtype=np.uint64)
     return run_sessions(place.mdp(), learner, GateSettings("always"), advice, seeds).steps[:, 0]
 
@@ -203,12 +203,12 @@ def _given(setting: AdviceSetting, *names: str) -> dict[str, Any]:
 
 
 def _learned(setting: AdviceSetting, seeds: NDArray[np.uint64]) -> "Batch":
-    from lab.advice.advisors import Advice, skill
     from lab.learning.batch import run_sessions
+    from lab.learning.simulated_advice import Advice, advice_chances
 
     place, advice = world(setting.world), None
     if setting.tau is not None:
         table = -table_of(setting) if setting.wrong else table_of(setting)
-        advice = Advice.of(skill(table, setting.tau), place.region() if setting.view == "limited" else None)
+        advice = Advice.of(advice_chances(table, setting.tau), place.region() if setting.view == "limited" else None)
     gate = gate_of(setting, place.gate)
     return run_sessions(problem(setting.world), learner_of(setting), gate, advice, seeds)

@@ -22,7 +22,7 @@ from lab.studies.runner import Progress
 from lab.studies.statistics import PERCENT_POINTS, RELATIVE
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, PrintedLine, printed
 from lab.studies.thesis.chapter_9_sessions import gate_of, learned_table
-from lab.tasks.grid_world import GridWorld, View
+from lab.tasks.grid_world import AdvisorView, GridWorld
 from lab.tasks.record import write_whole
 
 COMMENT = """\
@@ -97,7 +97,7 @@ def best_view(
 
 
 def _with(world: GridWorld, view: Ints) -> GridWorld:
-    return world.model_copy(update={"view": View(lower=_tuple(view[0]), upper=_tuple(view[1]))})
+    return world.model_copy(update={"view": AdvisorView(lower=_tuple(view[0]), upper=_tuple(view[1]))})
 
 
 def is_compared(cell: PrintedLine, view: str) -> bool:
@@ -169,13 +169,13 @@ def success_alone(mdp: TabularMDP, beta: float, sessions: int) -> float:
 
 def distance(world: GridWorld, table: FloatArray, cells: Sequence[PrintedLine]) -> float:
     """How far success and helped steps are from the printed ones; 1: on average just what counts as agreeing."""
-    from lab.advice.advisors import Advice, skill
     from lab.learning.batch import run_sessions
+    from lab.learning.simulated_advice import Advice, advice_chances
 
     mdp, region, far = world.mdp(), world.region(), 0.0
     for cell in cells:
         assert cell.setting.tau is not None
-        advice = Advice.of(skill(table, cell.setting.tau), region if cell.setting.view == "limited" else None)
+        advice = Advice.of(advice_chances(table, cell.setting.tau), region if cell.setting.view == "limited" else None)
         gate = gate_of(cell.setting, world.gate)
         batch = run_sessions(mdp, LEARNER, gate, advice, np.arange(COMPARED, dtype=np.uint64))
         success = 100.0 * float((batch.steps[:, -1] == MOVES + 1).mean())

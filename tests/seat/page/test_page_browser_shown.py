@@ -11,13 +11,13 @@ import pytest
 
 from lab.advice.entries import Entry
 from lab.advice.receipt import receipt
-from lab.learning.events import AdviceGiven, AdviceRequested, EpisodeEnded
+from lab.learning.events import AdviceGiven, AdviceRequested, EpisodeEnded, Improvement
 from lab.learning.reasons import Reason, TooSlow
 from lab.learning.requests import AdviceRequest
 from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP, grid, optimal_values
 from lab.seat.page.teaching_page import SeatPage
-from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.request import SequenceRequest
 from lab.sequencing.simulate.run import Run, follow
 from lab.tasks.task_file import load_cell
 
@@ -72,7 +72,16 @@ def space() -> TabularMDP:
 
 def test_a_space_is_shown_in_layers(tab: "Page", page: SeatPage, until: Until) -> None:
     mdp = space()
-    request = AdviceRequest(mdp, [[0.0] * 6 for _ in range(18)], mdp.start, 1, 1, 5, None, None, None, Reason())
+    request = AdviceRequest(
+        mdp=mdp,
+        q=[[0.0] * 6 for _ in range(18)],
+        state=mdp.start,
+        episode=1,
+        step=1,
+        own=5,
+        reason=Reason(),
+        allowed=range(mdp.n_actions),
+    )
     asked = ask(page, request)
     until(tab, "document.getElementById('layer-name').textContent === '1 of 0–2: robot'")
     tab.fill("#layer", "2")
@@ -92,7 +101,19 @@ class Drawing:
 def test_an_environments_own_drawing_is_shown_as_text(tab: "Page", page: SeatPage, until: Until) -> None:
     goal = np.array([False, False, True])
     mdp = TabularMDP(np.ones((3, 2), np.int32), np.zeros((3, 2)), goal, goal, 0, ("pick-up", "drop-off"))
-    asked = ask(page, AdviceRequest(mdp, [[0.0] * 2] * 3, 0, 1, 1, 0, None, None, None, place=Drawing()))
+    asked = ask(
+        page,
+        AdviceRequest(
+            mdp=mdp,
+            q=[[0.0] * 2] * 3,
+            state=0,
+            episode=1,
+            step=1,
+            own=0,
+            environment=Drawing(),
+            allowed=range(mdp.n_actions),
+        ),
+    )
     until(tab, "!document.getElementById('picture').hidden")
     assert tab.text_content("#picture") == " |A\n<b>|B\n"
     assert tab.locator("#picture .bg-3").count() == 1
@@ -103,13 +124,23 @@ def test_an_environments_own_drawing_is_shown_as_text(tab: "Page", page: SeatPag
 
 def test_the_order_is_advised(tab: "Page", page: SeatPage, until: Until) -> None:
     run = follow(load_cell("toast-case-1").cell(3), [1])
-    request = SequenceRequest(run, run.allowed(), 1, 30, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
+    request = SequenceRequest(
+        run=run,
+        allowed=run.allowed(),
+        own=1,
+        episode=30,
+        reason=TooSlow(0.012, 0.05),
+        improvement=Improvement(0.012, 606.0, 613.4),
+        step=2,
+        state=0,
+        made=(1,),
+    )
     page.begin_order("toast", 100, GateSettings(), 213.0)
-    ThreadPoolExecutor(1).submit(page.ask_order, replace(request, run=follow(run.cell, ()), allowed=(1, 2, 3)))
+    ThreadPoolExecutor(1).submit(page.ask, replace(request, run=follow(run.cell, ()), allowed=(1, 2, 3), made=()))
     until(tab, "document.querySelectorAll('#moves button:enabled').length === 3")
     tab.keyboard.press("1")
     until(tab, "!document.querySelector('#moves button:enabled')")
-    asked = ThreadPoolExecutor(1).submit(page.ask_order, request)
+    asked = ThreadPoolExecutor(1).submit(page.ask, request)
     until(tab, "document.getElementById('says').textContent.includes('57 s: the robot is at toaster')")
     until(tab, "document.querySelectorAll('#bars rect').length === 3")
     tab.click("#moves >> text=toast 2")
@@ -119,10 +150,21 @@ def test_the_order_is_advised(tab: "Page", page: SeatPage, until: Until) -> None
 def test_a_pallets_move_is_no_carry(tab: "Page", page: SeatPage, until: Until) -> None:
     run = Run(load_cell("fms").cell(("rook",)))
     page.begin_order("fms", 100, GateSettings(), None)
+    made = list[int]()
     while run.allowed():
-        request = SequenceRequest(deepcopy(run), run.allowed(), run.allowed()[0], 1, None, None, None, Reason())
-        ThreadPoolExecutor(1).submit(page.ask_order, request)
-        carries = run.move(run.allowed()[0]).carries
+        request = SequenceRequest(
+            run=deepcopy(run),
+            allowed=run.allowed(),
+            own=run.allowed()[0],
+            episode=1,
+            reason=Reason(),
+            step=1,
+            state=0,
+            made=tuple(made),
+        )
+        ThreadPoolExecutor(1).submit(page.ask, request)
+        made.append(run.allowed()[0])
+        carries = run.move(made[-1]).carries
         until(tab, "document.querySelector('#moves button:enabled')")
         tab.keyboard.press("1")
         until(tab, "!document.querySelector('#moves button:enabled')")
@@ -130,7 +172,7 @@ def test_a_pallets_move_is_no_carry(tab: "Page", page: SeatPage, until: Until) -
             break
         assert tab.is_hidden("[data-kind=pallet]")
     assert carries == "pallet"
-    ThreadPoolExecutor(1).submit(page.ask_order, replace(request, run=run, allowed=run.allowed() or (1,)))
+    ThreadPoolExecutor(1).submit(page.ask, replace(request, run=run, allowed=run.allowed() or (1,), made=tuple(made)))
     until(tab, "document.querySelectorAll('#bars .k-pallet').length === 1")
     assert tab.is_visible("[data-kind=pallet]")
     assert "carry an empty pallet" in (tab.text_content("#bars .k-pallet title") or "")
@@ -164,7 +206,9 @@ def test_a_receipt_of_another_kind_is_shown_as_it_is(tab: "Page", page: SeatPage
 
 def test_everything_has_a_name_and_a_phone_has_no_sideways_scrolling(tab: "Page", page: SeatPage, until: Until) -> None:
     mdp = grid((2, 3), np.zeros((2, 3), bool), (0, 0), (1, 2), action_labels=("up", "down", "left", "right"))
-    ask(page, AdviceRequest(mdp, [[0.0] * 4] * 6, 0, 1, 1, 3, None, None, None))
+    ask(
+        page, AdviceRequest(mdp=mdp, q=[[0.0] * 4] * 6, state=0, episode=1, step=1, own=3, allowed=range(mdp.n_actions))
+    )
     until(tab, "document.querySelector('#moves button:enabled')")
     until(tab, "document.querySelector('#grid').getAttribute('aria-label')")
     nameless = "b => !(b.getAttribute('aria-label') || b.textContent).trim()"

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.seat.page.page_messages import MAX_CHARS, Answer, Chair, Layer, Refused, Seat, understood
+from lab.seat.page.page_messages import MAX_CHARS, Answer, Chair, Layer, Refused, Wish, understood
 
 
 @pytest.mark.parametrize(
@@ -15,8 +15,8 @@ from lab.seat.page.page_messages import MAX_CHARS, Answer, Chair, Layer, Refused
         ({"answer": {"question": 3, "action": 0}}, Answer(3, 0)),
         ({"answer": {"question": 3, "word": "skip"}}, Answer(3, None, "skip")),
         ({"answer": {"question": 3, "word": "undo"}}, Answer(3, None, "undo")),
-        ({"seat": "take"}, Seat("take")),
-        ({"seat": "give"}, Seat("give")),
+        ({"seat": "take"}, Wish("take")),
+        ({"seat": "give"}, Wish("give")),
         ({"layer": 4}, Layer(4)),
         ({"layer": None}, Layer(None)),
     ],
@@ -59,7 +59,7 @@ def test_anything_else_is_refused_in_a_line(message: str | bytes) -> None:
 @given(st.text() | st.binary() | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(json.dumps))
 def test_nothing_else_can_come_of_a_message(message: str | bytes) -> None:
     try:
-        assert isinstance(understood(message), Answer | Seat | Layer)
+        assert isinstance(understood(message), Answer | Wish | Layer)
     except Refused:
         return
 
@@ -83,10 +83,10 @@ def test_the_seat_is_free_when_its_page_has_gone_and_the_next_to_come_has_it() -
 def test_a_page_takes_the_seat_only_when_it_is_free() -> None:
     chair = Chair([1, 2], 1)
     with pytest.raises(Refused, match="has to hand over first"):
-        chair.wish(2, Seat("take"))
-    chair.wish(1, Seat("give"))
+        chair.wish(2, Wish("take"))
+    chair.wish(1, Wish("give"))
     with pytest.raises(Refused, match="does not answer"):
-        chair.wish(1, Seat("give"))
-    chair.wish(2, Seat("take"))
-    chair.wish(2, Seat("take"))
+        chair.wish(1, Wish("give"))
+    chair.wish(2, Wish("take"))
+    chair.wish(2, Wish("take"))
     assert chair.holder == 2

@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 
-from lab.learning.reasons import Reason, TooSlow
+from lab.advice.advisors import Person
+from lab.learning.events import Improvement
+from lab.learning.reasons import TooSlow
 from lab.learning.settings import GateSettings
-from lab.seat.page.page_order import Follower, bars_of, order_of
+from lab.seat.page.page_order import bars_of, made_until
+from lab.seat.page.page_question import question_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.methods.srl_advised import AskedAdvisor, SequenceRequest, advised_srl
+from lab.sequencing.methods.srl_advised import advised_srl
+from lab.sequencing.request import SequenceRequest
 from lab.sequencing.search import Search
 from lab.sequencing.simulate.run import Run, follow, simulate
 from lab.tasks.task_file import load_cell
@@ -16,11 +20,20 @@ from lab.tasks.task_file import load_cell
 def request_after(*decisions: int, episode: int = 30) -> SequenceRequest:
     """Where the thesis's case I with 3 toasts stands after these decisions."""
     run = follow(load_cell("toast-case-1").cell(3), decisions)
-    return SequenceRequest(run, run.allowed(), run.allowed()[0], episode, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
+    return SequenceRequest(
+        run=run,
+        allowed=run.allowed(),
+        own=run.allowed()[0],
+        episode=episode,
+        reason=TooSlow(0.012, 0.05),
+        improvement=Improvement(0.012, 606.0, 613.4),
+        step=1,
+        state=0,
+    )
 
 
 def test_a_question_lists_the_allowed_moves() -> None:
-    asked = order_of(request_after(1))
+    asked = question_of(request_after(1))
     assert asked["title"] == "Episode 30, 57 s: the robot is at toaster"
     assert (asked["kind"], asked["own"], asked["why"], asked["rate"]) == ("order", 1, str(TooSlow(0.012, 0.05)), 0.012)
     assert asked["moves"][0] == {
@@ -39,41 +52,18 @@ def moves_of(*decisions: int) -> list[Move]:
     return [run.move(decision) for decision in decisions]
 
 
-def test_the_moves_that_nobody_was_asked_about_are_made_out() -> None:
-    """One part only: there is never a choice, so the whole way is found from where it stands."""
-    run = Run(load_cell("toast-case-1").cell(1))
-    made = [run.move(1), run.move(1)]
-    follower = Follower()
-    follower.follow(SequenceRequest(run, run.allowed(), 1, 1, None, None, None, Reason()))
-    assert follower.moves == made
-
-
-def test_the_decisions_since_the_last_question_are_remembered() -> None:
-    follower = Follower()
-    for asked in range(3):
-        follower.follow(request_after(*[1, 2, 3][:asked]))
-        follower.take([1, 2, 3][asked])
-    follower.follow(request_after(1, 2, 3))
-    assert follower.moves == moves_of(1, 2, 3)
-    follower.follow(request_after(2, episode=31))  # another episode, and a decision that this page did not hear of
-    assert follower.moves == []
-
-
-def test_a_whole_session_is_followed_move_by_move() -> None:
-    """In every question of a real session, the moves made out lead to exactly where the request is."""
+def test_the_moves_of_a_whole_session_lead_to_where_each_question_is() -> None:
     cell = load_cell("toast-case-2").cell(3)
-    follower, asked = Follower(), []
+    asked = []
 
     def ask(request: SequenceRequest) -> int | None:
-        follower.follow(request)
-        assert (follower.moves[-1].drop_s if follower.moves else 0.0) == request.run.now_s
-        asked.append(len(follower.moves))
-        said = None if len(asked) % 3 == 0 else request.allowed[-1]
-        follower.take(request.own if said is None else said)
-        return said
+        moves = made_until(request)
+        assert (moves[-1].drop_s if moves else 0.0) == request.run.now_s
+        asked.append(len(moves))
+        return None if len(asked) % 3 == 0 else request.allowed[-1]
 
     gate = GateSettings("always", first_episode=1)
-    advised_srl(cell, Search(6), np.random.default_rng(0), gate, AskedAdvisor(ask))
+    advised_srl(cell, Search(6), np.random.default_rng(0), gate, Person(ask))
     assert len(asked) > 20
     assert max(asked) > 5
 

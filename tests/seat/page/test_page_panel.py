@@ -123,7 +123,7 @@ def test_what_is_not_finite_is_null() -> None:
 
 
 def test_the_terminal_hears_labels(panel: SeatPanel, mdp: TabularMDP) -> None:
-    request = AdviceRequest(mdp, [[0.0] * 4] * 3, 0, 1, 1, 2, None, None, None)
+    request = AdviceRequest(mdp=mdp, q=[[0.0] * 4] * 3, state=0, episode=1, step=1, own=2, allowed=range(mdp.n_actions))
     assert [word_of(request, one) for one in (Answer(1, 3), Answer(1, None, "undo"))] == ["right", "undo"]
     words: list[str] = []
     panel.on_word = words.append

@@ -18,6 +18,7 @@ from lab.learning.events import (
     AdvisorsDisagreed,
     EpisodeEnded,
     Event,
+    Improvement,
     Verdict,
 )
 from lab.learning.reasons import TooSlow
@@ -50,7 +51,19 @@ def known(mdp: TabularMDP) -> Known:
 
 def request_in(mdp: TabularMDP) -> AdviceRequest:
     q = [[0.0] * 4, [0.0, 0.0, 0.0, 1.0], [0.0] * 4, [0.0] * 4]
-    return AdviceRequest(mdp, q, 1, 30, 2, 3, -0.25, 50.0, 40.0, TooSlow(-0.25, 0.05), 1.0, "greedy")
+    return AdviceRequest(
+        mdp=mdp,
+        q=q,
+        state=1,
+        episode=30,
+        step=2,
+        own=3,
+        reason=TooSlow(-0.25, 0.05),
+        temperature=1.0,
+        selection="greedy",
+        improvement=Improvement(-0.25, 50.0, 40.0),
+        allowed=range(mdp.n_actions),
+    )
 
 
 def tell(known: Known, events: Sequence[Event]) -> list[str]:
@@ -90,12 +103,14 @@ def test_a_question_says_where_what_and_why(known: Known, mdp: TabularMDP) -> No
 
 def test_the_way_into_an_obstacle_is_said(known: Known) -> None:
     near = grid((2, 2), [[0, 1], [0, 0]], (0, 0), (1, 1), action_labels=LABELS)
-    known.pending = Pending(AdviceRequest(near, [[0.0] * 4] * 4, 0, 1, 1, 3, None, None, None))
+    known.pending = Pending(
+        AdviceRequest(mdp=near, q=[[0.0] * 4] * 4, state=0, episode=1, step=1, own=3, allowed=range(near.n_actions))
+    )
     assert [move["leads"] for move in document(known)["question"]["moves"]] == ["nowhere", "", "nowhere", "obstacle"]
 
 
 def test_an_environments_own_drawing_keeps_its_colours(mdp: TabularMDP, known: Known) -> None:
-    known.pending = Pending(replace(request_in(mdp), place=Drawn()))
+    known.pending = Pending(replace(request_in(mdp), environment=Drawn()))
     asked = document(known)["question"]
     assert asked["picture"] == [[["S", "bg-1"], ["F", ""]], [["G", "bold fg-4"]]]
     assert {move["leads"] for move in asked["moves"]} == {""}  # chance may decide

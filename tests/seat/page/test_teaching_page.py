@@ -14,18 +14,19 @@ import pytest
 from lab.advice.advisors import Person
 from lab.advice.journal import Undo
 from lab.errors import BadInput, WorkFailed
-from lab.learning.events import EpisodeEnded, Event
+from lab.learning.events import EpisodeEnded, Event, Improvement
+from lab.learning.problem import Problem
 from lab.learning.reasons import Reason, TooSlow
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
+from lab.seat.order_text import ORDER
 from lab.seat.page.teaching_page import SeatPage
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.methods.srl_advised import SequenceRequest
+from lab.sequencing.request import SequenceRequest
 from lab.sequencing.search import EpisodeSequenced, SequenceResult
 from lab.sequencing.simulate.run import follow
-from lab.skills.skill import Problem
 from lab.tasks.task_file import load_cell
 
 if TYPE_CHECKING:
@@ -50,7 +51,16 @@ def page() -> Iterator[SeatPage]:
 
 @pytest.fixture
 def request_1(mdp: TabularMDP) -> AdviceRequest:
-    return AdviceRequest(mdp, [[0.0] * 4 for _ in range(3)], 0, 1, 1, 2, None, None, None, Reason())
+    return AdviceRequest(
+        mdp=mdp,
+        q=[[0.0] * 4 for _ in range(3)],
+        state=0,
+        episode=1,
+        step=1,
+        own=2,
+        reason=Reason(),
+        allowed=range(mdp.n_actions),
+    )
 
 
 def meanwhile(function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
@@ -319,23 +329,36 @@ def test_a_session_that_is_only_shown_takes_no_answers(
 
 def order_request(*decisions: int) -> SequenceRequest:
     run = follow(load_cell("toast-case-1").cell(3), decisions)
-    return SequenceRequest(run, run.allowed(), 1, 30, 0.012, 606.0, 613.4, TooSlow(0.012, 0.05))
+    return SequenceRequest(
+        run=run,
+        allowed=run.allowed(),
+        own=1,
+        episode=30,
+        reason=TooSlow(0.012, 0.05),
+        improvement=Improvement(0.012, 606.0, 613.4),
+        step=1,
+        state=0,
+    )
 
 
 def test_the_order_is_asked_and_the_work_shown(page: SeatPage, opens: "Opens") -> None:
     with opens(page) as browser:
-        page.begin_order("toast", 100, GateSettings(window=4, first_episode=8), 213.0)
+        page.begin_order(ORDER, 100, GateSettings(window=4, first_episode=8), 213.0)
         number = 0
         for decisions, said in (((), 1), ((1,), 2)):
-            asked = meanwhile(page.ask_order, order_request(*decisions))
+            asked = meanwhile(page.ask, order_request(*decisions))
             number = browser.hear_until(asked_again(number))["question"]["number"]
             assert "no such move" in browser.refused({"answer": {"question": number, "action": 9}})
             answer(browser, number, action=said)
             assert asked.result(20) == said
         assert browser.seat["work"]["rows"] == ["robot", "toaster"]
         assert browser.seat["work"]["now_s"] == 57.0
-        page.on_order_episode(EpisodeSequenced(30, 250.0, 250.0, (1, 2)))
-        page.on_order_episode(EpisodeSequenced(31, 240.0, 240.0, (2, 1)))
+        for order, helped in (
+            (EpisodeSequenced(30, 250.0, 250.0, (1, 2)), 2),
+            (EpisodeSequenced(31, 240.0, 240.0, (2, 1)), 0),
+        ):
+            page.on_event(EpisodeEnded(order.episode, order.cost, helped > 0, helped, None, True), ORDER)
+            page.on_order_episode(order)
         seat = browser.hear_until(lambda seat: seat["curve"]["count"] == 2)
         assert seat["curve"]["guided"] == [1, 0]
         assert (seat["lesson"]["optimal"], seat["lesson"]["kind"]) == (213.0, "order")
@@ -343,7 +366,7 @@ def test_the_order_is_asked_and_the_work_shown(page: SeatPage, opens: "Opens") -
 
 def test_an_order_may_be_left_to_the_learner(page: SeatPage, opens: "Opens") -> None:
     with opens(page) as browser:
-        asked = meanwhile(page.ask_order, order_request())
+        asked = meanwhile(page.ask, order_request())
         answer(browser, word="skip")
         assert asked.result(20) is None
 
@@ -370,7 +393,9 @@ def test_a_lesson_that_begins_again_begins_anew(page: SeatPage, mdp: TabularMDP,
 def test_a_question_of_another_problem_brings_its_map(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
     page.offer(request_1)
     other = grid((2, 2), np.zeros((2, 2), bool), (0, 0), (1, 1))
-    page.offer(AdviceRequest(other, [[0.0] * 4] * 4, 0, 1, 1, 0, None, None, None))
+    page.offer(
+        AdviceRequest(mdp=other, q=[[0.0] * 4] * 4, state=0, episode=1, step=1, own=0, allowed=range(other.n_actions))
+    )
     with opens(page) as browser:
         assert browser.hear_until(question)["place"]["rows"] == 2
 

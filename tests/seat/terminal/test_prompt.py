@@ -21,6 +21,7 @@ from lab.learning.events import (
     AdvisorReadmitted,
     AdvisorsDisagreed,
     EpisodeEnded,
+    Improvement,
 )
 from lab.learning.reasons import TooSlow
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Standing
@@ -47,7 +48,16 @@ BOARD = board()
 
 def request(mdp: TabularMDP = BOARD, action: int = 3, state: int | None = None) -> AdviceRequest:
     q = [[0.0] * mdp.n_actions] * mdp.n_states
-    return AdviceRequest(mdp, q, mdp.start if state is None else state, 31, 2, action, 0.0125, 39.5, 40.0)
+    return AdviceRequest(
+        mdp=mdp,
+        q=q,
+        state=mdp.start if state is None else state,
+        episode=31,
+        step=2,
+        own=action,
+        improvement=Improvement(0.0125, 39.5, 40.0),
+        allowed=range(mdp.n_actions),
+    )
 
 
 def console(encoding: str = "utf-8", width: int = 100) -> Console:
@@ -111,7 +121,7 @@ def test_a_question_mark_explains() -> None:
 
 
 def test_why_explains_with_numbers() -> None:
-    answer, shown = ask("why\nup\n", replace(request(), why=TooSlow(0.012, 0.05)))
+    answer, shown = ask("why\nup\n", replace(request(), reason=TooSlow(0.012, 0.05)))
     assert answer == 0
     assert "It asks because its improvement is +1.2%, below 5%." in shown
     assert "Its last episodes took 39.5 steps on average, those before them 40.0" in shown

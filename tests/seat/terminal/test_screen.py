@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 from rich.text import Text
 
+from lab.learning.events import Improvement
 from lab.learning.reasons import TooSlow
 from lab.learning.requests import AdviceRequest, Standing
 from lab.mdp import TabularMDP
@@ -38,7 +39,20 @@ def world(shape: tuple[int, ...], density: float = 0.0) -> TabularMDP:
 def request(mdp: TabularMDP, state: int = 0, action: int = 1) -> AdviceRequest:
     table = [[0.0] * mdp.n_actions] * mdp.n_states
     now = Standing(123, 500, 3, 7, 0.05)
-    return AdviceRequest(mdp, table, state, 131, 102, action, -0.083, 201.0, 185.6, WHY, 0.01, "softmax", now)
+    return AdviceRequest(
+        mdp=mdp,
+        q=table,
+        state=state,
+        episode=131,
+        step=102,
+        own=action,
+        reason=WHY,
+        temperature=0.01,
+        selection="softmax",
+        standing=now,
+        improvement=Improvement(-0.083, 201.0, 185.6),
+        allowed=range(mdp.n_actions),
+    )
 
 
 def shown(asked: AdviceRequest, width: int, height: int) -> list[str]:

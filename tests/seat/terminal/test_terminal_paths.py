@@ -10,9 +10,10 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from rich.console import Console
 
-from lab.advice.advisors import make_advisor
+from lab.advice.advisors import AdvisorName
 from lab.advice.journal import Again, Journal, Undo
-from lab.learning.events import EpisodeEnded, Event
+from lab.advice.table_level import TableLevel
+from lab.learning.events import EpisodeEnded, Event, Improvement
 from lab.learning.requests import AdviceRequest
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -35,7 +36,16 @@ BOARD = board()
 
 def request(mdp: TabularMDP = BOARD, action: int = 3, state: int = 0) -> AdviceRequest:
     q = [[0.0] * mdp.n_actions] * mdp.n_states
-    return AdviceRequest(mdp, q, state, 31, 2, action, 0.0125, 39.5, 40.0)
+    return AdviceRequest(
+        mdp=mdp,
+        q=q,
+        state=state,
+        episode=31,
+        step=2,
+        own=action,
+        improvement=Improvement(0.0125, 39.5, 40.0),
+        allowed=range(mdp.n_actions),
+    )
 
 
 def said(console: Console) -> str:
@@ -166,7 +176,7 @@ def test_a_letter_that_is_no_move_gets_the_letters() -> None:
 
 def teach(ask: Callable[[AdviceRequest], int | None], on_event: Callable[..., None]) -> SessionResult:
     rng = np.random.default_rng(0)
-    advisor = make_advisor("terminal", BOARD, 0.99, rng, {"terminal": ask})
+    advisor = TableLevel(BOARD, 0.99, rng, {"terminal": ask}).advisor(AdvisorName.of("terminal"))
     gate = GateSettings(first_episode=4, window=1, omega=0, lambda_threshold=1.0)
     settings = LearnerSettings(episodes=12, max_steps=20)
     return run_session(BOARD, settings, gate, advisor, rng, on_event=on_event)

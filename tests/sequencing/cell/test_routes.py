@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.routes import choice_of, entry, part_of
+from lab.sequencing.cell.routes import choice_of, entry, from_the_ends, part_of
 from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
@@ -84,3 +84,15 @@ def test_the_needed_moves_are_enough(cells: Callable[..., st.SearchStrategy[Cell
     while allowed := run.allowed():
         run.move(data.draw(st.sampled_from(allowed)))
     assert np.isfinite(run.now_s)
+
+
+def test_values_are_found_from_the_ends_back(toast_cell: Callable[..., Cell]) -> None:
+    """How many moves are left at the most: plate, toaster, its buffer, applier, its buffer, done."""
+    cell = toast_cell("I", 2)
+    names = [cell.names[place.station] for place in cell.positions]
+    left = from_the_ends(cell.positions, lambda _, ahead: max((1 + moves for moves in ahead), default=0))
+    by_name = dict(zip(names, left, strict=True))
+    wanted = {"plate": 5, "toaster buffer": 4, "toaster": 3, "butter buffer": 2, "butter": 1, "done": 0}
+    assert by_name == wanted
+    whole = from_the_ends(cell.positions, lambda place, ahead: {names[place]}.union(*ahead))
+    assert whole[0] == set(names)

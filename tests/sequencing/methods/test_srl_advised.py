@@ -5,29 +5,34 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from lab.advice.advisors import AdvisorName, make_advisor
+from lab.advice.order_level import OrderLevel
 from lab.errors import BadInput
 from lab.learning.reasons import TooSlow
-from lab.learning.requests import AdvisorLeft
+from lab.learning.requests import Advisor, AdvisorLeft
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.srl import srl
 from lab.sequencing.methods.srl_advised import (
     AdvisedResult,
-    SequenceAdvisor,
-    SequenceRequest,
     advised_srl,
-    sequence_advisor,
+    check_gate,
 )
+from lab.sequencing.request import SequenceRequest
 from lab.sequencing.search import Search
 
 CellMaker = Callable[..., Cell]
 EPISODES = 80
 
 
-def learned(cell: Cell, advisor: SequenceAdvisor | str | None, seed: int = 0, gate: str = "ccrl") -> AdvisedResult:
+def named(name: str, cell: Cell, seed: int = 0) -> Advisor | None:
+    return make_advisor(AdvisorName.of(name), OrderLevel(cell, np.random.default_rng(seed), episodes=EPISODES))
+
+
+def learned(cell: Cell, advisor: Advisor | str | None, seed: int = 0, gate: str = "ccrl") -> AdvisedResult:
     if isinstance(advisor, str):
-        advisor = sequence_advisor(advisor, cell, np.random.default_rng(seed))
+        advisor = named(advisor, cell, seed)
     return advised_srl(cell, Search(EPISODES), np.random.default_rng(seed), GateSettings(gate), advisor)
 
 
@@ -63,7 +68,7 @@ def test_an_optimum_that_cannot_be_beaten_misleads_as_printed_but_not_where_the_
 ) -> None:
     cell = toast_cell("I", 3)
     for spare_best in (False, True):
-        gate, advisor = GateSettings(spare_best=spare_best), sequence_advisor("expert", cell, np.random.default_rng(0))
+        gate, advisor = GateSettings(spare_best=spare_best), named("expert", cell)
         result = advised_srl(cell, Search(EPISODES), np.random.default_rng(0), gate, advisor)
         assert result.helped_steps > 0
         assert (result.misleads > 0) == (not spare_best)
@@ -85,8 +90,8 @@ def test_what_a_person_is_shown(toast_cell: CellMaker) -> None:
     result = learned(toast_cell("I", 3), person)
     assert person.seen[0].episode >= GateSettings().first_episode
     assert all(len(request.allowed) > 1 and request.own in request.allowed for request in person.seen)
-    assert isinstance(person.seen[0].why, TooSlow)
-    assert person.seen[0].current_mean is not None
+    assert isinstance(person.seen[0].reason, TooSlow)
+    assert person.seen[0].improvement is not None
     assert result.helped_steps == len(person.seen)
 
 
@@ -107,11 +112,8 @@ def test_what_cannot_be(toast_cell: CellMaker) -> None:
     with pytest.raises(BadInput, match="the advisor named 7: allowed 1, 2"):
         learned(cell, Person(lambda request: 7), gate="always")
     with pytest.raises(BadInput, match=r"gate 'ia' .--gate.: it looks at a table of states"):
-        learned(cell, "none", gate="ia")
+        check_gate("ia")
     with pytest.raises(BadInput, match=r"unknown gate 'ccrrl'.*did you mean 'ccrl'"):
         learned(cell, "none", gate="ccrrl")
-    for name in ("expret", "tau=0", "tau=x", "tau=nan"):
-        with pytest.raises(BadInput, match=f"unknown advisor '{name}'"):
-            sequence_advisor(name, cell, np.random.default_rng(0))
-    with pytest.raises(BadInput, match="there is no prompt"):
-        sequence_advisor("terminal", cell, np.random.default_rng(0))
+    with pytest.raises(BadInput, match="this command has no prompt"):
+        named("terminal", cell)

@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.objectives import OBJECTIVES, cost
+from lab.sequencing.cell.objectives import OBJECTIVES, cost, stuck_cost
+from lab.sequencing.cell.stations import Product, Stage, Station
 from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.srl_time import SrlTimeResult, srl_time
 from lab.sequencing.search import EpisodeSequenced, Search
-from lab.sequencing.simulate.run import Run
+from lab.sequencing.simulate.run import Run, simulate
 
 CellMaker = Callable[..., Cell]
 Cells = Callable[..., st.SearchStrategy[Cell]]
@@ -101,3 +102,17 @@ def test_what_cannot_be(toast_cell: CellMaker) -> None:
         learned(toast_cell("I", 1), 0)
     with pytest.raises(BadInput, match="'tardy-parts': the cell has no due times"):
         learned(toast_cell("I", 1), 1, objective="tardy-parts")
+
+
+def test_many_parts_that_may_block_one_another(oven_cell: CellMaker) -> None:
+    """Eight parts by left and right or by right and left: what few parts taught may end in a deadlock with eight."""
+    stations = (*(Station(name, "machine", 1, 5.0) for name in ("left", "right")), Station("in", "storage", 9))
+    ways = (("in", "left", "right", "out"), ("in", "right", "left", "out"))
+    products = (Product("toast", tuple(tuple(Stage(name) for name in way) for way in ways)),)
+    table = 1.0 - np.eye(4)
+    more = {"stations": (*stations, Station("out", "storage", 9)), "empty_s": table, "loaded_s": table}
+    cell = oven_cell(8, products=products, **more)
+    result = learned(cell, 200)
+    stuck = [cost for cost in result.episode_costs if cost == stuck_cost(cell, "makespan")]
+    assert stuck
+    assert result.cost == simulate(cell, result.sequence).makespan_s

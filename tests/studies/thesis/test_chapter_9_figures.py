@@ -100,7 +100,7 @@ def test_the_rate_is_the_one_that_the_learner_knows() -> None:
     assert np.asarray(cut.get_xydata()).tolist() == [[4, figures.LOWEST_RATE]]
 
 
-@settings(max_examples=10)
+@settings(max_examples=4)
 @given(steps=st.lists(st.integers(1, 201), min_size=1, max_size=30), data=st.data())
 def test_any_session(steps: list[int], data: st.DataObject) -> None:
     guided = data.draw(st.lists(st.booleans(), min_size=len(steps), max_size=len(steps)))

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.advice.advisors import Advice
 from lab.errors import WorkFailed
 from lab.learning import batch as compiled
 from lab.learning.batch import Batch
 from lab.learning.settings import GateSettings
+from lab.learning.simulated_advice import Advice
 from lab.mdp import grid, shortest_steps
 from lab.studies.thesis import world_2 as module
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, PrintedLine, printed

@@ -1,0 +1,126 @@
+"""Who advises in a session: one advisor or several, simulated, recorded or people, and how they are brought together."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lab.advice.advisors import PEOPLE, AdvisorName, make_advisor
+from lab.advice.entries import Read, read_journal
+from lab.advice.journal import Journal
+from lab.advice.panel import Panel, PanelSettings, members_of
+from lab.advice.table_level import TableLevel
+from lab.errors import BadInput
+from lab.learning.environment import Environment
+from lab.learning.events import Event
+from lab.learning.requests import AdviceRequest, Advisor, Ask, Walked
+from lab.learning.selection import uniforms
+from lab.learning.settings import LearnerSettings
+from lab.mdp import BoolArray, TabularMDP
+
+EXPERT = AdvisorName.of("expert")
+Watch = Callable[[AdviceRequest, int | None], None]
+
+
+@dataclass(frozen=True)
+class Advising:
+    """Who is asked in a session, and the people behind such names as "terminal".
+
+    panel: how several are asked, and whom to follow; region (S,): where anybody is heard; watch: is shown each question
+    with its answer.
+    """
+
+    names: tuple[AdvisorName, ...] = (EXPERT,)
+    people: Mapping[str, Ask] = field(default_factory=dict)
+    panel: PanelSettings = field(default_factory=PanelSettings)
+    region: BoolArray | None = None
+    watch: Watch | None = None
+
+    @classmethod
+    def of(
+        cls,
+        names: Sequence[str],
+        people: Mapping[str, Ask] | None = None,
+        asked: str = PanelSettings.asked,
+        decide: str = PanelSettings.decide,
+        *,
+        watch: Watch | None = None,
+    ) -> "Advising":
+        """From names as they are typed; BadInput for one that no advisor has, and for an unknown way of asking or deciding."""
+        found = tuple(AdvisorName.of(name, "--advisor") for name in names)
+        if "none" in names and len(names) > 1:
+            raise BadInput(f"advisor 'none' (--advisor) beside {len(names) - 1} more: it is nobody or somebody")
+        for name in PEOPLE:
+            if names.count(name) > 1:
+                raise BadInput(f"advisor '{name}' (--advisor) is named {names.count(name)} times: once is enough")
+        return cls(found, people or {}, PanelSettings(asked, decide), watch=watch)
+
+    def __str__(self) -> str:
+        several = f" ({self.panel.asked}, {self.panel.decide})" if len(self.names) > 1 else ""
+        return " + ".join(map(str, self.names)) + several
+
+    @property
+    def records(self) -> bool:
+        """Whether anybody speaks only where a record has something: such silence is not held against the advice."""
+        return any(name.folder is not None for name in self.names)
+
+    def cut_records(self) -> list[Read]:
+        """The journals among the advisors whose last line was cut off. Raises BadInput for what is no journal."""
+        folders = [name.folder for name in self.names if name.folder is not None]
+        return [read for read in (read_journal(folder, "--advisor") for folder in folders) if read.cut]
+
+    def check_records(self, mdp: TabularMDP) -> None:
+        """Raises BadInput for a record that is not about this problem."""
+        for name in self.names:
+            if name.folder is not None:
+                make_advisor(name, TableLevel(mdp, 1.0, np.random.default_rng(0)))
+
+    def gather(
+        self,
+        environment: Environment,
+        learner: LearnerSettings,
+        rng: np.random.Generator,
+        *,
+        journal: Journal | None = None,
+        tell: Callable[[Event], None] = lambda event: None,
+    ) -> Advisor | None:
+        """The advisors of a session as one, None when there is nobody; people's answers go through the journal.
+
+        Each of several draws from a stream of its own. Raises BadInput as `make_advisor` does.
+        """
+        mdp, people = environment.mdp, through(journal, self.people)
+        streams = [rng] if len(self.names) == 1 else rng.spawn(len(self.names) + 1)
+        made = [
+            TableLevel(
+                mdp, learner.discount, stream, people, self.region, learner.episodes, environment.values
+            ).advisor(name)
+            for name, stream in zip(self.names, streams, strict=False)
+        ]
+        one = made[0]
+        if len(made) > 1:
+            members = members_of(map(str, self.names), made)
+            one = Panel(members, mdp.n_states, self.panel, draw=uniforms(streams[-1]), tell=tell)
+        return one if one is None or self.watch is None else Watched(one, self.watch)
+
+
+class Watched:
+    """An advisor whose answers somebody else is shown, too."""
+
+    def __init__(self, advisor: Advisor, watch: Watch):
+        self.advisor, self._watch = advisor, watch
+        self.followed: Callable[[Walked], None] | None = getattr(advisor, "followed", None)
+
+    def advise(self, request: AdviceRequest) -> int | None:
+        """The advisor's answer."""
+        action = self.advisor.advise(request)
+        self._watch(request, action)
+        return action
+
+
+def through(journal: Journal | None, people: Mapping[str, Ask]) -> dict[str, Ask]:
+    """The same people, asked through a journal, which keeps what they say, or says it again."""
+
+    def asked(by: str, ask: Ask) -> Ask:
+        return ask if journal is None else lambda request: journal.answer(by, request, ask)
+
+    return {name: asked(name, ask) for name, ask in people.items()}

@@ -1,0 +1,123 @@
+"""A Gymnasium environment under way: its states and actions as numbers, its errors as ours, its own picture of a state."""
+
+from copy import deepcopy
+from math import isfinite
+from typing import Any, NamedTuple, Self
+
+from lab.errors import BadInput, WorkFailed
+from lab.gym.environment_name import GymName, make, quiet, said
+from lab.gym.space_numbering import SUPPORTED, Numbering, Unsupported
+
+MAX_ENTRIES = 1_000_000  # states x actions
+
+
+class Moved(NamedTuple):
+    """What a step led to; success: whether the environment says that a goal is reached, None when it says nothing."""
+
+    reward: float
+    state: int
+    terminated: bool
+    truncated: bool
+    success: bool | None
+
+
+class NumberedEnvironment:
+    """An environment that is stepped, and where its state can be set, a second one that is put where it is to be drawn.
+
+    states, actions: the numbering of its spaces; first: a state that it begins in; limit: the steps of an episode, None
+    when it has no limit of its own; threshold: the mean return that counts as solved there, None when none is known for
+    these keywords. Raises BadInput when it cannot be made or reset, and for spaces that make no table.
+    """
+
+    def __init__(self, name: GymName, where: str):
+        self.name, self._where, self.which = name, where, f"environment '{name}' ({where})"
+        self._env = make(name, where)
+        self.states = self._numbered("observation", self._env.observation_space)
+        self.actions = self._numbered("action", self._env.action_space)
+        if self.states.count * self.actions.count > MAX_ENTRIES:
+            size = f"{self.states.count} states x {self.actions.count} actions"
+            raise BadInput(f"{self.which}: {size}: a table of at most {MAX_ENTRIES} entries is allowed")
+        self._choices = [self.actions.value(number) for number in range(self.actions.count)]
+        self._draws = "ansi" in ((self._env.metadata or {}).get("render_modes") or ())
+        if self._draws:
+            self._env = make(name, where, "ansi")
+        self._state = -1
+        try:
+            self.first = self.begin(0)
+        except WorkFailed as error:
+            raise BadInput(str(error)) from None
+        self._canvas = self._placeable() if self._draws else None
+        spec = self._env.spec
+        self.limit = self._own_limit() if spec is None or spec.max_episode_steps is None else spec.max_episode_steps
+        self.threshold = None if spec is None or name.options else spec.reward_threshold
+
+    def _own_limit(self) -> int | None:
+        """The limit that an environment keeps itself, as the lab's own do."""
+        limit = getattr(self.inside, "max_episode_steps", None)
+        return limit if isinstance(limit, int) and limit > 0 else None
+
+    def again(self) -> Self:
+        """Another one of the same, to play in without disturbing this one's episode."""
+        try:
+            return deepcopy(self)
+        except Exception:  # it holds what cannot be copied
+            return type(self)(self.name, self._where)
+
+    @property
+    def inside(self) -> Any:
+        """The environment itself, without what Gymnasium wraps it in."""
+        return self._env.unwrapped
+
+    def _numbered(self, kind: str, space: Any) -> Numbering:
+        try:
+            return Numbering(space)
+        except Unsupported:
+            raise BadInput(f"{self.which}: its {kind} space is {space}: supported are {SUPPORTED}") from None
+
+    def _failed(self, what: str, why: str) -> WorkFailed:
+        return WorkFailed(f"{self.which}: {what}: {why}")
+
+    def begin(self, seed: int | None) -> int:
+        """A new episode's first state; a seed begins all chance anew. Raises WorkFailed."""
+        try:
+            with quiet():
+                observation, _ = self._env.reset(seed=seed)
+            self._state = self.states.number(observation)
+        except Exception as error:
+            raise self._failed("it cannot be reset", said(error)) from error
+        return self._state
+
+    def step(self, action: int) -> Moved:
+        """One step. Raises WorkFailed for what is no step: an error, a state outside the space, a reward that is no number."""
+        try:
+            observation, reward, terminated, truncated, info = self._env.step(self._choices[action])
+            entered, worth, success = self.states.number(observation), float(reward), info.get("is_success")
+        except Exception as error:
+            raise self._failed(f"its step from {self._state} with action {action}", said(error)) from error
+        if not isfinite(worth):
+            raise self._failed(f"its step from {self._state} with action {action}", f"a reward of {worth}")
+        self._state = entered
+        return Moved(worth, entered, bool(terminated), bool(truncated), None if success is None else bool(success))
+
+    def _placeable(self) -> Any:
+        """A copy to draw any state with, when its state is kept where Gymnasium's own toy texts keep it; else None."""
+        if len(self.states.sizes) != 1 or self.states.value(self.first) != getattr(self.inside, "s", None):
+            return None
+        try:
+            return deepcopy(self.inside)
+        except Exception:  # it is drawn where it is
+            return None
+
+    def picture(self, state: int) -> str:
+        """The environment's own text for a state, with escape codes for colours; "" when it draws none, or not this one."""
+        if not self._draws or (self._canvas is None and state != self._state):
+            return ""
+        canvas = self._canvas or self.inside
+        try:
+            if self._canvas is not None:
+                canvas.s, canvas.lastaction = self.states.value(state), None
+            with quiet():
+                text = canvas.render()
+        except Exception:  # a picture that fails is no reason to end a session
+            return ""
+        return text.strip("\n") if isinstance(text, str) else ""

@@ -1,0 +1,75 @@
+"""What a simulated advisor would say: chances of actions from a table, drawn from in a session, or compiled in `kernels`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lab.errors import BadInput
+from lab.learning.requests import AdviceRequest
+from lab.learning.selection import Draw
+from lab.mdp import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """What a simulated advisor would say: the same for the interactive session and the compiled kernel.
+
+    thresholds (T, S, A) float64: the cumulated chances of the actions in each state, in episode n those of row
+    min(n, T) - 1; region (S,) bool: where the advisor sees the robot. Source: thesis section 9.2, limited view 9.7.
+    """
+
+    thresholds: FloatArray
+    region: BoolArray
+
+    @classmethod
+    def of(cls, chances: FloatArray, region: BoolArray | None = None) -> "Advice":
+        """From the chances (S, A) or (T, S, A) of the actions. Raises BadInput when shapes or chances do not fit."""
+        table = chances[None] if chances.ndim == 2 else chances
+        states = table.shape[1] if table.ndim == 3 else 0
+        view = np.ones(states, bool) if region is None else np.asarray(region, bool)
+        if table.ndim != 3 or view.shape != (states,):
+            raise BadInput(
+                f"advice: chances of shape {chances.shape} with a region of {view.shape}: wanted (S, A), (S,)"
+            )
+        if not (np.isfinite(table).all() and (table >= 0.0).all() and np.allclose(table.sum(axis=2), 1.0)):
+            raise BadInput("advice: the chances of a state's actions must be finite, at least 0 and sum to 1")
+        return cls(np.cumsum(table, axis=2), view)
+
+
+def advice_chances(q: FloatArray, tau: float | Sequence[float]) -> FloatArray:
+    """The chances (S, A) of an advisor that draws from a softmax over a table q (S, A); (T, S, A) for several tau.
+
+    tau > 0: .01 is an expert, 1 a novice. Source: thesis eq. 9.1.
+    """
+    taus = np.atleast_1d(np.asarray(tau, np.float64))
+    if q.ndim != 2 or not np.isfinite(q).all() or not (np.isfinite(taus).all() and (taus > 0.0).all()):
+        raise BadInput(f"advisor: a table of shape {q.shape} at tau {tau}: wanted finite values (S, A) and tau above 0")
+    best = q - q.max(axis=1, keepdims=True)
+    with np.errstate(over="ignore"):
+        weights = np.exp(best[None] / taus[:, None, None])
+    chances: FloatArray = weights / weights.sum(axis=2, keepdims=True)
+    return chances[0] if np.isscalar(tau) else chances
+
+
+def tau_schedule(taus: Sequence[float], episodes: int) -> list[float]:
+    """The tau of each episode, the last one's from then on: the only one, or from the first to the second in equal ratios."""
+    return np.geomspace(taus[0], taus[1], episodes).tolist() if len(taus) > 1 else [*taus]
+
+
+class TableAdvisor:
+    """A simulated advisor: draws from its `Advice`, and says nothing where it does not see the robot."""
+
+    def __init__(self, advice: Advice, draw: Draw):
+        self._draw = draw
+        self._region: list[bool] = advice.region.tolist()
+        self._last = len(advice.thresholds) - 1
+        self._thresholds = advice.thresholds
+
+    def advise(self, request: AdviceRequest) -> int | None:
+        """One draw for the state asked about."""
+        if not self._region[request.state]:
+            return None
+        row: list[float] = self._thresholds[min(request.episode - 1, self._last), request.state].tolist()
+        mark = self._draw() * row[-1]
+        return sum(below <= mark for below in row[:-1])

@@ -1,0 +1,82 @@
+"""A question about a table's step at a terminal: where the learner is, and which way to go."""
+
+from rich.console import Console, RenderableType
+from rich.text import Text
+
+from lab.errors import counted
+from lab.learning.requests import AdviceRequest
+from lab.seat import request_text as facts
+from lab.seat.grid_text import Marks
+from lab.seat.terminal.screen import folded, question, room, screen
+from lab.seat.terminal.typed_answer import Understood, explained, understand
+
+ROOMY = 18  # lines of a terminal; below, no empty line parts the questions
+
+
+class TableQuestion:
+    """How an `AdviceRequest` is shown, and what may be typed; plain: sentences instead of a picture."""
+
+    introduction = (
+        "The learner is stuck and asks you where to go. It does what you say, and learns from it as if the move were its "
+        "own. When episodes with your advice are no shorter than those before, it counts that, and after a few of them it "
+        "asks no more. You can type:"
+    )
+
+    def __init__(self, console: Console, plain: bool) -> None:
+        self._console, self._plain = console, plain
+        self._marks = facts.WORDS_ONLY if plain else Marks.of(console)
+
+    def subject(self, request: AdviceRequest) -> object:
+        """What is learned."""
+        return request.mdp
+
+    def asked(self, request: AdviceRequest) -> str:
+        """The words before the cursor."""
+        return question(request, self._marks, room(self._console)[0])
+
+    def shown(self, request: AdviceRequest) -> list[RenderableType]:
+        """Where the learner is, what it would do, and how it has been doing."""
+        width, height = room(self._console)
+        if self._plain:
+            return [Text(), *folded(facts.sentences(request), width)]
+        gap = [Text()] * (height >= ROOMY)
+        left = height - len(gap) - 1 - len(self.asked(request)) // width
+        return [*gap, *screen(request, self._marks, width, left)]
+
+    def understood(self, line: str, request: AdviceRequest) -> Understood:
+        """What a line means; see `understand`."""
+        return understand(line, request.mdp)
+
+    def warned(self, request: AdviceRequest, action: int) -> str:
+        """What is said of an action that leads nowhere, "" for any other."""
+        if facts.outcome(request, action) not in (facts.NOWHERE, facts.OBSTACLE, facts.DEAD_END):
+            return ""
+        return f"{self.named(request, action)}: that {facts.leads(request, action)}: given all the same."
+
+    def why(self, request: AdviceRequest, guided: int) -> list[str]:
+        """Why it asks, with all its numbers; guided: the episodes that were given advice until now."""
+        return facts.reasons(request, self._marks, guided)
+
+    def explained(self, request: AdviceRequest) -> list[tuple[str, str]]:
+        """What can be typed, and what it does."""
+        return explained(request.mdp)
+
+    def named(self, request: AdviceRequest, action: int) -> str:
+        """An action in words."""
+        return self._marks.named(request.mdp, action)
+
+    def briefly(self, request: AdviceRequest, action: int) -> str:
+        """An action as one of many."""
+        return request.mdp.action_labels[action] if self._plain else self.named(request, action).split()[0]
+
+    def where(self, request: AdviceRequest, state: int) -> str:
+        """What a state is called."""
+        return request.mdp.state_label(state)
+
+    def came_to(self, steps: float) -> str:
+        """What an episode came to."""
+        return f"counted {counted(steps, 'step')}"
+
+    def ended(self, steps: float, reached: bool) -> str:
+        """How an episode ended."""
+        return f"{'reached the goal in' if reached else 'did not reach the goal:'} {counted(steps, 'step')}"

@@ -1,0 +1,260 @@
+"""A session of episodes that learns values of decisions: readable here, compiled in `session_kernels`, with the same numbers.
+
+Each choice takes the next of the session's uniform numbers, and each episode's chance has a seed of its own, so that
+both give the same sequences, costs and values. The compiled session is taken wherever a state fits in 63 bits.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import log
+
+import numpy as np
+
+from lab.errors import BadInput
+from lab.learning.splitmix import MASK, stream, uniform
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import Episode
+from lab.sequencing.cell.objectives import MAKESPAN, cost
+from lab.sequencing.methods import session_arrays as arrays
+from lab.sequencing.methods import session_kernels
+from lab.sequencing.methods.session_updates import best_of, explore, log_of
+from lab.sequencing.methods.state_keys import Key, Keys, State, decoded, key_of, keys_of, no_keys
+from lab.sequencing.search import Log, Search, SrlSettings
+from lab.sequencing.simulate.cell_arrays import cell_arrays, most_moves
+from lab.sequencing.simulate.run import Run
+
+Table = dict[State, dict[int, float]]
+END_REWARD = 1.5  # of the last state in the listings, which keep values per state
+BLOCK = 256  # episodes of a compiled session between two reports to the listener
+ROWS = 2**16  # rows of a table before it has to grow
+
+
+@dataclass
+class Values:
+    """Values by state and decision; `first` is that of what was never visited."""
+
+    first: float
+    held: dict[Key, float] = field(default_factory=dict)
+
+    def __getitem__(self, key: Key) -> float:
+        return self.held.get(key, self.first)
+
+    def __setitem__(self, key: Key, value: float) -> None:
+        self.held[key] = value
+
+    def table(self) -> Table:
+        """The same by state, then by decision."""
+        table: Table = {}
+        for (state, decision), value in self.held.items():
+            table.setdefault(state, {})[decision] = value
+        return table
+
+
+class SessionLearner:
+    """What a session learns by. This one learns nothing and tries every allowed decision alike: random search."""
+
+    name = "random"
+    first = 0.0
+
+    def __init__(self, search: Search) -> None:
+        self._search = search
+        settings, keep = search.settings, log_of(1 - search.settings.alpha)
+        per_state = settings.values == "states"
+        self.rules = arrays.LearningRules(
+            learner=arrays.LEARNER_CODES[self.name],
+            log_keep=keep,
+            log_take=log_of(settings.alpha * settings.discount),
+            end_keep=log_of(settings.discount) if per_state else keep,
+            end_add=log(END_REWARD) if per_state else log_of(0.0),
+            type_a=settings.factor == "A",
+            offset=0.0 if search.objective == MAKESPAN else 1.0,
+        )
+
+    def learning(self, cell: Cell, keys: Keys) -> arrays.Learning:
+        """The same, compiled, in a cell; `keys`: those of its settings."""
+        there = cell_arrays(cell, self._search.objective, self._search.chance)
+        return arrays.Learning(there, cell_arrays(cell, self._search.objective), arrays.Method(keys, self.rules))
+
+    def epsilon(self, episode: int) -> float:
+        """The probability of a random decision in an episode, numbered from 1."""
+        return 1.0
+
+    @staticmethod
+    def keys(cell: Cell, settings: SrlSettings) -> Keys | None:
+        """What its values are kept by when compiled; None when that does not fit in 63 bits."""
+        return no_keys(cell)
+
+    def check(self, cost: float) -> None:
+        """BadInput for a cost that it cannot learn from."""
+
+    def step(self, values: Values, key: Key, following: Key | None, complete: bool) -> None:
+        """After a decision, once the following one is chosen; None: the episode is over, at its end if `complete`."""
+
+    def end(self, values: Values, trail: list[Key], cost: float, best_before: float) -> None:
+        """After an episode: the keys that were visited, in order, and what it cost."""
+
+
+class GreedyLearner(SessionLearner):
+    """One that keeps values, and chooses by them more and more."""
+
+    def __init__(self, search: Search) -> None:
+        super().__init__(search)
+        self.beta = search.settings.beta
+
+    def epsilon(self, episode: int) -> float:
+        """Eq. 5.1."""
+        return float(episode**-self.beta)
+
+    @staticmethod
+    def keys(cell: Cell, settings: SrlSettings) -> Keys | None:
+        """By pairs or next states, as the settings say."""
+        return keys_of(cell, settings.values, settings.state)
+
+    def check(self, cost: float) -> None:
+        """BadInput for a makespan of 0 s, of which there is no 1 / T."""
+        if self.rules.offset + cost <= 0:
+            raise BadInput(f"makespan {cost} s: {self.name} learns from 1 / T and needs one above 0")
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What a session came to: its episodes, the cost of its greedy policy at the end, and its values."""
+
+    log: Log
+    final_cost: float
+    table: Table
+
+
+class Guide:
+    """Who has a say in a readable session's decisions; the base has none."""
+
+    def begins(self, episode: int) -> None:
+        """An episode begins, numbered from 1."""
+
+    def decide(self, run: Run, allowed: tuple[int, ...], own: int) -> int:
+        """The decision to take instead of the learner's own, one of those allowed."""
+        return own
+
+    def ends(self, cost: float) -> None:
+        """The episode has ended with this cost."""
+
+
+@dataclass
+class _Session:
+    """A readable session under way."""
+
+    cell: Cell
+    search: Search
+    learner: SessionLearner
+    draw: Callable[[], float]
+    values: Values
+    guide: Guide = field(default_factory=Guide)
+
+
+def learn(cell: Cell, search: Search, seed: int, kind: type[SessionLearner]) -> Learned:
+    """A session with the uniform numbers of a seed, 0 to 2**64 - 1; compiled, unless its states do not fit in 63 bits.
+
+    Raises BadInput for an objective that the cell cannot be judged by, and for a cost of 0 where 1 / T is needed.
+    """
+    search.check(cell)
+    keys = kind.keys(cell, search.settings)
+    if keys is None:
+        return learn_readably(cell, search, seed, kind)
+    return learn_compiled(cell, search, seed, kind, keys)
+
+
+def learn_readably(
+    cell: Cell, search: Search, seed: int, kind: type[SessionLearner], guide: Guide | None = None
+) -> Learned:
+    """`learn`, one move after the other in Python; a guide has a say in every decision, and is told how it went."""
+    learner = kind(search)
+    session = _Session(cell, search, learner, stream(seed), Values(learner.first))
+    session.guide = guide or session.guide
+    noted = Log(search)
+    for episode in range(1, search.episodes + 1):
+        times = Episode(cell, search.chance, episode_seed(seed, episode))
+        session.guide.begins(episode)
+        run, sequence, trail = walk(session, times, learner.epsilon(episode), learns=True)
+        value = cost(run, search.objective)
+        learner.check(value)
+        learner.end(session.values, trail, value, noted.best_cost)
+        noted.note(tuple(sequence), value, run.done)
+        session.guide.ends(value)
+    session.guide = Guide()
+    run, _, _ = walk(session, Episode(cell), 0.0, learns=False)
+    return Learned(noted, cost(run, search.objective), session.values.table())
+
+
+def walk(session: _Session, times: Episode, epsilon: float, learns: bool) -> tuple[Run, list[int], list[Key]]:
+    """One episode: the finished run, its decisions, and the keys of their values."""
+    run, sequence, trail = Run(session.cell, times), list[int](), list[Key]()
+    while allowed := run.allowed():
+        keys = [key_of(run, decision, session.search.settings) for decision in allowed]
+        chosen = choose(keys, session.values, epsilon, session.draw)
+        chosen = allowed.index(session.guide.decide(run, allowed, allowed[chosen]))
+        if learns and trail:
+            session.learner.step(session.values, trail[-1], keys[chosen], complete=False)
+        trail.append(keys[chosen])
+        sequence.append(allowed[chosen])
+        run.move(allowed[chosen])
+    if learns:
+        session.learner.step(session.values, trail[-1], None, run.done)
+    return run, sequence, trail
+
+
+def choose(keys: list[Key], values: Values, epsilon: float, draw: Callable[[], float]) -> int:
+    """Any decision with probability epsilon, else one of highest value; no number is drawn where there is only one.
+
+    Source: thesis eq. 5.1; the same uniform number decides what to do and, scaled up again, between what.
+    """
+    if len(keys) == 1:
+        return 0
+    u = draw()
+    if u < epsilon:
+        return explore(u, epsilon, len(keys))
+    return best_of([values[key] for key in keys], len(keys), (u - epsilon) / (1.0 - epsilon))
+
+
+def episode_seed(seed: int, episode: int) -> int:
+    """The seed of what chance does in an episode of a session."""
+    return int(uniform(~seed & MASK, episode) * 2.0**53)
+
+
+def learn_compiled(cell: Cell, search: Search, seed: int, kind: type[SessionLearner], keys: Keys) -> Learned:
+    """`learn`, compiled; `keys`: those of its settings."""
+    learner, noted, longest = kind(search), Log(search), most_moves(cell)
+    learning = learner.learning(cell, keys)
+    memory = arrays.value_table(keys.size, min(search.episodes * longest, max(ROWS, BLOCK * longest)), learner.first)
+    work, seeds = arrays.session_arrays(cell, memory), np.array([seed], np.uint64)
+    final_cost = 0.0
+    for first in range(1, search.episodes + 1, BLOCK):
+        numbers = range(first, min(first + BLOCK, search.episodes + 1))
+        work = _with_room(work, keys, len(numbers) * longest)
+        found = arrays.Found.room(1, len(numbers), longest)
+        epsilons = np.array([learner.epsilon(episode) for episode in numbers])
+        session_kernels.advance(learning, work, seeds, epsilons, first, found)
+        sequence, final_cost = tuple(found.sequences[found.sequences > 0].tolist()), float(found.ends[0, 1])
+        for value, done in zip(found.costs[0].tolist(), found.complete[0].tolist(), strict=True):
+            learner.check(value)
+            noted.note(sequence, value, done)
+    return Learned(noted, final_cost, _table(keys, work.memory))
+
+
+def _with_room(work: arrays.SessionArrays, keys: Keys, rows: int) -> arrays.SessionArrays:
+    """The same with a table that has room for so many rows more, or for all there are."""
+    memory, full = work.memory, int(work.memory.used[0]) + rows
+    if full < len(memory.keys) or len(memory.keys) > keys.size:
+        return work
+    larger = arrays.value_table(keys.size, 2 * full, float(memory.values[0]))
+    session_kernels.copy_rows(memory, larger)
+    return work._replace(memory=larger)
+
+
+def _table(keys: Keys, memory: arrays.ValueTable) -> Table:
+    """The rows of a table, by state and decision as in `key_of`."""
+    table: Table = {}
+    filled = slice(1, int(memory.used[0]) + 1)
+    for key, value in zip(memory.keys[filled].tolist(), memory.values[filled].tolist(), strict=True):
+        state, label = decoded(keys, key)
+        table.setdefault(state, {})[label + 1 if keys.pairs else 0] = value
+    return table

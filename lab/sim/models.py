@@ -1,0 +1,192 @@
+"""The meshes and URDFs of the cell, made with trimesh from the parameters below; `write(folder)` regenerates `assets/`."""
+
+from math import pi
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lab.sim import kinematics as arm
+from lab.sim.frames import Vector
+from lab.sim.urdf_writer import Joint, Link, Model, Part, box, cylinder, hull, join, urdf
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+SLICE = (0.12, 0.015, 0.12)  # [m] width, thickness, height
+SLICE_KG = 0.040
+TOASTER = (0.20, 0.13, 0.10)  # [m] body, along and across the slot, up
+TOASTER_SLOT = (0.132, 0.023)  # [m] length and width of the slot
+TOASTER_FLOOR = 0.015  # [m] the slot's bottom above the table
+APPLIER_FLOOR = 0.02  # [m] what a slice stands on in the butter applier
+APPLIER_LIP = 0.012  # [m] how high the lips beside the slice rise above that floor
+NOZZLE_OUT = -0.115  # [m] the nozzle's plane beside the slice, along its thickness
+FINGER = (0.075, 0.012, 0.030)  # [m] length, thickness, width
+FINGER_OPEN = 0.022  # [m] each finger's pad from the middle when open
+MARKER_OUT, MARKER_UP = 0.13, 0.165  # [m] the gripper's marker beside the tool's axis and above the tips
+MARKER_RADIUS = 0.017
+MARKER_THICK = 0.001  # thin: a side that the camera sees would shift the middle of what it sees
+
+WHITE, GRAPHITE, BLUE = (0.93, 0.93, 0.95, 1.0), (0.22, 0.23, 0.26, 1.0), (0.16, 0.30, 0.55, 1.0)
+STEEL, RUBBER, CRUST, CRUMB = (
+    (0.72, 0.73, 0.76, 1.0),
+    (0.12, 0.12, 0.12, 1.0),
+    (0.62, 0.42, 0.22, 1.0),
+    (0.93, 0.83, 0.64, 1.0),
+)
+MARKER_MAGENTA, MARKER_CYAN, MARKER_GREEN = (0.95, 0.0, 0.95, 1.0), (0.0, 0.85, 0.85, 1.0), (0.0, 0.80, 0.0, 1.0)
+
+
+def _turning(number: int, parent: str, at: Vector, axis: Vector) -> Joint:
+    limits = (float(arm.LOWER[number]), float(arm.UPPER[number]))
+    return Joint(arm.JOINTS[number], "revolute", parent, at, axis, limits, float(arm.SPEED[number]))
+
+
+def robot() -> Model:
+    """The six-axis arm with its two-finger gripper (an approximate model of the UP6 class, see kinematics)."""
+    fingers = (_finger(name, side) for name, side in (("finger_left", 1.0), ("finger_right", -1.0)))
+    return Model("robot", [*_shoulder(), *_forearm(), _tool(), *fingers])
+
+
+def _shoulder() -> list[Link]:
+    """Base, turret and upper arm."""
+    shoulder, elbow = (arm.SHOULDER_OUT, 0.0, 0.20), (0.0, 0.0, arm.UPPER_ARM)
+    base = join(
+        hull(cylinder(0.19, 0.02, (0, 0, 0.01)), cylinder(0.15, 0.02, (0, 0, 0.06))),
+        cylinder(0.13, 0.19, (0, 0, 0.155)),
+    )
+    turret = join(
+        cylinder(0.145, 0.06, (0, 0, 0.03)),
+        hull(cylinder(0.12, 0.05, (0, 0, 0.06)), cylinder(0.10, 0.18, shoulder, "y")),
+    )
+    upper = join(
+        hull(cylinder(0.085, 0.11, (0, 0, 0), "y"), cylinder(0.065, 0.10, elbow, "y")),
+        cylinder(0.055, 0.17, elbow, "y"),
+    )
+    return [
+        Link("base", 40.0, [Part(GRAPHITE, mesh=base)]),
+        Link("turret", 30.0, [Part(BLUE, mesh=turret)], _turning(0, "base", (0, 0, 0.25), (0, 0, 1))),
+        Link("upper_arm", 18.0, [Part(WHITE, mesh=upper)], _turning(1, "turret", shoulder, (0, 1, 0))),
+    ]
+
+
+def _forearm() -> list[Link]:
+    """Forearm, roll and wrist."""
+    elbow, root, half = (0.0, 0.0, arm.UPPER_ARM), 0.20, arm.FOREARM
+    fore = hull(cylinder(0.085, 0.12, (0, 0, 0.06), "y"), cylinder(0.07, 0.14, (0.10, 0, arm.ELBOW_UP), "x"))
+    roll = hull(cylinder(0.062, 0.02, (0.0, 0, 0), "x"), cylinder(0.045, 0.02, (half - root - 0.04, 0, 0), "x"))
+    wrist = join(cylinder(0.047, 0.085, (0, 0, 0), "y"), cylinder(0.034, 0.075, (0.0375, 0, 0), "x"))
+    return [
+        Link("forearm", 12.0, [Part(BLUE, mesh=fore)], _turning(2, "upper_arm", elbow, (0, 1, 0))),
+        Link("roll", 5.0, [Part(WHITE, mesh=roll)], _turning(3, "forearm", (root, 0, arm.ELBOW_UP), (1, 0, 0))),
+        Link("wrist", 2.0, [Part(GRAPHITE, mesh=wrist)], _turning(4, "roll", (half - root, 0, 0), (0, 1, 0))),
+    ]
+
+
+def _tool() -> Link:
+    """The palm, with the marker that the overhead camera sees on an outrigger."""
+    palm = join(
+        cylinder(0.032, 0.02, (0.01, 0, 0), "x"),
+        box((0.05, 0.10, 0.05), (0.045, 0, 0)),
+        box((0.026, 0.085, 0.034), (0.083, 0, 0)),
+    )
+    marker_x = arm.TOOL - MARKER_UP
+    marker = cylinder(MARKER_RADIUS, MARKER_THICK, (marker_x, 0, MARKER_OUT), "x")
+    bar = (0.008, 0.018, MARKER_OUT - MARKER_RADIUS)
+    parts = [
+        Part(GRAPHITE, mesh=palm),
+        Part(STEEL, bar, (marker_x + 0.006, 0, bar[2] / 2), ghost=True),
+        Part(MARKER_MAGENTA, mesh=marker, ghost=True),
+    ]
+    return Link("tool", 1.2, parts, _turning(5, "wrist", (arm.FLANGE, 0, 0), (1, 0, 0)))
+
+
+def _finger(name: str, side: float) -> Link:
+    """One finger that slides outwards on its side, with rubber inside."""
+    pad = Part(STEEL, FINGER, (FINGER[0] / 2, side * FINGER[1] / 2, 0))
+    rubber = Part(RUBBER, (0.03, 0.0016, 0.028), (FINGER[0] - 0.016, side * 0.0008, 0), ghost=True)
+    root, open_m = (arm.TOOL - FINGER[0], 0, 0), FINGER_OPEN + 0.008
+    return Link(
+        name, 0.08, [pad, rubber], Joint(name, "prismatic", "tool", root, (0, side, 0), (0.0, open_m), 0.2, 200.0)
+    )
+
+
+def toaster() -> Model:
+    """A toaster with a real slot: floor, two walls and two ends around it, as separate boxes, for a mesh would be filled."""
+    (length, width, height), (slot_length, slot_width) = TOASTER, TOASTER_SLOT
+    wall, end, up = (width - slot_width) / 2, (length - slot_length) / 2, height - TOASTER_FLOOR
+    parts = [Part(STEEL, (length, width, TOASTER_FLOOR), (0, 0, TOASTER_FLOOR / 2))]
+    for side in (1.0, -1.0):
+        parts.append(Part(STEEL, (length, wall, up), (0, side * (slot_width + wall) / 2, TOASTER_FLOOR + up / 2)))
+        parts.append(Part(STEEL, (end, slot_width, up), (side * (slot_length + end) / 2, 0, TOASTER_FLOOR + up / 2)))
+    parts.append(Part(GRAPHITE, (length + 0.006, width + 0.006, 0.012), (0, 0, 0.006), ghost=True))
+    parts.append(Part(GRAPHITE, (0.014, 0.030, 0.010), (length / 2 + 0.007, 0.02, 0.066), ghost=True))
+    return Model("toaster", [Link("toaster", 2.0, parts)])
+
+
+def applier() -> Model:
+    """The butter applier: a groove with a low back rest that a slice stands in, and a head that slides across and up."""
+    groove, lip = SLICE[1] + 0.005, 0.012
+    span = SLICE[0] + 0.06
+    parts = [
+        Part(STEEL, (span, 0.34, APPLIER_FLOOR), (0, -0.07, APPLIER_FLOOR / 2)),
+        Part(STEEL, (SLICE[0], lip, 0.05), (0, (groove + lip) / 2, APPLIER_FLOOR + 0.025)),
+        Part(STEEL, (SLICE[0], lip, APPLIER_LIP), (0, -(groove + lip) / 2, APPLIER_FLOOR + APPLIER_LIP / 2)),
+        Part(GRAPHITE, (span, 0.03, 0.02), (0, NOZZLE_OUT - 0.06, APPLIER_FLOOR + 0.01), ghost=True),
+    ]
+    slide_x = Joint(
+        "head_x", "prismatic", "applier", (0, NOZZLE_OUT - 0.06, APPLIER_FLOOR), (1, 0, 0), (-0.06, 0.06), 0.5
+    )
+    slide_z = Joint("head_z", "prismatic", "column", (0, 0.03, 0), (0, 0, 1), (0.0, 0.14), 0.5)
+    column = [Part(WHITE, (0.03, 0.022, 0.16), (0, 0, 0.08))]
+    head = [Part(BLUE, (0.04, 0.03, 0.034), (0, 0, 0)), Part(STEEL, (0.012, 0.018, 0.012), (0, 0.024, 0), ghost=True)]
+    return Model(
+        "applier", [Link("applier", 3.0, parts), Link("column", 0.4, column, slide_x), Link("head", 0.2, head, slide_z)]
+    )
+
+
+def bread() -> Model:
+    """A slice of bread that stands: solid as a box, seen as a loaf's profile with a crust."""
+    width, thick, height = SLICE
+
+    def profile(shrink: float, depth: float) -> "Trimesh":
+        w, top, bottom = width / 2 - shrink, height / 2 - shrink, -height / 2 + shrink
+        side, round_ = top - 0.034, 0.030
+        cap = [(w - round_ + round_ * np.cos(t), top - round_ + round_ * np.sin(t)) for t in np.linspace(0, pi / 2, 8)]
+        outline = [(w * 0.97, bottom), (w * 0.97, side), *cap]
+        outline += [(-x, z) for x, z in outline]
+        import trimesh
+
+        return hull(trimesh.Trimesh([(x, y, z) for x, z in outline for y in (-depth / 2, depth / 2)]))
+
+    solid = Part(CRUST, SLICE, hidden=True)
+    return Model(
+        "slice",
+        [
+            Link(
+                "slice",
+                SLICE_KG,
+                [
+                    solid,
+                    Part(CRUST, mesh=profile(0.0, thick), ghost=True),
+                    Part(CRUMB, mesh=profile(0.007, thick + 0.0008), ghost=True),
+                ],
+            )
+        ],
+    )
+
+
+MODELS = {"robot": robot, "toaster": toaster, "applier": applier, "slice": bread}
+
+
+def write(folder: Path) -> list[Path]:
+    """Write every model's URDF and meshes into `folder`; returns the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for make in MODELS.values():
+        model = make()
+        text, meshes = urdf(model)
+        for name, content in {f"{model.name}.urdf": text, **meshes}.items():
+            (folder / name).write_text(content)
+            written.append(folder / name)
+    return written

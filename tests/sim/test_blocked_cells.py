@@ -1,0 +1,98 @@
+"""From a scene to cells that are free, out of reach or blocked, and by what."""
+
+import numpy as np
+import pytest
+
+from lab.sim.blocked_cells import OUT_OF_REACH, Survey, Surveyor
+from lab.sim.kinematics import ToolPose
+from lab.sim.robot import NAME
+from lab.sim.scene import Layout, Scene
+from lab.sim.world import World
+from lab.tasks.task_file import Obstacle, Task
+
+Cell = tuple[int, ...]
+CUBE = (0.70, 0.0)
+
+
+def cell_pose(cell: Cell) -> ToolPose:
+    """A line of five cells of 12 cm over y, at two heights, in front of the robot."""
+    return ToolPose(0.70, -0.24 + 0.12 * cell[0], 0.10 + 0.25 * cell[1])
+
+
+def surveyed(
+    task: Task, *, loaded: bool, clearance: float = 0.03, cubes: int = 2, ignore: tuple[str, ...] = ()
+) -> Survey:
+    """A survey of those cells around one stack of cubes in the middle cell."""
+    bare = task.model_copy(update={"obstacles": (Obstacle(name="cube", position_m=CUBE, cubes=cubes),)})
+    with World() as world:
+        scene = Scene(world, bare, 0, Layout((CUBE,), ()))
+        return Surveyor(scene, loaded=loaded, clearance=clearance, ignore=ignore).grid((5, 2), cell_pose)
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+def test_a_cube_blocks_the_cell_it_stands_in_and_is_named(task: Task, loaded: bool) -> None:
+    survey = surveyed(task, loaded=loaded)
+    assert survey.causes.shape == survey.blocked.shape == (5, 2)
+    assert survey.causes[2, 0] == "cube"
+    assert survey.causes[0, 1] == survey.causes[4, 1] == ""
+    assert survey.names([(2, 0), (2, 0), (0, 1)]) == ["cube"]
+    assert np.array_equal(survey.blocked, survey.causes != "")
+
+
+def test_a_carried_slice_needs_more_room_below(task: Task) -> None:
+    """Tips at 0.35 m: 3 cubes of 6 cm stay 17 cm below them, but only 8 cm below the slice in them."""
+    assert surveyed(task, loaded=False, clearance=0.1, cubes=3).causes[2, 1] == ""
+    assert surveyed(task, loaded=True, clearance=0.1, cubes=3).causes[2, 1] == "cube"
+    assert surveyed(task, loaded=True, clearance=0.07, cubes=3).causes[2, 1] == ""
+
+
+def test_what_is_ignored_blocks_nothing(task: Task) -> None:
+    assert not surveyed(task, loaded=True, ignore=("cube",)).blocked.any()
+
+
+def test_without_the_cube_the_cell_is_free(task: Task) -> None:
+    with World() as world:
+        scene = Scene(world, task.model_copy(update={"obstacles": ()}), 0, Layout((), ()))
+        assert not Surveyor(scene, loaded=True, clearance=0.03).grid((5, 2), cell_pose).blocked.any()
+
+
+def test_a_wider_clearance_never_frees_a_cell(task: Task) -> None:
+    narrow, wide = (surveyed(task, loaded=False, clearance=c).blocked for c in (0.005, 0.06))
+    assert np.all(wide[narrow])
+    assert wide.sum() > narrow.sum()
+
+
+@pytest.mark.parametrize("pose", [ToolPose(1.6, 0.0, 0.3), ToolPose(0.2, 0.1, 0.3), ToolPose(-0.8, 0.0, 0.3)])
+def test_out_of_reach_is_said(task: Task, world: World, pose: ToolPose) -> None:
+    scene = Scene(world, task.model_copy(update={"obstacles": ()}), 0, Layout((), ()))
+    assert Surveyor(scene, loaded=False, clearance=0.01).cause(pose) == OUT_OF_REACH
+
+
+def test_the_machines_block_too(task: Task, world: World) -> None:
+    scene = Scene(world, task.model_copy(update={"obstacles": ()}), 0, Layout((), ()))
+    surveyor = Surveyor(scene, loaded=False, clearance=0.01)
+    for station in task.stations:
+        x, y, yaw = station.pose
+        assert surveyor.cause(ToolPose(x, y, 0.0, yaw)) == station.name
+        assert surveyor.cause(ToolPose(x, y, 0.3, yaw)) == ""
+
+
+def test_surveying_says_the_same_twice_and_whatever_came_before(task: Task, world: World) -> None:
+    bare = task.model_copy(update={"obstacles": (Obstacle(name="cube", position_m=CUBE, cubes=2),)})
+    scene = Scene(world, bare, 0, Layout((CUBE,), ()))
+    surveyor = Surveyor(scene, loaded=True, clearance=0.03)
+    first = surveyor.grid((5, 2), cell_pose).causes
+    backwards = {cell: surveyor.cause(cell_pose(cell)) for cell in reversed(list(np.ndindex(5, 2)))}
+    assert all(first[cell] == cause for cell, cause in backwards.items())
+    assert world.steps == 0
+
+
+def test_the_slice_is_carried_where_the_fingers_hold_it(task: Task, world: World) -> None:
+    scene = Scene(world, task.model_copy(update={"obstacles": ()}), 0, Layout((), ()))
+    surveyor = Surveyor(scene, loaded=True, clearance=0.01)
+    assert surveyor.cause(ToolPose(0.7, 0.1, 0.4, 0.3)) == ""
+    position, turn = world.pose("carried slice")
+    assert position == pytest.approx((0.7, 0.1, 0.4 + 0.03 - 0.06))
+    assert 2 * np.arctan2(turn[2], turn[3]) == pytest.approx(0.3)
+    gap = world.nearest(NAME, "carried slice", 0.05)
+    assert -1e-4 < gap < 2e-3  # the fingers are as wide as the slice
