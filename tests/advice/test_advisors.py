@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from lab.advice.advisors import (
-    ADVISORS,
     PEOPLE,
     SKILL_TAUS,
     AdvisorName,
     RecordedAdvisor,
     make_advisor,
+    named,
 )
 from lab.advice.entries import FILE, Session
 from lab.advice.journal import Journal
@@ -27,8 +27,6 @@ from lab.mdp import FloatArray, TabularMDP, grid, optimal_values, shortest_steps
 from lab.sequencing.request import SequenceRequest, state_of
 from lab.sequencing.simulate.run import Run, follow
 from lab.tasks.task_file import load_cell
-
-NAMES = tuple(name for name in ADVISORS if not {"=", ":"} & {*name})  # the others have something of the user's in them
 
 
 def board() -> TabularMDP:
@@ -128,7 +126,7 @@ def test_a_person_may_leave() -> None:
 
 
 def test_names_are_checked() -> None:
-    for name in (*NAMES, "tau=0.25", "tau=1..0.01", "recorded:some/file"):
+    for name in (*named(), "tau=0.25", "tau=1..0.01", "recorded:some/file"):
         assert AdvisorName.of(name).text == name
     with pytest.raises(BadInput, match=r"unknown advisor 'exprt' \(--advisor\): did you mean 'expert'\?.*tau=X"):
         AdvisorName.of("exprt", "--advisor")
@@ -214,7 +212,7 @@ def test_a_record_of_another_problem_or_of_none(tmp_path: Path) -> None:
         made(f"recorded:{tmp_path / 'none'}", board())
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in PEOPLE] + ["tau=0.05", "tau=1..0.01"])
+@pytest.mark.parametrize("name", [name for name in named() if name not in PEOPLE] + ["tau=0.05", "tau=1..0.01"])
 def test_every_name_serves_both_levels(name: str) -> None:
     """One row makes who advises in a table and on the order; what is said is allowed."""
     mdp, run = board(), Run(load_cell("toast-case-1").cell(3))
