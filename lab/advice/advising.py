@@ -13,28 +13,25 @@ from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.environment import Environment
 from lab.learning.events import Event
-from lab.learning.requests import AdviceRequest, Advisor, Ask, Walked
+from lab.learning.requests import Advisor, Ask
 from lab.learning.selection import uniforms
 from lab.learning.settings import LearnerSettings
 from lab.mdp import BoolArray, TabularMDP
 
 EXPERT = AdvisorName.of("expert")
-Watch = Callable[[AdviceRequest, int | None], None]
 
 
 @dataclass(frozen=True)
 class Advising:
     """Who is asked in a session, and the people behind such names as "terminal".
 
-    panel: how several are asked, and whom to follow; region (S,): where anybody is heard; watch: is shown each question
-    with its answer.
+    panel: how several are asked, and whom to follow; region (S,): where anybody is heard.
     """
 
     names: tuple[AdvisorName, ...] = (EXPERT,)
     people: Mapping[str, Ask] = field(default_factory=dict)
     panel: PanelSettings = field(default_factory=PanelSettings)
     region: BoolArray | None = None
-    watch: Watch | None = None
 
     @classmethod
     def of(
@@ -43,8 +40,6 @@ class Advising:
         people: Mapping[str, Ask] | None = None,
         asked: str = PanelSettings.asked,
         decide: str = PanelSettings.decide,
-        *,
-        watch: Watch | None = None,
     ) -> "Advising":
         """From names as they are typed; BadInput for one that no advisor has, and for an unknown way of asking or deciding."""
         found = tuple(AdvisorName.of(name, "--advisor") for name in names)
@@ -53,7 +48,7 @@ class Advising:
         for name in PEOPLE:
             if names.count(name) > 1:
                 raise BadInput(f"advisor '{name}' (--advisor) is named {names.count(name)} times: once is enough")
-        return cls(found, people or {}, PanelSettings(asked, decide), watch=watch)
+        return cls(found, people or {}, PanelSettings(asked, decide))
 
     def __str__(self) -> str:
         several = f" ({self.panel.asked}, {self.panel.decide})" if len(self.names) > 1 else ""
@@ -96,25 +91,10 @@ class Advising:
             ).advisor(name)
             for name, stream in zip(self.names, streams, strict=False)
         ]
-        one = made[0]
-        if len(made) > 1:
-            members = members_of(map(str, self.names), made)
-            one = Panel(members, mdp.n_states, self.panel, draw=uniforms(streams[-1]), tell=tell)
-        return one if one is None or self.watch is None else Watched(one, self.watch)
-
-
-class Watched:
-    """An advisor whose answers somebody else is shown, too."""
-
-    def __init__(self, advisor: Advisor, watch: Watch):
-        self.advisor, self._watch = advisor, watch
-        self.followed: Callable[[Walked], None] | None = getattr(advisor, "followed", None)
-
-    def advise(self, request: AdviceRequest) -> int | None:
-        """The advisor's answer."""
-        action = self.advisor.advise(request)
-        self._watch(request, action)
-        return action
+        if len(made) == 1:
+            return made[0]
+        members = members_of(map(str, self.names), made)
+        return Panel(members, mdp.n_states, self.panel, draw=uniforms(streams[-1]), tell=tell)
 
 
 def through(journal: Journal | None, people: Mapping[str, Ask]) -> dict[str, Ask]:

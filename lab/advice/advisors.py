@@ -43,7 +43,7 @@ class AdvisorName:
     @classmethod
     def of(cls, text: str, where: str = "advisor") -> "AdvisorName":
         """From "expert", "tau=0.2", "tau=1..0.01", "recorded:DIR" and so on; BadInput for what is none, `where` it was said."""
-        if text in named():
+        if text in ADVISORS and not {"=", ":"} & {*text}:  # the others have something of the user's in them
             return cls(text, text, (SKILL_TAUS[text],) if text in SKILL_TAUS else ())
         if text.startswith("recorded:"):
             folder = Path(text.removeprefix("recorded:"))
@@ -141,16 +141,6 @@ ADVISORS: dict[str, AdvisorKind] = {
     "tau=X..Y": AdvisorKind(_simulated, "changing over the episodes"),
     "recorded:DIR": AdvisorKind(_recorded, "a session's folder"),
 }
-
-
-def named() -> list[str]:
-    """The names that are said as they stand; the others have something of the user's in them."""
-    return [name for name in ADVISORS if not {"=", ":"} & {*name}]
-
-
-def help_text() -> str:
-    """All names, and what is to be known of them, in one line."""
-    return ", ".join(name + (f" ({kind.help})" if kind.help else "") for name, kind in ADVISORS.items())
 
 
 def make_advisor(name: AdvisorName, level: Level) -> "Advisor | None":

@@ -1,32 +1,37 @@
-"""What the commands that teach share: who is in the room, the teacher that the options describe, a kept session."""
+"""What the commands that teach share: who hears of it, the teacher and the subject of the options, a kept session."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from lab.cli.output import complain, console
-from lab.errors import LabError
+from lab.errors import BadInput, LabError
 
 if TYPE_CHECKING:
-    from lab.advice.advising import Watch
+    from lab.learning.requests import Ask
     from lab.production.sequence import Wanted
-    from lab.seat.people import Classroom
+    from lab.seat.lesson_seat import LessonSeat
     from lab.teaching.kept_order import OrderSession
     from lab.teaching.kept_session import KeptSession
+    from lab.teaching.lesson import Subject
+    from lab.teaching.lesson_options import LessonOptions
     from lab.teaching.teacher import Teacher
+
+GYM = "gym:"
 
 
 @contextmanager
-def lesson_room(
+def lesson_seat(
     names: Sequence[str], *, page: bool = False, port: int = 0, wait_s: float | None = None, plain: bool = False
-) -> Iterator["Classroom"]:
-    """Who sits in the lessons of a command: the progress lines, and, when they are wanted, the prompt and the page."""
+) -> Iterator["LessonSeat"]:
+    """Who hears of a command's lessons: the progress lines, and, when they are wanted, the prompt and the page."""
     from contextlib import ExitStack
 
-    from lab.seat.people import Classroom
+    from lab.seat.lesson_seat import LessonSeat
+    from lab.seat.run_progress import RunProgress
     from lab.seat.terminal.prompt import TeachingPrompt
-    from lab.view.progress import RunProgress
 
     progress = RunProgress(console())
     with ExitStack() as stack:
@@ -37,33 +42,25 @@ def lesson_room(
             shown = stack.enter_context(SeatPage(port, wait_s=wait_s))
             progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
         prompt = TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
-        room = Classroom(progress, prompt, shown)
-        stack.callback(room.leave)
+        seat = LessonSeat(progress, prompt, shown)
+        stack.callback(seat.clear_stage)
         try:
-            yield room
+            yield seat
         except LabError as error:
             if shown is not None:
                 shown.finished(str(error))
             raise
 
 
-def teacher_of(
-    toolbox: Path | None,
-    names: Sequence[str],
-    seed: int,
-    room: "Classroom",
-    asked: str = "together",
-    decide: str = "trust-weighted",
-) -> "Teacher":
+def teacher_of(toolbox: Path | None, options: "LessonOptions", seat: "LessonSeat") -> "Teacher":
     """The teacher that the options describe; raises BadInput for options and folders that cannot be."""
-    from lab.advice.advising import Advising
     from lab.teaching.teacher import Teacher
     from lab.toolbox.registry import Toolbox
 
-    advising = Advising.of(names, room.people(), asked, decide, watch=room.passing)
+    advising = options.advising(seat.people())
     for journal in advising.cut_records():
         complain(f"journal '{journal.path}': its last line was cut off and is left out: {journal.cut[:60]!r}")
-    teacher = Teacher(Toolbox(toolbox), advising, seed, room)
+    teacher = Teacher(Toolbox(toolbox), advising, options.seed, seat.hear)
     teacher.toolbox.check()
     return teacher
 
@@ -80,35 +77,68 @@ def kept_session(
     return kept
 
 
-def wanted_of(kept: "OrderSession", room: "Classroom", watch: "Watch | None") -> "Wanted":
-    """What a session of `lab sequence` asks for, with the people in the room."""
-    from lab.production.sequence import Wanted
-    from lab.seat.order_text import ORDER
+def subject_of(options: "LessonOptions", kept: "KeptSession | None" = None) -> "Subject":
+    """The subject that the options name: an environment, a world or a skill of a task. BadInput for bad options.
 
-    words = kept.words
+    A module whose name comes out of a file, `kept`, is imported only when the user has said that it is trusted.
+    """
+    from lab.tasks.task_file import names_file
+
+    if options.subtask.startswith(GYM):
+        from lab.gym import parse_name
+
+        module = "" if kept is None else parse_name(options.subtask, kept.where).module
+        if kept is not None and module and module not in kept.trusted:
+            raise BadInput(
+                f"journal '{kept.read.path}' ({kept.where}): it names the module '{module}', whose code would run: if you "
+                f"trust whoever made it, say --trust-module {quote(module)}"
+            )
+        from lab.gym.gym_subject import GymSubject
+
+        return GymSubject.of(options)
+    if names_file(options.subtask):
+        from lab.teaching.world_subject import WorldSubject
+
+        return WorldSubject.of(options)
+    from lab.teaching.skill_subject import SkillSubject
+
+    return SkillSubject.of(options)
+
+
+def wanted_of(kept: "OrderSession", people: "Mapping[str, Ask]") -> "Wanted":
+    """What a session of `lab sequence` asks for, and whom."""
+    from lab.production.sequence import Wanted
+
+    options = kept.options
     return Wanted(
-        words.method,
-        words.episodes,
-        words.objective,
-        words.sessions,
-        words.seed,
-        words.stochastic,
-        words.asked,
-        words.gate,
-        room.people(),
-        keep=lambda cell, objective: kept.keep(Path(words.task).stem, cell, objective),
-        hears=lambda event, is_new: room.hears(ORDER, event, is_new),
-        watch=watch,
+        options.method,
+        options.episodes,
+        options.objective,
+        options.sessions,
+        options.seed,
+        options.stochastic,
+        options.asked,
+        options.gate,
+        people,
+        keep=lambda cell, objective: kept.keep(Path(options.task).stem, cell, objective),
     )
 
 
 def say_outside(kept: "KeptSession | OrderSession") -> None:
-    """Says which files the session has the lab read that are not its own."""
-    from lab.teaching import kept_order, lesson
+    """Says which files that are not its own a session has the lab read when it goes on or is shown again."""
+    from lab.advice.advisors import AdvisorName
+    from lab.tasks.task_file import is_path
 
-    assert kept.folder is not None
-    files = kept_order.outside(kept) if isinstance(kept, kept_order.OrderSession) else lesson.outside(kept)
-    if files:
-        complain(
-            f"journal '{kept.folder / 'events.jsonl'}' names, outside its folder, what is read now: {', '.join(files)}"
-        )
+    assert kept.read is not None
+    options = kept.options
+    named: list[object] = [getattr(options, "subtask", None), options.task]
+    if str(named[0]).startswith(GYM):
+        from lab.gym import parse_name
+
+        named = list(parse_name(str(named[0]), kept.where).options.values())
+    files = [word for word in named if isinstance(word, str) and is_path(word) and Path(word).is_file()]
+    advisors = [AdvisorName.of(name) for name in options.advisors]
+    files += [str(name.folder) for name in advisors if name.folder is not None]
+    here = kept.read.path.parent.resolve()
+    if outside := [name for name in files if not Path(name).resolve().is_relative_to(here)]:
+        complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(outside)}")

@@ -5,14 +5,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lab.cli.lessons import kept_session, lesson_room, say_outside, teacher_of, wanted_of
+from lab.cli.lessons import kept_session, lesson_seat, say_outside, subject_of, teacher_of, wanted_of
 from lab.cli.options import Json, Plain, Port, ToolboxFolder, TrustModule
 from lab.cli.output import end, show
 
 if TYPE_CHECKING:
     from lab.learning.requests import Request
-    from lab.seat.people import Classroom
+    from lab.seat.lesson_seat import LessonSeat
     from lab.teaching.kept_order import OrderSession
+    from lab.teaching.kept_session import KeptSession
 
 
 def replay(
@@ -41,42 +42,40 @@ def replay(
         rows = session_rows(Toolbox(toolbox))
         show({"sessions": rows}, as_json, lambda d: table_of(d["sessions"], ("session", "problem", "advisor", "state")))
         return
-    kept = (
-        kept_order(folder, "DIR", Toolbox(toolbox), read_only=True)
-        if is_order(folder, "DIR")
-        else kept_session(folder, "DIR", read_only=True, trusted=trust_module)
-    )
+    box = Toolbox(toolbox)
+    kept: KeptSession | OrderSession
+    if is_order(folder, "DIR"):
+        kept = kept_order(folder, "DIR", box, read_only=True)
+    else:
+        kept = kept_session(folder, "DIR", read_only=True, trusted=trust_module)
     say_outside(kept)
     try:
-        with lesson_room([] if as_json else ["terminal"], page=page, port=port, plain=plain) as room:
-            room.replaying(0.0 if as_json else pause)
+        with lesson_seat([] if as_json else ["terminal"], page=page, port=port, plain=plain) as seat:
+            seat.replaying(0.0 if as_json else pause)
             if isinstance(kept, OrderSession):
-                document = _replayed(kept, room, toolbox)
+                document = _replayed(kept, seat, toolbox)
             else:
-                document = replay_session(kept, room, room.watch)
-            room.ends(document)
+                document = replay_session(kept, subject_of(kept.options, kept), seat.hear)
+            seat.lesson_over(document)
             show(document, as_json, replay_summary)
-            room.stay()
+            seat.stay()
     except KeyboardInterrupt:
         end("stopped by Ctrl-C", 130)
 
 
-def _replayed(kept: "OrderSession", room: "Classroom", toolbox: Path | None) -> dict[str, Any]:
+def _replayed(kept: "OrderSession", seat: "LessonSeat", toolbox: Path | None) -> dict[str, Any]:
     """Advice on an order again: the session is run once more, and the journal answers for the people."""
-    from dataclasses import replace
-
     from lab.advice.advisors import PEOPLE
     from lab.production.sequence import sequence_named
+    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
 
     def nobody(request: "Request") -> int | None:
         raise KeyboardInterrupt
 
-    wanted = replace(wanted_of(kept, room, room.watch), people=dict.fromkeys(PEOPLE, nobody))
-    teacher, words = teacher_of(toolbox, ["expert"], kept.words.seed, room), kept.words
+    options, wanted = kept.options, wanted_of(kept, dict.fromkeys(PEOPLE, nobody))
+    teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
     try:
-        found = sequence_named(
-            words.task, words.case, words.toasts, wanted, teacher=teacher, listener=room.listener, files={}
-        )
+        found = sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files={})
         stopped = found["interrupted"]
     except KeyboardInterrupt:  # before an order was found
         stopped = True

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.lessons import lesson_room, teacher_of
+from lab.cli.lessons import lesson_seat, teacher_of
 from lab.cli.options import AdvisorNames, Asked, Decide, Json, Port, Seed, ShowPage, Toasts, ToolboxFolder, Wait
 from lab.cli.output import end, show
 from lab.errors import counted
@@ -31,28 +31,28 @@ def run(
     """Find or learn the skills, time them, find their best order, and carry them out in physics."""
     from dataclasses import replace
 
-    from lab.advice.advising import Advising
     from lab.advice.advisors import PEOPLE
     from lab.files import check_out
     from lab.production.run import run as run_task
     from lab.skills.prepared_scene import prepare
     from lab.tasks import task_file as taskfile
-    from lab.teaching.kept_session import Words, kept_by
+    from lab.teaching.kept_session import kept_by
+    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
     from lab.view.summary import run_summary
 
     loaded = taskfile.load(task)
     folder = out or Path(f"{loaded.name}-run")
     check_out(folder)
-    names = advisor or ["expert"]
-    Advising.of(names, asked=asked, decide=decide)
+    names = tuple(advisor or DEFAULT_ADVISORS)
+    options = LessonOptions(task=task, advisors=names, asked=asked, decide=decide, seed=seed, toasts=toasts)
+    options.advising()
     prepared = prepare(loaded, toasts, seed)
-    with lesson_room(names, page=page or view, port=port, wait_s=wait) as room:
-        teacher = teacher_of(toolbox, names, seed, room, asked, decide)
-        if any(name in PEOPLE for name in names):
-            words = Words(task=task, advisors=tuple(names), asked=asked, decide=decide, seed=seed, toasts=toasts)
-            teacher = replace(teacher, keep=kept_by(teacher.toolbox, words))
-        with room.progress:
-            report = run_task(prepared, teacher, folder, listener=room.listener, viewer=room.viewer)
+    with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
+        teacher = teacher_of(toolbox, options, seat)
+        if any(name in PEOPLE for name in options.advisors):
+            teacher = replace(teacher, keep=kept_by(teacher.toolbox, options))
+        with seat.progress:
+            report = run_task(prepared, teacher, folder, viewer=seat.viewer)
     show(report.to_json(), as_json, run_summary)
     if not report.success:
         end(report.outcome.failure or f"{len(report.outcome.delivered)} of {counted(toasts, 'toast')} delivered", 1)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from lab.cli.families import offers
-from lab.cli.lessons import lesson_room, say_outside, teacher_of, wanted_of
+from lab.cli.lessons import lesson_seat, say_outside, teacher_of, wanted_of
 from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Plain, Port, Seed, ShowPage, ToolboxFolder, Wait
 from lab.cli.output import end, show
 
@@ -70,27 +70,32 @@ def sequence(
     What a person advises is kept: --resume goes on with it, lab replay shows it again.
     """
     from lab.production.sequence import sequence_named
-    from lab.teaching.kept_order import OrderSession, OrderWords, gone_on
+    from lab.teaching.kept_order import OrderOptions, OrderSession, gone_on
+    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
     from lab.toolbox.registry import Toolbox
     from lab.view.summary import sequence_summary
 
-    given = OrderWords(task or "", case, toasts, method, objective, episodes, sessions, stochastic, advisor, gate, seed)
+    given = OrderOptions(
+        task or "", case, toasts, method, objective, episodes, sessions, stochastic, advisor, gate, seed
+    )
     box = Toolbox(toolbox)
     kept = OrderSession(given.complete(), box) if resume is None else gone_on(given, resume, box)
     if resume is not None:
         say_outside(kept)
-    words = kept.words
+    options = kept.options
     files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
     try:
-        with lesson_room([words.advisor], page=page, port=port, wait_s=wait, plain=plain) as room:
-            teacher = teacher_of(toolbox, ["expert"], words.seed, room)
-            wanted = wanted_of(kept, room, room.passing)
-            with room.progress:
+        with lesson_seat([options.advisor], page=page, port=port, wait_s=wait, plain=plain) as seat:
+            teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
+            wanted = wanted_of(kept, seat.people())
+            with seat.progress:
                 document = sequence_named(
-                    words.task, words.case, words.toasts, wanted, teacher=teacher, listener=room.listener, files=files
+                    options.task, options.case, options.toasts, wanted, teacher=teacher, files=files
                 )
     except KeyboardInterrupt as stopped:
-        raise KeyboardInterrupt(f"{stopped or 'stopped by Ctrl-C'}{kept.resume_command()}") from None
+        if kept.journal is None:
+            raise
+        raise KeyboardInterrupt(f"{str(stopped) or 'stopped by Ctrl-C'}{kept.resume_command()}") from None
     show(document | kept.worth(), as_json, sequence_summary)
     if document["interrupted"]:
         end(f"stopped by Ctrl-C; the best order until then is above{kept.resume_command()}", 130)

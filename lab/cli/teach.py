@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from lab.cli.families import offers
-from lab.cli.lessons import kept_session, lesson_room, say_outside, teacher_of
+from lab.cli.lessons import kept_session, lesson_seat, say_outside, subject_of, teacher_of
 from lab.cli.options import (
     MAX_EPISODES,
     AdvisorNames,
@@ -94,29 +94,29 @@ def teach(
     Each session keeps a journal: --resume goes on with one that was broken off, lab replay shows it again.
     """
     from lab.files import check_out
-    from lab.teaching.kept_session import Words
-    from lab.teaching.lesson import check
+    from lab.teaching.kept_session import check_new
     from lab.teaching.lesson import teach as teach_session
+    from lab.teaching.lesson_options import LessonOptions
     from lab.view.summary import lesson_summary
 
-    advisors = tuple(advisor or ())
-    given = Words(
-        subtask or "", task, sight or view, learner, gate, memory, advisors, asked, decide, episodes, seed, save
-    )
+    who = (tuple(advisor or ()), asked, decide)
+    given = LessonOptions(subtask or "", task, sight or view, learner, gate, memory, *who, episodes, seed, save)
     kept = None if resume is None else kept_session(resume, "--resume", trusted=trust_module)
     if kept is not None and out is not None:
         raise BadInput(f"--out {out} beside --resume {resume}: a session goes on in its own folder: leave it away")
-    words = given.complete() if kept is None else kept.same(given)
+    options = given.complete() if kept is None else kept.same(given)
     if kept is not None:
         say_outside(kept)
-    check(words, out, kept)
+    options.advising()
+    if out is not None:
+        check_new(out)
+    subject = subject_of(options, kept)
     folder = out if kept is None else kept.folder
     if folder is not None:
         check_out(folder)
-    with lesson_room(words.advisors, page=page, port=port, wait_s=wait, plain=plain) as room:
-        teacher = teacher_of(toolbox, words.advisors, words.seed, room, words.asked, words.decide)
-        document = teach_session(words, teacher, folder, kept)
-        room.ends(document)
+    with lesson_seat(options.advisors, page=page, port=port, wait_s=wait, plain=plain) as seat:
+        document = teach_session(subject, options, teacher_of(toolbox, options, seat), folder, kept)
+        seat.lesson_over(document)
     show(document, as_json, lesson_summary)
     if document["failure"] is not None:
         end(document["failure"], 1)

@@ -156,11 +156,11 @@ def _is_afterstate(learner: LearnerSettings) -> bool:
     return bool(UPDATES[learner.learner].compiled == STATE_VALUES)
 
 
-def _problem(mdp: TabularMDP, learner: LearnerSettings) -> records.Problem:
+def _problem(mdp: TabularMDP, learner: LearnerSettings) -> records.ProblemArrays:
     ends = np.where(mdp.goal, 1, np.where(mdp.terminal, 2, 0)).astype(np.uint8)
     starts = np.array(mdp.starts or (mdp.start,), np.int64)
     arrival, step_reward = (mdp.arrival, mdp.step_reward) if _is_afterstate(learner) else (np.zeros(1), 0.0)
-    return records.Problem(mdp.successor.flatten(), mdp.reward.flatten(), arrival, ends, starts, step_reward)
+    return records.ProblemArrays(mdp.successor.flatten(), mdp.reward.flatten(), arrival, ends, starts, step_reward)
 
 
 def _learning(mdp: TabularMDP, learner: LearnerSettings) -> records.Learning:

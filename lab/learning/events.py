@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Verdict = Literal["", "better", "best", "misled"]  # of a gate on an episode that was open for advice; "": none
+Ending = Literal["converged", "advisor left", "misled by what was remembered"]  # why there is no more advice
 
 
 @dataclass(frozen=True)
@@ -60,10 +61,10 @@ class AdviceRejected:
 
 @dataclass(frozen=True)
 class AdviceEnded:
-    """No more advice in this session: `reason` is "converged", "advisor left" or "misled by what was remembered"."""
+    """No more advice in this session, and why."""
 
     episode: int
-    reason: str
+    reason: Ending
 
 
 @dataclass(frozen=True)

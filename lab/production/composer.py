@@ -1,6 +1,6 @@
 """Sequence + skills -> motions: carries the order of transfers out in physics and notices what fails."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import hypot
 
@@ -15,6 +15,7 @@ from lab.sim.world import World
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import UPRIGHT, Status
+from lab.teaching.events import MoveMade, MoveRetried, Tell, unheard
 
 MAX_TRIES = 3  # a failed step is tried again from the state reached, at most twice
 ASTRAY_M = 0.15  # a slice this near to a spot of a station can be taken up again from there
@@ -44,8 +45,7 @@ class Production:
 
     floor: Floor
     cell: Cell
-    on_move: Callable[[Move], None] | None = None
-    on_retry: Callable[[str], None] | None = None
+    tell: Tell = unheard
     moves: list[Move] = field(default_factory=list)
     retries: list[str] = field(default_factory=list)
     deviations_m: list[float] = field(default_factory=list)
@@ -90,8 +90,7 @@ class Production:
         process_s = self.plan.move(toast).process_s
         self.moves.append(Move(toast, start, origin, target, leave_s, reach_s, pick_s, floor.now_s, process_s))
         self._start_machine(toast, target)
-        if self.on_move is not None:
-            self.on_move(self.moves[-1])
+        self.tell(MoveMade(self.moves[-1]))
 
     def _free_spot(self, station: str) -> Spot:
         """The first spot of a station on which no toast stands."""
@@ -143,8 +142,7 @@ class Production:
 
     def _note(self, text: str) -> None:
         self.retries.append(text)
-        if self.on_retry is not None:
-            self.on_retry(text)
+        self.tell(MoveRetried(text))
 
     def _await(self, toast: int, station: str) -> None:
         """Wait at a machine until it is done with its toast; a learned process that failed is tried again."""
@@ -198,8 +196,7 @@ def carry_out(
     sequence: Sequence[int],
     *,
     viewer: Viewer | None = None,
-    on_move: Callable[[Move], None] | None = None,
-    on_retry: Callable[[str], None] | None = None,
+    tell: Tell = unheard,
 ) -> tuple[Outcome, Recording]:
     """Carry `sequence` (toasts from 1, one entry a move) out in physics, from slices on the first station to the end.
 
@@ -209,7 +206,7 @@ def carry_out(
         floor = Floor(world, prepared.skillset, prepared.layout, cell.parts, film=True, viewer=viewer)
         floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
-        work = Production(floor, cell, on_move, on_retry)
+        work = Production(floor, cell, tell)
         floor.on_tick = work.watch
         failure = work.carry_out(sequence)
         floor.recorder.take()  # type: ignore[union-attr]

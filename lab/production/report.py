@@ -18,7 +18,7 @@ from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Recording
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared
-from lab.teaching.teacher import Lesson
+from lab.teaching.lesson_plan import Lesson
 from lab.toolbox.policy import Policy
 
 FILES = {

@@ -15,70 +15,62 @@ from lab.sequencing.search import Reference
 from lab.skills.prepared_scene import Prepared
 from lab.skills.trial import trial_of
 from lab.tasks.sequencing import search_for
-from lab.teaching.listener import Listener
+from lab.teaching.events import MoveTimed, PhaseBegan, RecordSkipped, SequenceFound, SkillReady
+from lab.teaching.lesson_plan import LessonPlan
 from lab.teaching.teacher import Teacher
 
 
-def teach_all(prepared: Prepared, teacher: Teacher, listener: Listener) -> Taught:
+def teach_all(prepared: Prepared, teacher: Teacher) -> Taught:
     """Find or learn every skill, then find or measure the durations of every move."""
     task, skillset = prepared.task, prepared.skillset
     teacher = replace(teacher, trial=trial_of(prepared))
     known, damaged = teacher.toolbox.index()
     for what in damaged:
-        listener.skipped(what)
-    listener.phase("learn", len(prepared.problems))
+        teacher.tell(RecordSkipped(what))
+    teacher.tell(PhaseBegan("learn", len(prepared.problems)))
     lessons = {}
     for name, problem in prepared.problems.items():
-        lesson = teacher.find_or_teach(problem, task.subtask(problem.subtask), task.name, known)
+        settings = task.subtask(problem.subtask)
+        lesson = teacher.find_or_teach(LessonPlan(problem, settings.learner, settings.gate, task.name), known)
         known[problem.subtask, problem.mdp.signature] = lesson.policy
         skillset.policies[name] = lesson.policy
         lessons[name] = lesson
-        listener.lesson(name, lesson)
-    durations = _durations(prepared, teacher, listener)
+        teacher.tell(SkillReady(name, lesson))
+    durations = _durations(prepared, teacher)
     return Taught(lessons, durations, cell_of(task, durations, prepared.toasts))
 
 
-def _durations(prepared: Prepared, teacher: Teacher, listener: Listener) -> Durations:
+def _durations(prepared: Prepared, teacher: Teacher) -> Durations:
     """The durations measured earlier for exactly these policies in exactly this scene, or measured now and kept."""
     skillset, key, kept = prepared.skillset, "", None
     try:
         key = durations_key(prepared.task, prepared.layout, skillset.moves, skillset.policies)
         kept = kept_durations(teacher.toolbox, key, prepared.task, skillset.moves)
     except LabError as error:  # then they are measured: nothing is lost but time
-        listener.skipped(f"durations measured earlier: {error}")
+        teacher.tell(RecordSkipped(f"durations measured earlier: {error}"))
     if kept is not None:
         return kept
     processes = sum(station.process is not None for station in prepared.task.stations)
-    listener.phase("measure", len(skillset.moves.loaded) + len(skillset.moves.empty) + processes)
-    durations = measure(prepared, listener.measured)
+    teacher.tell(PhaseBegan("measure", len(skillset.moves.loaded) + len(skillset.moves.empty) + processes))
+    durations = measure(prepared, lambda name, seconds: teacher.tell(MoveTimed(name, seconds)))
     if key:
         teacher.toolbox.save_record(RECORDS, key, durations.to_json())
     return durations
 
 
-def run(
-    prepared: Prepared, teacher: Teacher, out: Path, *, listener: Listener | None = None, viewer: Viewer | None = None
-) -> Report:
+def run(prepared: Prepared, teacher: Teacher, out: Path, *, viewer: Viewer | None = None) -> Report:
     """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.files.check_out`)."""
     began = time.perf_counter() - prepared.wall_s
-    listener = listener or Listener()
     if viewer is not None:
         show_scene(prepared.task, prepared.toasts, prepared.layout, viewer)
-    taught = teach_all(prepared, teacher, listener)
-    listener.phase("sequence", 1)
+    taught = teach_all(prepared, teacher)
+    teacher.tell(PhaseBegan("sequence", 1))
     settings = prepared.task.sequencing
     found = find_sequence(taught.cell, settings.method, search_for(settings), prepared.seed)
     proven = optimum(taught.cell)
-    listener.sequenced(found, Reference(proven.bound_s, proven.proven, "A*"))
-    listener.phase("carry out", len(found.sequence))
-    outcome, recording = carry_out(
-        prepared,
-        taught.cell,
-        found.sequence,
-        viewer=viewer,
-        on_move=listener.moved,
-        on_retry=listener.retried,
-    )
+    teacher.tell(SequenceFound(found, Reference(proven.bound_s, proven.proven, "A*")))
+    teacher.tell(PhaseBegan("carry out", len(found.sequence)))
+    outcome, recording = carry_out(prepared, taught.cell, found.sequence, viewer=viewer, tell=teacher.tell)
     report = Report(
         prepared.task.name,
         prepared.seed,
@@ -91,6 +83,6 @@ def run(
         recording,
         began,
     )
-    listener.phase("draw", 1)
+    teacher.tell(PhaseBegan("draw", 1))
     write_files(prepared, taught, report, out)
     return report

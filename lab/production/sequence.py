@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lab.advice.advising import Watch, Watched, through
+from lab.advice.advising import through
 from lab.advice.advisors import PEOPLE, AdvisorName, make_advisor
 from lab.advice.entries import Closed
 from lab.advice.journal import Again, Journal
 from lab.errors import BadInput, unknown
-from lab.learning.events import Event
+from lab.learning.events import Event as SessionEvent
 from lab.learning.requests import Ask
 from lab.learning.settings import GateSettings
 from lab.production.drawn_times import stochastic
@@ -26,7 +26,8 @@ from lab.tasks.cell import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.tasks.task_file import Task, load_any
-from lab.teaching.listener import Listener
+from lab.teaching.events import ORDER, LessonEvent, PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
+from lab.teaching.lesson_sessions import TellingAdvisor
 from lab.teaching.teacher import Teacher
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 DEFAULT_TOASTS = 3
 NOBODY = AdvisorName.of("none")
-Keep = Callable[[Cell, str], Journal]  # given the cell and the objective
+KeepOrder = Callable[[Cell, str], Journal]  # given the cell and the objective
 SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
 
 
@@ -42,8 +43,7 @@ SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
 class Wanted:
     """What `lab sequence` is asked for; None: as the file says. advisor: who may be asked which part to move next.
 
-    keep: gives the journal of what people say, by default one that is not written; hears: what the sessions tell, and
-    whether it is new; watch: is shown each question with its answer.
+    keep: gives the journal of what people say, by default one that is not written.
     """
 
     method: str | None = None
@@ -55,9 +55,7 @@ class Wanted:
     advisor: AdvisorName = NOBODY
     gate: str = "ccrl"
     people: Mapping[str, Ask] = field(default_factory=dict)
-    keep: Keep = lambda cell, objective: Journal()
-    hears: Callable[[Event, bool], None] = lambda event, is_new: None
-    watch: Watch | None = None
+    keep: KeepOrder = lambda cell, objective: Journal()
 
 
 def sequence_named(
@@ -67,7 +65,6 @@ def sequence_named(
     wanted: Wanted,
     *,
     teacher: Teacher,
-    listener: Listener,
     files: dict[str, Path],
 ) -> dict[str, Any]:
     """What `lab sequence` does: a cell file's cell, or a task's over durations measured in simulation, and its pictures.
@@ -88,16 +85,13 @@ def sequence_named(
         cell, chance = ordered_cell(loaded, case, toasts), loaded.chance()
     else:
         if case is not None:
-            raise BadInput(
-                f"case '{case}' (--case): task '{name}' has none; toast has I, II and III, a cell its orders"
-            )
-        cell, chance = (
-            measured_cell(loaded, DEFAULT_TOASTS if toasts is None else toasts, wanted, teacher, listener),
-            Chance(),
-        )
+            which = "toast has I, II and III, a cell its orders"
+            raise BadInput(f"case '{case}' (--case): task '{name}' has none; {which}")
+        wanted_toasts = DEFAULT_TOASTS if toasts is None else toasts
+        cell, chance = measured_cell(loaded, wanted_toasts, wanted, teacher), Chance()
     check_objective(wanted.objective or loaded.sequencing.objective, cell)
-    listener.phase("sequence", wanted.sessions)
-    document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, listener=listener)
+    teacher.tell(PhaseBegan("sequence", wanted.sessions))
+    document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, tell=teacher.tell)
     document = {"task": loaded.name} | document
     draw(cell, document, found, files)
     return document
@@ -123,7 +117,7 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
     return file.cell(order_from_word(file, case) if case is not None else toasts)
 
 
-def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher, listener: Listener) -> Cell:
+def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
     from lab.production.run import teach_all
     from lab.skills.prepared_scene import prepare
@@ -131,7 +125,7 @@ def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher, lis
     objective = wanted.objective or task.sequencing.objective
     if objective in WITH_DUE_TIMES:
         raise BadInput(f"objective '{objective}' (--objective) needs due times, and a task has none: use a cell file")
-    return teach_all(prepare(task, toasts, teacher.seed), teacher, listener).cell
+    return teach_all(prepare(task, toasts, teacher.seed), teacher).cell
 
 
 def sequence_cell(
@@ -140,21 +134,20 @@ def sequence_cell(
     wanted: Wanted,
     chance: Chance,
     *,
-    listener: Listener | None = None,
+    tell: Tell = unheard,
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     """Sessions of one method on a cell, beside what cannot be beaten; the document of `lab sequence`, and the sessions.
 
     They are run from their beginning each time an answer is taken back. BadInput for an unknown method or objective, and
     for an objective that the cell has no times for.
     """
-    asks_people = wanted.advisor.row in PEOPLE
-    journal = wanted.keep(cell, wanted.objective or settings.objective) if asks_people else Journal()
+    if wanted.advisor.row not in PEOPLE:
+        return _sessions(cell, settings, wanted, chance, tell, None)
+    journal = wanted.keep(cell, wanted.objective or settings.objective)
     try:
         while True:
             try:
-                return _sessions(
-                    cell, settings, wanted, chance, listener or Listener(), journal if asks_people else None
-                )
+                return _sessions(cell, settings, wanted, chance, tell, journal)
             except Again:
                 journal.rewind()
     finally:
@@ -162,7 +155,7 @@ def sequence_cell(
 
 
 def _sessions(
-    cell: Cell, settings: Sequencing, wanted: Wanted, chance: Chance, listener: Listener, journal: Journal | None
+    cell: Cell, settings: Sequencing, wanted: Wanted, chance: Chance, tell: Tell, journal: Journal | None
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     method = wanted.method or settings.method
     check_method(method)
@@ -174,16 +167,20 @@ def _sessions(
     )
     check_objective(search.objective, cell)
     known = reference(cell, search.objective)
-    found = []
-    interrupted = False
+    found, interrupted = list[SequenceResult](), False
     shown = known if search.chance == NO_CHANCE else None
     for session in range(wanted.sessions):
-        heard = _Heard(listener)
-        listener.sequences(
-            search.episodes, shown, None if wanted.advisor.row == "none" else GateSettings(wanted.gate, spare_best=True)
-        )
+        heard = _Heard(tell)
+        gate = None if wanted.advisor.row == "none" else GateSettings(wanted.gate, spare_best=True)
+        tell(SequencingBegan(search.episodes, shown, gate))
         try:
-            found.append(_session(cell, method, replace(search, on_episode=heard), wanted, session, journal))
+            if wanted.advisor.row == "none":
+                result: SequenceResult = find_sequence(
+                    cell, method, replace(search, on_episode=heard), wanted.seed, session
+                )
+            else:
+                result = _advised(cell, replace(search, on_episode=heard), wanted, session, journal, tell)
+            found.append(result)
         except KeyboardInterrupt:
             interrupted = True
             if heard.best is None and not found:
@@ -191,7 +188,7 @@ def _sessions(
             found += [] if heard.best is None else [heard.result()]
             break
         if journal is None or not journal.folding:
-            listener.sequenced(found[-1], shown)
+            tell(SequenceFound(found[-1], shown))
     document = _document(cell, method, search, found, known, wanted) | {"interrupted": interrupted}
     if wanted.stochastic and not interrupted:
         document["stochastic"] = stochastic(cell, method, search, min(found, key=_cost), chance, wanted.seed)
@@ -206,29 +203,23 @@ def _sessions(
 class _Heard:
     """Keeps what a session has found so far, for when it is stopped, and tells of it."""
 
-    listener: Listener
+    tell: Tell
     best: EpisodeSequenced | None = None
     costs: list[float] = field(default_factory=list)
 
     def __call__(self, event: EpisodeSequenced) -> None:
         self.costs.append(event.cost)
         self.best = event if event.best else self.best
-        self.listener.tried(event)
+        self.tell(event)
 
     def result(self) -> SequenceResult:
         assert self.best is not None
         return SequenceResult(self.best.best, self.best.best_cost, tuple(self.costs))
 
 
-def _session(
-    cell: Cell, method: str, search: Search, wanted: Wanted, session: int, journal: Journal | None
-) -> SequenceResult:
-    if wanted.advisor.row == "none":
-        return find_sequence(cell, method, search, wanted.seed, session)
-    return _advised(cell, search, wanted, session, journal)
-
-
-def _advised(cell: Cell, search: Search, wanted: Wanted, session: int, journal: Journal | None) -> "AdvisedResult":
+def _advised(
+    cell: Cell, search: Search, wanted: Wanted, session: int, journal: Journal | None, tell: Tell
+) -> "AdvisedResult":
     """A session of SRL with advice."""
     from lab.advice.order_level import OrderLevel, signature_of
     from lab.sequencing.methods.srl_advised import advised_srl
@@ -236,13 +227,13 @@ def _advised(cell: Cell, search: Search, wanted: Wanted, session: int, journal: 
     rng, own = (np.random.default_rng([wanted.seed, stream, session]) for stream in (2, 3))
     people, signature = through(journal, wanted.people), signature_of(cell, search.objective)
     advisor = make_advisor(wanted.advisor, OrderLevel(cell, own, people, search.episodes, signature))
-    if advisor is not None and wanted.watch is not None:
-        advisor = Watched(advisor, wanted.watch)
+    if advisor is not None:
+        advisor = TellingAdvisor(advisor, tell)
 
-    def tell(event: Event) -> None:
-        wanted.hears(event, True if journal is None else journal.tell(event))
+    def hear(event: SessionEvent) -> None:
+        tell(LessonEvent(ORDER, event, True if journal is None else journal.tell(event)))
 
-    return advised_srl(cell, search, rng, GateSettings(wanted.gate, spare_best=True), advisor, tell)
+    return advised_srl(cell, search, rng, GateSettings(wanted.gate, spare_best=True), advisor, hear)
 
 
 def reference(cell: Cell, objective: str) -> Reference:
@@ -268,9 +259,7 @@ def _document(
     # What was found in drawn times is judged by the means, too.
     costs = [result.cost if same_times else cost(follow(cell, result.sequence), search.objective) for result in found]
     best, least = found[costs.index(min(costs))], min(costs)
-    hits = [result.cost <= known.bound + SAME for result in found]
-    finals = [result.final_cost <= known.bound + SAME for result in found if isinstance(result, LearnedSequence)]
-    optimal = known.bound if known.proven else None
+    optimal, mean = known.bound if known.proven else None, float(np.mean([result.cost for result in found]))
     return {
         "toasts": cell.parts,
         "order": list(cell.order),
@@ -294,15 +283,24 @@ def _document(
         "bound_cost": known.bound,
         "bound_by": known.method,
         "gap": known.gap(least),
-        "success_percent": 100.0 * sum(hits) / len(found) if known.proven and same_times else None,
-        "final_success_percent": 100.0 * sum(finals) / len(finals) if finals and known.proven and same_times else None,
-        "mean_best_s": float(np.mean([result.cost for result in found])) if timed else None,
-        "mean_best_cost": float(np.mean([result.cost for result in found])),
+        **_success(found, known.bound if known.proven and same_times else None),
+        "mean_best_s": mean if timed else None,
+        "mean_best_cost": mean,
         "advisor": str(wanted.advisor),
         "advice": _advice(found) if wanted.advisor.row != "none" else None,
         "stochastic": None,
         "files": {},
     }
+
+
+def _success(found: Sequence[SequenceResult], optimal: float | None) -> dict[str, float | None]:
+    """How many of the sessions found the optimum, and how many end with it [%]; None where it is not known."""
+    finals = [result.final_cost for result in found if isinstance(result, LearnedSequence)]
+    rates: dict[str, float | None] = {}
+    for name, costs in (("success_percent", [result.cost for result in found]), ("final_success_percent", finals)):
+        hits = [optimal is not None and cost <= optimal + SAME for cost in costs]
+        rates[name] = 100.0 * sum(hits) / len(hits) if hits and optimal is not None else None
+    return rates
 
 
 def _advice(found: "Sequence[Any]") -> list[dict[str, Any]]:

@@ -6,8 +6,6 @@ from lab.errors import counted
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.request import SequenceRequest
 
-ORDER = "The order of the transfers"
-
 
 @dataclass(frozen=True)
 class OrderMove:

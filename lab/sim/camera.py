@@ -38,9 +38,9 @@ class Camera:
         matrix[:3, 3] = -matrix[:3, :3] @ eye
         return matrix
 
-    def projection_matrix(self, near: float = 0.05, far: float = 8.0) -> Array:
+    def projection_matrix(self) -> Array:
         """Camera to clip space, (4, 4), OpenGL's convention."""
-        scale = 1.0 / tan(self.field_of_view_rad / 2.0)
+        scale, near, far = 1.0 / tan(self.field_of_view_rad / 2.0), 0.05, 8.0  # [m]
         matrix = np.zeros((4, 4))
         matrix[0, 0], matrix[1, 1] = scale * self.height / self.width, scale
         matrix[2, 2], matrix[2, 3] = (far + near) / (near - far), 2.0 * far * near / (near - far)

@@ -119,20 +119,11 @@ class World:
         entry.looks = urdf_reader.looks(path)
         self._add(name, entry)
 
-    def box(
-        self,
-        name: str,
-        size: Position,
-        position: Position,
-        rgba: Rgba,
-        *,
-        yaw: float = 0.0,
-        solid: bool = True,
-    ) -> None:
-        """A box that never moves: `size` and centre `position` [m]; not `solid`: only seen."""
+    def box(self, name: str, size: Position, position: Position, rgba: Rgba, *, yaw: float = 0.0) -> None:
+        """A box that never moves: `size` and centre `position` [m]."""
         half = [s / 2 for s in size]
         turn = tuple(self._p.getQuaternionFromEuler([0, 0, yaw]))
-        shape = self._call("createCollisionShape", self._p.GEOM_BOX, halfExtents=half) if solid else -1
+        shape = self._call("createCollisionShape", self._p.GEOM_BOX, halfExtents=half)
         visual = self._call("createVisualShape", self._p.GEOM_BOX, halfExtents=half, rgbaColor=list(rgba))
         self._fixed(name, shape, visual, position, turn, Shape("box", tuple(size), None, rgba))
 

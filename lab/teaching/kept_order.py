@@ -1,30 +1,26 @@
 """Advice on the order of the transfers, kept: its journal, and what is needed to go on with it or to look at it again."""
 
-import json
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from shlex import quote
 from typing import Annotated, Any
 
 from annotated_types import Ge
 
 from lab.advice.advisors import AdvisorName
-from lab.advice.entries import Read, Session, line_of, read_journal
+from lab.advice.entries import Read, Session, read_journal
 from lab.advice.journal import Journal
 from lab.advice.order_level import signature_of
 from lab.advice.receipt import Receipt, receipt
 from lab.errors import BadInput
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.cell import Cell
-from lab.tasks.record import write_whole
-from lab.tasks.task_file import is_path, names_file
-from lab.teaching.kept_session import claimed, lab_version
-from lab.toolbox.registry import Toolbox, default_folder
+from lab.tasks.task_file import names_file
+from lab.teaching.kept_session import check_same, claimed, lab_version, replayed, resume_command, worth_of
+from lab.toolbox.registry import Toolbox
 
 
 @dataclass(frozen=True)
-class OrderWords:
+class OrderOptions:
     """The options of `lab sequence` that a session depends on, by name; None or empty: not given."""
 
     task: str = ""
@@ -39,7 +35,7 @@ class OrderWords:
     gate: str = "ccrl"
     seed: Annotated[int, Ge(0)] = 0
 
-    def complete(self) -> "OrderWords":
+    def complete(self) -> "OrderOptions":
         """Themselves; BadInput when nothing is named to sequence."""
         if not self.task:
             raise BadInput("nothing to sequence (TASK): name a task or a cell, or go on with --resume DIR")
@@ -49,6 +45,11 @@ class OrderWords:
     def asked(self) -> AdvisorName:
         """The advisor; BadInput for a name that nobody has."""
         return AdvisorName.of(self.advisor, "--advisor")
+
+    @property
+    def advisors(self) -> tuple[str, ...]:
+        """All who advise, by name."""
+        return (self.advisor,)
 
     def to_json(self) -> dict[str, Any]:
         """A plain dict, files by their whole paths, so that they are found from another folder."""
@@ -60,10 +61,11 @@ class OrderSession:
     """A session of `lab sequence`: a new one, or (`read`) one that is gone on with or, `read_only`, looked at again."""
 
     def __init__(
-        self, words: OrderWords, toolbox: Toolbox, read: Read | None = None, *, read_only: bool = False
+        self, options: OrderOptions, toolbox: Toolbox, read: Read | None = None, *, read_only: bool = False
     ) -> None:
-        self.words, self.read = words, read
+        self.options, self.read = options, read
         self._toolbox, self._read_only = toolbox, read_only
+        self.where = "--resume"
         self.journal: Journal | None = None
         self.folder = None if read is None else read.path.parent
 
@@ -72,7 +74,7 @@ class OrderSession:
         signature, read = signature_of(cell, objective), self.read
         if read is None:
             self.folder = claimed(self._toolbox, f"order of {name}", Path.mkdir)
-            words = self.words.to_json()
+            words = self.options.to_json()
             head = Session(words, f"order of {name}", signature, lab_version(), command="sequence")
             self.journal = Journal.begin(self.folder, head)
         elif read.session.signature != signature:
@@ -88,8 +90,7 @@ class OrderSession:
         """What goes on with it; "" when there is nothing to go on with."""
         if self.folder is None or self.journal is None:
             return ""
-        box = "" if self._toolbox.folder == default_folder() else f" --toolbox {quote(str(self._toolbox.folder))}"
-        return f"; go on with: lab sequence --resume {quote(str(self.folder))}{box}"
+        return f"; go on with: {resume_command(self.folder, self._toolbox, 'sequence')}"
 
     def receipt(self) -> Receipt:
         """What the advice was worth."""
@@ -100,25 +101,12 @@ class OrderSession:
         """Where it is kept, and its receipt, which is written beside the journal; nothing where nothing is kept."""
         if self.folder is None or self.journal is None:
             return {}
-        made = self.receipt()
-        write_whole(self.folder / "receipt.json", json.dumps(made.to_json(), indent=1, allow_nan=False) + "\n")
-        return {"session": str(self.folder), "receipt": made.to_json() | {"lines": made.lines()}}
+        return worth_of(self.folder, self.receipt())
 
     def replayed(self) -> dict[str, Any]:
         """The document of `lab replay --json`."""
-        read, made = self.read, self.receipt()
-        assert read is not None
-        return {
-            "session": str(self.folder),
-            "problem": read.session.problem,
-            "words": read.session.words,
-            "seed": self.words.seed,
-            "lab": read.session.lab,
-            "closed": None if read.closed is None else asdict(read.closed),
-            "cut": read.cut,
-            "events": [json.loads(line_of(entry)) for entry in read.entries],
-            "receipt": made.to_json() | {"lines": made.lines()},
-        }
+        assert self.read is not None
+        return replayed(self.read, self.options.seed, self.receipt())
 
 
 def is_order(folder: Path, where: str) -> bool:
@@ -136,30 +124,16 @@ def kept_order(folder: Path, where: str, toolbox: Toolbox, *, read_only: bool = 
             f"journal '{read.path}' ({where}): it is no advice on an order: lab teach --resume goes on with it"
         )
     try:
-        words = TypeAdapter(OrderWords).validate_python(read.session.words)
+        options = TypeAdapter(OrderOptions).validate_python(read.session.words)
     except ValidationError as error:
         why = " ".join(str(error).split())[:160]
         raise BadInput(f"journal '{read.path}' ({where}): its options are none of lab sequence: {why}") from None
-    return OrderSession(words, toolbox, read, read_only=read_only)
+    return OrderSession(options, toolbox, read, read_only=read_only)
 
 
-def gone_on(given: OrderWords, folder: Path, toolbox: Toolbox) -> OrderSession:
+def gone_on(given: OrderOptions, folder: Path, toolbox: Toolbox) -> OrderSession:
     """The session that --resume names; BadInput when it is over, and for options beside it."""
     kept = kept_order(folder, "--resume", toolbox)
-    for name, value in asdict(given).items():
-        if value != getattr(OrderWords(), name):
-            option = "TASK" if name == "task" else f"--{name}"
-            raise BadInput(f"{option} beside --resume {folder}: a session goes on as it was begun: leave it away")
     assert kept.read is not None
-    kept.read.check_goes_on()
+    check_same(given, kept.read, {"task": "TASK"})
     return kept
-
-
-def outside(kept: OrderSession) -> Sequence[str]:
-    """The files outside its own folder that a session names, and that are read when it goes on or is shown again."""
-    task, recorded = kept.words.task, kept.words.asked.folder
-    assert kept.folder is not None
-    here = kept.folder.resolve()
-    files = [task] if is_path(task) and Path(task).is_file() else []
-    files += [] if recorded is None else [str(recorded)]
-    return [name for name in files if not Path(name).resolve().is_relative_to(here)]

@@ -1,99 +1,37 @@
 """Sessions kept in folders: where a journal is written, how a session goes on, and how it is looked at again."""
 
+import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from shlex import quote
-from typing import Annotated, Any
+from typing import Any
 
-from annotated_types import Ge, Le
-
-from lab.advice.entries import FILE, Read, Session, read_journal
+from lab.advice.entries import FILE, Read, Session, line_of, read_journal
 from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment
 from lab.learning.problem import Problem
-from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray
-from lab.tasks.task_file import names_file
-from lab.teaching.teacher import MAX_SESSIONS, Keep
+from lab.tasks.record import write_whole
+from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.lesson_plan import MAX_SESSIONS, Keep, LessonPlan
 from lab.toolbox.policy import Policy
-from lab.toolbox.registry import Toolbox, slug
+from lab.toolbox.registry import Toolbox, default_folder, slug
 
 SESSIONS = "sessions"  # the folder in the toolbox
 _BEGUN = "begun"  # the folder in a session's folder for the policy that it went on from
 _MOST = 100_000  # sessions of one name
-
-
-DEFAULT_ADVISORS = ("expert",)
 _OPTIONS = {
     "subtask": "SUBTASK",
     "advisors": "--advisor",
     "asked": "--ask",
     "view": "--sight",
 }  # that are called otherwise than their fields
-
-
-@dataclass(frozen=True)
-class Words:
-    """The options of `lab teach` that a session depends on, by name; None or empty: not given.
-
-    toasts and sessions: how many slices, and at most how many sessions, the lesson of a `lab run` had.
-    """
-
-    subtask: str = ""
-    task: str | None = None
-    view: str | None = None
-    learner: str | None = None
-    gate: str | None = None
-    memory: bool | None = None
-    advisors: tuple[str, ...] = ()
-    asked: str = "together"
-    decide: str = "trust-weighted"
-    episodes: Annotated[int, Ge(1)] | None = None
-    seed: Annotated[int, Ge(0)] = 0
-    save: str | None = None
-    toasts: int | None = None
-    sessions: Annotated[int, Ge(1), Le(MAX_SESSIONS)] | None = None
-
-    def complete(self) -> "Words":
-        """With the advisor that is asked when none is named; BadInput when nothing is named to learn."""
-        if not self.subtask:
-            raise BadInput("nothing to learn (SUBTASK): name a sub-task, a world or gym:ID, or go on with --resume DIR")
-        return replace(self, advisors=self.advisors or DEFAULT_ADVISORS)
-
-    def to_json(self) -> dict[str, Any]:
-        """A plain dict, files by their whole paths, so that they are found from another folder."""
-
-        def whole(name: str | None) -> str | None:
-            return (
-                str(Path(name).absolute()) if name is not None and names_file(name) and Path(name).is_file() else name
-            )
-
-        def recorded(name: str) -> str:
-            head, _, path = name.partition("recorded:")
-            return f"recorded:{Path(path).absolute()}" if path and not head else name
-
-        changed = {"subtask": whole(self.subtask), "task": whole(self.task)}
-        return asdict(self) | changed | {"advisors": [recorded(name) for name in self.advisors]}
-
-    @classmethod
-    def from_json(cls, record: dict[str, Any], where: str) -> "Words":
-        """What `to_json` wrote; BadInput, naming where it stands, for anything else."""
-        from pydantic import TypeAdapter, ValidationError
-
-        try:
-            return TypeAdapter(cls).validate_python(record | {"advisors": tuple(record.get("advisors", ()))})
-        except (ValidationError, TypeError) as error:
-            raise BadInput(
-                f"{where}: its options are none of lab teach: {' '.join(str(error).split())[:160]}"
-            ) from None
-
-
 MOST_VALUES = 3_000_000  # a larger table's optimal values take too long to know
 
 
@@ -102,30 +40,28 @@ class _InFolder:
 
     folder: Path | None = None
     journal: Journal | None = None
-    problem: Problem | None = None
-    learner = LearnerSettings()
-    gate = GateSettings()
-
-    def knows(self, problem: Problem, learner: LearnerSettings, gate: GateSettings) -> None:
-        """The lesson begins."""
-        self.problem, self.learner, self.gate = problem, learner, gate
+    plan: LessonPlan | None = None
 
     def receipt(self) -> Receipt:
         """What the advice was worth."""
-        assert self.problem is not None
+        assert self.plan is not None
         assert self.journal is not None
-        values = known_values(self.problem, self.learner.discount)
-        certain = self.problem.environment is None
-        return receipt(self.journal.entries, self.problem.mdp, values, self.gate.window, certain=certain)
+        return receipt_of(self.plan, self.journal, known_values(self.plan))
 
 
-def known_values(problem: Problem, discount: float) -> FloatArray | None:
-    """The optimal action values of a problem, None where they cannot be known."""
-    mdp = problem.mdp
+def receipt_of(plan: LessonPlan, journal: Journal, values: FloatArray | None) -> Receipt:
+    """What the advice in a lesson was worth so far; values: its problem's optimal ones, None where they are not known."""
+    problem = plan.problem
+    return receipt(journal.entries, problem.mdp, values, plan.gate.window, certain=problem.environment is None)
+
+
+def known_values(plan: LessonPlan) -> FloatArray | None:
+    """The optimal action values of a lesson's problem, None where they cannot be known."""
+    problem, mdp = plan.problem, plan.problem.mdp
     if mdp.n_states * mdp.n_actions > MOST_VALUES:
         return None
     try:
-        return (problem.environment or TableEnvironment(mdp)).values(discount)
+        return (problem.environment or TableEnvironment(mdp)).values(plan.learner.discount)
     except WorkFailed:
         return None
 
@@ -133,25 +69,23 @@ def known_values(problem: Problem, discount: float) -> FloatArray | None:
 class NewSession(_InFolder):
     """A session's journal in a folder, or, without one, in the toolbox's folder `sessions`; made when the lesson begins."""
 
-    def __init__(self, folder: Path | None, toolbox: Toolbox, words: Words):
-        self._wanted, self._toolbox, self._words = folder, toolbox, words
+    def __init__(self, folder: Path | None, toolbox: Toolbox, options: LessonOptions):
+        self._wanted, self._toolbox, self._options = folder, toolbox, options
 
-    def keep(
-        self, problem: Problem, learner: LearnerSettings, gate: GateSettings, unfinished: Policy | None
-    ) -> Journal:
+    def keep(self, plan: LessonPlan) -> Journal:
         """The journal of a lesson. Raises BadInput when the folder holds a session already."""
-        self.knows(problem, learner, gate)
+        self.plan, problem = plan, plan.problem
         self.folder = claimed(self._toolbox, problem.name, Path.mkdir) if self._wanted is None else self._wanted
-        if unfinished is not None:
-            Toolbox(self.folder / _BEGUN).save(unfinished)
+        if plan.unfinished is not None:
+            Toolbox(self.folder / _BEGUN).save(plan.unfinished)
         head = Session(
-            self._words.to_json(),
+            self._options.to_json(),
             problem.name,
             problem.mdp.signature,
             lab_version(),
-            asdict(learner),
-            asdict(gate),
-            "" if unfinished is None else unfinished.name,
+            asdict(plan.learner),
+            asdict(plan.gate),
+            "" if plan.unfinished is None else plan.unfinished.name,
         )
         self.journal = Journal.begin(self.folder, head)
         if self._wanted is not None:
@@ -177,12 +111,12 @@ def claimed(toolbox: Toolbox, name: str, make: Callable[[Path], None]) -> Path:
     raise BadInput(f"toolbox {toolbox.folder}: it holds {_MOST} sessions of '{name}': remove some")
 
 
-def kept_by(toolbox: Toolbox, words: Words) -> Keep:
+def kept_by(toolbox: Toolbox, options: LessonOptions) -> Keep:
     """Keeps the journal of each lesson of a run in the toolbox; it can be replayed, gone on with, and advise again."""
 
-    def keep(problem: Problem, learner: LearnerSettings, gate: GateSettings, unfinished: Policy | None) -> Journal:
-        session = NewSession(None, toolbox, replace(words, subtask=problem.name, sessions=MAX_SESSIONS))
-        return session.keep(problem, learner, gate, unfinished)
+    def keep(plan: LessonPlan) -> Journal:
+        own = replace(options, subtask=plan.problem.name, sessions=MAX_SESSIONS)
+        return NewSession(None, toolbox, own).keep(plan)
 
     return keep
 
@@ -200,21 +134,22 @@ class KeptSession(_InFolder):
             raise BadInput(
                 f"journal '{self.read.path}' ({where}): it is advice on an order: wanted a session of lab teach"
             )
-        self.words = Words.from_json(self.read.session.words, f"journal '{self.read.path}' ({where})")
+        self.options = LessonOptions.from_json(self.read.session.words, f"journal '{self.read.path}' ({where})")
         self._read_only, self.where, self.trusted = read_only, where, trusted
 
-    def keep(
-        self, problem: Problem, learner: LearnerSettings, gate: GateSettings, unfinished: Policy | None
-    ) -> Journal:
+    def keep(self, plan: LessonPlan) -> Journal:
         """The journal, which answers until it is used up. Raises BadInput when the problem is not the same any more."""
-        self.knows(problem, learner, gate)
+        self.plan, problem = plan, plan.problem
         head = self.read.session
         if head.signature != problem.mdp.signature:
             raise BadInput(
                 f"session '{self.folder}' ({self.where}): it is about '{head.problem}' ({head.signature[:8]}), and the "
                 f"task now gives another problem ({problem.mdp.signature[:8]}): its file or the lab has changed"
             )
-        for what, then, now in (("learner", head.learner, asdict(learner)), ("gate", head.gate, asdict(gate))):
+        for what, then, now in (
+            ("learner", head.learner, asdict(plan.learner)),
+            ("gate", head.gate, asdict(plan.gate)),
+        ):
             then = now | then  # an older journal does not know all settings of today
             if changed := [name for name in now if then[name] != now[name]]:
                 name = changed[0]
@@ -226,16 +161,10 @@ class KeptSession(_InFolder):
         self.journal = Journal(None, entries, read_only=True) if self._read_only else Journal.resume(self.read)
         return self.journal
 
-    def same(self, given: Words) -> Words:
-        """The words of the session; BadInput when the command names others, and when the session is over."""
-        for name, value in asdict(given).items():
-            if value != getattr(Words(), name):
-                option = _OPTIONS.get(name, f"--{name}")
-                raise BadInput(
-                    f"{option} beside --resume {self.folder}: a session goes on as it was begun: leave it away"
-                )
-        self.read.check_goes_on()
-        return self.words
+    def same(self, given: LessonOptions) -> LessonOptions:
+        """The options of the session; BadInput when the command names others, and when the session is over."""
+        check_same(given, self.read, _OPTIONS)
+        return self.options
 
     def begun(self, problem: Problem) -> Policy | None:
         """The policy that the session went on from when it began. Raises BadInput when it is not there any more."""
@@ -246,6 +175,46 @@ class KeptSession(_InFolder):
         if found is None:
             raise BadInput(f"session '{self.folder}': the policy that it went on from is not in '{_BEGUN}' any more")
         return found
+
+
+def check_same(given: Any, read: Read, names: Mapping[str, str]) -> None:
+    """BadInput when a command that goes on with a session names options, too, or when the session is over.
+
+    names: of options that are called otherwise than their fields.
+    """
+    for name, value in asdict(given).items():
+        if value != getattr(type(given)(), name):
+            option, folder = names.get(name, f"--{name}"), read.path.parent
+            raise BadInput(f"{option} beside --resume {folder}: a session goes on as it was begun: leave it away")
+    read.check_goes_on()
+
+
+def resume_command(folder: Path | None, toolbox: Toolbox, command: str = "teach") -> str:
+    """The command that goes on with a session."""
+    box = "" if toolbox.folder == default_folder() else f" --toolbox {quote(str(toolbox.folder))}"
+    return f"lab {command} --resume {quote(str(folder))}{box}"
+
+
+def worth_of(folder: Path | None, made: Receipt) -> dict[str, Any]:
+    """Where a session is kept, and what its advice was worth; the receipt is written beside the journal."""
+    assert folder is not None
+    write_whole(folder / "receipt.json", json.dumps(made.to_json(), indent=1, allow_nan=False) + "\n")
+    return {"session": str(folder), "receipt": made.to_json() | {"lines": made.lines()}}
+
+
+def replayed(read: Read, seed: int, made: Receipt) -> dict[str, Any]:
+    """The document of `lab replay --json`."""
+    return {
+        "session": str(read.path.parent),
+        "problem": read.session.problem,
+        "words": read.session.words,
+        "seed": seed,
+        "lab": read.session.lab,
+        "closed": None if read.closed is None else asdict(read.closed),
+        "cut": read.cut,
+        "events": [json.loads(line_of(entry)) for entry in read.entries],
+        "receipt": made.to_json() | {"lines": made.lines()},
+    }
 
 
 def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:

@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 
 from lab.advice.advisors import (
+    ADVISORS,
+    PEOPLE,
     SKILL_TAUS,
     AdvisorName,
     RecordedAdvisor,
-    named,
+    make_advisor,
 )
 from lab.advice.entries import FILE, Session
 from lab.advice.journal import Journal
+from lab.advice.order_level import OrderLevel
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.events import AdviceGiven
@@ -21,6 +24,11 @@ from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft
 from lab.learning.selection import softmax
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.mdp import FloatArray, TabularMDP, grid, optimal_values, shortest_steps
+from lab.sequencing.request import SequenceRequest, state_of
+from lab.sequencing.simulate.run import Run, follow
+from lab.tasks.task_file import load_cell
+
+NAMES = tuple(name for name in ADVISORS if not {"=", ":"} & {*name})  # the others have something of the user's in them
 
 
 def board() -> TabularMDP:
@@ -120,7 +128,7 @@ def test_a_person_may_leave() -> None:
 
 
 def test_names_are_checked() -> None:
-    for name in (*named(), "tau=0.25", "tau=1..0.01", "recorded:some/file"):
+    for name in (*NAMES, "tau=0.25", "tau=1..0.01", "recorded:some/file"):
         assert AdvisorName.of(name).text == name
     with pytest.raises(BadInput, match=r"unknown advisor 'exprt' \(--advisor\): did you mean 'expert'\?.*tau=X"):
         AdvisorName.of("exprt", "--advisor")
@@ -204,3 +212,43 @@ def test_a_record_of_another_problem_or_of_none(tmp_path: Path) -> None:
         made(recorded(tmp_path, other, [(0, 1)]), board())
     with pytest.raises(BadInput, match="cannot be read"):
         made(f"recorded:{tmp_path / 'none'}", board())
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in PEOPLE] + ["tau=0.05", "tau=1..0.01"])
+def test_every_name_serves_both_levels(name: str) -> None:
+    """One row makes who advises in a table and on the order; what is said is allowed."""
+    mdp, run = board(), Run(load_cell("toast-case-1").cell(3))
+    order = SequenceRequest(episode=1, step=1, state=state_of(run), own=1, allowed=run.allowed(), run=run)
+    level = OrderLevel(run.cell, np.random.default_rng(0), episodes=5)
+    for advisor, asked in (
+        (TableLevel(mdp, 0.99, np.random.default_rng(0)).advisor(AdvisorName.of(name)), request(mdp, 5)),
+        (make_advisor(AdvisorName.of(name), level), order),
+    ):
+        assert (advisor is None) == (name == "none")
+        assert advisor is None or advisor.advise(asked) in asked.allowed
+
+
+def test_an_advisor_of_the_order_may_learn_over_the_episodes() -> None:
+    """With a large tau it takes any of the moves; with a small one, from the last episode on, only the best."""
+    run = follow(load_cell("toast-case-2").cell(3), (1, 2))
+    level = OrderLevel(run.cell, np.random.default_rng(0), episodes=2)
+    advisor = make_advisor(AdvisorName.of("tau=100..0.0001"), level)
+    assert advisor is not None
+
+    def said(episode: int) -> set[int | None]:
+        asked = SequenceRequest(episode=episode, step=1, state=0, own=1, allowed=run.allowed(), run=run)
+        return {advisor.advise(asked) for _ in range(200)}
+
+    assert said(1) == {*run.allowed()}
+    assert said(2) == said(9) < said(1)
+
+
+def test_where_the_work_stands_is_one_number() -> None:
+    """Other places, other numbers; the same places by another way, the same number, whatever the time."""
+    cell = load_cell("toast-case-1").cell(3)
+    run, seen = Run(cell), {state_of(Run(cell))}
+    for decision in (1, 2, 1):
+        run.move(decision)
+        assert state_of(run) not in seen
+        seen.add(state_of(run))
+    assert state_of(follow(cell, (1, 2, 1))) == state_of(run)

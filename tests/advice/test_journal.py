@@ -31,7 +31,7 @@ from lab.advice.journal import Again, Journal, Undo
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment
-from lab.learning.events import AdviceGiven, EpisodeEnded, Event, Verdict
+from lab.learning.events import AdviceGiven, Ending, EpisodeEnded, Event, Verdict
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Ask
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -287,13 +287,13 @@ BY_FIELD: dict[str, Any] = {
     "said": st.lists(st.tuples(st.text(max_size=5), whole_numbers), max_size=3).map(tuple),
     "action": st.one_of(st.none(), whole_numbers),
     "verdict": st.sampled_from(get_args(Verdict)),
+    "reason": st.sampled_from(get_args(Ending)),
     **dict.fromkeys(("improvement_rate", "current_mean", "previous_mean"), some_numbers),
     **dict.fromkeys(("final_steps", "optimal_steps"), st.one_of(st.none(), numbers)),
     **dict.fromkeys(("mean_before", "trust"), st.floats(allow_nan=False, allow_infinity=False)),
     **dict.fromkeys(("guided", "reached", "left", "solved"), st.booleans()),
     **dict.fromkeys(
-        ("problem", "signature", "lab", "by", "why", "reason", "advisor", "saved_as", "continues", "command"),
-        st.text(max_size=9),
+        ("problem", "signature", "lab", "by", "why", "advisor", "saved_as", "continues", "command"), st.text(max_size=9)
     ),
 }
 

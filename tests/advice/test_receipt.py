@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -24,6 +24,7 @@ from lab.learning.events import (
     AdvisorDropped,
     AdvisorReadmitted,
     AdvisorsDisagreed,
+    Ending,
     EpisodeEnded,
     Event,
     Verdict,
@@ -323,7 +324,7 @@ ENTRIES = st.one_of(
     st.builds(AdviceGiven, small, small, st.integers(0, 2), st.integers(0, 1), small),
     st.builds(EpisodeEnded, small, st.integers(0, 200), st.booleans(), small, st.none() | numbers, st.booleans()),
     st.builds(AdviceRejected, small, small, small, small, numbers),
-    st.builds(AdviceEnded, small, names),
+    st.builds(AdviceEnded, small, st.sampled_from(get_args(Ending))),
     st.builds(AdviceRemembered, small, small),
     st.builds(AdvisorsDisagreed, small, small, small, st.lists(st.tuples(names, small), max_size=3).map(tuple), small),
     st.builds(AdvisorDropped, small, names, numbers, names),

@@ -166,7 +166,7 @@ def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: 
         raise KeyboardInterrupt
 
     monkeypatch.setattr("lab.skills.prepared_scene.prepare", stop)
-    monkeypatch.setattr("lab.teaching.lesson.load", stop)
+    monkeypatch.setattr("lab.teaching.skill_subject.load", stop)
     monkeypatch.setattr("lab.tasks.task_file.load", stop)
     ran = lab(*words.split(), "--json")
     why = f"stopped by Ctrl-C{said}"

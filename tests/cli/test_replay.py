@@ -52,8 +52,8 @@ def test_ctrl_c_ends_a_replay_at_once(lab: Lab, folder: Path, monkeypatch: pytes
         if pause_s in (0.25, 3600):
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("lab.seat.people.time.sleep", stop)
-    monkeypatch.setattr("lab.seat.people.PAGE_S", 0.0)
+    monkeypatch.setattr("lab.seat.lesson_seat.time.sleep", stop)
+    monkeypatch.setattr("lab.seat.lesson_seat.PAGE_S", 0.0)
     for words in (["--pause", "0.25"], ["--pause", "0.25", "--page"], ["--pause", "0", "--page"]):
         ran = lab("replay", "lesson", *words)
         assert (ran.code, ran.err.splitlines()[-1]) == (130, "lab: stopped by Ctrl-C")

@@ -11,7 +11,6 @@ from lab.production.composer import MAX_TRIES, Outcome, Production, carry_out
 from lab.production.durations import Durations, cell_of, measure
 from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.schedule import Move
 from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Body, Frame
 from lab.sim.scene import Layout, spots
@@ -23,6 +22,8 @@ from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.skills.trial import trial_of
 from lab.tasks.task_file import Stage, Task, load
+from lab.teaching.events import Event, MoveMade, MoveRetried
+from lab.teaching.lesson_plan import LessonPlan
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
 
@@ -60,7 +61,8 @@ def taught(
         problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items()}
         for name, problem in problems.items():
             settings = task.subtask(problem.subtask)
-            skillset.policies[name] = teacher.find_or_teach(problem, settings, task.name, {}).policy
+            lesson = LessonPlan(problem, settings.learner, settings.gate, task.name)
+            skillset.policies[name] = teacher.find_or_teach(lesson, {}).policy
         return Prepared(task, toasts, 0, layout, surveys, skillset, problems)
 
     return teach
@@ -148,9 +150,10 @@ def test_a_move_that_cannot_be_measured_is_a_failure_that_says_so(
 
 
 def test_one_toast_is_delivered_in_the_time_predicted(prepared: Prepared, skillset: SkillSet, cell: Cell) -> None:
-    moves: list[Move] = []
+    heard: list[Event] = []
     watcher = Watcher()
-    outcome, recording = carry_out(prepared, cell, (1, 1, 1), viewer=watcher, on_move=moves.append)
+    outcome, recording = carry_out(prepared, cell, (1, 1, 1), viewer=watcher, tell=heard.append)
+    moves = [event.move for event in heard if isinstance(event, MoveMade)]
     assert outcome.failure is None
     assert (outcome.delivered, outcome.dropped, outcome.retries) == ((1,), (), ())
     predicted = simulate(cell, (1, 1, 1))
@@ -196,13 +199,13 @@ def test_a_step_that_goes_on_failing_stops_the_run_with_toast_place_and_reason(
     clueless: Callable[[str], None],
 ) -> None:
     clueless(skill)
-    heard: list[str] = []
-    outcome, _ = carry_out(prepared, cell, (1, 1, 1), on_retry=heard.append)
+    heard: list[Event] = []
+    outcome, _ = carry_out(prepared, cell, (1, 1, 1), tell=heard.append)
     start = skillset.skills[skill].reason
     assert start.startswith(f"policy '{skillset.policies[skill].name}' does not reach its goal from ")
     failed(outcome, where, start)
-    assert tuple(heard) == outcome.retries
-    assert all(text.startswith(f"toast 1 at '{where}', '{skill}', try ") for text in heard)
+    assert heard == [MoveRetried(why) for why in outcome.retries]
+    assert all(text.startswith(f"toast 1 at '{where}', '{skill}', try ") for text in outcome.retries)
     assert outcome.schedule.robot == ()
 
 
@@ -242,11 +245,12 @@ def test_a_grasp_that_failed_once_is_tried_again_and_the_run_goes_on(ground: Gro
     place = ground.floor.world.pose("slice 1")[0]
     ground.put("slice 1", 0.6, 0.0, -9.0)
 
-    def put_back(text: str) -> None:
-        assert text.endswith("try 1: slice 1 is out of reach at (0.60, 0.00) m")
-        ground.put("slice 1", *place)
+    def put_back(event: Event) -> None:
+        if isinstance(event, MoveRetried):
+            assert event.why.endswith("try 1: slice 1 is out of reach at (0.60, 0.00) m")
+            ground.put("slice 1", *place)
 
-    ground.work.on_retry = put_back
+    ground.work.tell = put_back
     assert ground.work.carry_out((1,)) is None
     assert len(ground.work.retries) == 1
     assert ground.work.moves[0].target == "toaster"

@@ -25,7 +25,7 @@ from lab.sim.frames import Recording
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.tasks.sequencing import search_for
 from lab.tasks.task_file import Task, load
-from lab.teaching.listener import Listener
+from lab.teaching.events import Event, PhaseBegan, RecordSkipped
 from lab.teaching.teacher import Teacher
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
@@ -154,18 +154,12 @@ def test_a_second_run_learns_nothing_and_does_the_same(cold: Ran, warm: Ran) -> 
 # ---- what is reused, and what is not -------------------------------------------------------------------------------
 
 
-class Heard(Listener):
-    """Notes what was skipped and which phases came."""
+def skipped(heard: list[Event]) -> list[str]:
+    return [event.why for event in heard if isinstance(event, RecordSkipped)]
 
-    def __init__(self) -> None:
-        self.damaged: list[str] = []
-        self.phases: list[str] = []
 
-    def skipped(self, what: str) -> None:
-        self.damaged.append(what)
-
-    def phase(self, name: str, parts: int) -> None:
-        self.phases.append(name)
+def phases(heard: list[Event]) -> list[str]:
+    return [event.name for event in heard if isinstance(event, PhaseBegan)]
 
 
 @pytest.fixture(scope="module")
@@ -205,10 +199,10 @@ def sources(taught: Taught) -> dict[str, str]:
 
 
 def test_the_same_scene_needs_nothing(prepared: Prepared, toolbox: Toolbox, measured: list[Prepared]) -> None:
-    heard = Heard()
-    taught = teach_all(prepared, Teacher(toolbox), heard)
+    heard: list[Event] = []
+    taught = teach_all(prepared, Teacher(toolbox, tell=heard.append))
     assert set(sources(taught).values()) == {"reused"}
-    assert (heard.phases, heard.damaged, measured) == (["learn"], [], [])
+    assert (phases(heard), skipped(heard), measured) == (["learn"], [], [])
 
 
 def move(task: Task, name: str, by: tuple[float, float]) -> Task:
@@ -240,7 +234,7 @@ def test_a_moved_obstacle_is_learned_around_and_nothing_else(
     assert must in {prepared.problems[name].subtask for name in affected}
     assert not {prepared.problems[name].subtask for name in affected} & {"grasp", "butter", "place"}
     assert len(affected) < len(prepared.problems)
-    found = sources(teach_all(changed, Teacher(toolbox), Listener()))
+    found = sources(teach_all(changed, Teacher(toolbox)))
     assert {name for name, source in found.items() if source == "learned"} == affected
     assert set(found.values()) == {"learned", "reused"}
     assert len(measured) == 1
@@ -252,14 +246,14 @@ def test_damaged_policies_are_named_and_learned_again(
     files = {path.stem.partition("-at-")[0]: path for path in toolbox.folder.glob("*-at-*.safetensors")}
     files["insert"].write_bytes(files["insert"].read_bytes()[:-8])
     files["butter"].write_bytes(b"")
-    heard = Heard()
-    found = sources(teach_all(prepared, Teacher(toolbox), heard))
+    heard: list[Event] = []
+    found = sources(teach_all(prepared, Teacher(toolbox, tell=heard.append)))
     assert {name for name, source in found.items() if source == "learned"} == {
         "insert at toaster",
         "butter at butter_applier",
     }
-    assert len(heard.damaged) == 2
-    assert all(str(files[name]) in " ".join(heard.damaged) for name in ("insert", "butter"))
+    assert len(skipped(heard)) == 2
+    assert all(str(files[name]) in " ".join(skipped(heard)) for name in ("insert", "butter"))
     assert measured == []  # the same seed learns the same tables: the durations still hold
 
 
@@ -281,13 +275,15 @@ def test_damaged_durations_are_measured_again(
     (path,) = (toolbox.folder / "records" / "durations").glob("*.json")
     whole = json.loads(path.read_text(encoding="utf-8"))
     path.write_text(json.dumps(whole | {"record": damage(whole["record"])}), encoding="utf-8")
-    heard = Heard()
-    taught = teach_all(prepared, Teacher(toolbox), heard)
+    heard: list[Event] = []
+    taught = teach_all(prepared, Teacher(toolbox, tell=heard.append))
     assert len(measured) == 1
-    assert [what for what in heard.damaged if what.startswith("durations measured earlier: record '")] == heard.damaged
-    assert len(heard.damaged) == 1
+    assert [what for what in skipped(heard) if what.startswith("durations measured earlier: record '")] == skipped(
+        heard
+    )
+    assert len(skipped(heard)) == 1
     assert set(taught.durations.loaded_s.values()) == {5.0}
-    teach_all(prepared, Teacher(toolbox), Listener())
+    teach_all(prepared, Teacher(toolbox))
     assert len(measured) == 1
 
 
@@ -297,7 +293,7 @@ def test_only_one_skill_can_be_prepared() -> None:
 
 @pytest.mark.parametrize("method", [name for name in SEQUENCERS if name != "earliest-due"])
 def test_methods_of_sequencing(prepared: Prepared, toolbox: Toolbox, method: str) -> None:
-    cell = teach_all(prepared, Teacher(toolbox), Listener()).cell
+    cell = teach_all(prepared, Teacher(toolbox)).cell
     search = search_for(prepared.task.sequencing, episodes=5)
     assert find_sequence(cell, method, search, prepared.seed).sequence == (1, 1, 1)
 
@@ -308,7 +304,7 @@ def test_methods_of_sequencing(prepared: Prepared, toolbox: Toolbox, method: str
 @pytest.fixture
 def report(prepared: Prepared, toolbox: Toolbox) -> tuple[Taught, Report]:
     """A run whose second step failed."""
-    taught = teach_all(prepared, Teacher(toolbox), Listener())
+    taught = teach_all(prepared, Teacher(toolbox))
     why = "toast 1 at 'plate': slice 1 is not in the gripper after grasping at 'plate' (tried 3 times)"
     outcome = Outcome(Schedule.from_moves(taught.cell, []), (), (1,), ("try 1",), why, 30.0, ())
     settings = prepared.task.sequencing

@@ -1,6 +1,7 @@
 """The order of the transfers: what `lab sequence` answers for a cell and for a task, and what it refuses."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,11 @@ from lab.production.sequence import (
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES
-from lab.sequencing.search import Reference, SequenceResult
+from lab.sequencing.search import Reference
 from lab.sequencing.simulate.run import simulate
 from lab.tasks.sequencing import search_for
 from lab.tasks.task_file import load, load_cell
-from lab.teaching.listener import Listener
+from lab.teaching.events import Event, PhaseBegan, SequenceFound
 from lab.teaching.teacher import Teacher
 from lab.vision import read_picture
 
@@ -341,19 +342,6 @@ def test_pictures_are_in_the_document(lab: Lab) -> None:
 # ---- a task: measured in simulation, then sequenced -----------------------------------------------------------------
 
 
-class Heard(Listener):
-    """Notes what it hears."""
-
-    def __init__(self) -> None:
-        self.notes: list[object] = []
-
-    def phase(self, name: str, parts: int) -> None:
-        self.notes.append((name, parts))
-
-    def sequenced(self, best: SequenceResult, known: Reference | None) -> None:
-        self.notes.append((best.cost, known))
-
-
 @pytest.mark.parametrize("method", [None, "srl", "srl-time", "exact", "fifo", "random"])
 def test_a_task(lab: Lab, measured: list[tuple[str, int, int]], method: str | None) -> None:
     words = "toast --toasts 2 --episodes 20 --sessions 3 --seed 9 --plot p.png --gantt g.svg"
@@ -372,11 +360,13 @@ def test_a_task(lab: Lab, measured: list[tuple[str, int, int]], method: str | No
 
 @pytest.mark.usefixtures("measured")
 def test_who_listens_hears_every_session(teacher: Teacher) -> None:
-    heard = Heard()
+    heard: list[Event] = []
     wanted = Wanted("random", 4, sessions=3)
-    document = sequence_named("toast", None, 2, wanted, teacher=teacher, listener=heard, files={})
+    document = sequence_named("toast", None, 2, wanted, teacher=replace(teacher, tell=heard.append), files={})
     assert document["sessions"] == 3
-    assert heard.notes == [("sequence", 3), *[(29.0, Reference(29.0, True, "A*"))] * 3]
+    assert heard[0] == PhaseBegan("sequence", 3)
+    found = [(event.result.cost, event.reference) for event in heard if isinstance(event, SequenceFound)]
+    assert found == [(29.0, Reference(29.0, True, "A*"))] * 3
 
 
 def test_a_task_is_for_three_toasts_unless_told(lab: Lab, measured: list[tuple[str, int, int]]) -> None:

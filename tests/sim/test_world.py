@@ -136,7 +136,7 @@ def test_mass_is_changed_with_its_inertia(world: World) -> None:
 def test_distances_and_rays(world: World) -> None:
     world.box("left", (0.2, 0.2, 0.2), (0, 0, 0.1), WOOD)
     world.box("right", (0.2, 0.2, 0.2), (0.5, 0, 0.1), WOOD)
-    world.box("seen only", (0.2, 0.2, 0.2), (0.25, 0, 0.1), WOOD, solid=False)
+    world.disc("seen only", 0.1, 0.2, (0.25, 0, 0.1), WOOD)
     world.step()
     assert world.nearest("left", "right", 1.0) == pytest.approx(0.3, abs=1e-3)
     assert world.nearest("left", "right", 0.1) == 0.1  # farther apart than asked for
@@ -164,10 +164,10 @@ def test_joints_are_set_driven_and_read(world: World) -> None:
 def test_the_viewer_sees_every_visible_link_where_it_is(world: World) -> None:
     tumble(world, 3)
     world.disc("spot", 0.02, 0.004, (1, 2, 3), (0, 1, 0, 1))
-    world.box("ghost", (0.1, 0.2, 0.3), (4, 5, 6), WOOD, solid=False)
+    world.box("block", (0.1, 0.2, 0.3), (4, 5, 6), WOOD)
     bodies, poses = {body.name: body for body in world.bodies()}, world.frame().poses
-    assert set(bodies) == set(poses) == {"cube", "applier", "applier column", "applier head", "slice", "spot", "ghost"}
-    assert bodies["ghost"].shapes[0].size == (0.1, 0.2, 0.3)
+    assert set(bodies) == set(poses) == {"cube", "applier", "applier column", "applier head", "slice", "spot", "block"}
+    assert bodies["block"].shapes[0].size == (0.1, 0.2, 0.3)
     assert bodies["spot"].shapes[0].size == (0.02, 0.004)
     assert list(poses["spot"]) == [1, 2, 3, 0, 0, 0, 1]
     assert list(poses["slice"][:3]) == world.pose("slice")[0].tolist()

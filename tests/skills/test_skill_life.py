@@ -21,7 +21,9 @@ from lab.skills.skill import Bench, SkillFailed, Status, learned_path, no_way
 from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.task_file import Stage, Subtask, Task
-from lab.teaching.lesson import teach_one
+from lab.teaching.lesson import one_lesson
+from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.skill_subject import SkillSubject
 from lab.teaching.teacher import Teacher
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
@@ -233,7 +235,8 @@ def test_a_new_skill_is_a_class_and_a_row_and_all_else_knows_it(
     """The task file may have settings for it, lessons teach and show it, and jobs need it, time it and carry it out."""
     ends = tuple(Stage(station=stage.station) for stage in (task.route[0], task.route[-1]))
     short = task.model_copy(update={"route": ends, "subtasks": task.subtasks | {"hover": Subtask()}})
-    document = teach_one(short, "hover", Teacher(Toolbox(tmp_path)), episodes=40, out=tmp_path / "out")
+    subject = SkillSubject.of(LessonOptions("hover", episodes=40), short)
+    document = one_lesson(subject, Teacher(Toolbox(tmp_path)), out=tmp_path / "out")
     assert (document["subtask"], document["skill"], document["solved"]) == ("hover", "hover at toaster_buffer", True)
     skillset = SkillSet.of(short, 1)
     hovers = [skill for skill in skillset.skills.values() if isinstance(skill, Hover)]

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from lab.advice.advising import Advising
 from lab.advice.entries import FILE, read_journal
 from lab.learning.requests import AdviceRequest
-from lab.teaching.kept_session import SESSIONS, KeptSession, Words
+from lab.teaching.kept_session import SESSIONS, KeptSession
 from lab.teaching.lesson import teach
+from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.teacher import Teacher
+from lab.teaching.world_subject import WorldSubject
 from lab.toolbox.registry import Toolbox
 
 
@@ -33,8 +34,10 @@ def held(folder: Path, maze: Path, *, goes_on: bool = False) -> tuple[Any, ...]:
     """A session, or one gone on with: all that it comes to, wherever it was held."""
     box = Toolbox(folder / "toolbox")
     kept = KeptSession(lesson_in(folder), "--resume") if goes_on else None
-    words = Words(str(maze), advisors=("terminal",), seed=3, episodes=60) if kept is None else kept.words
-    document = teach(words, Teacher(box, Advising.of(words.advisors, {"terminal": person}), seed=3), None, kept)
+    new = LessonOptions(str(maze), advisors=("terminal",), seed=3, episodes=60)
+    options = new if kept is None else kept.options
+    teacher = Teacher(box, options.advising({"terminal": person}), seed=3)
+    document = teach(WorldSubject.of(options), options, teacher, None, kept)
     (row,) = box.list()
     policy = box.find("world", row["signature"])
     assert policy is not None

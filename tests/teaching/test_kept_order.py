@@ -103,3 +103,9 @@ def test_simulated_advisors_keep_no_journal(lab: Lab) -> None:
     ran = advised(lab, words=WORDS.replace("terminal", "expert"))
     assert "session" not in ran.json
     assert lab("replay", "--json").json["sessions"] == before
+
+
+def test_stopped_before_an_order_was_found_it_goes_on_too(lab: Lab) -> None:
+    stopped = advised(lab, "2", "quit")
+    assert stopped.code == 130
+    assert "before an order was found; go on with: lab sequence --resume " in stopped.err

@@ -18,9 +18,13 @@ from lab.errors import BadInput
 from lab.learning.events import AdviceGiven
 from lab.learning.requests import AdviceRequest, Ask
 from lab.tasks.task_file import load_world
-from lab.teaching.kept_session import SESSIONS, KeptSession, Words, session_rows
-from lab.teaching.lesson import check, replay, teach
-from lab.teaching.teacher import Audience, Interrupted, Teacher
+from lab.teaching.events import Event, LessonEvent, QuestionAnswered, unheard
+from lab.teaching.kept_session import SESSIONS, KeptSession, check_new, session_rows
+from lab.teaching.lesson import replay, teach
+from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.lesson_plan import Interrupted
+from lab.teaching.teacher import Teacher
+from lab.teaching.world_subject import WorldSubject
 from lab.toolbox.registry import Toolbox
 
 MAZE = """
@@ -50,8 +54,14 @@ def teacher(folder: Path, ask: Ask = person, *names: str) -> Teacher:
     return Teacher(Toolbox(folder / "toolbox"), Advising.of(names or ("terminal",), {"terminal": ask}), seed=3)
 
 
-def words(maze: Path, *names: str, **changes: Any) -> Words:
-    return replace(Words(str(maze), advisors=names or ("terminal",), seed=3, episodes=60), **changes)
+def options(maze: Path, *names: str, **changes: Any) -> LessonOptions:
+    return replace(LessonOptions(str(maze), advisors=names or ("terminal",), seed=3, episodes=60), **changes)
+
+
+def taught(
+    wanted: LessonOptions, teacher: Teacher, out: Path | None, kept: KeptSession | None = None
+) -> dict[str, Any]:
+    return teach(WorldSubject.of(wanted), wanted, teacher, out, kept)
 
 
 def result(folder: Path, document: dict[str, Any]) -> tuple[Any, ...]:
@@ -65,13 +75,13 @@ def result(folder: Path, document: dict[str, Any]) -> tuple[Any, ...]:
 
 def held(folder: Path, maze: Path) -> tuple[Any, ...]:
     """The session without a break."""
-    return result(folder, teach(words(maze), teacher(folder), folder / "lesson"))
+    return result(folder, taught(options(maze), teacher(folder), folder / "lesson"))
 
 
 def gone_on(folder: Path, maze: Path) -> tuple[Any, ...]:
     """The session gone on with until it is over, without pictures."""
     kept = KeptSession(folder / "lesson", "--resume")
-    return result(folder, teach(kept.words, teacher(folder), None, kept))
+    return result(folder, taught(kept.options, teacher(folder), None, kept))
 
 
 def test_killed_at_any_moment_and_gone_on_with_it_is_the_same_session(tmp_path: Path, maze: Path, root: Path) -> None:
@@ -99,7 +109,7 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path, maze: Path) -> None:
         return person(request)
 
     with pytest.raises(Interrupted, match=r"what was learned is kept; go on with: lab teach --resume .*lesson"):
-        teach(words(maze), teacher(tmp_path, stops), tmp_path / "lesson")
+        taught(options(maze), teacher(tmp_path, stops), tmp_path / "lesson")
     assert len(Toolbox(tmp_path / "toolbox").list()) == 1
     assert gone_on(tmp_path, maze) == whole
 
@@ -108,33 +118,33 @@ def test_what_a_session_went_on_from_is_kept_with_it(tmp_path: Path, maze: Path)
     """An unfinished policy is learned on; broken off and gone on with, it begins from the same table."""
 
     def half(folder: Path) -> None:
-        teach(words(maze, "none", episodes=2, gate="never"), teacher(folder, person, "none"), None)
+        taught(options(maze, "none", episodes=2, gate="never"), teacher(folder, person, "none"), None)
 
     again = {"gate": "never", "episodes": 30}
     half(tmp_path / "whole")
-    document = teach(
-        words(maze, "none", **again), teacher(tmp_path / "whole", person, "none"), tmp_path / "whole" / "lesson"
+    document = taught(
+        options(maze, "none", **again), teacher(tmp_path / "whole", person, "none"), tmp_path / "whole" / "lesson"
     )
     assert document["source"] == "continued"
     half(tmp_path / "cut")
     folder = tmp_path / "cut" / "lesson"
-    teach(words(maze, "none", **again), teacher(tmp_path / "cut", person, "none"), folder)
+    taught(options(maze, "none", **again), teacher(tmp_path / "cut", person, "none"), folder)
     lines = (folder / FILE).read_bytes().splitlines(keepends=True)
     (folder / FILE).write_bytes(b"".join(lines[:9]))
     kept = KeptSession(folder, "--resume")
-    document = teach(kept.words, teacher(tmp_path / "cut", person, "none"), folder, kept)
+    document = taught(kept.options, teacher(tmp_path / "cut", person, "none"), folder, kept)
     assert result(tmp_path / "cut", document) == result(tmp_path / "whole", document)
     for policy in (folder / "begun").iterdir():
         policy.unlink()
     (folder / FILE).write_bytes(b"".join(lines[:9]))
     kept = KeptSession(folder, "--resume")
     with pytest.raises(BadInput, match="the policy that it went on from is not in 'begun' any more"):
-        teach(kept.words, teacher(tmp_path / "cut", person, "none"), folder, kept)
+        taught(kept.options, teacher(tmp_path / "cut", person, "none"), folder, kept)
 
 
 def test_a_session_without_a_folder_is_kept_in_the_toolbox(tmp_path: Path, maze: Path) -> None:
     for number in (1, 2):
-        document = teach(words(maze, "novice", episodes=12), teacher(tmp_path, person, "novice"), None)
+        document = taught(options(maze, "novice", episodes=12), teacher(tmp_path, person, "novice"), None)
         assert document["session"] == str(tmp_path / "toolbox" / SESSIONS / f"maze-{number}")
         assert (Path(document["session"]) / "receipt.json").is_file()
     rows = session_rows(Toolbox(tmp_path / "toolbox"))
@@ -160,7 +170,7 @@ def test_a_folder_that_holds_a_session(tmp_path: Path, maze: Path) -> None:
         journal.write_bytes(content)
         before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
         with pytest.raises(BadInput, match=reason):
-            check(words(maze), tmp_path / "lesson")
+            check_new(tmp_path / "lesson")
         with pytest.raises(BadInput, match=reason):
             held(tmp_path, maze)
         assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
@@ -168,7 +178,7 @@ def test_a_folder_that_holds_a_session(tmp_path: Path, maze: Path) -> None:
 
 def test_sessions_kept_elsewhere_are_listed(tmp_path: Path, maze: Path) -> None:
     held(tmp_path, maze)
-    teach(words(maze, "novice", episodes=12), teacher(tmp_path, person, "novice"), None)
+    taught(options(maze, "novice", episodes=12), teacher(tmp_path, person, "novice"), None)
     places = {tmp_path / "lesson", tmp_path / "toolbox" / SESSIONS / "maze-2"}
     assert {Path(row["session"]) for row in session_rows(Toolbox(tmp_path / "toolbox"))} == places
     (tmp_path / "lesson").rename(tmp_path / "gone")
@@ -194,20 +204,20 @@ def test_a_journal_of_an_older_version_knows_fewer_settings_and_verdicts(tmp_pat
         line.pop("verdict", None)
     journal.write_text("".join(json.dumps(line) + "\n" for line in lines))
     kept = KeptSession(tmp_path / "lesson", "DIR", read_only=True)
-    assert replay(kept, Audience(), lambda request, action: None)["closed"]
+    assert replay(kept, WorldSubject.of(kept.options), unheard)["closed"]
 
 
-def test_words_are_the_same_in_another_folder(tmp_path: Path, maze: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_options_are_the_same_in_another_folder(tmp_path: Path, maze: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    said = Words("maze.txt", advisors=("recorded:lesson", "tau=0.2"), memory=True)
-    assert Words.from_json(said.to_json(), "here") == replace(
+    said = LessonOptions("maze.txt", advisors=("recorded:lesson", "tau=0.2"), memory=True)
+    assert LessonOptions.from_json(said.to_json(), "here") == replace(
         said, subtask=str(maze), advisors=(f"recorded:{tmp_path / 'lesson'}", "tau=0.2")
     )
     with pytest.raises(BadInput, match=r"here: its options are none of lab teach: .*seed"):
-        Words.from_json(said.to_json() | {"seed": "x"}, "here")
+        LessonOptions.from_json(said.to_json() | {"seed": "x"}, "here")
     with pytest.raises(BadInput, match="nothing to learn"):
-        Words().complete()
-    assert Words("insert").complete().advisors == ("expert",)
+        LessonOptions().complete()
+    assert LessonOptions("insert").complete().advisors == ("expert",)
 
 
 def test_a_session_goes_on_as_it_was_begun(tmp_path: Path, maze: Path) -> None:
@@ -216,35 +226,31 @@ def test_a_session_goes_on_as_it_was_begun(tmp_path: Path, maze: Path) -> None:
     whole = journal.read_bytes()
     journal.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))
     kept = KeptSession(tmp_path / "lesson", "--resume")
-    assert kept.same(Words()) == kept.words == words(maze)
+    assert kept.same(LessonOptions()) == kept.options == options(maze)
     with pytest.raises(BadInput, match="--seed beside --resume"):
-        kept.same(Words(seed=4))
+        kept.same(LessonOptions(seed=4))
     journal.write_bytes(whole)
     with pytest.raises(BadInput, match="is over: look at it again with lab replay"):
-        KeptSession(tmp_path / "lesson", "--resume").same(Words())
+        KeptSession(tmp_path / "lesson", "--resume").same(LessonOptions())
 
 
-class Heard(Audience):
-    def __init__(self) -> None:
-        self.events: list[Any] = []
-
-    def hears(self, name: str, event: Any, is_new: bool) -> None:
-        self.events.append(event)
+def told(heard: list[Event]) -> list[Any]:
+    """What the sessions told."""
+    return [event.event for event in heard if isinstance(event, LessonEvent)]
 
 
 def test_a_replay_shows_every_answer_and_changes_nothing(tmp_path: Path, maze: Path) -> None:
     held(tmp_path, maze)
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
-    shown: list[tuple[int, int, int, int | None]] = []
-    audience = Heard()
+    heard: list[Event] = []
     kept = KeptSession(tmp_path / "lesson", "DIR", read_only=True)
-    document = replay(
-        kept, audience, lambda request, action: shown.append((request.episode, request.step, request.state, action))
-    )
+    document = replay(kept, WorldSubject.of(kept.options), heard.append)
+    answered = [(event.request, event.action) for event in heard if isinstance(event, QuestionAnswered)]
+    shown = [(request.episode, request.step, request.state, action) for request, action in answered]
     read = read_journal(tmp_path / "lesson", "DIR")
     given = [entry for entry in read.entries if isinstance(entry, AdviceGiven)]
     assert shown == [(one.episode, one.step, one.state, one.action) for one in given] != []
-    assert [one for one in read.entries if not isinstance(one, Answer)][:-1] == audience.events
+    assert [one for one in read.entries if not isinstance(one, Answer)][:-1] == told(heard)
     assert document["closed"]["episodes"] == 60
     assert document["receipt"]["helped_steps"] == sum(one.action is not None for one in given)
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
@@ -255,10 +261,11 @@ def test_a_replay_of_what_was_broken_off_ends_there(tmp_path: Path, maze: Path) 
     journal = tmp_path / "lesson" / FILE
     lines = journal.read_bytes().splitlines(keepends=True)
     journal.write_bytes(b"".join(lines[:60]) + lines[60][:9])
-    audience = Heard()
-    document = replay(KeptSession(tmp_path / "lesson", "DIR", read_only=True), audience, lambda request, action: None)
+    heard: list[Event] = []
+    kept = KeptSession(tmp_path / "lesson", "DIR", read_only=True)
+    document = replay(kept, WorldSubject.of(kept.options), heard.append)
     assert (document["closed"], document["cut"].encode()) == (None, lines[60][:9])
-    assert len(audience.events) <= 59
+    assert len(told(heard)) <= 59
 
 
 def test_a_kept_evening_is_given_to_another_gate(tmp_path: Path, maze: Path) -> None:
@@ -268,6 +275,6 @@ def test_a_kept_evening_is_given_to_another_gate(tmp_path: Path, maze: Path) -> 
     journal.tell(AdviceGiven(1, 1, 0, 3, 0))  # from the start to the right
     journal.close()
     name = f"recorded:{tmp_path / 'lesson'}"
-    document = teach(words(maze, name, gate="always"), teacher(tmp_path / "other", person, name), None)
+    document = taught(options(maze, name, gate="always"), teacher(tmp_path / "other", person, name), None)
     assert document["helped_steps"] >= 60  # at least once an episode
     assert document["receipt"]["refused"][SILENT] > 0

@@ -14,9 +14,12 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.skills import Butter, Grasp, Skill
 from lab.tasks.grid_world import AdvisorView, GridWorld
 from lab.tasks.task_file import Task, fitting, load
-from lab.teaching.kept_session import Words
-from lab.teaching.lesson import find_skill, teach, teach_one, teach_world
-from lab.teaching.teacher import Interrupted, Teacher
+from lab.teaching.lesson import one_lesson, teach
+from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.lesson_plan import Interrupted
+from lab.teaching.skill_subject import SkillSubject, find_skill
+from lab.teaching.teacher import Teacher
+from lab.teaching.world_subject import WorldSubject
 from lab.toolbox.registry import Toolbox
 from lab.vision import read_picture
 
@@ -31,6 +34,12 @@ def teacher(tmp_path: Path) -> Teacher:
     return Teacher(Toolbox(tmp_path / "toolbox"))
 
 
+def teach_skill(
+    task: Task, subtask: str, teacher: Teacher, name: str | None = None, out: Path | None = None, **changes: Any
+) -> dict[str, Any]:
+    return one_lesson(SkillSubject.of(LessonOptions(subtask, **changes), task), teacher, name, out)
+
+
 # ---- teach --------------------------------------------------------------------------------------------------------
 
 TEACH_FIELDS = (
@@ -41,7 +50,7 @@ TEACH_FIELDS = (
 
 
 def test_one_session_with_pictures(task: Task, teacher: Teacher, tmp_path: Path) -> None:
-    document = teach_one(task, "insert", teacher, out=tmp_path / "out")
+    document = teach_skill(task, "insert", teacher, out=tmp_path / "out")
     assert tuple(document) == TEACH_FIELDS
     assert (document["skill"], document["episodes"], len(document["steps_per_episode"])) == (
         "insert at toaster",
@@ -58,7 +67,7 @@ def test_one_session_with_pictures(task: Task, teacher: Teacher, tmp_path: Path)
 
 
 def test_options_change_the_session(task: Task, teacher: Teacher) -> None:
-    document = teach_one(
+    document = teach_skill(
         task, "butter at butter_applier", teacher, learner="sarsa", gate="never", episodes=7, name="mine"
     )
     assert {name: document[name] for name in ("learner", "gate", "episodes", "requests", "saved_as", "files")} == {
@@ -73,9 +82,9 @@ def test_options_change_the_session(task: Task, teacher: Teacher) -> None:
 
 
 def test_a_taught_grasp_is_tried_in_physics(task: Task, teacher: Teacher) -> None:
-    good = teach_one(task, "grasp", teacher)
+    good = teach_skill(task, "grasp", teacher)
     assert (good["solved"], good["failure"]) == (True, None)
-    bad = teach_one(task, "grasp", teacher, episodes=1)
+    bad = teach_skill(task, "grasp", teacher, episodes=1)
     assert bad["solved"] is False
     assert "does not reach its goal" in bad["failure"]
     assert bad["saved_as"] == f"{good['saved_as']} unfinished"
@@ -87,7 +96,7 @@ def test_ctrl_c_keeps_the_session(task: Task, tmp_path: Path) -> None:
 
     teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": ask}))
     with pytest.raises(Interrupted, match="stopped by Ctrl-C after 29 episodes of 'insert at toaster'"):
-        teach_one(task, "insert", teacher, out=tmp_path / "out")
+        teach_skill(task, "insert", teacher, out=tmp_path / "out")
     (row,) = teacher.toolbox.list()
     assert (row["episodes"], row["solved"]) == (29, False)
     assert not (tmp_path / "out").exists()
@@ -99,8 +108,8 @@ def test_an_interrupted_session_is_gone_on_with(task: Task, tmp_path: Path) -> N
 
     toolbox = Toolbox(tmp_path)
     with pytest.raises(Interrupted):
-        teach_one(task, "insert", Teacher(toolbox, Advising.of(("terminal",), {"terminal": ask})))
-    again = teach_one(task, "insert", Teacher(toolbox))
+        teach_skill(task, "insert", Teacher(toolbox, Advising.of(("terminal",), {"terminal": ask})))
+    again = teach_skill(task, "insert", Teacher(toolbox))
     assert again["episodes"] == 200
     (row,) = toolbox.list()
     assert (row["name"], row["episodes"], row["solved"]) == (again["saved_as"], 29 + 200, again["solved"])
@@ -108,9 +117,9 @@ def test_an_interrupted_session_is_gone_on_with(task: Task, tmp_path: Path) -> N
 
 def test_a_name_of_another_problem_is_refused(task: Task, teacher: Teacher) -> None:
     for _ in range(2):  # its own name may be used again
-        teach_one(task, "butter", teacher, episodes=1, name="mine")
+        teach_skill(task, "butter", teacher, episodes=1, name="mine")
     with pytest.raises(BadInput, match=r"policy name 'mine' .--save.: it is the name of a policy for 'butter'"):
-        teach_one(task, "insert", teacher, name="mine")
+        teach_skill(task, "insert", teacher, name="mine")
     (row,) = teacher.toolbox.list()
     assert (row["subtask"], row["episodes"]) == ("butter", 2)
 
@@ -119,14 +128,14 @@ def test_a_grasp_that_lifts_nothing_is_not_kept_as_solved(
     task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("lab.skills.trial.try_out", lambda *_: "slice 1 is not in the gripper")
-    bad = teach_one(task, "grasp", teacher)
+    bad = teach_skill(task, "grasp", teacher)
     assert (bad["solved"], bad["failure"]) == (False, "slice 1 is not in the gripper")
     assert [(row["name"], row["solved"]) for row in teacher.toolbox.list()] == [(bad["saved_as"], False)]
     monkeypatch.undo()
-    good = teach_one(task, "grasp", teacher)
+    good = teach_skill(task, "grasp", teacher)
     assert [(row["name"], row["solved"]) for row in teacher.toolbox.list()] == [(good["saved_as"], True)]
     monkeypatch.setattr("lab.skills.trial.try_out", lambda *_: "slice 1 is not in the gripper")
-    worse = teach_one(task, "grasp", teacher)
+    worse = teach_skill(task, "grasp", teacher)
     assert worse["saved_as"] == f"{good['saved_as']} unfinished"
     assert {row["name"]: row["solved"] for row in teacher.toolbox.list()} == {
         good["saved_as"]: True,
@@ -134,13 +143,11 @@ def test_a_grasp_that_lifts_nothing_is_not_kept_as_solved(
     }
 
 
-def test_a_journal_says_solved_only_after_the_trial_in_physics(
-    task: Task, teacher: Teacher, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_journal_says_solved_only_after_the_trial_in_physics(task: Task, teacher: Teacher, tmp_path: Path) -> None:
     """The grasp of a slice as slippery as wet ice is learned, and lifts nothing: journal and toolbox say the same."""
     ice = task.model_copy(update={"slices": task.slices.model_copy(update={"friction": 0.0})})
-    monkeypatch.setattr("lab.teaching.lesson.load", lambda name: ice)
-    document = teach(Words("grasp", advisors=("expert",)), teacher, tmp_path / "lesson")
+    options = LessonOptions("grasp", advisors=("expert",))
+    document = teach(SkillSubject.of(options, ice), options, teacher, tmp_path / "lesson")
     assert (document["solved"], document["final_steps"]) == (False, document["optimal_steps"])
     assert document["failure"] is not None
     closed = read_journal(tmp_path / "lesson", "DIR").closed
@@ -157,7 +164,7 @@ def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
 
     monkeypatch.setattr("lab.skills.trial.try_out", stop)
     with pytest.raises(KeyboardInterrupt):
-        teach_one(task, "grasp", teacher)
+        teach_skill(task, "grasp", teacher)
     (row,) = teacher.toolbox.list()
     assert (row["solved"], row["final_steps"]) == (False, row["optimal_steps"])
 
@@ -180,9 +187,9 @@ def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
 def test_bad_words_are_refused_before_the_scene_is_surveyed(
     task: Task, teacher: Teacher, monkeypatch: pytest.MonkeyPatch, subtask: str, options: dict[str, Any], reason: str
 ) -> None:
-    monkeypatch.setattr("lab.skills.prepared_scene.prepare", lambda *_: pytest.fail("surveyed"))
+    monkeypatch.setattr("lab.teaching.skill_subject.prepare", lambda *_: pytest.fail("surveyed"))
     with pytest.raises(BadInput, match=reason):
-        teach_one(task, subtask, teacher, **options)
+        teach_skill(task, subtask, teacher, **options)
     assert not teacher.toolbox.folder.exists()
 
 
@@ -205,7 +212,7 @@ def world() -> GridWorld:
 
 
 def test_a_world_is_learned_and_drawn(world: GridWorld, teacher: Teacher, tmp_path: Path) -> None:
-    document = teach_world(world, teacher, out=tmp_path / "out")
+    document = one_lesson(WorldSubject(world), teacher, out=tmp_path / "out")
     assert tuple(document) == (*TEACH_FIELDS, "view")
     names = ("subtask", "skill", "task", "view", "learner", "gate")
     assert [document[name] for name in names] == ["world", "small", "small", "full", "q", "always"]
@@ -217,11 +224,12 @@ def test_a_world_is_learned_and_drawn(world: GridWorld, teacher: Teacher, tmp_pa
 
 
 def test_options_change_how_a_world_is_learned(world: GridWorld, teacher: Teacher) -> None:
-    document = teach_world(world, teacher, learner="sarsa", gate="never", episodes=7, name="mine")
-    changed = [document[name] for name in ("learner", "gate", "episodes", "requests", "saved_as", "files")]
-    assert changed == ["sarsa", "never", 7, 0, "mine", {}]
+    changed = world.changed("sarsa", "never", 7)
+    document = one_lesson(WorldSubject(changed), teacher, "mine")
+    told = [document[name] for name in ("learner", "gate", "episodes", "requests", "saved_as", "files")]
+    assert told == ["sarsa", "never", 7, 0, "mine", {}]
     with pytest.raises(BadInput, match=r"policy name 'mine' .--save.: it is the name of a policy for 'world'"):
-        teach_world(world.model_copy(update={"goal": (4, 0)}), teacher, name="mine")
+        one_lesson(WorldSubject(world.model_copy(update={"goal": (4, 0)})), teacher, "mine")
 
 
 def test_with_a_limited_view_a_person_is_asked_inside_it_only(world: GridWorld, tmp_path: Path) -> None:
@@ -232,7 +240,8 @@ def test_with_a_limited_view_a_person_is_asked_inside_it_only(world: GridWorld, 
             states.add(request.state)
             return request.own
 
-        teach_world(world, Teacher(Toolbox(tmp_path / view), Advising.of(("terminal",), {"terminal": ask})), view=view)
+        teacher = Teacher(Toolbox(tmp_path / view), Advising.of(("terminal",), {"terminal": ask}))
+        one_lesson(WorldSubject(world, view), teacher)
     region = set(np.flatnonzero(world.region()).tolist())
     assert world.mdp().start in asked["full"]
     assert asked["limited"] & region == asked["limited"] != set()
@@ -240,18 +249,17 @@ def test_with_a_limited_view_a_person_is_asked_inside_it_only(world: GridWorld, 
 
 def test_with_a_limited_view_simulated_advice_helps_less(world: GridWorld, teacher: Teacher) -> None:
     once = world.changed(None, None, 1)
-    full = teach_world(once, teacher)
-    limited = teach_world(once, teacher, view="limited", name="limited")
+    full = one_lesson(WorldSubject(once), teacher)
+    limited = one_lesson(WorldSubject(once, "limited"), teacher, "limited")
     assert (full["view"], full["helped_steps"]) == ("full", 7)  # the expert leads all the way
     assert (limited["view"], limited["helped_steps"] < 7) == ("limited", True)
 
 
-def test_a_view_that_is_none(world: GridWorld, teacher: Teacher) -> None:
+def test_a_view_that_is_none(world: GridWorld) -> None:
     with pytest.raises(BadInput, match=r"^unknown sight 'part' .--sight.: known: full, limited$"):
-        teach_world(world, teacher, view="part")
+        WorldSubject(world, "part")
     with pytest.raises(BadInput, match=r"^sight 'limited' .--sight.: the file of world 'small' has no \[view\]$"):
-        teach_world(world.model_copy(update={"view": None}), teacher, view="limited")
-    assert not teacher.toolbox.folder.exists()
+        WorldSubject(world.model_copy(update={"view": None}), "limited")
 
 
 def test_a_skill_by_its_name_or_the_first_of_a_sub_task() -> None:

@@ -15,8 +15,11 @@ from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.session import Session, SessionResult
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, greedy_path, grid
-from lab.tasks.task_file import Subtask
-from lab.teaching.teacher import MAX_SESSIONS, MORE_SESSIONS, Audience, Interrupted, Teacher, fits
+from lab.teaching.events import Event as LessonsEvent
+from lab.teaching.events import LessonEvent
+from lab.teaching.lesson_plan import MAX_SESSIONS, Interrupted, LessonPlan
+from lab.teaching.lesson_sessions import MORE_SESSIONS, fits
+from lab.teaching.teacher import Teacher
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
 
@@ -37,8 +40,10 @@ def teacher(tmp_path: Path) -> Teacher:
     return Teacher(Toolbox(tmp_path / "toolbox"))
 
 
-def settings(learner: LearnerSettings = QUICK) -> Subtask:
-    return Subtask(learner=learner, gate=GATE)
+def plan(
+    learner: LearnerSettings = QUICK, gate: GateSettings = GATE, about: Problem | None = None, **more: Any
+) -> LessonPlan:
+    return LessonPlan(about or problem(), learner, gate, "toast", **more)
 
 
 def known(policy: Policy) -> dict[tuple[str, str], Policy]:
@@ -46,19 +51,19 @@ def known(policy: Policy) -> dict[tuple[str, str], Policy]:
 
 
 def test_a_new_problem_is_learned_kept_and_then_found(teacher: Teacher) -> None:
-    lesson = teacher.find_or_teach(problem(), settings(), "toast", {})
+    lesson = teacher.find_or_teach(plan(), {})
     assert (lesson.source, lesson.policy.solved, lesson.policy.final_steps) == ("learned", True, 5)
     assert lesson.policy.name == f"insert at toaster {problem().mdp.signature[:8]}"
     index, damaged = teacher.toolbox.index()
     assert (len(index), damaged) == (1, [])
-    again = teacher.find_or_teach(problem("insert elsewhere"), settings(HOPELESS), "toast", index)
+    again = teacher.find_or_teach(plan(HOPELESS, about=problem("insert elsewhere")), index)
     assert (again.source, again.result, again.policy.name) == ("reused", None, lesson.policy.name)
     assert np.array_equal(again.policy.q, lesson.policy.q)
 
 
 def test_another_scene_is_learned_anew(teacher: Teacher) -> None:
-    first = teacher.find_or_teach(problem(), settings(), "toast", {})
-    other = teacher.find_or_teach(problem(columns=5), settings(), "toast", known(first.policy))
+    first = teacher.find_or_teach(plan(), {})
+    other = teacher.find_or_teach(plan(about=problem(columns=5)), known(first.policy))
     assert other.source == "learned"
     assert len(teacher.toolbox.index()[0]) == 2
 
@@ -66,23 +71,23 @@ def test_another_scene_is_learned_anew(teacher: Teacher) -> None:
 def test_an_unfinished_policy_is_learned_on(teacher: Teacher) -> None:
     why = f"'insert at toaster' was not learned in {MAX_SESSIONS} episodes.*what was learned is kept"
     with pytest.raises(WorkFailed, match=why):
-        teacher.find_or_teach(problem(), settings(HOPELESS), "toast", {})
+        teacher.find_or_teach(plan(HOPELESS), {})
     index, _ = teacher.toolbox.index()
     (unfinished,) = index.values()
     assert (unfinished.solved, len(unfinished.curve), unfinished.visits.sum()) == (False, MAX_SESSIONS, MAX_SESSIONS)
-    lesson = teacher.find_or_teach(problem(), settings(), "toast", index)
+    lesson = teacher.find_or_teach(plan(), index)
     assert (lesson.source, lesson.policy.solved) == ("continued", True)
     assert teacher.toolbox.index()[0].keys() == index.keys()
 
 
 def test_a_policy_of_another_size_or_with_other_actions_is_not_taken(teacher: Teacher) -> None:
-    sound = teacher.find_or_teach(problem(), settings(), "toast", {}).policy
+    sound = teacher.find_or_teach(plan(), {}).policy
     q, visits = np.zeros((7, 4)), np.zeros((7, 4), np.int64)
     for wrong in (
         replace(sound, q=q, visits=visits, shape=(7,), start=0),
         replace(sound, action_labels=("n", "s", "w", "e")),
     ):
-        assert teacher.find_or_teach(problem(), settings(), "toast", known(wrong)).source == "learned"
+        assert teacher.find_or_teach(plan(), known(wrong)).source == "learned"
 
 
 def detour(teacher: Teacher) -> Policy:
@@ -94,7 +99,7 @@ def detour(teacher: Teacher) -> Policy:
         q[state, action] = 1.0
         state = int(board.successor[state, action])
     assert board.goal[state]
-    half = teacher.teach(problem(), HOPELESS, GATE, "toast", sessions=1).policy
+    half = teacher.teach(plan(HOPELESS, sessions=1)).policy
     longer = replace(half, q=q, final_steps=7)
     teacher.toolbox.save(longer)
     return longer
@@ -102,17 +107,17 @@ def detour(teacher: Teacher) -> Policy:
 
 def test_a_way_that_is_not_the_shortest_is_learned_on_until_it_is(teacher: Teacher) -> None:
     longer = detour(teacher)
-    lesson = teacher.find_or_teach(problem(), settings(), "toast", known(longer))
+    lesson = teacher.find_or_teach(plan(), known(longer))
     assert (lesson.source, lesson.policy.solved, lesson.policy.final_steps) == ("continued", True, 5)
     index, _ = teacher.toolbox.index()
-    assert teacher.find_or_teach(problem(), settings(), "toast", index).source == "reused"
+    assert teacher.find_or_teach(plan(), index).source == "reused"
 
 
 def test_the_longer_way_is_followed_when_no_shorter_one_is_found(teacher: Teacher) -> None:
     longer = detour(teacher)
     for tries in (1, 2):
         (kept,) = teacher.toolbox.index()[0].values()
-        lesson = teacher.find_or_teach(problem(), settings(HOPELESS), "toast", known(kept))
+        lesson = teacher.find_or_teach(plan(HOPELESS), known(kept))
         assert lesson.result is not None
         assert (lesson.source, len(lesson.result.steps), lesson.policy.final_steps) == ("continued", MORE_SESSIONS, 7)
         assert (lesson.policy.solved, len(lesson.policy.curve)) == (False, 1 + tries * MORE_SESSIONS)
@@ -133,7 +138,7 @@ def scripted(monkeypatch: pytest.MonkeyPatch, tables: "list[np.ndarray[Any, Any]
             moves = greedy_path(q, self.mdp, 40)
             return replace(super().run(), q=q, final_steps=len(moves[1]) if moves[2] else None, solved=solved)
 
-    monkeypatch.setattr("lab.teaching.teacher.Session", Scripted)
+    monkeypatch.setattr("lab.teaching.lesson_sessions.Session", Scripted)
     return began
 
 
@@ -141,18 +146,18 @@ def test_a_worse_table_never_replaces_a_better_one(teacher: Teacher, monkeypatch
     longer = detour(teacher)
     lost = np.zeros_like(longer.q)
     began = scripted(monkeypatch, [lost, longer.q, lost, lost, lost])
-    policy = teacher.teach(problem(), QUICK, GATE, "toast").policy
+    policy = teacher.teach(plan()).policy
     assert [q is longer.q for q in began] == [False, False, True, True, True]  # MORE_SESSIONS after it fits
     assert (policy.final_steps, policy.solved, policy.q is longer.q) == (7, False, True)
     scripted(monkeypatch, [lost])
-    policy = teacher.teach(problem(), QUICK, GATE, "toast", unfinished=longer, sessions=1).policy
+    policy = teacher.teach(plan(unfinished=longer, sessions=1)).policy
     assert (policy.final_steps, policy.q is longer.q) == (7, True)
 
 
 def test_going_on_keeps_the_history(teacher: Teacher) -> None:
-    half = teacher.teach(problem(), HOPELESS, GateSettings("always"), "toast", sessions=1).policy
+    half = teacher.teach(plan(HOPELESS, GateSettings("always"), sessions=1)).policy
     assert (half.curve, half.guided, half.helped_steps, half.requests) == ([2], [True], 1, 1)
-    lesson = teacher.teach(problem(), QUICK, GateSettings("always"), "toast", unfinished=half, sessions=1)
+    lesson = teacher.teach(plan(QUICK, GateSettings("always"), unfinished=half, sessions=1))
     policy, now = lesson.policy, lesson.result
     assert now is not None
     assert policy.curve == [2, *now.steps.tolist()]
@@ -164,17 +169,17 @@ def test_going_on_keeps_the_history(teacher: Teacher) -> None:
 
 def test_the_unfinished_one_is_found_also_beside_a_finished_one(teacher: Teacher) -> None:
     assert teacher.unfinished(problem()) is None
-    half = teacher.teach(problem(), HOPELESS, GATE, "toast", sessions=1).policy
+    half = teacher.teach(plan(HOPELESS, sessions=1)).policy
     found = teacher.unfinished(problem())
     assert found is not None
     assert found.name == half.name
-    teacher.teach(problem(), QUICK, GATE, "toast")
+    teacher.teach(plan())
     assert teacher.unfinished(problem()) is None
-    beside = teacher.teach(problem(), HOPELESS, GATE, "toast", sessions=1).policy
+    beside = teacher.teach(plan(HOPELESS, sessions=1)).policy
     found = teacher.unfinished(problem())
     assert found is not None
     assert found.name == beside.name == f"{half.name} unfinished"
-    done = teacher.teach(problem(), QUICK, GATE, "toast", unfinished=found).policy
+    done = teacher.teach(plan(unfinished=found)).policy
     assert (done.solved, done.curve[0]) == (True, 2)
     assert [row["name"] for row in teacher.toolbox.list()] == [half.name]
 
@@ -187,35 +192,29 @@ def test_who_left_or_was_rejected_is_not_asked_in_further_sessions(tmp_path: Pat
         raise AdvisorLeft
 
     teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": leave}))
-    slow = Subtask(learner=HOPELESS, gate=GateSettings("always"))
     for times in (1, 2):  # each skill asks once
         with pytest.raises(WorkFailed):
-            teacher.find_or_teach(problem(columns=3 + times), slow, "toast", {})
+            teacher.find_or_teach(plan(HOPELESS, GateSettings("always"), problem(columns=3 + times)), {})
         assert len(asked) == times
 
     def stay(request: AdviceRequest) -> int:
         asked.append(request)
         return 0  # into the wall
 
-    events: list[tuple[str, Event]] = []
+    heard: list[LessonsEvent] = []
     wary = GateSettings(first_episode=5, window=2, omega=0, lambda_threshold=1.0)
     short = LearnerSettings(episodes=8, max_steps=2)
     asked.clear()
-    teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": stay}), audience=Hearing(events))
+    teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": stay}), tell=heard.append)
     with pytest.raises(WorkFailed):
-        teacher.find_or_teach(problem(columns=6), Subtask(learner=short, gate=wary), "toast", {})
-    assert sum(isinstance(event, AdviceRejected) for _, event in events) == 1
+        teacher.find_or_teach(plan(short, wary, problem(columns=6)), {})
+    assert sum(isinstance(event, AdviceRejected) for _, event in told(heard)) == 1
     assert {request.episode for request in asked} == {5}
 
 
-class Hearing(Audience):
-    """Keeps what it hears, and from which lesson."""
-
-    def __init__(self, heard: list[tuple[str, Event]]) -> None:
-        self.heard = heard
-
-    def hears(self, name: str, event: Event, is_new: bool) -> None:
-        self.heard.append((name, event))
+def told(heard: list[LessonsEvent]) -> list[tuple[str, Event]]:
+    """What sessions told, and of which lesson."""
+    return [(event.lesson, event.event) for event in heard if isinstance(event, LessonEvent)]
 
 
 class Person:
@@ -234,9 +233,7 @@ class Person:
 def test_ctrl_c_keeps_what_was_learned_and_the_next_run_goes_on(tmp_path: Path) -> None:
     toolbox = Toolbox(tmp_path)
     with pytest.raises(Interrupted) as stopped:
-        Teacher(toolbox, Advising.of(("terminal",), {"terminal": Person(50)})).teach(
-            problem(), QUICK, GateSettings("always"), "toast"
-        )
+        Teacher(toolbox, Advising.of(("terminal",), {"terminal": Person(50)})).teach(plan(gate=GateSettings("always")))
     assert isinstance(stopped.value, KeyboardInterrupt)
     index, _ = toolbox.index()
     (kept,) = index.values()
@@ -246,46 +243,46 @@ def test_ctrl_c_keeps_what_was_learned_and_the_next_run_goes_on(tmp_path: Path) 
     assert (kept.visits.sum(), kept.advisor) == (50, "terminal")
     after = f"after {len(kept.curve)} episodes of 'insert at toaster'"
     assert str(stopped.value) == f"stopped by Ctrl-C {after}; what was learned is kept"
-    on = Teacher(toolbox).find_or_teach(problem(), settings(), "toast", index)
+    on = Teacher(toolbox).find_or_teach(plan(), index)
     assert on.source in ("continued", "reused")
     assert fits(on.policy.q, problem(), QUICK)
 
 
 def test_the_unfinished_never_replaces_the_finished(teacher: Teacher) -> None:
-    done = teacher.teach(problem(), QUICK, GATE, "toast").policy
-    half = teacher.teach(problem(), HOPELESS, GATE, "toast", sessions=1).policy
+    done = teacher.teach(plan()).policy
+    half = teacher.teach(plan(HOPELESS, sessions=1)).policy
     assert (done.solved, half.solved, half.name) == (True, False, f"{done.name} unfinished")
     assert [row["name"] for row in teacher.toolbox.list()] == [done.name, half.name]
     found = teacher.toolbox.find("insert", done.signature)
     assert found is not None
     assert found.name == done.name
-    again = teacher.teach(problem(), QUICK, GATE, "toast").policy
+    again = teacher.teach(plan()).policy
     assert again.name == done.name
 
 
 def test_a_name_of_ones_own_is_used_as_it_is(teacher: Teacher) -> None:
-    assert teacher.teach(problem(), HOPELESS, GATE, "toast", name="mine", sessions=1).policy.name == "mine"
-    assert teacher.teach(problem(), QUICK, GATE, "toast", name="mine").policy.name == "mine"
+    assert teacher.teach(plan(HOPELESS, name="mine", sessions=1)).policy.name == "mine"
+    assert teacher.teach(plan(name="mine")).policy.name == "mine"
     assert [row["solved"] for row in teacher.toolbox.list()] == [True]
 
 
 def test_a_long_skill_name_fits(teacher: Teacher) -> None:
     long = problem(f"transfer {'a' * 40} to {'b' * 40} with slice")
-    teacher.teach(long, QUICK, GATE, "toast")
-    name = teacher.teach(long, HOPELESS, GATE, "toast", sessions=1).policy.name
+    teacher.teach(plan(about=long))
+    name = teacher.teach(plan(HOPELESS, about=long, sessions=1)).policy.name
     assert name.endswith(f"{long.mdp.signature[:8]} unfinished")
 
 
 def test_several_sessions_are_one_lesson(teacher: Teacher) -> None:
     slow = LearnerSettings(episodes=2, max_steps=8)
-    events: list[tuple[str, Event]] = []
-    lesson = replace(teacher, audience=Hearing(events)).teach(problem(), slow, GATE, "toast")
+    heard: list[LessonsEvent] = []
+    lesson = replace(teacher, tell=heard.append).teach(plan(slow))
     assert lesson.result is not None
     episodes = len(lesson.result.steps)
     assert episodes in (4, 6, 8, 10, 12)
     assert lesson.policy.curve == lesson.result.steps.tolist()
     assert len(lesson.policy.guided) == episodes
-    ended = [(name, event.episode) for name, event in events if isinstance(event, EpisodeEnded)]
+    ended = [(name, event.episode) for name, event in told(heard) if isinstance(event, EpisodeEnded)]
     assert ended == [("insert at toaster", n % 2 + 1) for n in range(episodes)]
     assert lesson.policy.visits.sum() >= episodes
 
@@ -293,7 +290,7 @@ def test_several_sessions_are_one_lesson(teacher: Teacher) -> None:
 def test_the_seed_and_the_skill_decide_what_is_learned(tmp_path: Path) -> None:
     def table(seed: int, name: str = "insert at toaster") -> list[float]:
         teacher = Teacher(Toolbox(tmp_path), seed=seed)
-        q: list[float] = teacher.teach(problem(name), QUICK, GATE, "toast").policy.q.ravel().tolist()
+        q: list[float] = teacher.teach(plan(about=problem(name))).policy.q.ravel().tolist()
         return q
 
     assert table(1) == table(1)

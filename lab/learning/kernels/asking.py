@@ -9,16 +9,6 @@ from lab.learning.compiled import inlined, inner
 from lab.learning.gates import gate_rules as rules
 from lab.learning.kernels.learners import draw, gauge
 
-_OWN, _REMEMBERED, _ASKED, _PRACTISED = memory.OWN, memory.REMEMBERED, memory.ASKED, memory.PRACTISED
-_NOTHING = memory.NOTHING
-_ALWAYS, _FROM_X, _SLOW, _LONG = (
-    rules.OPENS_ALWAYS,
-    rules.OPENS_FROM_X,
-    rules.OPENS_WHILE_SLOW,
-    rules.OPENS_WHILE_LONG,
-)
-_ALIKE, _APART = rules.ASKS_WHERE_ALIKE, rules.ASKS_WHERE_APART
-_CHANCE, _DIFFER = rules.ASKS_BY_CHANCE, rules.ASKS_WHERE_TABLES_DIFFER
 _window_mean: Any = inner(rules.window_mean)
 _too_slow: Any = inner(rules.too_slow)
 _misled: Any = inner(rules.misled)
@@ -29,14 +19,14 @@ _unsure: Any = inlined(rules.unsure)
 def opens(asking: Any, lane: Any, steps: Any, max_steps: int, rejected: bool) -> bool:
     """`Gate.opens`: whether the episode that begins in a lane may ask; steps (E,) are those of its session."""
     rule, episode, window = asking.gate.opens, lane.episode, asking.window
-    if rule not in (_FROM_X, _LONG, _SLOW):
-        return bool(rule == _ALWAYS)
+    if rule not in (rules.OPENS_FROM_X, rules.OPENS_WHILE_LONG, rules.OPENS_WHILE_SLOW):
+        return bool(rule == rules.OPENS_ALWAYS)
     if episode < asking.first_episode:
         return False
-    if rule == _LONG:
+    if rule == rules.OPENS_WHILE_LONG:
         return bool(episode > window and _window_mean(steps, episode - 1, window) > asking.enough_steps)
-    if rule == _FROM_X or rejected or episode <= 2 * window:
-        return bool(rule == _FROM_X)
+    if rule == rules.OPENS_FROM_X or rejected or episode <= 2 * window:
+        return bool(rule == rules.OPENS_FROM_X)
     result = steps[episode - 2]
     if result == lane.last_result and result < max_steps:
         lane.equal_results += 1
@@ -85,13 +75,13 @@ def asks(work: Any, j: int, state: Any) -> bool:
     """`Gate.asks` in a state of lane j's open episode."""
     asking, lanes = work.asking, work.lanes
     rule = asking.gate.asks
-    if rule == _ALIKE:
+    if rule == rules.ASKS_WHERE_ALIKE:
         return bool(_unsure(lanes.widths[j], asking.psi))
-    if rule == _APART:
+    if rule == rules.ASKS_WHERE_APART:
         return bool(lanes.widths[j] >= asking.psi)
-    if rule == _CHANCE:
+    if rule == rules.ASKS_BY_CHANCE:
         return bool(draw(lanes.rng, j) < asking.rate)
-    if rule == _DIFFER:
+    if rule == rules.ASKS_WHERE_TABLES_DIFFER:
         return bool(_deviation(work, j, state) >= asking.spread)
     return True
 
@@ -111,21 +101,21 @@ def advised(work: Any, j: int, state: Any) -> Any:
 def decided(work: Any, memories: Any, j: int) -> Any:
     """The action of lane j's next step and where it comes from: its own, or what memory or the advisor says."""
     lanes, state = work.lanes, work.lanes.states[j]
-    action, source, said = np.uint64(lanes.chosen[j]), np.int64(_OWN), np.int64(_NOTHING)
+    action, source, said = np.uint64(lanes.chosen[j]), np.int64(memory.OWN), np.int64(memory.NOTHING)
     if memories is not None:
         if lanes.is_open[j]:
             said = np.int64(memories.said[j, state])
-        elif memories.now[j].practises == 1 and memories.way[j, state] != _NOTHING:
-            action, source = np.uint64(memories.way[j, state]), np.int64(_PRACTISED)
+        elif memories.now[j].practises == 1 and memories.way[j, state] != memory.NOTHING:
+            action, source = np.uint64(memories.way[j, state]), np.int64(memory.PRACTISED)
     if lanes.is_open[j]:
         lane = lanes.lane[j]
-        if (said != _NOTHING or lane.helped < lane.left) and asks(work, j, state):
-            if said != _NOTHING:
-                return np.uint64(said), np.int64(_REMEMBERED)
+        if (said != memory.NOTHING or lane.helped < lane.left) and asks(work, j, state):
+            if said != memory.NOTHING:
+                return np.uint64(said), np.int64(memory.REMEMBERED)
             lane.asked = 1
             if work.region[state]:
                 lane.helped += 1
-                action, source = advised(work, j, state), np.int64(_ASKED)
+                action, source = advised(work, j, state), np.int64(memory.ASKED)
                 if memories is not None:
                     memories.said[j, state] = action
     return action, source

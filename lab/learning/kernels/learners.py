@@ -9,7 +9,6 @@ from lab.learning.compiled import inlined
 from lab.learning.kernels.records import LANES
 from lab.learning.updates import afterstate, update
 
-_BELOW_ONE = selection.BELOW_ONE
 _exp_of: Any = inlined(selection.exp_of)
 _following: Any = inlined(splitmix.following)
 _mixed: Any = inlined(splitmix.mixed)
@@ -81,7 +80,7 @@ def choose(work: Any) -> None:
             values[a * LANES + j] = total
     for j in range(LANES):
         rng[j] = _following(rng[j])
-        mark = _fraction(_mixed(rng[j])) * values[(A - 1) * LANES + j] * _BELOW_ONE
+        mark = _fraction(_mixed(rng[j])) * values[(A - 1) * LANES + j] * selection.BELOW_ONE
         action = np.int64(0)
         for a in range(A - 1):
             action += np.int64(values[a * LANES + j] <= mark)

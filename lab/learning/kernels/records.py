@@ -13,7 +13,7 @@ from lab.mdp import FloatArray
 LANES = 24
 
 
-class Problem(NamedTuple):
+class ProblemArrays(NamedTuple):
     """The problem; successor, reward: (S * A,) flat; `ends`: 0 goes on, 1 goal, 2 another terminal state."""
 
     successor: NDArray[np.int32]
@@ -104,7 +104,7 @@ class Work(NamedTuple):
     the advisor's `Advice`.
     """
 
-    problem: Problem
+    problem: ProblemArrays
     learning: Learning
     asking: Asking
     thresholds: FloatArray

@@ -5,20 +5,19 @@ Nothing here waits, sends or draws. `document` says all; `Known.since` finds wha
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from lab.errors import counted
-from lab.learning.events import EpisodeEnded
 from lab.learning.gates import improvement
 from lab.learning.requests import Request, Standing
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
+from lab.seat.event_text import SessionText, Told
 from lab.seat.page.page_curve import Curve
 from lab.seat.page.page_grid import place_of, slice_of, spot
 from lab.seat.page.page_question import question_of
-from lab.seat.request_text import VERDICTS
+from lab.sequencing.cell.schedule import Move
 
 Json = dict[str, Any]
 UNLIMITED = 1_000_000_000  # a budget of this many steps is none
@@ -52,22 +51,11 @@ class Pending:
 
 @dataclass
 class Notice:
-    """What a learner says; tone: "good", "bad" or ""."""
+    """What is said about a lesson, and how often at once; tone: see `Told`."""
 
     text: str
     tone: str = ""
     times: int = 1
-
-    @classmethod
-    def of(cls, told: "Notice | EpisodeEnded", kind: str = "steps") -> "Notice":
-        """What is said of a guided episode, in words."""
-        if isinstance(told, Notice):
-            return told
-        outcome = f"I reached the goal in {counted(told.steps, 'step')}" if told.reached else "I did not reach the goal"
-        outcome = f"my order cost {told.steps:.1f}" if kind == "order" else outcome
-        verdict = f", {VERDICTS[told.verdict]}" if told.verdict else ""
-        tone = "bad" if told.verdict == "misled" else "good" * told.reached
-        return cls(f"Episode {told.episode}: {outcome}{verdict}; moves advised: {told.helped_steps}.", tone)
 
 
 @dataclass
@@ -83,7 +71,8 @@ class Learning:
     episodes: int = 0
     optimal: float | None = None
     curve: Curve = field(default_factory=Curve)
-    notices: deque[Notice | EpisodeEnded] = field(default_factory=lambda: deque(maxlen=MOST_NOTICES))
+    notices: deque[Notice] = field(default_factory=lambda: deque(maxlen=MOST_NOTICES))
+    text: SessionText = field(default_factory=SessionText)
     requests: int = 0  # episodes in which it asked
     taken: int = 0
     skipped: int = 0
@@ -100,15 +89,16 @@ class Learning:
     state: int | None = None  # where it was seen last
 
     def __post_init__(self) -> None:
+        self.text.kind = self.kind
         self.lately = deque(maxlen=2 * self.gate.window if self.gate is not None else 0)
 
-    def notice(self, text: str, tone: str = "") -> None:
-        """Something that the advisor should read; tone: "good", "bad" or "". What is said again at once is counted."""
+    def notice(self, told: Told) -> None:
+        """Something that the advisor should read. What is said again at once is counted."""
         last = self.notices[-1] if self.notices else None
-        if isinstance(last, Notice) and last.text == text:
+        if last is not None and last.text == told.text:
             last.times += 1
         else:
-            self.notices.append(Notice(text, tone))
+            self.notices.append(Notice(told.text, told.tone))
 
 
 @dataclass(frozen=True)
@@ -130,6 +120,7 @@ class Known:
     progress: Progress | None = None
     pending: Pending | None = None
     work: Json | None = None  # bars of the order
+    moves: list[Move] = field(default_factory=list)  # of the run that is carried out
     members: list[Json] = field(default_factory=list)
     receipt: Json | None = None
     ended: str = ""
@@ -141,6 +132,11 @@ class Known:
     def changed(self, *parts: str) -> None:
         """These parts of the document are not what they were."""
         self.touched.update(parts)
+
+    def begin(self, learning: Learning) -> None:
+        """A lesson, or a sequencer's session, begins."""
+        self.learning = learning
+        self.changed("lesson", "place", "robot", "curve", "standing", "notices", "slice")
 
     def settle(self) -> int:
         """Give what has changed a new version; the version of the whole."""
@@ -217,13 +213,6 @@ def _standing(known: Known, now_s: float) -> Json:
     }
 
 
-def _progress(known: Known, now_s: float) -> Json | None:
-    progress = known.progress
-    if progress is None:
-        return None
-    return {"phase": progress.phase, "parts": progress.parts, "done": progress.done, "lines": list(progress.lines)}
-
-
 PARTS: dict[str, Callable[[Known, float], Any]] = {
     "lesson": _lesson,
     "place": _place,
@@ -231,8 +220,8 @@ PARTS: dict[str, Callable[[Known, float], Any]] = {
     "question": _question,
     "curve": lambda known, now_s: known.learning.curve.document(),
     "standing": _standing,
-    "notices": lambda known, now_s: [vars(Notice.of(told, known.learning.kind)) for told in known.learning.notices],
-    "progress": _progress,
+    "notices": lambda known, now_s: [vars(notice) for notice in known.learning.notices],
+    "progress": lambda known, now_s: None if known.progress is None else asdict(known.progress),
     "work": lambda known, now_s: known.work,
     "members": lambda known, now_s: known.members,
     "receipt": lambda known, now_s: known.receipt,
@@ -260,7 +249,6 @@ def layer_of(known: Known, layer: int | None = None) -> Json | None:
 def standing_of(learning: Learning, standing: Standing) -> None:
     """Take over how advice stands with the learner; what has become worse is said."""
     if standing.misleads > learning.misleads:
-        learning.notice(
-            f"The last lesson did not help: {standing.misleads} so far, {standing.omega} are tolerated.", "bad"
-        )
+        text = f"The last lesson did not help: {standing.misleads} so far, {standing.omega} are tolerated."
+        learning.notice(Told(text, "bad"))
     learning.misleads, learning.helped_steps = standing.misleads, standing.helped_steps

@@ -6,42 +6,28 @@ the question waits. Several pages may watch, one of them has the seat.
 
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, is_dataclass
+from contextlib import suppress
+from dataclasses import asdict
 from math import inf
-from typing import Any, Protocol
+from typing import Any
 
 from lab.advice.journal import Undo
 from lab.errors import BadInput
-from lab.learning.events import Event
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
-from lab.learning.settings import GateSettings, LearnerSettings
-from lab.mdp import NoPath, TabularMDP, shortest_steps
-from lab.seat.order_text import ORDER
+from lab.mdp import NoPath, shortest_steps
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_messages import Answer
 from lab.seat.page.page_order import bars_of, made_until
 from lab.seat.page.page_panel import CLOSED, SeatPanel
-from lab.seat.page.page_state import Learning, Pending, Progress, standing_of
-from lab.sequencing.cell.schedule import Move
+from lab.seat.page.page_run import hear_run
+from lab.seat.page.page_state import Learning, Pending, standing_of
 from lab.sequencing.request import SequenceRequest
-from lab.sequencing.search import EpisodeSequenced
-from lab.teaching.listener import Listener
+from lab.teaching.events import ORDER, Event, LessonBegan, LessonEvent
+from lab.teaching.lesson_plan import LessonPlan
 from lab.view.meshcat import LiveView
 
 TITLE = "Teaching lab"
 MOST_STATES = 50_000  # of problems whose shortest way is looked for
-
-
-class Subject(Protocol):
-    """What a lesson is about, such as a `lab.skills.skill.Problem`."""
-
-    @property
-    def name(self) -> str:
-        """What it is called."""
-
-    @property
-    def mdp(self) -> TabularMDP:
-        """The problem's table."""
 
 
 class SeatPage(LiveView):
@@ -126,7 +112,7 @@ class SeatPage(LiveView):
     def _see_table(self, request: AdviceRequest) -> None:
         known = self._panel.known
         if known.learning.mdp not in (None, request.mdp):
-            self._new(Learning())
+            known.begin(Learning())
         learning = known.learning
         if learning.mdp is None:
             learning.mdp = request.mdp
@@ -137,49 +123,28 @@ class SeatPage(LiveView):
     def _see_order(self, request: SequenceRequest) -> None:
         known = self._panel.known
         if known.learning.kind != "order":
-            self._new(Learning(ORDER, "order", "s"))
+            known.begin(Learning(ORDER, "order", "s"))
         known.work = bars_of(made_until(request), request.run.now_s)
         known.changed("work", "standing")
 
-    # ---- lessons
+    # ---- what happens
 
-    def begin(self, problem: Subject, learner: LearnerSettings, gate: GateSettings) -> None:
-        """A lesson begins, or begins again because an answer was taken back: curve and notices begin anew."""
-        made = Learning(problem.name, mdp=problem.mdp, learner=learner, gate=gate, episodes=learner.episodes)
-        made.optimal = _fewest(problem.mdp, learner)
+    def hear(self, event: Event) -> None:
+        """Show what happens in a lesson or a run, of a lesson in as little time as can be."""
+        known = self._panel.known
+        if type(event) is LessonEvent:
+            with self._panel.guard:  # quicker than the condition's own way
+                if event.lesson != known.learning.title:  # one of another skill begins a new curve
+                    known.begin(Learning(event.lesson))
+                known.touched.update(hear(known.learning, event.event))
+            return
+        made = _lesson(event.plan) if isinstance(event, LessonBegan) else None
         with self._panel.lock:
-            self._panel.known.receipt, self._panel.known.ended = None, ""
-            self._new(made)
-
-    def begin_order(
-        self, title: str, episodes: int, gate: GateSettings | None = None, optimal: float | None = None, unit: str = "s"
-    ) -> None:
-        """A session of a sequencer begins; optimal: what no order can beat."""
-        with self._panel.lock:
-            self._panel.known.work = None
-            self._new(Learning(title, "order", unit, gate=gate, episodes=episodes, optimal=optimal))
-
-    def on_event(self, event: Event, skill: str = "") -> None:
-        """Something happened in a lesson; one of another skill begins a new curve."""
-        known = self._panel.known
-        with self._panel.guard:  # quicker than the condition's own way
-            if skill and known.learning.title != skill:
-                self._new(Learning(skill))
-            known.touched.update(hear(known.learning, event))
-
-    def on_order_episode(self, event: EpisodeSequenced) -> None:
-        """An order was tried; where somebody is asked, the session's own events say that, and whether it was guided."""
-        known = self._panel.known
-        if known.learning.gate is None:
-            with self._panel.lock:
-                known.learning.curve.add(event.cost, False)
-                known.changed("curve")
-
-    def _new(self, learning: Learning) -> Learning:
-        known = self._panel.known
-        known.learning = learning
-        known.changed("lesson", "place", "robot", "curve", "standing", "notices", "slice")
-        return learning
+            if made is None:
+                hear_run(known, event)
+            else:  # anew, too, because an answer was taken back
+                known.receipt, known.ended = None, ""
+                known.begin(made)
 
     # ---- what is shown beside
 
@@ -188,28 +153,14 @@ class SeatPage(LiveView):
         self._show("receipt", dict(document))
 
     def members(self, members: Iterable[Any]) -> None:
-        """Several advisors: records or dicts with `name`, `trust`, `low`, `high` and `dropped`."""
-        self._show("members", [_member(member) for member in members])
-
-    def work(self, moves: Iterable[Move]) -> None:
-        """The work so far, as bars of robot and machines."""
-        self._show("work", bars_of(list(moves)))
-
-    def progress(self, progress: Progress) -> None:
-        """How a whole run goes."""
-        self._show("progress", progress)
+        """Several advisors: records with `name`, `trust`, `low`, `high` and `dropped`."""
+        self._show("members", [asdict(member) for member in members])
 
     def finished(self, text: str) -> None:
         """The lesson is over: nothing is asked any more."""
         self._panel.close()
         self._show("ended", text)
         self._wake()
-
-    def listener(self) -> Listener:
-        """Who shows a whole run, or the sessions of a sequencer, in the panel."""
-        from lab.seat.page.page_run import SeatListener
-
-        return SeatListener(self)
 
     def _show(self, part: str, value: Any) -> None:
         with self._panel.lock:
@@ -236,15 +187,11 @@ def _said(pending: Pending, answer: Answer | None) -> int | None:
     return answer.action
 
 
-def _fewest(mdp: TabularMDP, learner: LearnerSettings) -> float | None:
-    """The fewest steps of a certain problem, counted as the learner counts; None where nobody knows them."""
-    if mdp.n_states > MOST_STATES or not (mdp.shape or mdp.coverage_shape):
-        return None
-    try:
-        return shortest_steps(mdp) + learner.count_start
-    except NoPath:
-        return None
-
-
-def _member(member: Any) -> dict[str, Any]:
-    return asdict(member) if is_dataclass(member) and not isinstance(member, type) else dict(member)
+def _lesson(plan: LessonPlan) -> Learning:
+    """A lesson that begins, beside the fewest steps of a certain problem, counted as the learner counts, where they are known."""
+    mdp, learner = plan.problem.mdp, plan.learner
+    made = Learning(plan.problem.name, mdp=mdp, learner=learner, gate=plan.gate, episodes=learner.episodes)
+    if mdp.n_states <= MOST_STATES and (mdp.shape or mdp.coverage_shape):
+        with suppress(NoPath):
+            made.optimal = shortest_steps(mdp) + learner.count_start
+    return made

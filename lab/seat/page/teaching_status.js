@@ -75,18 +75,7 @@ const seatStatus = (() => {
     seatDraw.bars(el("bars"), work);
   }
 
-  function worded(value) {
-    if (value === null || value === undefined) return "–";
-    if (typeof value === "boolean") return value ? "yes" : "no";
-    if (typeof value === "number") return String(seatDraw.nice(value));
-    if (Array.isArray(value)) return value.map(worded).join(value.some((one) => typeof one === "string" && one.length > 24) ? " " : ", ") || "none";
-    if (typeof value === "object") return Object.entries(value).map(([key, inner]) => `${key.replaceAll("_", " ")} ${worded(inner)}`).join(", ") || "none";
-    return String(value);
-  }
-
-  // The rows of a session's receipt; of a document that is none, all that is in it
   function receiptRows(of) {
-    if (!("questions" in of && "taken" in of)) return Object.entries(of).map(([key, value]) => [key.replaceAll("_", " "), worded(value)]);
     const rows = [["It asked in", `${count(of.requests, "episode")}, about ${count(of.questions, "step")}`]];
     if (of.taken) rows.push([of.yours ? "With your help" : "With advice", `${count(of.taken, "step")}, ${of.agreed} its own choice, too`]);
     for (const [why, times] of Object.entries(of.refused)) rows.push(["Not followed", `${times}: ${why}`]);

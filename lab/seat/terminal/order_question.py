@@ -92,11 +92,3 @@ class OrderQuestion:
     def where(self, request: SequenceRequest, state: int) -> str:
         """Where the robot is."""
         return request.run.cell.names[request.run.robot]
-
-    def came_to(self, cost: float) -> str:
-        """What an episode came to."""
-        return f"cost {cost:.1f}"
-
-    def ended(self, cost: float, reached: bool) -> str:
-        """How an episode ended."""
-        return self.came_to(cost)

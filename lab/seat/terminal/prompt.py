@@ -10,29 +10,23 @@ from rich.text import Text
 
 from lab.advice.journal import Undo
 from lab.errors import counted
-from lab.learning.events import (
-    AdviceEnded,
-    AdviceRejected,
-    AdviceRequested,
-    AdvisorDropped,
-    AdvisorReadmitted,
-    AdvisorsDisagreed,
-    EpisodeEnded,
-    Event,
-)
+from lab.learning.events import EpisodeEnded
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
 from lab.seat import request_text as facts
+from lab.seat.event_text import SessionText
 from lab.seat.terminal.line_reader import Outside, ReadLine, default_reader
 from lab.seat.terminal.order_question import OrderQuestion
 from lab.seat.terminal.screen import folded, room
 from lab.seat.terminal.table_question import TableQuestion
 from lab.sequencing.request import SequenceRequest
+from lab.teaching.events import ORDER, Event, LessonEvent
 
+STYLES = {"": "", "ask": "bold", "note": "yellow", "good": "green", "bad": "yellow", "lost": "bold red"}
 MOST_DRAWN = 5  # equal moves of a path that are drawn one by one
 
 
 class TeachingPrompt:
-    """Asks a person for advice: call it with a request (it is an `Ask`), pass events to `on_event`.
+    """Asks a person for advice: call it with a request (it is an `Ask`), pass events to `hear`.
 
     console: where everything is written, usually stderr. read_line shows a prompt and returns one line or raises
     EOFError; by default the terminal with arrow keys when stdin is one, else plain lines of stdin. plain: sentences
@@ -49,7 +43,7 @@ class TeachingPrompt:
         self._wall: tuple[int, int, int] | None = None  # that was said of last: episode, state, action
         self._table, self._order = TableQuestion(console, plain), OrderQuestion(console, plain)
         self._last: Request | None = None  # what was asked last
-        self._mean_before: float | None = None
+        self._text, self._order_text = SessionText(self._table.marks.named), SessionText(kind="order")
         self._guided = self._misleads = 0
 
     def __call__(self, request: Request) -> int | None:
@@ -182,69 +176,18 @@ class TeachingPrompt:
 
     # ---- what happens in the session --------------------------------------------------------------------------------
 
-    def on_event(self, event: Event, skill: str = "") -> None:
-        """Tells the person when the learner of `skill` starts asking, what came of it, and why it stops."""
-        if self._done:
+    def hear(self, event: Event) -> None:
+        """Tells the person when a learner starts asking, what came of it, and why it stops."""
+        if self._done or not isinstance(event, LessonEvent):
             return
-        match event:
-            case AdviceRequested():
-                self._mean_before = event.current_mean
-                what = f" about '{skill}'" if skill else ""
-                self._say(f"Episode {event.episode}: the learner asks for advice{what}.", "bold")
-            case EpisodeEnded():
-                self._drop_path(f"episode {event.episode} is over")
-                if event.guided:
-                    self._episode_ended(event)
-            case AdviceRejected():
-                now = self._way(self._last).came_to(event.steps)
-                self._say(
-                    f"The learner takes no more advice (episodes misled: {event.misleads}, tolerated: {event.omega}). "
-                    f"Episode {event.episode} {now}, those before it {event.mean_before:.1f}.",
-                    "bold red",
-                )
-            case AdviceEnded(reason="converged"):
-                self._say(f"Episode {event.episode}: the same result again and again; the learner asks no more.")
-            case AdviceEnded(reason="misled by what was remembered"):
-                self._say(
-                    f"Episode {event.episode}: what was said led round in circles or into obstacles; the learner asks "
-                    "no more."
-                )
-            case AdviceEnded():
-                self._say(f"Episode {event.episode}: advice has ended; the learner goes on alone.")
-            case AdvisorsDisagreed():
-                self._disagreed(event)
-            case AdvisorDropped():
-                trust = facts.percent(event.trust)
-                self._say(
-                    f"Episode {event.episode}: {event.advisor} is heard no more (trust {trust}): {event.why}.", "red"
-                )
-            case AdvisorReadmitted():
-                trust = facts.percent(event.trust)
-                self._say(
-                    f"Episode {event.episode}: {event.advisor} is heard again (trust {trust}): {event.why}.", "green"
-                )
-
-    def _episode_ended(self, event: EpisodeEnded) -> None:
-        """One line on an episode with advice: its steps beside the mean before it."""
-        self._guided += 1
-        good, verdict = facts.verdict(event, self._mean_before)
-        style = {True: "green", False: "yellow", None: ""}[good]
-        ended = self._way(self._last).ended(event.steps, event.reached)
-        what = f"Episode {event.episode} {ended}{verdict and f', {verdict}'}; moves advised: {event.helped_steps}."
-        self._say(what, style)
-
-    def _disagreed(self, event: AdvisorsDisagreed) -> None:
-        """Who said what, and whom the learner follows."""
-        last = self._last
-        where = f"state {event.state}" if last is None else self._way(last).where(last, event.state)
-
-        def named(action: int) -> str:
-            return f"move {action}" if last is None else str(self._way(last).named(last, action))
-
-        said = ", ".join(f"{who} says {named(action)}" for who, action in event.said)
-        followed = [who for who, action in event.said if action == event.followed]
-        whom = f"it follows {' and '.join(followed)}" if followed else f"it goes {named(event.followed)}"
-        self._say(f"Step {event.step} at {where}: {said}; {whom}.", "yellow")
+        if isinstance(event.event, EpisodeEnded):
+            self._drop_path(f"episode {event.event.episode} is over")
+            self._guided += event.event.guided
+        last, text = self._last, self._order_text if event.lesson == ORDER else self._text
+        mdp = last.mdp if isinstance(last, AdviceRequest) else None
+        told = text.told(event.event, mdp, event.lesson)
+        if told is not None:
+            self._say(told.text, STYLES[told.tone])
 
     def _say(self, text: str, style: str = "") -> None:
         clean = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

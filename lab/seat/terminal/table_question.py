@@ -3,7 +3,6 @@
 from rich.console import Console, RenderableType
 from rich.text import Text
 
-from lab.errors import counted
 from lab.learning.requests import AdviceRequest
 from lab.seat import request_text as facts
 from lab.seat.grid_text import Marks
@@ -24,7 +23,7 @@ class TableQuestion:
 
     def __init__(self, console: Console, plain: bool) -> None:
         self._console, self._plain = console, plain
-        self._marks = facts.WORDS_ONLY if plain else Marks.of(console)
+        self.marks = facts.WORDS_ONLY if plain else Marks.of(console)
 
     def subject(self, request: AdviceRequest) -> object:
         """What is learned."""
@@ -32,7 +31,7 @@ class TableQuestion:
 
     def asked(self, request: AdviceRequest) -> str:
         """The words before the cursor."""
-        return question(request, self._marks, room(self._console)[0])
+        return question(request, self.marks, room(self._console)[0])
 
     def shown(self, request: AdviceRequest) -> list[RenderableType]:
         """Where the learner is, what it would do, and how it has been doing."""
@@ -41,7 +40,7 @@ class TableQuestion:
             return [Text(), *folded(facts.sentences(request), width)]
         gap = [Text()] * (height >= ROOMY)
         left = height - len(gap) - 1 - len(self.asked(request)) // width
-        return [*gap, *screen(request, self._marks, width, left)]
+        return [*gap, *screen(request, self.marks, width, left)]
 
     def understood(self, line: str, request: AdviceRequest) -> Understood:
         """What a line means; see `understand`."""
@@ -55,7 +54,7 @@ class TableQuestion:
 
     def why(self, request: AdviceRequest, guided: int) -> list[str]:
         """Why it asks, with all its numbers; guided: the episodes that were given advice until now."""
-        return facts.reasons(request, self._marks, guided)
+        return facts.reasons(request, self.marks, guided)
 
     def explained(self, request: AdviceRequest) -> list[tuple[str, str]]:
         """What can be typed, and what it does."""
@@ -63,7 +62,7 @@ class TableQuestion:
 
     def named(self, request: AdviceRequest, action: int) -> str:
         """An action in words."""
-        return self._marks.named(request.mdp, action)
+        return self.marks.named(request.mdp, action)
 
     def briefly(self, request: AdviceRequest, action: int) -> str:
         """An action as one of many."""
@@ -72,11 +71,3 @@ class TableQuestion:
     def where(self, request: AdviceRequest, state: int) -> str:
         """What a state is called."""
         return request.mdp.state_label(state)
-
-    def came_to(self, steps: float) -> str:
-        """What an episode came to."""
-        return f"counted {counted(steps, 'step')}"
-
-    def ended(self, steps: float, reached: bool) -> str:
-        """How an episode ended."""
-        return f"{'reached the goal in' if reached else 'did not reach the goal:'} {counted(steps, 'step')}"

@@ -87,20 +87,9 @@ class Run:
             self.processed_s += process_s
         if not there.options:
             self.finished_s[part - 1] = drop_s
-        names = cell.names
-        return Move(
-            part,
-            names[start],
-            names[option.origin],
-            names[option.target],
-            leave_s,
-            reach_s,
-            pick_s,
-            drop_s,
-            process_s,
-            option.service_s,
-            option.carries,
-        )
+        way = cell.names[start], cell.names[option.origin], cell.names[option.target]
+        times_s = leave_s, reach_s, pick_s, drop_s, process_s
+        return Move(part, *way, *times_s, option.service_s, option.carries)
 
     def refusal(self, decision: int) -> str:
         """Why the decision may not be taken now, in words; empty when it may."""

@@ -25,7 +25,7 @@ from lab.skills.prepared_scene import prepare
 from lab.skills.skill import Skill
 from lab.tasks.grid_world import GridWorld, random_world
 from lab.tasks.task_file import load, load_world
-from lab.teaching.teacher import world_problem
+from lab.teaching.world_subject import world_problem
 from lab.view.scene_data import describe
 
 SKILLS = (

@@ -21,6 +21,8 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.page.teaching_page import SeatPage
 from lab.sim.frames import Body, Frame, Shape
+from lab.teaching.events import LessonBegan, LessonEvent
+from lab.teaching.lesson_plan import LessonPlan
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -51,13 +53,14 @@ class Teaching:
 
     def start(self) -> "Future[SessionResult]":
         self.page.show(ROBOT)
-        self.page.begin(Problem("board", "world", self.mdp), self.learner, self.gate)
+        about = Problem("board", "world", self.mdp)
+        self.page.hear(LessonBegan(LessonPlan(about, self.learner, self.gate, "")))
         return ThreadPoolExecutor(1).submit(self._learn)
 
     def _learn(self) -> SessionResult:
         def hear(event: Event) -> None:
             self.events.append(event)
-            self.page.on_event(event, "board")
+            self.page.hear(LessonEvent("board", event))
 
         rng = np.random.default_rng(0)
         result = run_session(self.mdp, self.learner, self.gate, Person(self._ask), rng, on_event=hear)
@@ -116,7 +119,7 @@ def test_a_whole_session_by_keys(tab: "Page", page: SeatPage, until: Until) -> N
         tab.keyboard.press(key)
     until(tab, says(1, 2))
     assert "1 row" not in tab.inner_text("#notices")
-    assert "Episode 1: I reached the goal in 3 steps; moves advised: 3." in tab.inner_text("#notices")
+    assert "Episode 1 reached the goal in 3 steps" in tab.inner_text("#notices")
     tab.keyboard.press("s")  # this one is the learner's own
     until(tab, "document.getElementById('standing').textContent.includes('1 left to it')")
     tab.keyboard.press("q")  # as in the terminal it ends the session, once it is sure
@@ -230,7 +233,7 @@ def test_time_is_up_and_the_learner_goes_on_alone(browser_page: "Page", until: U
         until(browser_page, OVER)
         assert len(session.result(20).steps) == 2
         assert AdviceEnded(1, "advisor left") in teaching.events
-        assert "I go on alone" in browser_page.inner_text("#notices")
+        assert "the learner goes on alone" in browser_page.inner_text("#notices")
 
 
 class Tunnel:

@@ -18,8 +18,10 @@ from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP, grid, optimal_values
 from lab.seat.page.teaching_page import SeatPage
 from lab.sequencing.request import SequenceRequest
+from lab.sequencing.search import Reference
 from lab.sequencing.simulate.run import Run, follow
 from lab.tasks.task_file import load_cell
+from lab.teaching.events import SequencingBegan
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -135,7 +137,7 @@ def test_the_order_is_advised(tab: "Page", page: SeatPage, until: Until) -> None
         state=0,
         made=(1,),
     )
-    page.begin_order("toast", 100, GateSettings(), 213.0)
+    page.hear(SequencingBegan(100, Reference(213.0, True, "A*"), GateSettings()))
     ThreadPoolExecutor(1).submit(page.ask, replace(request, run=follow(run.cell, ()), allowed=(1, 2, 3), made=()))
     until(tab, "document.querySelectorAll('#moves button:enabled').length === 3")
     tab.keyboard.press("1")
@@ -149,7 +151,7 @@ def test_the_order_is_advised(tab: "Page", page: SeatPage, until: Until) -> None
 
 def test_a_pallets_move_is_no_carry(tab: "Page", page: SeatPage, until: Until) -> None:
     run = Run(load_cell("fms").cell(("rook",)))
-    page.begin_order("fms", 100, GateSettings(), None)
+    page.hear(SequencingBegan(100, None, GateSettings()))
     made = list[int]()
     while run.allowed():
         request = SequenceRequest(
@@ -196,12 +198,6 @@ def test_the_receipt_is_shown(tab: "Page", page: SeatPage, until: Until) -> None
     assert "With advice\n1 step, 1 its own choice, too" in shown
     assert "Not followed\n1: nothing was said" in shown
     assert "Not the best\n0 of 1" in shown
-
-
-def test_a_receipt_of_another_kind_is_shown_as_it_is(tab: "Page", page: SeatPage, until: Until) -> None:
-    page.receipt({"own_tau": 0.31, "next_time": ["<i>less</i>"]})
-    until(tab, "!document.getElementById('receipt').hidden")
-    assert "own tau\n0.31\nnext time\n<i>less</i>" in tab.inner_text("#receipt")
 
 
 def test_everything_has_a_name_and_a_phone_has_no_sideways_scrolling(tab: "Page", page: SeatPage, until: Until) -> None:

@@ -183,8 +183,8 @@ def test_answers_are_counted(known: Known) -> None:
 
 def test_a_guided_episode_is_told_and_an_unguided_one_is_not(known: Known) -> None:
     assert tell(known, [ended(1, 30), ended(2, 20, helped=4), ended(3, 201, helped=2, reached=False)]) == [
-        "Episode 2: I reached the goal in 20 steps; moves advised: 4.",
-        "Episode 3: I did not reach the goal; moves advised: 2.",
+        "Episode 2 reached the goal in 20 steps; moves advised: 4.",
+        "Episode 3 did not reach the goal: 201 steps; moves advised: 2.",
     ]
 
 
@@ -192,9 +192,9 @@ def test_a_guided_episode_is_as_good_as_its_verdict(known: Known) -> None:
     verdicts: tuple[Verdict, ...] = ("better", "best", "misled")
     told = tell(known, [replace(ended(n, 16, helped=1), verdict=verdict) for n, verdict in enumerate(verdicts)])
     assert told == [
-        "Episode 0: I reached the goal in 16 steps, better than before; moves advised: 1.",
-        "Episode 1: I reached the goal in 16 steps, as good as the best so far; moves advised: 1.",
-        "Episode 2: I reached the goal in 16 steps, no better than before; moves advised: 1.",
+        "Episode 0 reached the goal in 16 steps, better than before; moves advised: 1.",
+        "Episode 1 reached the goal in 16 steps, as good as the best so far; moves advised: 1.",
+        "Episode 2 reached the goal in 16 steps, no better than before; moves advised: 1.",
     ]
     assert [notice["tone"] for notice in document(known)["notices"]] == ["good", "good", "bad"]
 
@@ -203,15 +203,15 @@ def test_a_rejection_is_told_with_its_numbers(known: Known) -> None:
     asked = [AdviceRequested(n, None, None, None) for n in range(4)]
     (text,) = tell(known, [*asked, AdviceRejected(33, 3, 2, 50, 41.25)])
     assert text == (
-        "Advice did not help in 3 of 4 episodes, 2 are tolerated: I go on alone. "
-        "Episode 33 took 50 steps, those before it 41.2 on average."
+        "The learner takes no more advice (episodes misled: 3, tolerated: 2). "
+        "Episode 33 counted 50 steps, those before it 41.2."
     )
     assert document(known)["standing"]["verdict"] == "rejected"
 
 
 def test_the_end_of_advice_is_told(known: Known) -> None:
     (text,) = tell(known, [AdviceEnded(9, "converged")])
-    assert text == "Episode 9: The same result again and again: I ask no more."
+    assert text == "Episode 9: the same result again and again; the learner asks no more."
     assert document(known)["standing"]["verdict"] == "converged"
 
 
@@ -222,9 +222,9 @@ def test_disagreement_dropping_and_readmission_are_told(known: Known) -> None:
         AdvisorReadmitted(9, "ann", 0.75, "it was right lately"),
     ]
     assert tell(known, events) == [
-        "At (0, 1) you disagreed: ann said up, bob said right. I went right.",
-        "I do not listen to ann any more: trust 25%, 4 of 5 did not help.",
-        "I listen to ann again: trust 75%, it was right lately.",
+        "Step 1 at (0, 1): ann says up, bob says right; it follows bob.",
+        "Episode 6: ann is heard no more (trust 25%): 4 of 5 did not help.",
+        "Episode 9: ann is heard again (trust 75%): it was right lately.",
     ]
 
 

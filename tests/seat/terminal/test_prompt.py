@@ -28,6 +28,7 @@ from lab.learning.requests import AdviceRequest, AdvisorLeft, Standing
 from lab.mdp import TabularMDP, grid
 from lab.seat.terminal.line_reader import PlainReader, TerminalReader
 from lab.seat.terminal.prompt import TeachingPrompt
+from lab.teaching.events import LessonEvent
 
 WORDS = ("up", "down", "left", "right")
 CUBE = ("left", "right", "backward", "forward", "down", "up")
@@ -159,7 +160,7 @@ def test_a_narrow_console_gets_short_lines() -> None:
 def test_nothing_typed_or_named_gets_an_escape_code_through() -> None:
     prompt, shown = prompted("\x1b[2J\nup\n")
     prompt(request())
-    prompt.on_event(AdvisorDropped(3, "tau=1\x1b[2J", 0.1, "why\x1b[2J"), "skill")
+    prompt.hear(LessonEvent("skill", AdvisorDropped(3, "tau=1\x1b[2J", 0.1, "why\x1b[2J")))
     assert "\x1b" not in said(shown)
     assert said(shown).count("\\x1b[2") == 4  # echoed, refused, named, explained
 
@@ -181,9 +182,9 @@ def test_done_ends_advice_for_every_skill() -> None:
         prompt(request())
     assert "No more advice in this run" in said(shown)
     before = said(shown)
-    prompt.on_event(AdviceEnded(31, "advisor left"), "insert at toaster")
-    prompt.on_event(AdviceRequested(30, None, None, None), "place at plate")
-    prompt.on_event(AdvisorDropped(30, "novice", 0.2, "it misled"), "place at plate")
+    prompt.hear(LessonEvent("insert at toaster", AdviceEnded(31, "advisor left")))
+    prompt.hear(LessonEvent("place at plate", AdviceRequested(30, None, None, None)))
+    prompt.hear(LessonEvent("place at plate", AdvisorDropped(30, "novice", 0.2, "it misled")))
     with pytest.raises(AdvisorLeft):
         prompt(request(board()))
     assert said(shown) == before
@@ -301,9 +302,9 @@ def test_events_are_told_with_their_numbers() -> None:
         AdviceEnded(34, "converged"),
         AdviceEnded(35, "advisor left"),
     ):
-        prompt.on_event(event)
-    prompt.on_event(AdviceRequested(36, None, None, None), "insert at toaster")
-    prompt.on_event(EpisodeEnded(36, 1, True, 1, None, True), "insert at toaster")
+        prompt.hear(LessonEvent("", event))
+    prompt.hear(LessonEvent("insert at toaster", AdviceRequested(36, None, None, None)))
+    prompt.hear(LessonEvent("insert at toaster", EpisodeEnded(36, 1, True, 1, None, True)))
     assert said(shown).splitlines() == [
         "Episode 30: the learner asks for advice.",
         "Episode 30 reached the goal in 12 steps, better than the 185.6 before; moves advised: 9.",
@@ -320,8 +321,8 @@ def test_events_are_told_with_their_numbers() -> None:
 def test_an_episode_as_good_as_the_best_is_no_bad_one() -> None:
     shown = console()
     prompt = TeachingPrompt(shown)
-    prompt.on_event(AdviceRequested(30, 0.0, 16.0, 16.0))
-    prompt.on_event(EpisodeEnded(30, 16, True, 9, 0.0, True, "best"))
+    prompt.hear(LessonEvent("", AdviceRequested(30, 0.0, 16.0, 16.0)))
+    prompt.hear(LessonEvent("", EpisodeEnded(30, 16, True, 9, 0.0, True, "best")))
     assert said(shown).splitlines()[1:] == [
         "Episode 30 reached the goal in 16 steps, as good as the best so far; moves advised: 9."
     ]
@@ -333,7 +334,7 @@ def test_misled_episodes_are_counted_aloud() -> None:
     for episode, (steps, misleads) in enumerate([(12, 0), (201, 1), (201, 2), (201, 3)], start=31):
         before = misleads - (steps == 201)
         prompt(replace(request(), episode=episode, standing=Standing(misleads=before, omega=7)))
-        prompt.on_event(EpisodeEnded(episode, steps, True, 1, None, steps < 201))
+        prompt.hear(LessonEvent("", EpisodeEnded(episode, steps, True, 1, None, steps < 201)))
     prompt(replace(request(), episode=35, standing=Standing(misleads=3, omega=7)))
     told = [line for line in said(shown).splitlines() if line.startswith("Your advice")]
     assert told == [
@@ -346,13 +347,13 @@ def test_misled_episodes_are_counted_aloud() -> None:
 def test_advisors_that_disagree_leave_and_come_back() -> None:
     prompt, shown = prompted("up\n")
     disagreed = AdvisorsDisagreed(31, 2, 1, (("terminal", 3), ("expert", 1), ("novice", 1)), 1)
-    prompt.on_event(disagreed)
+    prompt.hear(LessonEvent("", disagreed))
     prompt(request())
     before = len(said(shown))
-    prompt.on_event(disagreed)
-    prompt.on_event(replace(disagreed, followed=0))
-    prompt.on_event(AdvisorDropped(40, "novice", 0.312, "it misled in 5 of 6 episodes"))
-    prompt.on_event(AdvisorReadmitted(55, "novice", 0.61, "it was right in 4 of 5 states"))
+    prompt.hear(LessonEvent("", disagreed))
+    prompt.hear(LessonEvent("", replace(disagreed, followed=0)))
+    prompt.hear(LessonEvent("", AdvisorDropped(40, "novice", 0.312, "it misled in 5 of 6 episodes")))
+    prompt.hear(LessonEvent("", AdvisorReadmitted(55, "novice", 0.61, "it was right in 4 of 5 states")))
     assert said(shown).splitlines()[:2] == [
         "Step 2 at state 1: terminal says move 3, expert says move 1, novice says move 1; it follows expert",
         "and novice.",

@@ -20,6 +20,7 @@ from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.terminal.line_reader import PlainReader, TerminalReader
 from lab.seat.terminal.prompt import TeachingPrompt
+from lab.teaching.events import LessonEvent
 
 
 def board() -> TabularMDP:
@@ -87,7 +88,7 @@ def again(lines: str) -> tuple[SessionResult, str]:
 
     def tell(event: Event) -> None:
         if journal.tell(event):
-            prompt.on_event(event)
+            prompt.hear(LessonEvent("", event))
 
     while True:
         try:
@@ -142,7 +143,7 @@ def test_a_path_is_dropped_where_the_learner_is_elsewhere() -> None:
 def test_a_path_is_dropped_at_the_end_of_its_episode() -> None:
     prompt, shown = prompted("rrdd\nleft\n")
     assert prompt(request()) == 3
-    prompt.on_event(EpisodeEnded(31, 201, True, 1, 0.0, False))
+    prompt.hear(LessonEvent("", EpisodeEnded(31, 201, True, 1, 0.0, False)))
     assert "The rest of your path is dropped (→ ↓ ↓): episode 31 is over." in said(shown)
     assert prompt(replace(request(state=1), episode=32)) == 2
 
@@ -184,7 +185,7 @@ def teach(ask: Callable[[AdviceRequest], int | None], on_event: Callable[..., No
 
 def taught(lines: str) -> tuple[SessionResult, str]:
     prompt, shown = prompted(lines)
-    return teach(prompt, prompt.on_event), said(shown)
+    return teach(prompt, lambda event: prompt.hear(LessonEvent("", event))), said(shown)
 
 
 @pytest.mark.parametrize("lines", ["right\nright\nright\ndown\ndown\nauto\n", "3r2d\nauto\n", "rrrd\nd\nauto\n"])
@@ -213,6 +214,6 @@ def test_ctrl_c_keeps_what_was_learned(keys: str) -> None:
     with create_pipe_input() as pipe:
         pipe.send_text(keys)
         prompt = TeachingPrompt(shown, TerminalReader(shown, pipe, DummyOutput()))
-        result = teach(prompt, prompt.on_event)
+        result = teach(prompt, lambda event: prompt.hear(LessonEvent("", event)))
     assert (result.interrupted, len(result.steps), result.helped_steps) == (True, 3, 0)
     assert result.visits.sum() > 0

@@ -1,0 +1,188 @@
+"""What happens in lessons and runs, in words: the same for the terminal, the page and the progress lines."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from lab.errors import counted
+from lab.learning.events import (
+    AdviceEnded,
+    AdviceRejected,
+    AdviceRequested,
+    AdvisorDropped,
+    AdvisorReadmitted,
+    AdvisorsDisagreed,
+    EpisodeEnded,
+)
+from lab.learning.events import Event as SessionEvent
+from lab.mdp import TabularMDP
+from lab.seat.request_text import percent, verdict
+from lab.sequencing.cell.schedule import Move
+from lab.teaching.events import (
+    Event,
+    LessonContinued,
+    MoveMade,
+    MoveRetried,
+    MoveTimed,
+    PhaseBegan,
+    RecordSkipped,
+    SequenceFound,
+    SkillReady,
+)
+from lab.teaching.lesson_plan import Lesson
+from lab.view.figures import beside, gap_of
+
+PHASES = {
+    "learn": "Find or learn the skills",
+    "measure": "Time every move in simulation",
+    "sequence": "Find the order of the transfers",
+    "carry out": "Make toast in physics",
+    "draw": "Draw the pictures",
+}
+ENDED = {
+    "converged": "the same result again and again; the learner asks no more",
+    "advisor left": "advice has ended; the learner goes on alone",
+    "misled by what was remembered": "what was said led round in circles or into obstacles; the learner asks no more",
+}
+_SHOWN_MOVES = 24
+_LEAST_WAIT_S = 0.05  # that is worth a word
+
+Tone = Literal["", "ask", "note", "good", "bad", "lost"]
+
+
+@dataclass(frozen=True)
+class Told:
+    """What is said of an event, and whether that is good news for who advises."""
+
+    text: str
+    tone: Tone = ""
+
+
+def _label(mdp: TabularMDP, action: int) -> str:
+    return mdp.action_labels[action]
+
+
+@dataclass
+class SessionText:
+    """Words for the events of sessions, one after the other; an episode is held against the mean told when it asked.
+
+    named: what a move of a problem is called; kind: "steps", or "order", whose steps are costs.
+    """
+
+    named: Callable[[TabularMDP, int], str] = _label
+    kind: str = "steps"
+    _mean_before: float | None = None
+
+    def told(self, event: SessionEvent, mdp: TabularMDP | None = None, skill: str = "") -> Told | None:
+        """What is said of an event of this problem, None for nothing; skill: what is taught, where that has to be said."""
+        match event:
+            case AdviceRequested():
+                self._mean_before = event.current_mean
+                about = f" about '{skill}'" if skill else ""
+                return Told(f"Episode {event.episode}: the learner asks for advice{about}.", "ask")
+            case EpisodeEnded(guided=True):
+                return self._episode(event)
+            case AdviceRejected():
+                return Told(
+                    f"The learner takes no more advice (episodes misled: {event.misleads}, tolerated: {event.omega}). "
+                    f"Episode {event.episode} {self._counted(event.steps)}, those before it {event.mean_before:.1f}.",
+                    "lost",
+                )
+            case AdviceEnded():
+                return Told(f"Episode {event.episode}: {ENDED[event.reason]}.")
+            case AdvisorsDisagreed():
+                return self._disagreed(event, mdp)
+            case AdvisorDropped() | AdvisorReadmitted():
+                is_lost = isinstance(event, AdvisorDropped)
+                heard = f"{event.advisor} is heard {'no more' if is_lost else 'again'} (trust {percent(event.trust)})"
+                return Told(f"Episode {event.episode}: {heard}: {event.why}.", "lost" if is_lost else "good")
+        return None
+
+    def _episode(self, event: EpisodeEnded) -> Told:
+        """One line on an episode with advice: its steps beside the mean before it."""
+        good, judged = verdict(event, self._mean_before)
+        outcome = (
+            f"{'reached the goal in' if event.reached else 'did not reach the goal:'} {counted(event.steps, 'step')}"
+        )
+        outcome = self._counted(event.steps) if self.kind == "order" else outcome
+        text = f"Episode {event.episode} {outcome}{judged and f', {judged}'}"
+        tone: Tone = "" if good is None else "good" if good else "bad"
+        return Told(f"{text}; moves advised: {event.helped_steps}.", tone)
+
+    def _counted(self, steps: float) -> str:
+        return f"cost {steps:.1f}" if self.kind == "order" else f"counted {counted(steps, 'step')}"
+
+    def _disagreed(self, event: AdvisorsDisagreed, mdp: TabularMDP | None) -> Told:
+        """Who said what, and whom the learner follows."""
+        where = f"state {event.state}" if mdp is None else mdp.state_label(event.state)
+
+        def named(action: int) -> str:
+            return f"move {action}" if mdp is None else self.named(mdp, action)
+
+        said = ", ".join(f"{who} says {named(action)}" for who, action in event.said)
+        followed = [who for who, action in event.said if action == event.followed]
+        whom = f"it follows {' and '.join(followed)}" if followed else f"it goes {named(event.followed)}"
+        return Told(f"Step {event.step} at {where}: {said}; {whom}.", "note")
+
+
+def lesson_parts(lesson: Lesson, first_asked: int | None = None, rejected: AdviceRejected | None = None) -> list[str]:
+    """What came of a lesson, beginning with the steps of the learned way and the fewest; where known, when it asked."""
+    policy, result = lesson.policy, lesson.result
+    reached, fewest = policy.final_steps, policy.optimal_steps
+    parts = [f"{'?' if reached is None else reached}/{fewest or '?'} steps"]
+    if reached is not None and reached > (fewest or reached):
+        parts.append("not the shortest way")
+    if result is not None and not result.requests:
+        parts.append("never asked")
+    elif result is not None:
+        when = "" if first_asked is None else f" from episode {first_asked}"
+        parts.append(f"asked {result.requests} x{when}, {counted(result.helped_steps, 'helped step')}")
+        if rejected is not None:
+            misleads = counted(rejected.misleads, "mislead")
+            parts.append(f"rejected its advisor in episode {rejected.episode} after {misleads}")
+    return parts
+
+
+def sequence_parts(event: SequenceFound) -> tuple[str, str]:
+    """An order of the parts, and what it costs beside what no order can beat."""
+    best, known = event.result, event.reference
+    order = " ".join(map(str, best.sequence[:_SHOWN_MOVES]))
+    more = f" and {len(best.sequence) - _SHOWN_MOVES} more" if len(best.sequence) > _SHOWN_MOVES else ""
+    shown, reference = f"{best.cost:.1f} s", "its luckiest drawn episode"  # there is nothing to compare it with
+    if known is not None:
+        gap = known.gap(best.cost)
+        shown, bound = beside(best.cost, known.bound, known.unit, 1)
+        what = "proven optimum" if known.proven else "proven bound"
+        reference = f"{what} {bound}" + ("" if gap is None else f", gap {gap_of(gap, 1)}")
+    found = f"{shown} found in episode {best.episode_costs.index(best.cost) + 1} of {len(best.episode_costs)}"
+    return f"parts {order}{more}:", f"{found}, {reference}"
+
+
+def move_text(move: Move) -> str:
+    """What a move brought where."""
+    waited_s = move.pick_s - move.reach_s
+    wait = f", waited {waited_s:.1f} s" if waited_s > _LEAST_WAIT_S else ""
+    return f"toast {move.part}: {move.origin} to {move.target}{wait}"
+
+
+def run_text(event: Event) -> str:
+    """What happens in a run as one line; "" for what is not told."""
+    match event:
+        case PhaseBegan():
+            return PHASES.get(event.name, event.name)
+        case RecordSkipped():
+            return f"skipped: {event.why}"
+        case MoveRetried():
+            return f"failed, trying again: {event.why}"
+        case SkillReady():
+            return f"{event.lesson.source} {event.name}: {', '.join(lesson_parts(event.lesson))}"
+        case MoveTimed():
+            return f"{event.name}: {event.seconds:.2f} s"
+        case SequenceFound():
+            return " ".join(sequence_parts(event))
+        case MoveMade():
+            return f"{event.move.drop_s:.1f} s: {move_text(event.move)}"
+        case LessonContinued(unfinished=left):
+            length = counted(len(left.curve), "episode")
+            return f"'{left.name}' was left unfinished after {length}: it is learned on"
+    return ""

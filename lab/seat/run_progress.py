@@ -1,0 +1,147 @@
+"""How a run goes on, written to a console: phases, each skill's learning curve, when it asked and what came of it."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import TaskID
+from rich.text import Text
+
+from lab.learning.events import AdviceRejected, AdviceRequested
+from lab.seat.event_text import lesson_parts, move_text, run_text, sequence_parts
+from lab.teaching.events import (
+    Event,
+    LessonContinued,
+    LessonEvent,
+    MoveMade,
+    MoveRetried,
+    MoveTimed,
+    PhaseBegan,
+    RecordSkipped,
+    SequenceFound,
+    SkillReady,
+)
+from lab.teaching.lesson_plan import Lesson
+from lab.view.progress import bars_for, progress_bar, sparkline
+
+_NAME = 52
+_INDENT = 12
+_LONGEST_LIST = 8
+_UNLIMITED = 1000
+
+
+class RunProgress:
+    """Writes lines to `console`, which is not stdout, and on a terminal a progress bar below them.
+
+    Use it as a context manager for the bar; the lines come without it, too.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+        self._progress, self._bars = progress_bar(console), bars_for(console)
+        self._running = False
+        self._task: TaskID | None = None
+        self._first_asked: dict[str, int] = {}  # skill -> episode
+        self._rejected: dict[str, AdviceRejected] = {}
+        self._reused: list[tuple[str, str]] = []  # skill, sub-task
+
+    def __enter__(self) -> "RunProgress":
+        self._running = True
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._running = False
+        self._tell_reused()
+        self._progress.stop()
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Leave the terminal to somebody else, such as the teaching prompt."""
+        if not self._running:
+            yield
+            return
+        self._progress.stop()
+        try:
+            yield
+        finally:
+            self._progress.start()
+
+    def hear(self, event: Event) -> None:
+        """Write what happened; what a learner does is told in the line of its lesson."""
+        match event:
+            case LessonEvent(lesson=name, event=AdviceRequested() as asked):
+                self._first_asked.setdefault(name, asked.episode)
+            case LessonEvent(lesson=name, event=AdviceRejected() as rejected):
+                self._rejected[name] = rejected
+            case PhaseBegan():
+                self._begin(run_text(event), event.parts)
+            case LessonContinued():
+                self._say(run_text(event))
+            case RecordSkipped() | MoveRetried():
+                self._say((f"  {run_text(event)}", "yellow"))
+            case SkillReady() | MoveTimed() | SequenceFound() | MoveMade():
+                self._done(event)
+                if self._task is not None:
+                    self._progress.advance(self._task)
+
+    def _begin(self, title: str, parts: int) -> None:
+        self._tell_reused()
+        if self._task is not None:
+            self._progress.remove_task(self._task)
+        self._say((title, "bold"))
+        self._task = self._progress.add_task(title, total=parts)
+
+    def _done(self, event: SkillReady | MoveTimed | SequenceFound | MoveMade) -> None:
+        """One part of the phase is done."""
+        match event:
+            case SkillReady():
+                self._lesson(event.name, event.lesson)
+            case MoveTimed():
+                self._say(f"  {event.name:{_NAME}} {event.seconds:6.2f} s")
+            case SequenceFound():
+                order, found = sequence_parts(event)
+                self._pack([Text(f"  {order}"), Text(found)], gap=" ")
+            case MoveMade():
+                self._say(f"  {event.move.drop_s:7.1f} s  {move_text(event.move)}")
+
+    def _lesson(self, name: str, lesson: Lesson) -> None:
+        if lesson.result is None:
+            self._reused.append((name, lesson.policy.subtask))
+            return
+        steps, *rest = lesson_parts(lesson, self._first_asked.get(name), self._rejected.get(name))
+        curve = sparkline(lesson.result.steps.tolist(), bars=self._bars)
+        head = Text.assemble("  ", (f"{lesson.source:9}", "cyan"), f" {name:{_NAME}}")
+        self._pack([head, *map(Text, [f"{curve} {steps:>11}", *rest])])
+
+    def _tell_reused(self) -> None:
+        """In few lines, all skills that were there already."""
+        reused, self._reused = self._reused, []
+        if not reused:
+            return
+        names = [name for name, _ in reused]
+        if len(names) > _LONGEST_LIST:
+            counts = Counter(subtask for _, subtask in reused)
+            names = [f"{len(reused)} skills: " + ", ".join(f"{count} x {name}" for name, count in counts.items())]
+        parts = [Text(name + ",") for name in names[:-1]] + [Text(names[-1])]
+        self._pack([Text.assemble("  ", (f"{'reused':9}", "green"), " ") + parts[0], *parts[1:]], gap=" ")
+
+    def _say(self, *parts: str | tuple[str, str]) -> None:
+        self.console.print(Text.assemble(*parts), soft_wrap=True)
+
+    def _pack(self, parts: Sequence[Text], gap: str = "  ") -> None:
+        """Write parts side by side; one that does not fit begins another line. What is no terminal has no width."""
+        width = self.console.width if self.console.is_terminal else _UNLIMITED
+        line = parts[0]
+        for part in parts[1:]:
+            if line.cell_len + len(gap) + part.cell_len > width:
+                self._print(line)
+                line = Text(" " * _INDENT) + part
+            else:
+                line = line + gap + part
+        self._print(line)
+
+    def _print(self, line: Text) -> None:
+        line.rstrip()
+        self.console.print(line, soft_wrap=True)

@@ -1,0 +1,150 @@
+"""What happens in a lesson and in a whole run, as records; whoever hears them is one function of an event."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from lab.advice.journal import Journal
+from lab.learning import events as session
+from lab.learning.problem import Problem
+from lab.learning.requests import Advisor, Request
+from lab.learning.settings import GateSettings
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
+from lab.teaching.lesson_plan import Lesson, LessonPlan
+from lab.toolbox.policy import Policy
+
+ORDER = "The order of the transfers"  # the lesson of that name in a `LessonEvent`
+
+
+@dataclass(frozen=True)
+class ScenePrepared:
+    """Where the next lesson takes place, for those who show it: a prepared task, a world, None for no place at all."""
+
+    scene: Any
+    problem: Problem
+
+
+@dataclass(frozen=True)
+class LessonContinued:
+    """The next lesson goes on from a policy that was left unfinished."""
+
+    unfinished: Policy
+
+
+@dataclass(frozen=True)
+class LessonBegan:
+    """A lesson begins, or begins again because an answer was taken back: what it told before is told again."""
+
+    plan: LessonPlan
+    journal: Journal = field(default_factory=Journal)
+
+
+@dataclass(frozen=True)
+class AdvisorGathered:
+    """Who advises in the session that begins now, several as a `Panel`."""
+
+    advisor: Advisor | None
+
+
+@dataclass(frozen=True)
+class LessonEvent:
+    """Something happened in a session of the lesson of that name; not new: it is told again."""
+
+    lesson: str
+    event: session.Event
+    is_new: bool = True
+
+
+@dataclass(frozen=True)
+class QuestionAnswered:
+    """What an advisor said to a request; None: the step was left to the learner."""
+
+    request: Request
+    action: int | None
+
+
+@dataclass(frozen=True)
+class PhaseBegan:
+    """A phase of a run with so many parts begins."""
+
+    name: str
+    parts: int
+
+
+@dataclass(frozen=True)
+class RecordSkipped:
+    """What was kept is damaged, and was not read."""
+
+    why: str
+
+
+@dataclass(frozen=True)
+class SkillReady:
+    """A skill was found or learned."""
+
+    name: str
+    lesson: Lesson
+
+
+@dataclass(frozen=True)
+class MoveTimed:
+    """A move or a machine's process was timed [s]."""
+
+    name: str
+    seconds: float
+
+
+@dataclass(frozen=True)
+class SequencingBegan:
+    """A sequencer begins to try orders; gate: when it asks which part to move, None: it asks nobody."""
+
+    episodes: int
+    reference: Reference | None = None
+    gate: GateSettings | None = None
+
+
+@dataclass(frozen=True)
+class SequenceFound:
+    """The best order of a sequencer's session, beside what no order can beat; None: costs were drawn."""
+
+    result: SequenceResult
+    reference: Reference | None = None
+
+
+@dataclass(frozen=True)
+class MoveMade:
+    """A part was brought on."""
+
+    move: Move
+
+
+@dataclass(frozen=True)
+class MoveRetried:
+    """A step failed and is tried again."""
+
+    why: str
+
+
+Event = (
+    ScenePrepared
+    | LessonContinued
+    | LessonBegan
+    | AdvisorGathered
+    | LessonEvent
+    | QuestionAnswered
+    | PhaseBegan
+    | RecordSkipped
+    | SkillReady
+    | MoveTimed
+    | SequencingBegan
+    | EpisodeSequenced
+    | SequenceFound
+    | MoveMade
+    | MoveRetried
+)
+Tell = Callable[[Event], None]
+
+
+def unheard(event: Event) -> None:
+    """Nobody listens."""

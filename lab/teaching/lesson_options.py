@@ -1,0 +1,83 @@
+"""The options of a lesson as one record: typed by a person, or read from a journal's head."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from annotated_types import Ge, Le
+
+from lab.advice.advising import Advising
+from lab.errors import BadInput
+from lab.learning.requests import Ask
+from lab.tasks.record import Learned
+from lab.tasks.task_file import names_file
+from lab.teaching.lesson_plan import MAX_SESSIONS
+
+DEFAULT_ADVISORS = ("expert",)
+Settings = TypeVar("Settings", bound=Learned)
+
+
+@dataclass(frozen=True)
+class LessonOptions:
+    """The options of `lab teach` that a session depends on, by name; None or empty: not given. A journal keeps them.
+
+    view: where in a world the advisor sees (--sight); toasts and sessions: how many slices, and at most how many
+    sessions, the lesson of a `lab run` had.
+    """
+
+    subtask: str = ""
+    task: str | None = None
+    view: str | None = None
+    learner: str | None = None
+    gate: str | None = None
+    memory: bool | None = None
+    advisors: tuple[str, ...] = ()
+    asked: str = "together"
+    decide: str = "trust-weighted"
+    episodes: Annotated[int, Ge(1)] | None = None
+    seed: Annotated[int, Ge(0)] = 0
+    save: str | None = None
+    toasts: int | None = None
+    sessions: Annotated[int, Ge(1), Le(MAX_SESSIONS)] | None = None
+
+    def complete(self) -> "LessonOptions":
+        """With the advisor that is asked when none is named; BadInput when nothing is named to learn."""
+        if not self.subtask:
+            raise BadInput("nothing to learn (SUBTASK): name a sub-task, a world or gym:ID, or go on with --resume DIR")
+        return replace(self, advisors=self.advisors or DEFAULT_ADVISORS)
+
+    def changed(self, settings: Settings) -> Settings:
+        """How something is learned, with what these options say; BadInput for an unknown learner or gate."""
+        return settings.changed(self.learner, self.gate, self.episodes, self.memory)
+
+    def advising(self, people: Mapping[str, Ask] | None = None) -> Advising:
+        """Who advises, with the people behind such names as "terminal"."""
+        return Advising.of(self.advisors, people, self.asked, self.decide)
+
+    def to_json(self) -> dict[str, Any]:
+        """A plain dict, files by their whole paths, so that they are found from another folder."""
+
+        def whole(name: str | None) -> str | None:
+            return (
+                str(Path(name).absolute()) if name is not None and names_file(name) and Path(name).is_file() else name
+            )
+
+        def recorded(name: str) -> str:
+            head, _, path = name.partition("recorded:")
+            return f"recorded:{Path(path).absolute()}" if path and not head else name
+
+        changed = {"subtask": whole(self.subtask), "task": whole(self.task)}
+        return asdict(self) | changed | {"advisors": [recorded(name) for name in self.advisors]}
+
+    @classmethod
+    def from_json(cls, record: dict[str, Any], where: str) -> "LessonOptions":
+        """What `to_json` wrote; BadInput, naming where it stands, for anything else."""
+        from pydantic import TypeAdapter, ValidationError
+
+        try:
+            return TypeAdapter(cls).validate_python(record | {"advisors": tuple(record.get("advisors", ()))})
+        except (ValidationError, TypeError) as error:
+            raise BadInput(
+                f"{where}: its options are none of lab teach: {' '.join(str(error).split())[:160]}"
+            ) from None

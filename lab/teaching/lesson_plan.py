@@ -1,0 +1,51 @@
+"""What a lesson teaches and what comes of it: the records that teacher, sessions and listeners hand on."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from lab.advice.journal import Journal
+from lab.learning.problem import Problem
+from lab.learning.session import SessionResult
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.toolbox.policy import Policy
+
+MAX_SESSIONS = 20  # to reach the goal at all; further sessions go on from the table of the one before
+
+
+@dataclass(frozen=True)
+class LessonPlan:
+    """What a lesson teaches, to which learner with which gate, and the task, world or environment that it is kept under.
+
+    unfinished: a policy of this very problem that is learned on; name: what the policy is saved as, None: a free name;
+    sessions: at most so many.
+    """
+
+    problem: Problem
+    learner: LearnerSettings
+    gate: GateSettings
+    task: str
+    unfinished: Policy | None = None
+    name: str | None = None
+    sessions: int = MAX_SESSIONS
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """A taught skill: its policy with all its history, where that came from, and the sessions now (None when reused).
+
+    failure: why it failed when it was tried in physics, None when it did not, or was not tried.
+    """
+
+    policy: Policy
+    source: Literal["learned", "reused", "continued"]
+    result: SessionResult | None = None
+    failure: str | None = None
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C: what was learned so far has been kept, and the text says so."""
+
+
+Keep = Callable[[LessonPlan], Journal]  # gives a lesson its journal
+Trial = Callable[[Problem, Policy], str | None]  # tries in physics what was learned: why it failed, or None

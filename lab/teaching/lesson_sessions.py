@@ -1,0 +1,136 @@
+"""The sessions of one lesson, taken as one: each goes on from the best table so far, and tells what happens."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import inf
+from zlib import crc32
+
+import numpy as np
+
+from lab.advice.advising import Advising
+from lab.advice.journal import Again, Journal
+from lab.learning import events as session
+from lab.learning.environment import TableEnvironment, unreached
+from lab.learning.events import AdviceEnded, AdviceRejected
+from lab.learning.problem import Problem
+from lab.learning.requests import Advisor, Request, Walked
+from lab.learning.session import Session, SessionResult
+from lab.learning.settings import LearnerSettings
+from lab.mdp import FloatArray, greedy_path
+from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, Tell
+from lab.teaching.lesson_plan import LessonPlan
+from lab.toolbox.policy import Policy
+
+MORE_SESSIONS = 3  # to find a shorter way once the goal is reached
+
+
+def learn(plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tell: Tell) -> SessionResult:
+    """All sessions of a lesson as one, run from the beginning each time an answer is taken back.
+
+    Up to `plan.sessions` are run until the greedy path is as short as can be; once it leads to the goal, at most
+    MORE_SESSIONS further ones look for a shorter one. A table that leads to the goal is never given up for a worse one.
+    """
+    while True:
+        tell(LessonBegan(plan, journal))
+        try:
+            return _Sessions(plan, advising, seed, journal, tell).run()
+        except Again:
+            journal.rewind()
+
+
+class _Sessions:
+    """The sessions of a lesson under way, and who advises in them."""
+
+    def __init__(self, plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tell: Tell):
+        self.plan, self.advising, self.journal, self.tell = plan, advising, journal, tell
+        self.place = plan.problem.environment or TableEnvironment(plan.problem.mdp)
+        self.gate = replace(plan.gate, judge_unhelped=False) if advising.records else plan.gate
+        lived = 0 if plan.unfinished is None else len(plan.unfinished.curve)  # what did not help is not drawn again
+        self.rng = np.random.default_rng([seed, crc32(plan.problem.name.encode()), lived])
+        self.alone = False  # the advisor left or was rejected: nobody is asked about this skill again
+
+    def run(self) -> SessionResult:
+        """The curves of all sessions, with the best table of these and of the unfinished policy."""
+        plan, several, unfinished = self.plan, self.plan.sessions > 1, self.plan.unfinished
+        kept: SessionResult | Policy | None = unfinished
+        moves = before = inf if unfinished is None else moves_to_goal(unfinished.q, plan.problem, plan.learner)
+        left = plan.sessions if moves == inf else min(plan.sessions, MORE_SESSIONS)
+        whole: SessionResult | None = None
+        while left:
+            left -= 1
+            result = self._session(None if kept is None else kept.q)
+            whole, now = joined(whole, result), moves_to_goal(result.q, plan.problem, plan.learner)
+            if now <= moves:
+                if now < moves == inf:
+                    left = MORE_SESSIONS if several else 0
+                kept, moves = result, now
+            if result.interrupted or (kept is result and result.solved and now < inf):
+                break
+        assert whole is not None
+        assert kept is not None
+        if several and not (whole.interrupted or kept.solved) and before == moves < inf and unfinished is not None:
+            kept = unfinished  # no shorter way: with the same table, what was measured with it still holds
+        return replace(whole, q=kept.q, final_steps=kept.final_steps, solved=kept.solved)
+
+    def _session(self, q0: FloatArray | None) -> SessionResult:
+        plan, advisor = self.plan, None if self.alone else self._advisor()
+        return Session(self.place, plan.learner, self.gate, advisor, self.rng, q0).run(self._hear)
+
+    def _advisor(self) -> Advisor | None:
+        made = self.advising.gather(self.place, self.plan.learner, self.rng, journal=self.journal, tell=self._hear)
+        self.tell(AdvisorGathered(made))
+        return None if made is None else TellingAdvisor(made, self.tell)
+
+    def _hear(self, event: session.Event) -> None:
+        left_for_good = isinstance(event, AdviceEnded) and event.reason != "converged"
+        self.alone = self.alone or left_for_good or isinstance(event, AdviceRejected)
+        self.tell(LessonEvent(self.plan.problem.name, event, self.journal.tell(event)))
+
+
+class TellingAdvisor:
+    """An advisor whose answers are told."""
+
+    def __init__(self, advisor: Advisor, tell: Tell):
+        self._advisor, self._tell = advisor, tell
+        self.followed: Callable[[Walked], None] | None = getattr(advisor, "followed", None)
+
+    def advise(self, request: Request) -> int | None:
+        """The advisor's answer."""
+        action = self._advisor.advise(request)
+        self._tell(QuestionAnswered(request, action))
+        return action
+
+
+def fits(q: FloatArray, problem: Problem, learner: LearnerSettings) -> bool:
+    """Whether greedy steps lead from every start of the problem to its goal."""
+    return moves_to_goal(q, problem, learner) < inf
+
+
+def moves_to_goal(q: FloatArray, problem: Problem, learner: LearnerSettings) -> float:
+    """The moves of the greedy path from the start; infinite when it, or that from another start, misses the goal."""
+    if problem.environment is not None:
+        steps = problem.environment.judge(q, learner).final_steps
+        return inf if steps is None else steps
+    mdp = problem.mdp
+    _, actions, reached = greedy_path(q, mdp, mdp.n_states)
+    return len(actions) if reached and not unreached(q, mdp) else inf
+
+
+def joined(before: SessionResult | Policy | None, now: SessionResult) -> SessionResult:
+    """A session with the history of what it went on from before it: curves one after the other, counts added."""
+    if before is None:
+        return now
+    steps = before.curve if isinstance(before, Policy) else before.steps
+    whole = replace(
+        now,
+        visits=before.visits + now.visits,
+        steps=np.concatenate([np.asarray(steps, np.int64), now.steps]),
+        guided=np.concatenate([np.asarray(before.guided, bool), now.guided]),
+        requests=before.requests + now.requests,
+        helped_steps=before.helped_steps + now.helped_steps,
+    )
+    if isinstance(before, Policy):  # it does not know of misleads
+        return whole
+    first = before.rejected_at_episode
+    first = now.rejected_at_episode if first is None else first
+    return replace(whole, misleads=before.misleads + now.misleads, rejected_at_episode=first)

@@ -1,0 +1,80 @@
+"""One skill of a task as what a lesson is about: surveyed in its scene, and tried in physics when it is learned."""
+
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+from lab.errors import BadInput
+from lab.learning.problem import Problem
+from lab.skills import Skill
+from lab.skills.prepared_scene import Prepared, prepare
+from lab.skills.skillset import SkillSet
+from lab.skills.trial import trial_of
+from lab.tasks.record import Learned
+from lab.tasks.task_file import Task, check_toasts, fitting, load, names_of
+from lab.teaching.lesson import Subject
+from lab.teaching.lesson_options import LessonOptions
+from lab.toolbox.policy import Policy
+
+
+@dataclass
+class SkillSubject(Subject):
+    """A skill of a task, by its full name; toasts: how many slices the scene has."""
+
+    task: Task
+    skill: str
+    toasts: int
+    settings: Learned
+    scene: Prepared | None = None
+
+    def __post_init__(self) -> None:
+        self.name = self.task.name
+
+    @classmethod
+    def of(cls, options: LessonOptions, task: Task | None = None) -> "SkillSubject":
+        """The skill that the options name, by its full name or its sub-task; task: by default the one that they name."""
+        if options.view is not None:
+            raise BadInput(f"sight '{options.view}' (--sight): only a world has one, '{options.subtask}' is none")
+        task = task or load(options.task or "toast")
+        toasts = fitting(task, 2) if options.toasts is None else options.toasts
+        check_toasts(toasts, task)
+        wanted = find_skill(SkillSet.of(task, toasts).skills, options.subtask)
+        return cls(task, wanted.name, toasts, options.changed(task.subtask(wanted.subtask)))
+
+    def prepare(self, seed: int) -> Problem:
+        """Lay the scene out as the seed says, and survey the skill's problem."""
+        self.scene = prepare(self.task, self.toasts, seed, self.skill)
+        return self.scene.problems[self.skill]
+
+    def tried(self, problem: Problem, policy: Policy) -> str | None:
+        """Why the skill failed in physics."""
+        assert self.scene is not None
+        return trial_of(self.scene)(problem, policy)
+
+    def draw(self, policy: Policy, out: Path) -> dict[str, str]:
+        """The values over the picture that the problem was read from, where it was."""
+        from lab.view.plots import values_seen
+
+        assert self.scene is not None
+        skill = self.scene.skillset.skills[self.skill]
+        photo, path = skill.photo(), out / f"{skill.subtask}-value-map.png"
+        if photo is None:
+            return {}
+        values_seen(policy.q, skill.problem.mdp, photo.picture, photo.seen, path)
+        return {"value_map": str(path)}
+
+
+def find_skill(skills: "dict[str, Skill]", name: str) -> "Skill":
+    """The skill of that full name, or the first of that sub-task; BadInput lists what there is."""
+    if name in skills:
+        return skills[name]
+    for skill in skills.values():
+        if skill.subtask == name:
+            return skill
+    subtasks = sorted({skill.subtask for skill in skills.values()})
+    worlds = names_of("world")
+    near = get_close_matches(name, [*subtasks, *worlds, *skills], n=1)
+    hint = f" did you mean '{near[0]}'?" if near else ""
+    allowed = f"{', '.join(subtasks)}, or one skill's full name, such as '{next(iter(skills))}'"
+    allowed += f", or a world: {', '.join(worlds)}"
+    raise BadInput(f"unknown sub-task '{name}' (SUBTASK):{hint} known: {allowed}")

@@ -1,0 +1,79 @@
+"""A grid world as what a lesson is about."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lab.errors import BadInput, unknown
+from lab.learning.problem import Problem
+from lab.mdp import greedy_path
+from lab.tasks.grid_world import GridWorld
+from lab.tasks.task_file import load_world
+from lab.teaching.lesson import Subject
+from lab.teaching.lesson_options import LessonOptions
+from lab.toolbox.policy import Policy
+
+SIGHTS = ("full", "limited")
+
+
+def world_problem(world: GridWorld) -> Problem:
+    """What a grid world sets to learn; BadInput when that cannot be learned (see `GridWorld.check`)."""
+    return Problem(world.name, "world", world.check())
+
+
+@dataclass
+class WorldSubject(Subject):
+    """A grid world, in which nothing is simulated; with the sight "limited" advice comes from the region in its file only.
+
+    Raises BadInput for an unknown sight, and when the world has no limited one.
+    """
+
+    world: GridWorld
+    sight: str = "full"
+
+    def __post_init__(self) -> None:
+        if self.sight not in SIGHTS:
+            raise unknown("sight", self.sight, SIGHTS, "--sight")
+        if self.sight == "limited" and self.world.view is None:
+            raise BadInput(f"sight 'limited' (--sight): the file of world '{self.world.name}' has no [view]")
+        self.name, self.settings, self.scene = self.world.name, self.world, self.world
+        self.region = self.world.region() if self.sight == "limited" else None
+
+    @classmethod
+    def of(cls, options: LessonOptions) -> "WorldSubject":
+        """The world that the options name."""
+        world = load_world(options.subtask)
+        if options.task is not None:
+            raise BadInput(
+                f"task '{options.task}' (--task): the world '{options.subtask}' belongs to no task: leave --task away"
+            )
+        return cls(options.changed(world), options.view or "full")
+
+    def prepare(self, seed: int) -> Problem:
+        """What the world sets to learn."""
+        return world_problem(self.world)
+
+    def facts(self) -> dict[str, Any]:
+        """Where the advisor saw the robot."""
+        return {"view": self.sight}
+
+    def draw(self, policy: Policy, out: Path) -> dict[str, str]:
+        """The values of a world with two axes, and the learned way through it."""
+        if len(self.world.shape) != 2:
+            return {}
+        from lab.view.plots import Places, value_map
+
+        world, mdp, path = self.world, self.world.mdp(), out / "value-map.png"
+        states, _, _ = greedy_path(policy.q, mdp, mdp.n_states)
+        value_map(
+            policy.q.max(axis=1).reshape(world.shape),
+            None,
+            path,
+            places=Places(
+                route=[(row, column) for row, column in map(mdp.state_cell, states)],
+                blocked=world.blocked(),
+                start=(world.start[0], world.start[1]),
+                goal=(world.goal[0], world.goal[1]),
+            ),
+        )
+        return {"value_map": str(path)}
