@@ -338,14 +338,15 @@ def test_a_failed_run_says_so_and_leaves_no_old_chart(
     assert (document["success"], document["delivered"], document["dropped"]) == (False, 0, 1)
     assert (document["measured_makespan_s"], document["camera_deviation_m"]) == (None, None)
     assert document["failure"].startswith("toast 1 at 'plate': ")
-    (tmp_path / "gantt.png").write_text("old")
-    (tmp_path / "mine.txt").write_text("mine")
-    (tmp_path / ".run-k3pt_0ab").mkdir()  # a run that was killed while it drew has left this
-    (tmp_path / ".run-k3pt_0ab" / "gantt.png").write_text("half")
+    out = tmp_path / "out"
+    (out / ".run-k3pt_0ab").mkdir(parents=True)  # a run that was killed while it drew has left this
+    (out / ".run-k3pt_0ab" / "gantt.png").write_text("half")
+    (out / "gantt.png").write_text("old")
+    (out / "mine.txt").write_text("mine")
     curves = drawn(monkeypatch)
-    write_files(prepared, taught, failed, tmp_path)
+    write_files(prepared, taught, failed, out)
     assert sorted(failed.files) == sorted(set(FILES) - {"gantt"})
-    assert sorted(os.listdir(tmp_path)) == sorted(["mine.txt", "toolbox", *map(FILES.__getitem__, failed.files)])
+    assert sorted(os.listdir(out)) == sorted(["mine.txt", *map(FILES.__getitem__, failed.files)])
     assert len(curves) == len({lesson.policy.name for lesson in taught.lessons.values()})
     assert {"grasp at plate, starts vary", "insert at toaster"} < set(curves)
 
