@@ -7,9 +7,9 @@ from math import fsum, log
 
 from lab.advice.trust import Pair, Trail, Ways, bounds, circles, is_bad, is_good, trust, trust_there
 from lab.errors import BadInput, unknown
-from lab.learning.events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Walked
 from lab.learning.selection import Draw
+from lab.learning.session_events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.mdp import BoolArray
 
 PROBED = 0.1  # the share of the questions that a dropped advisor is still asked

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from lab.learning.events import Improvement
 from lab.learning.reasons import Reason
 from lab.learning.selection import chances
+from lab.learning.session_events import Improvement
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
 

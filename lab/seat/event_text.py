@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from lab.errors import counted
-from lab.learning.events import (
+from lab.learning.session_events import (
     AdviceEnded,
     AdviceRejected,
     AdviceRequested,
@@ -14,7 +14,7 @@ from lab.learning.events import (
     AdvisorsDisagreed,
     EpisodeEnded,
 )
-from lab.learning.events import Event as SessionEvent
+from lab.learning.session_events import Event as SessionEvent
 from lab.mdp import TabularMDP
 from lab.seat.request_text import percent, verdict
 from lab.sequencing.cell.schedule import Move

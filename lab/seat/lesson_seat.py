@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from lab.advice.entries import Answer
 from lab.advice.panel import Panel
-from lab.learning.events import EpisodeEnded
 from lab.learning.requests import Ask, Request
+from lab.learning.session_events import EpisodeEnded
 from lab.mdp import FloatArray
 from lab.seat.run_progress import RunProgress
 from lab.seat.terminal.prompt import TeachingPrompt

@@ -7,9 +7,9 @@ from rich.text import Text
 
 from lab.errors import counted
 from lab.learning.environment import TableEnvironment
-from lab.learning.events import EpisodeEnded
 from lab.learning.reasons import TooSlow
 from lab.learning.requests import AdviceRequest, Standing
+from lab.learning.session_events import EpisodeEnded
 from lab.mdp import TabularMDP
 from lab.seat.grid_text import Marks, Picture, nearest_goal, points_by_name
 from lab.view.grid_planes import is_map

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.progress import TaskID
 from rich.text import Text
 
-from lab.learning.events import AdviceRejected, AdviceRequested
+from lab.learning.session_events import AdviceRejected, AdviceRequested
 from lab.seat.event_text import lesson_parts, move_text, run_text, sequence_parts
 from lab.teaching.events import (
     Event,

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from lab.learning.events import Improvement
 from lab.learning.requests import AdviceRequest
+from lab.learning.session_events import Improvement
 from lab.mdp import TabularMDP, coverage, grid
 from lab.seat.grid_text import Marks, Picture, bracketed, direction_of, draw, picture_of, safe_ansi, window
 

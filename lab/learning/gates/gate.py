@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from lab.learning.events import Verdict
 from lab.learning.gates.gate_rules import Steps
 from lab.learning.reasons import Reason
 from lab.learning.selection import Draw
+from lab.learning.session_events import Verdict
 from lab.learning.settings import GateSettings
 from lab.learning.updates.update import Update
 

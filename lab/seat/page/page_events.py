@@ -1,6 +1,6 @@
 """What a session tells, taken over into what the teaching page shows: counts, the curve, and notices."""
 
-from lab.learning.events import (
+from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
     AdviceRejected,

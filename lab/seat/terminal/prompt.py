@@ -10,8 +10,8 @@ from rich.text import Text
 
 from lab.advice.journal import Undo
 from lab.errors import counted
-from lab.learning.events import EpisodeEnded
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
+from lab.learning.session_events import EpisodeEnded
 from lab.seat import request_text as facts
 from lab.seat.event_text import SessionText
 from lab.seat.terminal.line_reader import Outside, ReadLine, default_reader

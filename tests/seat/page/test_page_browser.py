@@ -13,10 +13,10 @@ import pytest
 
 from lab.advice.advisors import Person
 from lab.advice.journal import Undo
-from lab.learning.events import AdviceEnded, Event
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest
 from lab.learning.session import SessionResult, run_session
+from lab.learning.session_events import AdviceEnded, Event
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.page.teaching_page import SeatPage

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.learning.events import EpisodeEnded
 from lab.learning.requests import AdviceRequest
+from lab.learning.session_events import EpisodeEnded
 from lab.mdp import TabularMDP, grid
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_messages import Answer

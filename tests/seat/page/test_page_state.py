@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lab.learning.events import (
+from lab.learning.reasons import TooSlow
+from lab.learning.requests import AdviceRequest, Standing
+from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
     AdviceRejected,
@@ -21,8 +23,6 @@ from lab.learning.events import (
     Improvement,
     Verdict,
 )
-from lab.learning.reasons import TooSlow
-from lab.learning.requests import AdviceRequest, Standing
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.page.page_curve import MOST, Curve

@@ -14,11 +14,11 @@ import pytest
 from lab.advice.advisors import Person
 from lab.advice.journal import Undo
 from lab.errors import BadInput, WorkFailed
-from lab.learning.events import EpisodeEnded, Event, Improvement
 from lab.learning.problem import Problem
 from lab.learning.reasons import Reason, TooSlow
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.session import SessionResult, run_session
+from lab.learning.session_events import EpisodeEnded, Event, Improvement
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.page.teaching_page import SeatPage
