@@ -1,4 +1,4 @@
-"""What the commands that teach share: who hears of it, the teacher and the subject of the options, a kept session."""
+"""What the commands that teach share: who hears of it, the teacher and the subject of the options, what a kept session reads."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -10,6 +10,7 @@ from lab.cli.output import complain, console
 from lab.errors import BadInput, LabError
 
 if TYPE_CHECKING:
+    from lab.advice.entries import Read
     from lab.learning.requests import Ask
     from lab.production.sequence import Wanted
     from lab.seat.lesson_seat import LessonSeat
@@ -59,22 +60,10 @@ def teacher_of(toolbox: Path | None, options: "LessonOptions", seat: "LessonSeat
 
     advising = options.advising(seat.people())
     for journal in advising.cut_records():
-        complain(f"journal '{journal.path}': its last line was cut off and is left out: {journal.cut[:60]!r}")
+        _say_cut(journal)
     teacher = Teacher(Toolbox(toolbox), advising, options.seed, seat.hear)
     teacher.toolbox.check()
     return teacher
-
-
-def kept_session(
-    folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] | None = None
-) -> "KeptSession":
-    """A session that was kept; what was cut off at its end is said."""
-    from lab.teaching.kept_session import KeptSession
-
-    kept = KeptSession(folder, where, read_only=read_only, trusted=trusted or ())
-    if kept.read.cut:
-        complain(f"journal '{kept.read.path}': its last line was cut off and is left out: {kept.read.cut[:60]!r}")
-    return kept
 
 
 def subject_of(options: "LessonOptions", kept: "KeptSession | None" = None) -> "Subject":
@@ -120,22 +109,28 @@ def wanted_of(kept: "OrderSession", people: "Mapping[str, Ask]") -> "Wanted":
         options.asked,
         options.gate,
         people,
-        keep=lambda cell, objective: kept.keep(Path(options.task).stem, cell, objective),
+        keep=kept.keep,
     )
 
 
-def say_outside(kept: "KeptSession | OrderSession") -> None:
-    """Says which files that are not its own a session has the lab read when it goes on or is shown again."""
+def _say_cut(read: "Read") -> None:
+    complain(f"journal '{read.path}': its last line was cut off and is left out: {read.cut[:60]!r}")
+
+
+def say_read(kept: "KeptSession | OrderSession", where: str) -> None:
+    """Says of a session that goes on or is shown again what was cut off, and which files are read that are not its own."""
     from lab.advice.advisors import AdvisorName
     from lab.tasks.task_file import is_path
 
     assert kept.read is not None
+    if kept.read.cut:
+        _say_cut(kept.read)
     options = kept.options
     named: list[object] = [getattr(options, "subtask", None), options.task]
     if str(named[0]).startswith(GYM):
         from lab.gym import parse_name
 
-        named = list(parse_name(str(named[0]), kept.where).options.values())
+        named = list(parse_name(str(named[0]), where).options.values())
     files = [word for word in named if isinstance(word, str) and is_path(word) and Path(word).is_file()]
     advisors = [AdvisorName.of(name) for name in options.advisors]
     files += [str(name.folder) for name in advisors if name.folder is not None]

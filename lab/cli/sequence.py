@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from lab.cli.families import offers
-from lab.cli.lessons import lesson_seat, say_outside, teacher_of, wanted_of
+from lab.cli.lessons import lesson_seat, say_read, teacher_of, wanted_of
 from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Plain, Port, Seed, ShowPage, ToolboxFolder, Wait
 from lab.cli.output import end, show
 
@@ -81,7 +81,7 @@ def sequence(
     box = Toolbox(toolbox)
     kept = OrderSession(given.complete(), box) if resume is None else gone_on(given, resume, box)
     if resume is not None:
-        say_outside(kept)
+        say_read(kept, "--resume")
     options = kept.options
     files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
     try:
@@ -95,7 +95,7 @@ def sequence(
     except KeyboardInterrupt as stopped:
         if kept.journal is None:
             raise
-        raise KeyboardInterrupt(f"{str(stopped) or 'stopped by Ctrl-C'}{kept.resume_command()}") from None
+        raise KeyboardInterrupt(f"{str(stopped) or 'stopped by Ctrl-C'}{kept.resume_command(box)}") from None
     show(document | kept.worth(), as_json, sequence_summary)
     if document["interrupted"]:
-        end(f"stopped by Ctrl-C; the best order until then is above{kept.resume_command()}", 130)
+        end(f"stopped by Ctrl-C; the best order until then is above{kept.resume_command(box)}", 130)

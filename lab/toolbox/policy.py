@@ -4,12 +4,12 @@ import platform
 import re
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from math import prod
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
+from lab import __version__
 from lab.errors import BadInput
 from lab.mdp import FloatArray, TabularMDP
 
@@ -124,18 +124,10 @@ class Policy:
             final_steps=result.final_steps,
             solved=result.solved,
             created=datetime.now(UTC).isoformat(timespec="microseconds"),
-            versions=_versions(),
+            versions={"teaching-lab": __version__, "python": platform.python_version(), "numpy": np.__version__},
         )
 
 
 def is_name(name: str) -> bool:
     """Whether a policy may have this name: 1 to 100 printable characters, not only blanks."""
     return bool(name.strip()) and len(name) <= MAX_NAME_LENGTH and name.isprintable()
-
-
-def _versions() -> dict[str, str]:
-    try:
-        lab = version("teaching-lab")
-    except PackageNotFoundError:  # run from a source folder
-        lab = "unknown"
-    return {"teaching-lab": lab, "python": platform.python_version(), "numpy": np.__version__}
