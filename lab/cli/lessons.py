@@ -44,7 +44,7 @@ def lesson_seat(
             progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
         prompt = TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
         seat = LessonSeat(progress, prompt, shown)
-        stack.callback(seat.clear_stage)
+        stack.callback(seat.clear_scene)
         try:
             yield seat
         except LabError as error:

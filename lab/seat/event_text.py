@@ -44,6 +44,7 @@ ENDED = {
     "advisor left": "advice has ended; the learner goes on alone",
     "misled by what was remembered": "what was said led round in circles or into obstacles; the learner asks no more",
 }
+PARTS_DONE = (SkillReady, MoveTimed, SequenceFound, MoveMade)  # each tells that one part of a phase is done
 _SHOWN_MOVES = 24
 _LEAST_WAIT_S = 0.05  # that is worth a word
 

@@ -1,6 +1,6 @@
 """All that the teaching page shows, as one plain document: what is known, and the functions that write it down.
 
-Nothing here waits, sends or draws. `document` says all; `Known.since` finds what has changed.
+Nothing here waits, sends or draws. PARTS say all; `Known.since` finds what has changed.
 """
 
 from collections import deque
@@ -227,11 +227,6 @@ PARTS: dict[str, Callable[[Known, float], Any]] = {
     "receipt": lambda known, now_s: known.receipt,
     "ended": lambda known, now_s: known.ended,
 }
-
-
-def document(known: Known, now_s: float = 0.0, layer: int | None = None) -> Json:
-    """The whole document, with the slice of one layer, by default the robot's. now_s: the clock of `Pending.until_s`."""
-    return {name: part(known, now_s) for name, part in PARTS.items()} | {"slice": layer_of(known, layer)}
 
 
 def layer_of(known: Known, layer: int | None = None) -> Json | None:

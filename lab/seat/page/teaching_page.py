@@ -44,15 +44,6 @@ class SeatPage(LiveView):
         self._wait_s = wait_s
         self._panel: SeatPanel = SeatPanel(title)
 
-    @property
-    def on_word(self) -> Callable[[str], None] | None:
-        """Called from the server's thread with the answer to an offered question, as a word that the terminal knows."""
-        return self._panel.on_word
-
-    @on_word.setter
-    def on_word(self, callback: Callable[[str], None] | None) -> None:
-        self._panel.on_word = callback
-
     def close(self) -> None:
         """Stop serving; who waits for an answer learns that there is nobody any more. Safe to call again."""
         self._panel.end()
@@ -73,8 +64,12 @@ class SeatPage(LiveView):
             self.withdraw()
         return _said(pending, answer)
 
-    def offer(self, request: Request) -> None:
-        """Show a question that is answered elsewhere, too; an answer on the page goes to `on_word`. Returns at once."""
+    def offer(self, request: Request, on_word: Callable[[str], None] | None = None) -> None:
+        """Show a question that is answered elsewhere, too; returns at once.
+
+        on_word: called from the server's thread with the answer on the page, as a word that the terminal knows.
+        """
+        self._panel.on_word = on_word
         self._pose(request, offered=True)
 
     def look(self, request: Request) -> None:

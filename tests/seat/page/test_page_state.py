@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ from lab.mdp import TabularMDP, grid
 from lab.seat.page.page_curve import MOST, Curve
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_question import picture_of
-from lab.seat.page.page_state import PARTS, Known, Learning, Pending, document, standing_of
+from lab.seat.page.page_state import PARTS, Known, Learning, Pending, layer_of, standing_of
 
 LABELS = ("up", "down", "left", "right")
 
@@ -64,6 +65,11 @@ def request_in(mdp: TabularMDP) -> AdviceRequest:
         improvement=Improvement(-0.25, 50.0, 40.0),
         allowed=range(mdp.n_actions),
     )
+
+
+def document(known: Known, now_s: float = 0.0, layer: int | None = None) -> dict[str, Any]:
+    """All that the page shows, with the slice of one layer, by default the robot's."""
+    return {name: part(known, now_s) for name, part in PARTS.items()} | {"slice": layer_of(known, layer)}
 
 
 def tell(known: Known, events: Sequence[Event]) -> list[str]:

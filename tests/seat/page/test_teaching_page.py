@@ -312,11 +312,10 @@ def test_an_offered_question_is_answered_in_a_word(page: SeatPage, request_1: Ad
         words.append(word)
         heard.set()
 
-    page.on_word = told
     with opens(page) as browser:
         number = 0
         for what, word in (({"action": RIGHT}, "right"), ({"word": "skip"}, "skip"), ({"word": "auto"}, "auto")):
-            page.offer(request_1)
+            page.offer(request_1, told)
             number = browser.hear_until(asked_again(number))["question"]["number"]
             assert browser.seat["question"]["offered"]
             answer(browser, number, **what)
