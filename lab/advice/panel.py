@@ -35,11 +35,7 @@ def trust_weighted(trusts: Sequence[float]) -> float:
 
 
 Decide = Callable[[Sequence[float]], float]  # what an action is worth, from the trusts in those who said it
-DECISIONS: dict[str, Decide] = {
-    "majority": majority,
-    "best-trusted": best_trusted,
-    "trust-weighted": trust_weighted,
-}
+DECISIONS: dict[str, Decide] = {"majority": majority, "best-trusted": best_trusted, "trust-weighted": trust_weighted}
 
 
 def decided(votes: Mapping[str, int], trusts: Mapping[str, float], own: int, decide: Decide) -> int:

@@ -21,16 +21,14 @@ def sequence(
     ] = None,
     toasts: Annotated[int | None, typer.Option("--toasts", "-n", help="How many parts of the only product.")] = None,
     method: Annotated[
-        str | None,
-        typer.Option("--method", help="{methods}; default: the file's.", autocompletion=offers("methods")),
+        str | None, typer.Option("--method", help="{methods}; default: the file's.", autocompletion=offers("methods"))
     ] = None,
     objective: Annotated[
         str | None,
         typer.Option("--objective", help="{objectives}; default: the file's.", autocompletion=offers("objectives")),
     ] = None,
     episodes: Annotated[
-        int | None,
-        typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the file's."),
+        int | None, typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the file's.")
     ] = None,
     sessions: Annotated[
         int, typer.Option("--sessions", min=1, max=MAX_SESSIONS, help="How many sessions, each with its own chance.")
@@ -42,9 +40,7 @@ def sequence(
     advisor: Annotated[
         str,
         typer.Option(
-            "--advisor",
-            help="Who srl may ask which part to move: {advisors}.",
-            autocompletion=offers("advisors"),
+            "--advisor", help="Who srl may ask which part to move: {advisors}.", autocompletion=offers("advisors")
         ),
     ] = "none",
     gate: Annotated[

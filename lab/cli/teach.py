@@ -39,19 +39,11 @@ def teach(
     ] = None,
     learner: Annotated[
         str | None,
-        typer.Option(
-            "--learner",
-            help="{learners}; default: the task's.",
-            autocompletion=offers("learners"),
-        ),
+        typer.Option("--learner", help="{learners}; default: the task's.", autocompletion=offers("learners")),
     ] = None,
     gate: Annotated[
         str | None,
-        typer.Option(
-            "--gate",
-            help="When it asks: {gates}; default: the task's.",
-            autocompletion=offers("gates"),
-        ),
+        typer.Option("--gate", help="When it asks: {gates}; default: the task's.", autocompletion=offers("gates")),
     ] = None,
     memory: Annotated[
         bool | None,
@@ -61,8 +53,7 @@ def teach(
     asked: Asked = "together",
     decide: Decide = "trust-weighted",
     episodes: Annotated[
-        int | None,
-        typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the task's."),
+        int | None, typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the task's.")
     ] = None,
     save: Annotated[str | None, typer.Option("--save", help="Name of the policy in the toolbox.")] = None,
     sight: Annotated[
