@@ -12,9 +12,7 @@ from lab.advice.advisors import AdvisorName
 from lab.advice.entries import Read, Session
 from lab.advice.journal import Journal
 from lab.advice.order_level import signature_of
-from lab.advice.receipt import Receipt, receipt
 from lab.errors import BadInput
-from lab.learning.settings import GateSettings
 from lab.sequencing.cell.cell import Cell
 from lab.teaching.kept_session import InFolder, again, check_same, claimed, found
 from lab.teaching.lesson_options import SessionOptions, whole_path
@@ -89,11 +87,6 @@ class OrderSession(InFolder):
         else:
             self.journal = again(read, self._read_only)
         return self.journal
-
-    def receipt(self) -> Receipt:
-        """What the advice was worth."""
-        entries = [] if self.journal is None else self.journal.entries
-        return receipt(entries, None, None, GateSettings.window, certain=False)
 
 
 def kept_order(folder: Path, where: str, toolbox: Toolbox, *, read_only: bool = False) -> OrderSession:

@@ -27,25 +27,27 @@ SESSIONS = "sessions"  # the folder in the toolbox
 _BEGUN = "begun"  # the folder in a session's folder for the policy that it went on from
 _MOST = 100_000  # sessions of one name
 MOST_VALUES = 3_000_000  # a larger table's optimal values take too long to know
-
-
 Options = TypeVar("Options", bound=SessionOptions)
 
 
 class InFolder:
     """What all sessions know that are kept in folders, about a table or about an order.
 
-    folder, journal: None until it has begun; read: the journal as it was found, None of a new session.
+    folder, journal: None until it has begun; plan: None of an order; read: the journal as it was found, None of a new
+    session.
     """
 
     options: SessionOptions
     folder: Path | None = None
     journal: Journal | None = None
+    plan: LessonPlan | None = None
     read: Read | None = None
 
     def receipt(self) -> Receipt:
-        """What the advice was worth."""
-        raise NotImplementedError
+        """What the advice was worth; of an order nobody knows the values."""
+        if self.plan is None or self.journal is None:
+            return receipt([] if self.journal is None else self.journal.entries, None, None, certain=False)
+        return receipt_of(self.plan, self.journal, known_values(self.plan))
 
     def worth(self) -> dict[str, Any]:
         """Where it is kept, and its receipt, which is written beside the journal; nothing where nothing is kept."""
@@ -79,20 +81,6 @@ class InFolder:
         }
 
 
-class _OfLesson(InFolder):
-    """A session of one lesson."""
-
-    options: LessonOptions
-
-    plan: LessonPlan | None = None
-
-    def receipt(self) -> Receipt:
-        """What the advice was worth."""
-        assert self.plan is not None
-        assert self.journal is not None
-        return receipt_of(self.plan, self.journal, known_values(self.plan))
-
-
 def found(folder: Path, where: str, kind: type[Options]) -> tuple[Read, Options]:
     """The journal in a folder, and the options that its session was begun with. BadInput for another command's."""
     read = read_journal(folder, where)
@@ -124,11 +112,12 @@ def known_values(plan: LessonPlan) -> FloatArray | None:
         return None
 
 
-class NewSession(_OfLesson):
+class NewSession(InFolder):
     """A session's journal in a folder, or, without one, in the toolbox's folder `sessions`; made when the lesson begins."""
 
     def __init__(self, folder: Path | None, toolbox: Toolbox, options: LessonOptions):
-        self._wanted, self._toolbox, self.options = folder, toolbox, options
+        self._wanted, self._toolbox = folder, toolbox
+        self.options: LessonOptions = options
 
     def keep(self, plan: LessonPlan) -> Journal:
         """The journal of a lesson. Raises BadInput when the folder holds a session already."""
@@ -179,12 +168,13 @@ def kept_by(toolbox: Toolbox, options: LessonOptions) -> Keep:
     return keep
 
 
-class KeptSession(_OfLesson):
+class KeptSession(InFolder):
     """A session that was kept: to go on with it, or (`read_only`) to look at it again. Raises BadInput for none.
 
     trusted: modules that the session may name: it may be somebody else's, and code runs when one is imported.
     """
 
+    options: LessonOptions
     read: Read
 
     def __init__(self, folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] = ()):
