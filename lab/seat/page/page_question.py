@@ -4,16 +4,17 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from lab.learning.requests import AdviceRequest, Request
-from lab.mdp import TabularMDP
 from lab.seat.grid_text import safe_ansi
 from lab.seat.page.page_grid import directions, spot
 from lab.seat.page.page_order import order_of
+from lab.seat.request_text import DEAD_END, GOAL, NOWHERE, OBSTACLE, outcome
 from lab.sequencing.request import SequenceRequest
 
 if TYPE_CHECKING:
     from rich.text import Text
 
 Json = dict[str, Any]
+LEADS = {NOWHERE: "nowhere", GOAL: "goal", OBSTACLE: "obstacle", DEAD_END: "obstacle"}  # as the page's script knows it
 
 
 def question_of(request: Request) -> Json:
@@ -27,7 +28,6 @@ def question_of(request: Request) -> Json:
     return shown | {
         "own": request.own,
         "why": str(request.reason or ""),
-        "undoable": request.undoable,
         "rate": None if known is None else known.rate,
         "current": None if known is None else known.current_mean,
         "previous": None if known is None else known.previous_mean,
@@ -59,20 +59,10 @@ def moves_of(request: AdviceRequest) -> list[Json]:
             "direction": direction,
             "chance": round(chance, 3),
             "value": float(f"{value:.4g}"),
-            "leads": "" if request.picture else leads_to(mdp, state, action),
+            "leads": "" if request.picture else LEADS.get(outcome(request, action), ""),
         }
         for action, (label, direction, chance, value) in enumerate(rows)
     ]
-
-
-def leads_to(mdp: TabularMDP, state: int, action: int) -> str:
-    """What an action leads to, in a word: "nowhere", "goal", "obstacle", "" for a free cell."""
-    entered = int(mdp.successor[state, action])
-    if entered == state:
-        return "nowhere"
-    if mdp.goal[entered]:
-        return "goal"
-    return "obstacle" if mdp.terminal[entered] else ""
 
 
 def picture_of(drawing: str) -> list[list[list[str]]]:
