@@ -27,7 +27,7 @@ def hear_run(known: Known, event: Event) -> None:
         case SequencingBegan():
             known.work = None
             optimal = None if event.reference is None else event.reference.bound
-            known.begin(Learning(ORDER, "order", "s", gate=event.gate, episodes=event.episodes, optimal=optimal))
+            known.begin(Learning(ORDER, "order", gate=event.gate, episodes=event.episodes, optimal=optimal))
         case EpisodeSequenced():
             if known.learning.gate is None:  # else the session itself tells of it, and whether it was guided
                 known.learning.curve.add(event.cost, False)

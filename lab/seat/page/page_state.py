@@ -10,7 +10,7 @@ from typing import Any
 
 from lab.learning.gates import improvement
 from lab.learning.requests import Request, Standing
-from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.settings import GateSettings
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
 from lab.seat.event_text import SessionText, Told
@@ -64,9 +64,7 @@ class Learning:
 
     title: str = ""
     kind: str = "steps"  # or "order"
-    unit: str = "steps"
     mdp: TabularMDP | None = None
-    learner: LearnerSettings | None = None
     gate: GateSettings | None = None
     episodes: int = 0
     optimal: float | None = None
@@ -157,14 +155,10 @@ def _lesson(known: Known, now_s: float) -> Json:
         "title": learning.title,
         "page": known.title,
         "kind": learning.kind,
-        "unit": learning.unit,
+        "unit": "s" if learning.kind == "order" else "steps",
         "episodes": learning.episodes,
         "optimal": learning.optimal,
-        "learner": None if learning.learner is None else learning.learner.learner,
-        "gate": None if gate is None else gate.gate,
         "threshold": None if gate is None else gate.lambda_threshold,
-        "window": None if gate is None else gate.window,
-        "first_episode": None if gate is None else gate.first_episode,
     }
 
 
@@ -184,7 +178,6 @@ def _question(known: Known, now_s: float) -> Json | None:
     left_s = None if pending.until_s is None else round(max(0.0, pending.until_s - now_s), 1)
     return question_of(pending.request) | {
         "number": pending.number,
-        "wait_s": pending.wait_s,
         "left_s": left_s,
         "words": list(pending.words),
         "offered": pending.offered,

@@ -118,7 +118,7 @@ class SeatPage(LiveView):
     def _see_order(self, request: SequenceRequest) -> None:
         known = self._panel.known
         if known.learning.kind != "order":
-            known.begin(Learning(ORDER, "order", "s"))
+            known.begin(Learning(ORDER, "order"))
         known.work = bars_of(made_until(request), request.run.now_s)
         known.changed("work", "standing")
 
@@ -185,7 +185,7 @@ def _said(pending: Pending, answer: Answer | None) -> int | None:
 def _lesson(plan: LessonPlan) -> Learning:
     """A lesson that begins, beside the fewest steps of a certain problem, counted as the learner counts, where they are known."""
     mdp, learner = plan.problem.mdp, plan.learner
-    made = Learning(plan.problem.name, mdp=mdp, learner=learner, gate=plan.gate, episodes=learner.episodes)
+    made = Learning(plan.problem.name, mdp=mdp, gate=plan.gate, episodes=learner.episodes)
     if mdp.n_states <= MOST_STATES and (mdp.shape or mdp.coverage_shape):
         with suppress(NoPath):
             made.optimal = shortest_steps(mdp) + learner.count_start

@@ -180,7 +180,6 @@ def test_the_time_that_is_left_is_told(request_1: AdviceRequest, opens: "Opens")
         asked = meanwhile(page.ask, request_1)
         with opens(page) as browser:
             shown = browser.hear_until(question)["question"]
-            assert shown["wait_s"] == 1000.0
             assert 900.0 < shown["left_s"] <= 1000.0
             answer(browser, action=0)
         assert asked.result(20) == 0
