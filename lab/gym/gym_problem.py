@@ -1,11 +1,11 @@
 """What `lab teach gym:...` teaches: the problem that a Gymnasium environment sets, and how it is learned by default."""
 
 from dataclasses import replace
-from typing import Literal, Self
+from typing import Self
 
 from pydantic import PrivateAttr
 
-from lab.errors import BadInput, counted
+from lab.errors import BadInput
 from lab.gym.environment_name import parse_name
 from lab.gym.gym_environment import ALONE, GymEnvironment
 from lab.gym.numbered_environment import NumberedEnvironment
@@ -20,21 +20,14 @@ CHANCE_EPISODES = (5000, 20_000)  # twenty for each entry
 class GymWorld(Learned):
     """A Gymnasium environment, by its id and keywords, and how it is learned; made by `gym_world`."""
 
-    kind: Literal["gym"] = "gym"
     name: str
-    title: str = ""
     _environment: GymEnvironment = PrivateAttr()
 
     @classmethod
     def of(cls, environment: GymEnvironment) -> Self:
         """The environment with the settings that fit it."""
         learner, gate = fitting(environment)
-        mdp, model = environment.mdp, environment.model
-        steps = "steps learned from" if model is None else "certain steps" if model.certain else "steps left to chance"
-        title = (
-            f"{environment.live.name.id}: {counted(mdp.n_states, 'state')}, {counted(mdp.n_actions, 'action')}, {steps}"
-        )
-        made = cls(name=str(environment.live.name), title=title, learner=learner, gate=gate)
+        made = cls(name=str(environment.live.name), learner=learner, gate=gate)
         made._environment = environment
         return made
 
