@@ -7,14 +7,13 @@ from lab.learning.requests import AdviceRequest, Request
 from lab.seat.grid_text import safe_ansi
 from lab.seat.page.page_grid import directions, spot
 from lab.seat.page.page_order import order_of
-from lab.seat.request_text import DEAD_END, GOAL, NOWHERE, OBSTACLE, outcome
+from lab.seat.request_text import outcome
 from lab.sequencing.request import SequenceRequest
 
 if TYPE_CHECKING:
     from rich.text import Text
 
 Json = dict[str, Any]
-LEADS = {NOWHERE: "nowhere", GOAL: "goal", OBSTACLE: "obstacle", DEAD_END: "obstacle"}  # as the page's script knows it
 
 
 def question_of(request: Request) -> Json:
@@ -59,7 +58,7 @@ def moves_of(request: AdviceRequest) -> list[Json]:
             "direction": direction,
             "chance": round(chance, 3),
             "value": float(f"{value:.4g}"),
-            "leads": "" if request.picture else LEADS.get(outcome(request, action), ""),
+            "leads": "" if request.picture else outcome(request, action),
         }
         for action, (label, direction, chance, value) in enumerate(rows)
     ]

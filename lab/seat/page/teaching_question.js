@@ -83,7 +83,7 @@ const seat = (() => {
   }
 
   function detail() {
-    const own = ownMove(), leads = { nowhere: ", which leads nowhere", goal: ", to the goal", obstacle: ", into an obstacle" }[own.leads] || "";
+    const own = ownMove(), leads = own.leads ? `, which leads ${own.leads}` : "";
     const would = shown.kind === "order" ? `Alone it would move ${own.label} from ${own.from} to ${own.to}.` : `Alone it would now go ${named(own)}${rated(own)}${leads}.`;
     return `${would}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered ? " The terminal asks, too." : ""}`;
   }
@@ -115,7 +115,7 @@ const seat = (() => {
     head.append(...["move", "its value", "its chance", "leads"].map((text) => make("th", text)));
     table.append(head, ...shown.moves.map((move) => {
       const row = make("tr");
-      row.append(...[named(move), String(move.value), percent(move.chance), { nowhere: "nowhere", goal: "to the goal", obstacle: "into an obstacle" }[move.leads] || "on"].map((text) => make("td", text)));
+      row.append(...[named(move), String(move.value), percent(move.chance), move.leads || "on"].map((text) => make("td", text)));
       return row;
     }));
     because.append(table);
@@ -161,7 +161,7 @@ const seat = (() => {
     }
     text("chance", `${own ? "★ " : ""}${percent(move.chance)}`);
     button.querySelector(".sure").style.width = move.chance < 0.01 ? "0" : `${100 * move.chance}%`;
-    button.setAttribute("aria-label", `${move.label}: chance ${percent(move.chance)}${own ? ", its own choice" : ""}${move.leads ? `, leads ${move.leads === "nowhere" ? "nowhere" : `to the ${move.leads}`}` : ""}`);
+    button.setAttribute("aria-label", `${move.label}: chance ${percent(move.chance)}${own ? ", its own choice" : ""}${move.leads ? `, leads ${move.leads}` : ""}`);
   }
 
   // ---- answers

@@ -102,7 +102,7 @@ def test_a_question_says_where_what_and_why(known: Known, mdp: TabularMDP) -> No
     assert (asked["why"], asked["rate"]) == ("its improvement is -25.0%, below 5%", -0.25)
     assert asked["left_s"] == 3.5
     assert asked["words"] == ["skip", "auto", "quit", "undo"]
-    assert [move["leads"] for move in asked["moves"]] == ["nowhere", "nowhere", "", "goal"]
+    assert [move["leads"] for move in asked["moves"]] == ["nowhere", "nowhere", "", "to the goal"]
     assert [move["chance"] for move in asked["moves"]] == [0.0, 0.0, 0.0, 1.0]
     assert [move["direction"] for move in asked["moves"]] == [0, 1, 2, 3]
 
@@ -112,7 +112,12 @@ def test_the_way_into_an_obstacle_is_said(known: Known) -> None:
     known.pending = Pending(
         AdviceRequest(mdp=near, q=[[0.0] * 4] * 4, state=0, episode=1, step=1, own=3, allowed=range(near.n_actions))
     )
-    assert [move["leads"] for move in document(known)["question"]["moves"]] == ["nowhere", "", "nowhere", "obstacle"]
+    assert [move["leads"] for move in document(known)["question"]["moves"]] == [
+        "nowhere",
+        "",
+        "nowhere",
+        "into an obstacle",
+    ]
 
 
 def test_where_no_table_says_where_moves_lead_the_page_does_not_either(known: Known) -> None:
