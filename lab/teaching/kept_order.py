@@ -14,7 +14,7 @@ from lab.advice.journal import Journal
 from lab.advice.order_level import signature_of
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
-from lab.teaching.kept_session import InFolder, again, check_same, claimed, found
+from lab.teaching.kept_session import SessionInFolder, check_same, claimed, kept_journal, read_session
 from lab.teaching.lesson_options import SessionOptions, whole_path
 from lab.toolbox.registry import Toolbox
 
@@ -60,7 +60,7 @@ class OrderOptions(SessionOptions):
         return asdict(self) | {"task": whole_path(self.task)}
 
 
-class OrderSession(InFolder):
+class OrderSession(SessionInFolder):
     """A session of `lab sequence`: a new one, or (`read`) one that is gone on with or, `read_only`, looked at again."""
 
     def __init__(
@@ -85,18 +85,18 @@ class OrderSession(InFolder):
                 f"cell is another one ({signature[:8]}): its file, or what its moves were measured with, has changed"
             )
         else:
-            self.journal = again(read, self._read_only)
+            self.journal = kept_journal(read, self._read_only)
         return self.journal
 
 
 def kept_order(folder: Path, where: str, toolbox: Toolbox, *, read_only: bool = False) -> OrderSession:
     """A session of `lab sequence` that was kept. Raises BadInput for anything else."""
-    read, options = found(folder, where, OrderOptions)
+    read, options = read_session(folder, where, OrderOptions)
     return OrderSession(options, toolbox, read, read_only=read_only)
 
 
 def gone_on(given: OrderOptions, folder: Path, toolbox: Toolbox) -> OrderSession:
     """The session that --resume names; BadInput when it is over, and for options beside it."""
-    read, options = found(folder, "--resume", OrderOptions)
+    read, options = read_session(folder, "--resume", OrderOptions)
     check_same(given, read)
     return OrderSession(options, toolbox, read)

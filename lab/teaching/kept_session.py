@@ -30,7 +30,7 @@ MOST_VALUES = 3_000_000  # a larger table's optimal values take too long to know
 Options = TypeVar("Options", bound=SessionOptions)
 
 
-class InFolder:
+class SessionInFolder:
     """What all sessions know that are kept in folders, about a table or about an order.
 
     folder, journal: None until it has begun; plan: None of an order; read: the journal as it was found, None of a new
@@ -81,7 +81,7 @@ class InFolder:
         }
 
 
-def found(folder: Path, where: str, kind: type[Options]) -> tuple[Read, Options]:
+def read_session(folder: Path, where: str, kind: type[Options]) -> tuple[Read, Options]:
     """The journal in a folder, and the options that its session was begun with. BadInput for another command's."""
     read = read_journal(folder, where)
     which = f"journal '{read.path}' ({where})"
@@ -90,7 +90,7 @@ def found(folder: Path, where: str, kind: type[Options]) -> tuple[Read, Options]
     return read, kind.from_json(read.session.words, which)
 
 
-def again(read: Read, read_only: bool) -> Journal:
+def kept_journal(read: Read, read_only: bool) -> Journal:
     """The journal of a kept session, which answers until it is used up."""
     return Journal(None, read.effective(), read_only=True) if read_only else Journal.resume(read)
 
@@ -112,7 +112,7 @@ def known_values(plan: LessonPlan) -> FloatArray | None:
         return None
 
 
-class NewSession(InFolder):
+class NewSession(SessionInFolder):
     """A session's journal in a folder, or, without one, in the toolbox's folder `sessions`; made when the lesson begins."""
 
     def __init__(self, folder: Path | None, toolbox: Toolbox, options: LessonOptions):
@@ -168,7 +168,7 @@ def kept_by(toolbox: Toolbox, options: LessonOptions) -> Keep:
     return keep
 
 
-class KeptSession(InFolder):
+class KeptSession(SessionInFolder):
     """A session that was kept: to go on with it, or (`read_only`) to look at it again. Raises BadInput for none.
 
     trusted: modules that the session may name: it may be somebody else's, and code runs when one is imported.
@@ -178,7 +178,7 @@ class KeptSession(InFolder):
     read: Read
 
     def __init__(self, folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] = ()):
-        self.read, self.options = found(folder, where, LessonOptions)
+        self.read, self.options = read_session(folder, where, LessonOptions)
         self.folder: Path = self.read.path.parent
         self._read_only, self.where, self.trusted = read_only, where, trusted
 
@@ -202,7 +202,7 @@ class KeptSession(InFolder):
                     f"session '{self.folder}' ({self.where}): its {what} had {name} = {then[name]!r}, and the task now "
                     f"gives {now[name]!r}: its file has changed"
                 )
-        self.journal = again(self.read, self._read_only)
+        self.journal = kept_journal(self.read, self._read_only)
         return self.journal
 
     def same(self, given: LessonOptions) -> LessonOptions:
