@@ -13,12 +13,14 @@ Json = dict[str, Any]
 
 
 def order_of(request: SequenceRequest) -> Json:
-    """Where the work stands, and which moves are allowed."""
+    """Where the work stands, which moves are allowed, and what it would do."""
+    own = move_of(request, request.own)
     return {
         "kind": "order",
         "title": title(request),
         "at": [],
         "moves": [_allowed(move_of(request, decision)) for decision in request.allowed],
+        "would": f"Alone it would move {own.name} from {own.origin} to {own.target}.",
         "picture": [],
     }
 

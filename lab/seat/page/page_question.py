@@ -4,10 +4,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from lab.learning.requests import AdviceRequest, Request
-from lab.seat.grid_text import safe_ansi
+from lab.seat.grid_text import Marks, safe_ansi
 from lab.seat.page.page_grid import directions, spot
 from lab.seat.page.page_order import order_of
-from lab.seat.request_text import outcome
+from lab.seat.request_text import choice, outcome
 from lab.sequencing.request import SequenceRequest
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ def step_of(request: AdviceRequest) -> Json:
         "title": f"Episode {request.episode}, step {request.step}: at {mdp.state_label(state)}",
         "at": spot(mdp, state),
         "moves": moves_of(request),
+        "would": choice(request, Marks()),
         "temperature": request.temperature,
         "selection": request.selection,
         "picture": picture_of(request.picture),

@@ -59,7 +59,7 @@ class Notice:
 
 
 @dataclass
-class Learning:
+class ShownLesson:
     """One lesson, or the sessions of a sequencer: how it goes, and what the learner has said about it."""
 
     title: str = ""
@@ -114,7 +114,7 @@ class Known:
     """All that the page may have to show. `changed` says what is new; versions are counted, so that nothing is sent twice."""
 
     title: str
-    learning: Learning = field(default_factory=Learning)
+    learning: ShownLesson = field(default_factory=ShownLesson)
     progress: Progress | None = None
     pending: Pending | None = None
     work: Json | None = None  # bars of the order
@@ -131,7 +131,7 @@ class Known:
         """These parts of the document are not what they were."""
         self.touched.update(parts)
 
-    def begin(self, learning: Learning) -> None:
+    def begin(self, learning: ShownLesson) -> None:
         """A lesson, or a sequencer's session, begins."""
         self.learning = learning
         self.changed("lesson", "place", "robot", "curve", "standing", "notices", "slice")
@@ -234,7 +234,7 @@ def layer_of(known: Known, layer: int | None = None) -> Json | None:
     return slice_of(mdp, state, wanted, learning.q, learning.selection, learning.temperature)
 
 
-def standing_of(learning: Learning, standing: Standing) -> None:
+def standing_of(learning: ShownLesson, standing: Standing) -> None:
     """Take over how advice stands with the learner; what has become worse is said."""
     if standing.misleads > learning.misleads:
         text = f"The last lesson did not help: {standing.misleads} so far, {standing.omega} are tolerated."

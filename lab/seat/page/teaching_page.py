@@ -20,7 +20,7 @@ from lab.seat.page.page_messages import Answer
 from lab.seat.page.page_order import bars_of, made_until
 from lab.seat.page.page_panel import CLOSED, SeatPanel
 from lab.seat.page.page_run import hear_run
-from lab.seat.page.page_state import Learning, Pending, standing_of
+from lab.seat.page.page_state import Pending, ShownLesson, standing_of
 from lab.sequencing.request import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonBegan, LessonEvent
 from lab.teaching.lesson_plan import LessonPlan
@@ -107,7 +107,7 @@ class SeatPage(LiveView):
     def _see_table(self, request: AdviceRequest) -> None:
         known = self._panel.known
         if known.learning.mdp not in (None, request.mdp):
-            known.begin(Learning())
+            known.begin(ShownLesson())
         learning = known.learning
         if learning.mdp is None:
             learning.mdp = request.mdp
@@ -118,7 +118,7 @@ class SeatPage(LiveView):
     def _see_order(self, request: SequenceRequest) -> None:
         known = self._panel.known
         if known.learning.kind != "order":
-            known.begin(Learning(ORDER, "order"))
+            known.begin(ShownLesson(ORDER, "order"))
         known.work = bars_of(made_until(request), request.run.now_s)
         known.changed("work", "standing")
 
@@ -130,7 +130,7 @@ class SeatPage(LiveView):
         if type(event) is LessonEvent:
             with self._panel.guard:  # quicker than the condition's own way
                 if event.lesson != known.learning.title:  # one of another skill begins a new curve
-                    known.begin(Learning(event.lesson))
+                    known.begin(ShownLesson(event.lesson))
                 known.touched.update(hear(known.learning, event.event))
             return
         made = _lesson(event.plan) if isinstance(event, LessonBegan) else None
@@ -182,10 +182,10 @@ def _said(pending: Pending, answer: Answer | None) -> int | None:
     return answer.action
 
 
-def _lesson(plan: LessonPlan) -> Learning:
+def _lesson(plan: LessonPlan) -> ShownLesson:
     """A lesson that begins, beside the fewest steps of a certain problem, counted as the learner counts, where they are known."""
     mdp, learner = plan.problem.mdp, plan.learner
-    made = Learning(plan.problem.name, mdp=mdp, gate=plan.gate, episodes=learner.episodes)
+    made = ShownLesson(plan.problem.name, mdp=mdp, gate=plan.gate, episodes=learner.episodes)
     if mdp.n_states <= MOST_STATES and (mdp.shape or mdp.coverage_shape):
         with suppress(NoPath):
             made.optimal = shortest_steps(mdp) + learner.count_start

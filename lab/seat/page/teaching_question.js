@@ -47,7 +47,6 @@ const seat = (() => {
 
   const { make, percent } = seatStatus;
   const named = (move) => `${move.direction === null ? "" : `${ARROWS[move.direction]} `}${move.label}`;
-  const ownMove = () => shown.moves.find((move) => move.action === shown.own);
 
   // ---- the question
 
@@ -82,19 +81,7 @@ const seat = (() => {
     return `${episode}: ${why || "it works alone, and asks when it stops improving"}.`;
   }
 
-  function detail() {
-    const own = ownMove(), leads = own.leads ? `, which leads ${own.leads}` : "";
-    const would = shown.kind === "order" ? `Alone it would move ${own.label} from ${own.from} to ${own.to}.` : `Alone it would now go ${named(own)}${rated(own)}${leads}.`;
-    return `${would}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered ? " The terminal asks, too." : ""}`;
-  }
-
-  // What was drawn for this step, beside the move it rates best
-  function rated(own) {
-    const chances = shown.moves.map((move) => move.chance), top = Math.max(...chances);
-    if (chances.length > 1 && top === Math.min(...chances)) return `, drawn at random: all moves are alike to it here (${percent(top)} each)`;
-    if (own.chance === top) return `, the move it rates best (${percent(top)})`;
-    return `, drawn at random (${percent(own.chance)}; it rates ${named(shown.moves.find((move) => move.chance === top))} best, ${percent(top)})`;
-  }
+  const detail = () => `${shown.would}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered ? " The terminal asks, too." : ""}`;
 
   function countDown() {
     const left = until === null || !shown ? null : Math.max(0, Math.ceil((until - performance.now()) / 1000));

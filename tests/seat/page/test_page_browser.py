@@ -113,7 +113,7 @@ def test_a_whole_session_by_keys(tab: "Page", page: SeatPage, until: Until) -> N
     session = Teaching(page).start()
     until(tab, says(1))
     assert tab.inner_text("#chair") == "You answer here"
-    assert "drawn at random: all moves are alike to it here (25 % each)" in tab.inner_text("#detail")
+    assert "drawn at random: all moves are alike to it here (25% each)" in tab.inner_text("#detail")
     for step, key in enumerate(["ArrowRight", "ArrowRight", "ArrowDown"], start=1):
         until(tab, says(step))
         tab.keyboard.press(key)

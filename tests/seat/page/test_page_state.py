@@ -29,7 +29,7 @@ from lab.mdp import TabularMDP, grid
 from lab.seat.page.page_curve import MOST, Curve
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_question import picture_of
-from lab.seat.page.page_state import PARTS, Known, Learning, Pending, layer_of, standing_of
+from lab.seat.page.page_state import PARTS, Known, Pending, ShownLesson, layer_of, standing_of
 
 LABELS = ("up", "down", "left", "right")
 
@@ -47,7 +47,7 @@ def mdp() -> TabularMDP:
 @pytest.fixture
 def known(mdp: TabularMDP) -> Known:
     gate = GateSettings(window=2, first_episode=4, omega=1)
-    return Known("the page", Learning("maze", mdp=mdp, gate=gate, episodes=9))
+    return Known("the page", ShownLesson("maze", mdp=mdp, gate=gate, episodes=9))
 
 
 def request_in(mdp: TabularMDP) -> AdviceRequest:
@@ -156,7 +156,7 @@ def test_the_lesson_and_the_map_are_there_before_any_question(known: Known) -> N
 
 def test_a_problem_without_a_grid_has_no_map() -> None:
     mdp = TabularMDP(np.array([[1], [1]]), np.zeros((2, 1)), np.array([0, 1]), np.array([0, 1]), 0, ("go",))
-    known = Known("", Learning("steps", mdp=mdp))
+    known = Known("", ShownLesson("steps", mdp=mdp))
     assert document(known)["place"] is None
     assert document(known)["slice"] is None
 
