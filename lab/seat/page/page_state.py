@@ -20,7 +20,6 @@ from lab.seat.page.page_question import question_of
 from lab.sequencing.cell.schedule import Move
 
 Json = dict[str, Any]
-UNLIMITED = 1_000_000_000  # a budget of this many steps is none
 MOST_NOTICES = 60
 MOST_LINES = 80
 
@@ -189,7 +188,7 @@ def _standing(known: Known, now_s: float) -> Json:
     gate = learning.gate
     means = improvement([*learning.lately], gate.window) if gate is not None else None
     current, previous = learning.means if means is None else (means.current_mean, means.previous_mean)
-    budget = None if gate is None or gate.budget >= UNLIMITED else gate.budget
+    budget = None if gate is None or gate.budget >= GateSettings.budget else gate.budget
     return {
         "rate": learning.rate,
         "current": current,

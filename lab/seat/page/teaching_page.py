@@ -37,12 +37,12 @@ class SeatPage(LiveView):
     the session's thread. Entering raises BadInput for a port that it cannot have, and for a `wait_s` that is no time.
     """
 
-    def __init__(self, port: int = 0, *, title: str = TITLE, wait_s: float | None = None) -> None:
+    def __init__(self, port: int = 0, *, wait_s: float | None = None) -> None:
         if wait_s is not None and not 0 < wait_s < inf:
             raise BadInput(f"time to wait for an answer, {wait_s} s: must be finite and above 0")
-        super().__init__(port, title=title)
+        super().__init__(port, title=TITLE)
         self._wait_s = wait_s
-        self._panel: SeatPanel = SeatPanel(title)
+        self._panel: SeatPanel = SeatPanel(TITLE)
 
     def close(self) -> None:
         """Stop serving; who waits for an answer learns that there is nobody any more. Safe to call again."""
