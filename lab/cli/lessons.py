@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lab.cli.output import complain, console
 from lab.errors import BadInput, LabError
@@ -12,7 +12,6 @@ from lab.errors import BadInput, LabError
 if TYPE_CHECKING:
     from lab.advice.entries import Read
     from lab.learning.requests import Ask
-    from lab.production.sequence import Wanted
     from lab.seat.lesson_seat import LessonSeat
     from lab.teaching.kept_order import OrderSession
     from lab.teaching.kept_session import KeptSession
@@ -94,12 +93,15 @@ def subject_of(options: "LessonOptions", kept: "KeptSession | None" = None) -> "
     return SkillSubject.of(options)
 
 
-def wanted_of(kept: "OrderSession", people: "Mapping[str, Ask]") -> "Wanted":
-    """What a session of `lab sequence` asks for, and whom."""
-    from lab.production.sequence import Wanted
+def sequenced(
+    kept: "OrderSession", people: "Mapping[str, Ask]", seat: "LessonSeat", toolbox: Path | None, files: dict[str, Path]
+) -> dict[str, Any]:
+    """The document of a session of `lab sequence`, whom it may ask behind such names as "terminal", its pictures in files."""
+    from lab.production.sequence import Wanted, sequence_named
+    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
 
     options = kept.options
-    return Wanted(
+    wanted = Wanted(
         options.method,
         options.episodes,
         options.objective,
@@ -109,8 +111,10 @@ def wanted_of(kept: "OrderSession", people: "Mapping[str, Ask]") -> "Wanted":
         options.asked,
         options.gate,
         people,
-        keep=kept.keep,
+        kept.keep,
     )
+    teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
+    return sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)
 
 
 def _say_cut(read: "Read") -> None:

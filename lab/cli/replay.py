@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lab.cli.lessons import lesson_seat, say_read, subject_of, teacher_of, wanted_of
+from lab.cli.lessons import lesson_seat, say_read, sequenced, subject_of
 from lab.cli.options import Json, Plain, Port, ToolboxFolder, TrustModule
 from lab.cli.output import end, show
 
@@ -66,17 +66,12 @@ def replay(
 def _replayed(kept: "OrderSession", seat: "LessonSeat", toolbox: Path | None) -> dict[str, Any]:
     """Advice on an order again: the session is run once more, and the journal answers for the people."""
     from lab.advice.advisors import PEOPLE
-    from lab.production.sequence import sequence_named
-    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
 
     def nobody(request: "Request") -> int | None:
         raise KeyboardInterrupt
 
-    options, wanted = kept.options, wanted_of(kept, dict.fromkeys(PEOPLE, nobody))
-    teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
     try:
-        found = sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files={})
-        stopped = found["interrupted"]
+        stopped = sequenced(kept, dict.fromkeys(PEOPLE, nobody), seat, toolbox, files={})["interrupted"]
     except KeyboardInterrupt:  # before an order was found
         stopped = True
     if stopped and (kept.journal is None or kept.journal.folding):  # by Ctrl-C, not by the journal's end

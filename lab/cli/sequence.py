@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from lab.cli.families import offers
-from lab.cli.lessons import lesson_seat, say_read, teacher_of, wanted_of
+from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Plain, Port, Seed, ShowPage, ToolboxFolder, Wait
 from lab.cli.output import end, show
 
@@ -65,9 +65,7 @@ def sequence(
 
     What a person advises is kept: --resume goes on with it, lab replay shows it again.
     """
-    from lab.production.sequence import sequence_named
     from lab.teaching.kept_order import OrderOptions, OrderSession, gone_on
-    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
     from lab.toolbox.registry import Toolbox
     from lab.view.summary import sequence_summary
 
@@ -78,16 +76,10 @@ def sequence(
     kept = OrderSession(given.complete(), box) if resume is None else gone_on(given, resume, box)
     if resume is not None:
         say_read(kept, "--resume")
-    options = kept.options
     files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
     try:
-        with lesson_seat([options.advisor], page=page, port=port, wait_s=wait, plain=plain) as seat:
-            teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
-            wanted = wanted_of(kept, seat.people())
-            with seat.progress:
-                document = sequence_named(
-                    options.task, options.case, options.toasts, wanted, teacher=teacher, files=files
-                )
+        with lesson_seat(kept.options.advisors, page=page, port=port, wait_s=wait, plain=plain) as seat, seat.progress:
+            document = sequenced(kept, seat.people(), seat, toolbox, files)
     except KeyboardInterrupt as stopped:
         if kept.journal is None:
             raise
