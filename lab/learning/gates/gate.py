@@ -71,12 +71,4 @@ class Never(Gate):
         return False
 
 
-class PerStep(Gate):
-    """From episode X on, whether to ask is decided at each step."""
-
-    def opens(self, episode: int, steps: Steps) -> bool:
-        """Every episode from X on may ask."""
-        return episode >= self.settings.first_episode
-
-
 GateClass = Callable[[GateSettings, int, int, Surroundings | None], Gate]
