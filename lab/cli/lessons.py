@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from lab.teaching.lesson_options import LessonOptions
     from lab.teaching.teacher import Teacher
 
-GYM = "gym:"
+GYM = "gym:"  # as in `lab.gym`, which takes a while to load and is asked for such a name only
 
 
 @contextmanager

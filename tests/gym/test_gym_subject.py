@@ -21,8 +21,9 @@ from hypothesis.strategies import SearchStrategy
 from lab.advice.advisors import AdvisorName
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, LabError, WorkFailed
-from lab.gym import GymWorld, gym_world, names_environment, parse_name
+from lab.gym.environment_name import names_environment, parse_name
 from lab.gym.gym_environment import ALONE, GymEnvironment
+from lab.gym.gym_subject import GymWorld, gym_world
 from lab.gym.space_numbering import Numbering, Unsupported
 from lab.gym.transition_model import TransitionModel, Worth
 from lab.learning.environment import Judged
