@@ -165,12 +165,11 @@ class LessonSeat:
 
     # ---- a replay
 
-    def replaying(self, pause_s: float) -> "LessonSeat":
-        """The same seat for a session that is shown again: everything is told, `pause_s` between two answers."""
+    def replaying(self, pause_s: float) -> None:
+        """A session is shown again: everything is told, `pause_s` between two answers."""
         self._pause_s = pause_s
         if self.page is not None:
             self.page.wait_for_page(PAGE_S)
-        return self
 
     def stay(self) -> None:
         """Keeps serving the page until Ctrl-C; returns at once when there is none."""

@@ -128,7 +128,7 @@ def _document(problem: Problem, lesson: Lesson, teacher: Teacher) -> dict[str, A
         "task": policy.task,
         "learner": policy.learner["learner"],
         "gate": policy.gate["gate"],
-        "advisor": teacher.advisor,
+        "advisor": str(teacher.advising),
         "memory": policy.gate["memory"],
         "seed": teacher.seed,
         "episodes": len(result.steps),
