@@ -10,6 +10,11 @@ _END = (
 )  # of a longer one that is shown: it says where it comes from first, what is allowed last
 
 
+def printable(text: str) -> str:
+    """Text with each character that cannot be printed, such as a line break or an escape code, as its escape."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 class LabError(Exception):
     """Any failure the lab explains in one line; `exit_code` is what a command ends with.
 
@@ -20,7 +25,7 @@ class LabError(Exception):
     exit_code = 1
 
     def __init__(self, message: str = "") -> None:
-        shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in message)
+        shown = printable(message)
         if len(shown) > MOST_CHARACTERS:
             shown = f"{shown[:_END]} ... ({len(shown) - 2 * _END} more characters) ... {shown[-_END:]}"
         super().__init__(shown)

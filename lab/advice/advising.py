@@ -12,9 +12,9 @@ from lab.advice.panel import Panel, PanelSettings, members_of
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.environment import Environment
-from lab.learning.events import Event
 from lab.learning.requests import Advisor, Ask
 from lab.learning.selection import uniforms
+from lab.learning.session_events import Event
 from lab.learning.settings import LearnerSettings
 from lab.mdp import BoolArray, TabularMDP
 

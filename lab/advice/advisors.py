@@ -100,10 +100,6 @@ def _simulated(name: AdvisorName, level: Level) -> "Advisor":
     return level.simulated(name.taus, 1.0)
 
 
-def _wrong(name: AdvisorName, level: Level) -> "Advisor":
-    return level.simulated((SKILL_TAUS["expert"],), -1.0)
-
-
 def _person(name: AdvisorName, level: Level) -> "Advisor":
     if name.text not in level.people:
         raise BadInput(f"advisor '{name}': this command has no {PEOPLE[name.text]} to ask a person through")
@@ -125,18 +121,14 @@ def _recorded(name: AdvisorName, level: Level) -> "Advisor":
     return RecordedAdvisor(said)
 
 
-def _nobody(name: AdvisorName, level: Level) -> None:
-    return None
-
-
 PEOPLE = {"terminal": "prompt", "web": "page"}
 SKILL_TAUS = {"expert": 0.01, "moderate": 0.1, "limited": 0.3, "novice": 1.0}
 
 ADVISORS: dict[str, AdvisorKind] = {
     **{name: AdvisorKind(_simulated) for name in SKILL_TAUS},
-    "wrong": AdvisorKind(_wrong),
+    "wrong": AdvisorKind(lambda name, level: level.simulated((SKILL_TAUS["expert"],), -1.0)),
     **{name: AdvisorKind(_person) for name in PEOPLE},
-    "none": AdvisorKind(_nobody),
+    "none": AdvisorKind(lambda name, level: None),
     "tau=X": AdvisorKind(_simulated),
     "tau=X..Y": AdvisorKind(_simulated, "changing over the episodes"),
     "recorded:DIR": AdvisorKind(_recorded, "a session's folder"),

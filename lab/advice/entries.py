@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.errors import BadInput
-from lab.learning.events import (
+from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
     AdviceRejected,

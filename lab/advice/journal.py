@@ -12,8 +12,8 @@ from pathlib import Path
 
 from lab.advice.entries import FILE, Answer, Closed, Entry, Read, Session, Undone, line_of, read_journal, undoable
 from lab.errors import BadInput, WorkFailed
-from lab.learning.events import EpisodeEnded
 from lab.learning.requests import AdvisorLeft, Ask, Request, allowed_words
+from lab.learning.session_events import EpisodeEnded
 
 
 class Undo(Exception):

@@ -3,13 +3,14 @@
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, count
 from math import fsum, log
 
 from lab.advice.trust import Pair, Trail, Ways, bounds, circles, is_bad, is_good, trust, trust_there
 from lab.errors import BadInput, unknown
-from lab.learning.events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Walked
 from lab.learning.selection import Draw
+from lab.learning.session_events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.mdp import BoolArray
 
 PROBED = 0.1  # the share of the questions that a dropped advisor is still asked
@@ -35,11 +36,7 @@ def trust_weighted(trusts: Sequence[float]) -> float:
 
 
 Decide = Callable[[Sequence[float]], float]  # what an action is worth, from the trusts in those who said it
-DECISIONS: dict[str, Decide] = {
-    "majority": majority,
-    "best-trusted": best_trusted,
-    "trust-weighted": trust_weighted,
-}
+DECISIONS: dict[str, Decide] = {"majority": majority, "best-trusted": best_trusted, "trust-weighted": trust_weighted}
 
 
 def decided(votes: Mapping[str, int], trusts: Mapping[str, float], own: int, decide: Decide) -> int:
@@ -213,23 +210,20 @@ class Panel:
         self._ways.walked(walked.trail, walked.reached, over)
         for name, member in self._members.items():
             member.judge(walked.trail, self._ways)
-            if not member.dropped and is_bad(member.good, member.bad):
-                self._drop(name, walked.episode)
-            elif member.dropped and is_good(member.good, member.bad):
-                self._readmit(name, walked.episode)
+            if (is_good if member.dropped else is_bad)(member.good, member.bad):
+                self._switch(name, walked.episode)
 
-    def _drop(self, name: str, episode: int) -> None:
+    def _switch(self, name: str, episode: int) -> None:
+        """Drops a member, or readmits one that was dropped."""
         member = self._members[name]
-        why = f"{member.good} of its {member.good + member.bad} answers that could be judged led nearer to the goal"
-        self._tell(AdvisorDropped(episode, name, trust(member.good, member.bad), why))
-        member.dropped = True
-        member.forget()
-
-    def _readmit(self, name: str, episode: int) -> None:
-        member = self._members[name]
-        member.dropped = False
-        why = f"asked now and then, {member.good} of its {member.good + member.bad} answers led nearer to the goal"
-        self._tell(AdvisorReadmitted(episode, name, trust(member.good, member.bad), why))
+        answers, now = f"{member.good} of its {member.good + member.bad} answers", trust(member.good, member.bad)
+        if member.dropped:
+            why = f"asked now and then, {answers} led nearer to the goal"
+            self._tell(AdvisorReadmitted(episode, name, now, why))
+        else:
+            self._tell(AdvisorDropped(episode, name, now, f"{answers} that could be judged led nearer to the goal"))
+            member.forget()
+        member.dropped = not member.dropped
 
     def standing(self) -> list[MemberStanding]:
         """How the members stand that have not left, in the order in which they came."""
@@ -251,13 +245,6 @@ def members_of(names: Iterable[str], advisors: Iterable[Advisor | None]) -> dict
     members: dict[str, Advisor] = {}
     for name, advisor in zip(names, advisors, strict=True):
         if advisor is not None:
-            members[_free(name, members)] = advisor
+            free = chain([name], (f"{name} {number}" for number in count(2)))
+            members[next(one for one in free if one not in members)] = advisor
     return members
-
-
-def _free(name: str, taken: Mapping[str, Advisor]) -> str:
-    number, found = 1, name
-    while found in taken:
-        number += 1
-        found = f"{name} {number}"
-    return found

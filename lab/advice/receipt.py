@@ -9,7 +9,7 @@ from typing import Any
 from lab.advice.entries import Answer, Entry
 from lab.advice.trust import Difference, Pair, Skill, differences, skill_of, worse
 from lab.errors import counted
-from lab.learning.events import (
+from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
     AdviceRejected,

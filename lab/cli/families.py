@@ -5,15 +5,17 @@ are filled in when the help of that very command is asked for: `lab --help` load
 """
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from typer.core import TyperCommand
 
-from lab.cli import glossary
+from lab.cli.glossary import TERMS, TEXTS
+
+Tables = dict[str, Mapping[str, Any] | Sequence[str]]
 
 
-def _of_teaching() -> dict[str, Iterable[str]]:
+def _of_teaching() -> Tables:
     from lab.advice.advisors import ADVISORS
     from lab.advice.panel import ASKED, DECISIONS
     from lab.learning.gates import GATES
@@ -21,6 +23,7 @@ def _of_teaching() -> dict[str, Iterable[str]]:
     from lab.skills import SKILLS
 
     return {
+        "terms": TERMS,
         "skills": SKILLS,
         "learners": UPDATES,
         "gates": GATES,
@@ -30,7 +33,7 @@ def _of_teaching() -> dict[str, Iterable[str]]:
     }
 
 
-def _of_sequencing() -> dict[str, Iterable[str]]:
+def _of_sequencing() -> Tables:
     from lab.sequencing import SEQUENCERS
     from lab.sequencing.cell.objectives import OBJECTIVES
     from lab.sequencing.methods.srl_advised import FITTING
@@ -38,14 +41,14 @@ def _of_sequencing() -> dict[str, Iterable[str]]:
     return {"methods": SEQUENCERS, "objectives": OBJECTIVES, "order gates": FITTING}
 
 
-def _of_studies() -> dict[str, Iterable[str]]:
+def _of_studies() -> Tables:
     from lab.studies import STUDIES
 
     return {"studies": STUDIES}
 
 
-def members(family: str) -> Iterable[str]:
-    """The names in a family's table, such as "gates"; only tables are loaded that are needed to find it."""
+def members(family: str) -> Mapping[str, Any] | Sequence[str]:
+    """The table of a family, such as "gates", or its names; only tables are loaded that are needed to find it."""
     for room in (_of_studies, _of_teaching, _of_sequencing):
         if family in (found := room()):
             return found[family]
@@ -76,6 +79,15 @@ class CommandOfFamilies(TyperCommand):
 def _filled(text: str) -> str:
     def told(match: "re.Match[str]") -> str:
         name = match[1]
-        return glossary.TEXTS[name]() if name in glossary.TEXTS else ", ".join(members(name))
+        if name not in TEXTS:
+            return ", ".join(members(name))
+        return "\n\n".join(_explained(heading, family) for heading, family in TEXTS[name].items())
 
     return re.sub(r"\{([a-z ]+)\}", told, text)
+
+
+def _explained(heading: str, family: str) -> str:
+    """The members of a family, one a line with what it means, as typer sets the text below a command's options."""
+    table: Any = members(family)
+    rows = [f"  {name}: {getattr(row, 'help', row)}" for name, row in table.items()]
+    return "\n".join([f"{heading}:", *rows])

@@ -1,17 +1,17 @@
-"""What the commands that teach share: who hears of it, the teacher and the subject of the options, a kept session."""
+"""What the commands that teach share: who hears of it, the teacher and the subject of the options, what a kept session reads."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lab.cli.output import complain, console
 from lab.errors import BadInput, LabError
 
 if TYPE_CHECKING:
+    from lab.advice.entries import Read
     from lab.learning.requests import Ask
-    from lab.production.sequence import Wanted
     from lab.seat.lesson_seat import LessonSeat
     from lab.teaching.kept_order import OrderSession
     from lab.teaching.kept_session import KeptSession
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from lab.teaching.lesson_options import LessonOptions
     from lab.teaching.teacher import Teacher
 
-GYM = "gym:"
+GYM = "gym:"  # as in `lab.gym`, which takes a while to load and is asked for such a name only
 
 
 @contextmanager
@@ -43,7 +43,7 @@ def lesson_seat(
             progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
         prompt = TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
         seat = LessonSeat(progress, prompt, shown)
-        stack.callback(seat.clear_stage)
+        stack.callback(seat.clear_scene)
         try:
             yield seat
         except LabError as error:
@@ -59,22 +59,10 @@ def teacher_of(toolbox: Path | None, options: "LessonOptions", seat: "LessonSeat
 
     advising = options.advising(seat.people())
     for journal in advising.cut_records():
-        complain(f"journal '{journal.path}': its last line was cut off and is left out: {journal.cut[:60]!r}")
+        _say_cut(journal)
     teacher = Teacher(Toolbox(toolbox), advising, options.seed, seat.hear)
     teacher.toolbox.check()
     return teacher
-
-
-def kept_session(
-    folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] | None = None
-) -> "KeptSession":
-    """A session that was kept; what was cut off at its end is said."""
-    from lab.teaching.kept_session import KeptSession
-
-    kept = KeptSession(folder, where, read_only=read_only, trusted=trusted or ())
-    if kept.read.cut:
-        complain(f"journal '{kept.read.path}': its last line was cut off and is left out: {kept.read.cut[:60]!r}")
-    return kept
 
 
 def subject_of(options: "LessonOptions", kept: "KeptSession | None" = None) -> "Subject":
@@ -105,12 +93,15 @@ def subject_of(options: "LessonOptions", kept: "KeptSession | None" = None) -> "
     return SkillSubject.of(options)
 
 
-def wanted_of(kept: "OrderSession", people: "Mapping[str, Ask]") -> "Wanted":
-    """What a session of `lab sequence` asks for, and whom."""
-    from lab.production.sequence import Wanted
+def sequenced(
+    kept: "OrderSession", people: "Mapping[str, Ask]", seat: "LessonSeat", toolbox: Path | None, files: dict[str, Path]
+) -> dict[str, Any]:
+    """The document of a session of `lab sequence`, whom it may ask behind such names as "terminal", its pictures in files."""
+    from lab.production.sequence import Wanted, sequence_named
+    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
 
     options = kept.options
-    return Wanted(
+    wanted = Wanted(
         options.method,
         options.episodes,
         options.objective,
@@ -120,22 +111,30 @@ def wanted_of(kept: "OrderSession", people: "Mapping[str, Ask]") -> "Wanted":
         options.asked,
         options.gate,
         people,
-        keep=lambda cell, objective: kept.keep(Path(options.task).stem, cell, objective),
+        kept.keep,
     )
+    teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
+    return sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)
 
 
-def say_outside(kept: "KeptSession | OrderSession") -> None:
-    """Says which files that are not its own a session has the lab read when it goes on or is shown again."""
+def _say_cut(read: "Read") -> None:
+    complain(f"journal '{read.path}': its last line was cut off and is left out: {read.cut[:60]!r}")
+
+
+def say_read(kept: "KeptSession | OrderSession", where: str) -> None:
+    """Says of a session that goes on or is shown again what was cut off, and which files are read that are not its own."""
     from lab.advice.advisors import AdvisorName
     from lab.tasks.task_file import is_path
 
     assert kept.read is not None
+    if kept.read.cut:
+        _say_cut(kept.read)
     options = kept.options
     named: list[object] = [getattr(options, "subtask", None), options.task]
     if str(named[0]).startswith(GYM):
         from lab.gym import parse_name
 
-        named = list(parse_name(str(named[0]), kept.where).options.values())
+        named = list(parse_name(str(named[0]), where).options.values())
     files = [word for word in named if isinstance(word, str) and is_path(word) and Path(word).is_file()]
     advisors = [AdvisorName.of(name) for name in options.advisors]
     files += [str(name.folder) for name in advisors if name.folder is not None]

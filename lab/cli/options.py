@@ -29,8 +29,7 @@ Asked = Annotated[
     str, typer.Option("--ask", help="Several advisors are asked: {asked}.", autocompletion=offers("asked"))
 ]
 Decide = Annotated[
-    str,
-    typer.Option("--decide", help="Whom of several to follow: {decisions}.", autocompletion=offers("decisions")),
+    str, typer.Option("--decide", help="Whom of several to follow: {decisions}.", autocompletion=offers("decisions"))
 ]
 Plain = Annotated[bool, typer.Option("--plain", help="Plain sentences instead of pictures, as screen readers want.")]
 ShowPage = Annotated[

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lab.cli.lessons import kept_session, lesson_seat, say_outside, subject_of, teacher_of, wanted_of
+from lab.cli.lessons import lesson_seat, say_read, sequenced, subject_of
 from lab.cli.options import Json, Plain, Port, ToolboxFolder, TrustModule
 from lab.cli.output import end, show
 
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from lab.learning.requests import Request
     from lab.seat.lesson_seat import LessonSeat
     from lab.teaching.kept_order import OrderSession
-    from lab.teaching.kept_session import KeptSession
 
 
 def replay(
@@ -32,8 +31,9 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """Show a kept teaching session again: each question, what was answered, what came of it, and what it was worth."""
-    from lab.teaching.kept_order import OrderSession, is_order, kept_order
-    from lab.teaching.kept_session import session_rows
+    from lab.advice.entries import read_journal
+    from lab.teaching.kept_order import OrderSession, kept_order
+    from lab.teaching.kept_session import KeptSession, session_rows
     from lab.teaching.lesson import replay as replay_session
     from lab.toolbox.registry import Toolbox
     from lab.view.summary import replay_summary, table_of
@@ -44,11 +44,11 @@ def replay(
         return
     box = Toolbox(toolbox)
     kept: KeptSession | OrderSession
-    if is_order(folder, "DIR"):
+    if read_journal(folder, "DIR").session.command == "sequence":
         kept = kept_order(folder, "DIR", box, read_only=True)
     else:
-        kept = kept_session(folder, "DIR", read_only=True, trusted=trust_module)
-    say_outside(kept)
+        kept = KeptSession(folder, "DIR", read_only=True, trusted=trust_module or ())
+    say_read(kept, "DIR")
     try:
         with lesson_seat([] if as_json else ["terminal"], page=page, port=port, plain=plain) as seat:
             seat.replaying(0.0 if as_json else pause)
@@ -66,17 +66,12 @@ def replay(
 def _replayed(kept: "OrderSession", seat: "LessonSeat", toolbox: Path | None) -> dict[str, Any]:
     """Advice on an order again: the session is run once more, and the journal answers for the people."""
     from lab.advice.advisors import PEOPLE
-    from lab.production.sequence import sequence_named
-    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
 
     def nobody(request: "Request") -> int | None:
         raise KeyboardInterrupt
 
-    options, wanted = kept.options, wanted_of(kept, dict.fromkeys(PEOPLE, nobody))
-    teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
     try:
-        found = sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files={})
-        stopped = found["interrupted"]
+        stopped = sequenced(kept, dict.fromkeys(PEOPLE, nobody), seat, toolbox, files={})["interrupted"]
     except KeyboardInterrupt:  # before an order was found
         stopped = True
     if stopped and (kept.journal is None or kept.journal.folding):  # by Ctrl-C, not by the journal's end

@@ -52,7 +52,7 @@ def run(
         if any(name in PEOPLE for name in options.advisors):
             teacher = replace(teacher, keep=kept_by(teacher.toolbox, options))
         with seat.progress:
-            report = run_task(prepared, teacher, folder, viewer=seat.viewer)
+            report = run_task(prepared, teacher, folder, viewer=seat.page)
     show(report.to_json(), as_json, run_summary)
     if not report.success:
         end(report.outcome.failure or f"{len(report.outcome.delivered)} of {counted(toasts, 'toast')} delivered", 1)

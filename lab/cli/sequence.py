@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from lab.cli.families import offers
-from lab.cli.lessons import lesson_seat, say_outside, teacher_of, wanted_of
+from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Plain, Port, Seed, ShowPage, ToolboxFolder, Wait
 from lab.cli.output import end, show
 
@@ -21,16 +21,14 @@ def sequence(
     ] = None,
     toasts: Annotated[int | None, typer.Option("--toasts", "-n", help="How many parts of the only product.")] = None,
     method: Annotated[
-        str | None,
-        typer.Option("--method", help="{methods}; default: the file's.", autocompletion=offers("methods")),
+        str | None, typer.Option("--method", help="{methods}; default: the file's.", autocompletion=offers("methods"))
     ] = None,
     objective: Annotated[
         str | None,
         typer.Option("--objective", help="{objectives}; default: the file's.", autocompletion=offers("objectives")),
     ] = None,
     episodes: Annotated[
-        int | None,
-        typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the file's."),
+        int | None, typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the file's.")
     ] = None,
     sessions: Annotated[
         int, typer.Option("--sessions", min=1, max=MAX_SESSIONS, help="How many sessions, each with its own chance.")
@@ -42,9 +40,7 @@ def sequence(
     advisor: Annotated[
         str,
         typer.Option(
-            "--advisor",
-            help="Who srl may ask which part to move: {advisors}.",
-            autocompletion=offers("advisors"),
+            "--advisor", help="Who srl may ask which part to move: {advisors}.", autocompletion=offers("advisors")
         ),
     ] = "none",
     gate: Annotated[
@@ -69,9 +65,7 @@ def sequence(
 
     What a person advises is kept: --resume goes on with it, lab replay shows it again.
     """
-    from lab.production.sequence import sequence_named
     from lab.teaching.kept_order import OrderOptions, OrderSession, gone_on
-    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
     from lab.toolbox.registry import Toolbox
     from lab.view.summary import sequence_summary
 
@@ -81,21 +75,15 @@ def sequence(
     box = Toolbox(toolbox)
     kept = OrderSession(given.complete(), box) if resume is None else gone_on(given, resume, box)
     if resume is not None:
-        say_outside(kept)
-    options = kept.options
+        say_read(kept, "--resume")
     files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
     try:
-        with lesson_seat([options.advisor], page=page, port=port, wait_s=wait, plain=plain) as seat:
-            teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
-            wanted = wanted_of(kept, seat.people())
-            with seat.progress:
-                document = sequence_named(
-                    options.task, options.case, options.toasts, wanted, teacher=teacher, files=files
-                )
+        with lesson_seat(kept.options.advisors, page=page, port=port, wait_s=wait, plain=plain) as seat, seat.progress:
+            document = sequenced(kept, seat.people(), seat, toolbox, files)
     except KeyboardInterrupt as stopped:
         if kept.journal is None:
             raise
-        raise KeyboardInterrupt(f"{str(stopped) or 'stopped by Ctrl-C'}{kept.resume_command()}") from None
+        raise KeyboardInterrupt(f"{str(stopped) or 'stopped by Ctrl-C'}{kept.resume_command(box)}") from None
     show(document | kept.worth(), as_json, sequence_summary)
     if document["interrupted"]:
-        end(f"stopped by Ctrl-C; the best order until then is above{kept.resume_command()}", 130)
+        end(f"stopped by Ctrl-C; the best order until then is above{kept.resume_command(box)}", 130)

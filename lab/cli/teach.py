@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from lab.cli.families import offers
-from lab.cli.lessons import kept_session, lesson_seat, say_outside, subject_of, teacher_of
+from lab.cli.lessons import lesson_seat, say_read, subject_of, teacher_of
 from lab.cli.options import (
     MAX_EPISODES,
     AdvisorNames,
@@ -39,19 +39,11 @@ def teach(
     ] = None,
     learner: Annotated[
         str | None,
-        typer.Option(
-            "--learner",
-            help="{learners}; default: the task's.",
-            autocompletion=offers("learners"),
-        ),
+        typer.Option("--learner", help="{learners}; default: the task's.", autocompletion=offers("learners")),
     ] = None,
     gate: Annotated[
         str | None,
-        typer.Option(
-            "--gate",
-            help="When it asks: {gates}; default: the task's.",
-            autocompletion=offers("gates"),
-        ),
+        typer.Option("--gate", help="When it asks: {gates}; default: the task's.", autocompletion=offers("gates")),
     ] = None,
     memory: Annotated[
         bool | None,
@@ -61,8 +53,7 @@ def teach(
     asked: Asked = "together",
     decide: Decide = "trust-weighted",
     episodes: Annotated[
-        int | None,
-        typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the task's."),
+        int | None, typer.Option("--episodes", min=1, max=MAX_EPISODES, help="Session length; default: the task's.")
     ] = None,
     save: Annotated[str | None, typer.Option("--save", help="Name of the policy in the toolbox.")] = None,
     sight: Annotated[
@@ -94,19 +85,19 @@ def teach(
     Each session keeps a journal: --resume goes on with one that was broken off, lab replay shows it again.
     """
     from lab.files import check_out
-    from lab.teaching.kept_session import check_new
+    from lab.teaching.kept_session import KeptSession, check_new
     from lab.teaching.lesson import teach as teach_session
     from lab.teaching.lesson_options import LessonOptions
     from lab.view.summary import lesson_summary
 
     who = (tuple(advisor or ()), asked, decide)
     given = LessonOptions(subtask or "", task, sight or view, learner, gate, memory, *who, episodes, seed, save)
-    kept = None if resume is None else kept_session(resume, "--resume", trusted=trust_module)
+    kept = None if resume is None else KeptSession(resume, "--resume", trusted=trust_module or ())
     if kept is not None and out is not None:
         raise BadInput(f"--out {out} beside --resume {resume}: a session goes on in its own folder: leave it away")
     options = given.complete() if kept is None else kept.same(given)
     if kept is not None:
-        say_outside(kept)
+        say_read(kept, "--resume")
     options.advising()
     if out is not None:
         check_new(out)

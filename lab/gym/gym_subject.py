@@ -1,12 +1,75 @@
-"""A Gymnasium environment as what a lesson is about."""
+"""What `lab teach gym:...` teaches: the problem that a Gymnasium environment sets, and how it is learned by default."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
+
+from pydantic import PrivateAttr
 
 from lab.errors import BadInput
-from lab.gym.gym_problem import GymWorld, gym_world
+from lab.gym.environment_name import parse_name
+from lab.gym.gym_environment import ALONE, GymEnvironment
+from lab.gym.numbered_environment import NumberedEnvironment
 from lab.learning.problem import Problem
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.tasks.record import Learned
 from lab.teaching.lesson import Subject
 from lab.teaching.lesson_options import LessonOptions
+
+CERTAIN_EPISODES = (1000, 5000)  # eight for each entry of the table, but at least and at most so many
+CHANCE_EPISODES = (5000, 20_000)  # twenty for each entry
+
+
+class GymWorld(Learned):
+    """A Gymnasium environment, by its id and keywords, and how it is learned; made by `gym_world`."""
+
+    name: str
+    _environment: GymEnvironment = PrivateAttr()
+
+    @classmethod
+    def of(cls, environment: GymEnvironment) -> Self:
+        """The environment with the settings that fit it."""
+        learner, gate = fitting(environment)
+        made = cls(name=str(environment.live.name), learner=learner, gate=gate)
+        made._environment = environment
+        return made
+
+    def problem(self) -> Problem:
+        """What it sets to learn."""
+        return Problem(self.name, "gym", self._environment.mdp, self._environment)
+
+    def check_members(self, where: str = "") -> None:
+        """As `Learned.check_members`; BadInput also for a learner that needs to know where each action leads."""
+        super().check_members(where)
+        model = self._environment.model
+        if self.learner.learner == "afterstate" and not (model is not None and model.certain):
+            why = f"where the steps of '{self.name}' lead is not certain, and it looks at the states after them"
+            raise BadInput(f"learner 'afterstate' ({where}learner): {why}: wanted another one, such as q")
+
+
+def gym_world(word: str, where: str = "SUBTASK") -> GymWorld:
+    """The environment that "gym:ID?KEYWORD=VALUE&..." means. Raises BadInput in one line for whatever it cannot be."""
+    return GymWorld.of(GymEnvironment(NumberedEnvironment(parse_name(word, where), where)))
+
+
+def fitting(environment: GymEnvironment) -> tuple[LearnerSettings, GateSettings]:
+    """A learner that mostly finds the best policy alone, and a gate; the numbers come from sessions in the toy texts.
+
+    With several starts every state matters, not only those on the way from one: it explores for longer. Where chance has
+    a hand in steps, what an episode takes says little about the advice in it: step counts are averaged over more
+    episodes, and more misleads tolerated.
+    """
+    mdp, model = environment.mdp, environment.model
+    entries, most = mdp.n_states * mdp.n_actions, environment.max_steps
+    if model is None or not model.certain:
+        gate = GateSettings(window=20, first_episode=40, omega=30, spare_best=True)
+        return replace(ALONE, episodes=_within(20 * entries, CHANCE_EPISODES), max_steps=most), gate
+    beta = 0.2 if mdp.starts else 0.7
+    learner = replace(ALONE, alpha=1.0, beta=beta, episodes=_within(8 * entries, CERTAIN_EPISODES), max_steps=most)
+    return learner, GateSettings(spare_best=True)
+
+
+def _within(number: int, limits: tuple[int, int]) -> int:
+    return min(max(number, limits[0]), limits[1])
 
 
 @dataclass

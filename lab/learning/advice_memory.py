@@ -24,7 +24,7 @@ from collections.abc import Iterator, MutableSequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from lab.learning.events import AdviceEnded, AdviceRemembered, Event
+from lab.learning.session_events import AdviceEnded, AdviceRemembered, Event
 
 OWN, REMEMBERED, ASKED, PRACTISED = range(4)  # where a move comes from
 START, GAIN, LOSS, MOST = 4, 1, 4, 12  # trust, in quarters of a point

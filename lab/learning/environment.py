@@ -1,6 +1,6 @@
 """Where a learner acts: what an episode begins with, what a step leads to, and how a learned table is judged.
 
-A `TabularMDP` is such an environment by its table; others, such as Gymnasium's, are stepped (see lab/gym.py).
+A `TabularMDP` is such an environment by its table; others, such as Gymnasium's, are stepped (see lab/gym).
 """
 
 from typing import NamedTuple, Protocol

@@ -4,9 +4,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from lab.learning.events import Improvement
 from lab.learning.reasons import Reason
 from lab.learning.selection import chances
+from lab.learning.session_events import Improvement
+from lab.learning.settings import GateSettings
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
 
@@ -16,7 +17,7 @@ class Standing:
     """How advice stands with the learner: steps helped of those allowed, episodes misled of those tolerated, Lambda."""
 
     helped_steps: int = 0
-    budget: int = 1_000_000_000
+    budget: int = GateSettings.budget
     misleads: int = 0
     omega: int = 0
     lambda_threshold: float = 0.0

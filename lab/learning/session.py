@@ -9,7 +9,10 @@ from numpy.typing import NDArray
 from lab.errors import BadInput, unknown
 from lab.learning.advice_memory import Recall
 from lab.learning.environment import Environment, TableEnvironment, check_solvable
-from lab.learning.events import (
+from lab.learning.gates import GATES, Surroundings, improvement
+from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked, allowed_words
+from lab.learning.selection import SELECTIONS, Draw, temperature, uniforms
+from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
     AdviceRejected,
@@ -18,9 +21,6 @@ from lab.learning.events import (
     Event,
     Improvement,
 )
-from lab.learning.gates import GATES, Surroundings, improvement
-from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked, allowed_words
-from lab.learning.selection import SELECTIONS, Draw, temperature, uniforms
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES, Update
 from lab.mdp import BoolArray, FloatArray, TabularMDP

@@ -12,8 +12,8 @@ from lab.advice.advisors import PEOPLE, AdvisorName, make_advisor
 from lab.advice.entries import Closed
 from lab.advice.journal import Again, Journal
 from lab.errors import BadInput, unknown
-from lab.learning.events import Event as SessionEvent
 from lab.learning.requests import Ask
+from lab.learning.session_events import Event as SessionEvent
 from lab.learning.settings import GateSettings
 from lab.production.drawn_times import stochastic
 from lab.sequencing import SEQUENCERS, check_method, find_sequence

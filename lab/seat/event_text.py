@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from lab.errors import counted
-from lab.learning.events import (
+from lab.learning.session_events import (
     AdviceEnded,
     AdviceRejected,
     AdviceRequested,
@@ -14,7 +14,7 @@ from lab.learning.events import (
     AdvisorsDisagreed,
     EpisodeEnded,
 )
-from lab.learning.events import Event as SessionEvent
+from lab.learning.session_events import Event as SessionEvent
 from lab.mdp import TabularMDP
 from lab.seat.request_text import percent, verdict
 from lab.sequencing.cell.schedule import Move
@@ -44,6 +44,7 @@ ENDED = {
     "advisor left": "advice has ended; the learner goes on alone",
     "misled by what was remembered": "what was said led round in circles or into obstacles; the learner asks no more",
 }
+PARTS_DONE = (SkillReady, MoveTimed, SequenceFound, MoveMade)  # each tells that one part of a phase is done
 _SHOWN_MOVES = 24
 _LEAST_WAIT_S = 0.05  # that is worth a word
 

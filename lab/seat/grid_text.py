@@ -25,7 +25,6 @@ STYLES = {"R": "bold cyan", "r": "cyan", "G": "bold green", "g": "green", "#": "
 )
 GAP = 3  # columns between two slices
 FEWEST_COLUMNS = 9  # cells of a slice that is cut so that its neighbours can be seen beside it
-UNLIMITED = 10**6
 _SGR = re.compile(r"\x1b\[[0-9;]*m")
 _ESCAPE = re.compile(  # a colour; another sequence, a string up to its end or to that of the text; a lone escape
     r"(\x1b\[[0-9;]*m)|(?:\x1b\[|\x9b)[0-?]*[ -/]*[@-~]?|(?:\x1b[]P^_X]|[\x90\x98\x9d-\x9f]).*?(?:\x1b\\|[\x07\x9c]|\Z)"
@@ -148,21 +147,12 @@ def window(at: int, size: int, room: int) -> range:
     return range(low, low + room)
 
 
-def draw(request: AdviceRequest, arrows: str = ARROWS, free: str = "·") -> Text | None:
-    """The whole plane of axes 0 and 1 through the robot: R robot, G goal, # obstacle, x covered, an arrow.
-
-    A goal in another plane casts a small g into this one. The arrow stands in the cell that the learner itself would
-    enter. None when the states are no grid. Rows run down and columns to the right, but a map is shown as from above: x
-    to the right, y up.
-    """
-    if not (request.mdp.shape or request.mdp.coverage_shape):
-        return None
-    drawn = _GridDrawing(request, Marks(arrows, free)).fitting(UNLIMITED, UNLIMITED, most=1)
-    return Text("\n").join([*drawn.lines, Text(drawn.legend)])
-
-
 class _GridDrawing:
-    """The grid of one request as planes of axes 0 and 1, layer by layer of axis 2."""
+    """The grid of one request as planes of axes 0 and 1, layer by layer of axis 2.
+
+    R robot, G goal, # obstacle, x covered; a goal in another plane casts a small g into this one. An arrow stands in the
+    cell that the learner itself would enter.
+    """
 
     def __init__(self, request: AdviceRequest, marks: Marks):
         self.request, self.mdp, self.marks = request, request.mdp, marks
@@ -204,22 +194,22 @@ class _GridDrawing:
         if plane[there] in (self.marks.free, "x", "g"):
             plane[there] = "*" if direction is None else self.marks.arrows[direction]
 
-    def _room(self, width: int, most: int) -> tuple[range, int]:
+    def _room(self, width: int) -> tuple[range, int]:
         """Which layers are shown, and how many columns of each: many whole ones, or else three that are cut."""
-        title = len(f" [level {self.layers}]") if self.layers > 1 and most > 1 else 0
-        whole = min((width + GAP) // (max(2 * self.columns, title) + GAP), self.layers, most)
+        title = len(f" [level {self.layers}]") if self.layers > 1 else 0
+        whole = min((width + GAP) // (max(2 * self.columns, title) + GAP), self.layers)
         third = (width - 2 * GAP) // 3
         fewest = max(title, 2 * min(self.columns, FEWEST_COLUMNS))
-        if self.layers > 1 and whole < min(3, self.layers, most) and third >= fewest:
+        if self.layers > 1 and whole < min(3, self.layers) and third >= fewest:
             return window(self.layer, self.layers, 3), third // 2
         if whole % 2 == 0 and whole < self.layers:
             whole -= 1  # as many below as above
         return window(self.layer, self.layers, whole), min(self.columns, width // 2)
 
-    def fitting(self, width: int, height: int, most: int = UNLIMITED) -> Picture:
-        """The slices that so many columns and lines hold; with `most` 1 only the robot's own, without a title."""
-        layers, room = self._room(width, most)
-        titled = self.layers > 1 and most > 1
+    def fitting(self, width: int, height: int) -> Picture:
+        """The slices that so many columns and lines hold."""
+        layers, room = self._room(width)
+        titled = self.layers > 1
         row, column = self._place(self.cell)
         rows, columns = window(row, self.rows, height - titled), window(column, self.columns, room)
         planes = {k: self.plane(k)[rows.start : rows.stop, columns.start : columns.stop] for k in layers}

@@ -7,9 +7,10 @@ from rich.text import Text
 
 from lab.errors import counted
 from lab.learning.environment import TableEnvironment
-from lab.learning.events import EpisodeEnded
 from lab.learning.reasons import TooSlow
 from lab.learning.requests import AdviceRequest, Standing
+from lab.learning.session_events import EpisodeEnded
+from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP
 from lab.seat.grid_text import Marks, Picture, nearest_goal, points_by_name
 from lab.view.grid_planes import is_map
@@ -127,7 +128,7 @@ def progress(request: AdviceRequest, brief: bool = False) -> list[str]:
 def standing(request: AdviceRequest, brief: bool = False) -> str:
     """How much advice was used of what is allowed, and how many episodes it misled of those tolerated."""
     now = request.standing
-    allowed = f" of {now.budget}" if now.budget < Standing().budget else ""
+    allowed = f" of {now.budget}" if now.budget < GateSettings.budget else ""
     said = f"{now.helped_steps}{allowed} moves" if allowed else counted(now.helped_steps, "move")
     if brief:
         return f"Advised {said}; misled {now.misleads}" + (f" of {now.omega}." if now.omega else ", none allowed.")
@@ -267,7 +268,7 @@ def reasons(request: AdviceRequest, marks: Marks, guided: int) -> list[str]:
     worth = ", ".join(f"{marks.named(mdp, action)} {value:+.2f}" for action, value in enumerate(values))
     lines.append(f"What it thinks each move is worth here: {worth}; they span {float(np.ptp(values)):.2f}.")
     lines.append(_certainty(request, marks))
-    allowed = f" of {now.budget} that it may use" if now.budget < Standing().budget else ""
+    allowed = f" of {now.budget} that it may use" if now.budget < GateSettings.budget else ""
     lines.append(f"Advice so far: {counted(now.helped_steps, 'move')}{allowed}. {_verdict(now, guided)}")
     return lines
 

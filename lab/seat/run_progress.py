@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.progress import TaskID
 from rich.text import Text
 
-from lab.learning.events import AdviceRejected, AdviceRequested
-from lab.seat.event_text import lesson_parts, move_text, run_text, sequence_parts
+from lab.learning.session_events import AdviceRejected, AdviceRequested
+from lab.seat.event_text import PARTS_DONE, lesson_parts, move_text, run_text, sequence_parts
 from lab.teaching.events import (
     Event,
     LessonContinued,
@@ -81,21 +81,6 @@ class RunProgress:
                 self._say(run_text(event))
             case RecordSkipped() | MoveRetried():
                 self._say((f"  {run_text(event)}", "yellow"))
-            case SkillReady() | MoveTimed() | SequenceFound() | MoveMade():
-                self._done(event)
-                if self._task is not None:
-                    self._progress.advance(self._task)
-
-    def _begin(self, title: str, parts: int) -> None:
-        self._tell_reused()
-        if self._task is not None:
-            self._progress.remove_task(self._task)
-        self._say((title, "bold"))
-        self._task = self._progress.add_task(title, total=parts)
-
-    def _done(self, event: SkillReady | MoveTimed | SequenceFound | MoveMade) -> None:
-        """One part of the phase is done."""
-        match event:
             case SkillReady():
                 self._lesson(event.name, event.lesson)
             case MoveTimed():
@@ -105,6 +90,15 @@ class RunProgress:
                 self._pack([Text(f"  {order}"), Text(found)], gap=" ")
             case MoveMade():
                 self._say(f"  {event.move.drop_s:7.1f} s  {move_text(event.move)}")
+        if self._task is not None and isinstance(event, PARTS_DONE):
+            self._progress.advance(self._task)
+
+    def _begin(self, title: str, parts: int) -> None:
+        self._tell_reused()
+        if self._task is not None:
+            self._progress.remove_task(self._task)
+        self._say((title, "bold"))
+        self._task = self._progress.add_task(title, total=parts)
 
     def _lesson(self, name: str, lesson: Lesson) -> None:
         if lesson.result is None:

@@ -2,14 +2,14 @@
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from shlex import quote
-from typing import Any
+from typing import Any, TypeVar
 
+from lab import __version__
 from lab.advice.entries import FILE, Read, Session, line_of, read_journal
 from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
@@ -18,7 +18,7 @@ from lab.learning.environment import TableEnvironment
 from lab.learning.problem import Problem
 from lab.mdp import FloatArray
 from lab.tasks.record import write_whole
-from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.lesson_options import LessonOptions, SessionOptions
 from lab.teaching.lesson_plan import MAX_SESSIONS, Keep, LessonPlan
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox, default_folder, slug
@@ -26,27 +26,73 @@ from lab.toolbox.registry import Toolbox, default_folder, slug
 SESSIONS = "sessions"  # the folder in the toolbox
 _BEGUN = "begun"  # the folder in a session's folder for the policy that it went on from
 _MOST = 100_000  # sessions of one name
-_OPTIONS = {
-    "subtask": "SUBTASK",
-    "advisors": "--advisor",
-    "asked": "--ask",
-    "view": "--sight",
-}  # that are called otherwise than their fields
 MOST_VALUES = 3_000_000  # a larger table's optimal values take too long to know
+Options = TypeVar("Options", bound=SessionOptions)
 
 
-class _InFolder:
-    """What both kinds of session know once the lesson has begun."""
+class SessionInFolder:
+    """What all sessions know that are kept in folders, about a table or about an order.
 
+    folder, journal: None until it has begun; plan: None of an order; read: the journal as it was found, None of a new
+    session.
+    """
+
+    options: SessionOptions
     folder: Path | None = None
     journal: Journal | None = None
     plan: LessonPlan | None = None
+    read: Read | None = None
 
     def receipt(self) -> Receipt:
-        """What the advice was worth."""
-        assert self.plan is not None
-        assert self.journal is not None
+        """What the advice was worth; of an order nobody knows the values."""
+        if self.plan is None or self.journal is None:
+            return receipt([] if self.journal is None else self.journal.entries, None, None, certain=False)
         return receipt_of(self.plan, self.journal, known_values(self.plan))
+
+    def worth(self) -> dict[str, Any]:
+        """Where it is kept, and its receipt, which is written beside the journal; nothing where nothing is kept."""
+        if self.folder is None or self.journal is None:
+            return {}
+        made = self.receipt()
+        write_whole(self.folder / "receipt.json", json.dumps(made.to_json(), indent=1, allow_nan=False) + "\n")
+        return {"session": str(self.folder), "receipt": made.to_json() | {"lines": made.lines()}}
+
+    def resume_command(self, toolbox: Toolbox) -> str:
+        """What goes on with it; "" when there is nothing to go on with."""
+        if self.folder is None or self.journal is None:
+            return ""
+        box = "" if toolbox.folder == default_folder() else f" --toolbox {quote(str(toolbox.folder))}"
+        return f"; go on with: lab {self.options.command} --resume {quote(str(self.folder))}{box}"
+
+    def replayed(self) -> dict[str, Any]:
+        """The document of `lab replay --json`."""
+        assert self.read is not None
+        read, made = self.read, self.receipt()
+        return {
+            "session": str(read.path.parent),
+            "problem": read.session.problem,
+            "words": read.session.words,
+            "seed": self.options.seed,
+            "lab": read.session.lab,
+            "closed": None if read.closed is None else asdict(read.closed),
+            "cut": read.cut,
+            "events": [json.loads(line_of(entry)) for entry in read.entries],
+            "receipt": made.to_json() | {"lines": made.lines()},
+        }
+
+
+def read_session(folder: Path, where: str, kind: type[Options]) -> tuple[Read, Options]:
+    """The journal in a folder, and the options that its session was begun with. BadInput for another command's."""
+    read = read_journal(folder, where)
+    which = f"journal '{read.path}' ({where})"
+    if read.session.command != kind.command:
+        raise BadInput(f"{which}: {kind.wanted}")
+    return read, kind.from_json(read.session.words, which)
+
+
+def kept_journal(read: Read, read_only: bool) -> Journal:
+    """The journal of a kept session, which answers until it is used up."""
+    return Journal(None, read.effective(), read_only=True) if read_only else Journal.resume(read)
 
 
 def receipt_of(plan: LessonPlan, journal: Journal, values: FloatArray | None) -> Receipt:
@@ -66,11 +112,12 @@ def known_values(plan: LessonPlan) -> FloatArray | None:
         return None
 
 
-class NewSession(_InFolder):
+class NewSession(SessionInFolder):
     """A session's journal in a folder, or, without one, in the toolbox's folder `sessions`; made when the lesson begins."""
 
     def __init__(self, folder: Path | None, toolbox: Toolbox, options: LessonOptions):
-        self._wanted, self._toolbox, self._options = folder, toolbox, options
+        self._wanted, self._toolbox = folder, toolbox
+        self.options: LessonOptions = options
 
     def keep(self, plan: LessonPlan) -> Journal:
         """The journal of a lesson. Raises BadInput when the folder holds a session already."""
@@ -79,10 +126,10 @@ class NewSession(_InFolder):
         if plan.unfinished is not None:
             Toolbox(self.folder / _BEGUN).save(plan.unfinished)
         head = Session(
-            self._options.to_json(),
+            self.options.to_json(),
             problem.name,
             problem.mdp.signature,
-            lab_version(),
+            __version__,
             asdict(plan.learner),
             asdict(plan.gate),
             "" if plan.unfinished is None else plan.unfinished.name,
@@ -121,20 +168,18 @@ def kept_by(toolbox: Toolbox, options: LessonOptions) -> Keep:
     return keep
 
 
-class KeptSession(_InFolder):
+class KeptSession(SessionInFolder):
     """A session that was kept: to go on with it, or (`read_only`) to look at it again. Raises BadInput for none.
 
     trusted: modules that the session may name: it may be somebody else's, and code runs when one is imported.
     """
 
+    options: LessonOptions
+    read: Read
+
     def __init__(self, folder: Path, where: str, *, read_only: bool = False, trusted: Sequence[str] = ()):
-        self.read: Read = read_journal(folder, where)
-        self.folder = self.read.path.parent
-        if self.read.session.command != "teach":
-            raise BadInput(
-                f"journal '{self.read.path}' ({where}): it is advice on an order: wanted a session of lab teach"
-            )
-        self.options = LessonOptions.from_json(self.read.session.words, f"journal '{self.read.path}' ({where})")
+        self.read, self.options = read_session(folder, where, LessonOptions)
+        self.folder: Path = self.read.path.parent
         self._read_only, self.where, self.trusted = read_only, where, trusted
 
     def keep(self, plan: LessonPlan) -> Journal:
@@ -157,13 +202,12 @@ class KeptSession(_InFolder):
                     f"session '{self.folder}' ({self.where}): its {what} had {name} = {then[name]!r}, and the task now "
                     f"gives {now[name]!r}: its file has changed"
                 )
-        entries = self.read.effective()
-        self.journal = Journal(None, entries, read_only=True) if self._read_only else Journal.resume(self.read)
+        self.journal = kept_journal(self.read, self._read_only)
         return self.journal
 
     def same(self, given: LessonOptions) -> LessonOptions:
         """The options of the session; BadInput when the command names others, and when the session is over."""
-        check_same(given, self.read, _OPTIONS)
+        check_same(given, self.read)
         return self.options
 
     def begun(self, problem: Problem) -> Policy | None:
@@ -171,50 +215,19 @@ class KeptSession(_InFolder):
         name = self.read.session.continues
         if not name:
             return None
-        found = Toolbox(self.read.path.parent / _BEGUN).find(problem.subtask, problem.mdp.signature, name)
+        found = Toolbox(self.folder / _BEGUN).find(problem.subtask, problem.mdp.signature, name)
         if found is None:
             raise BadInput(f"session '{self.folder}': the policy that it went on from is not in '{_BEGUN}' any more")
         return found
 
 
-def check_same(given: Any, read: Read, names: Mapping[str, str]) -> None:
-    """BadInput when a command that goes on with a session names options, too, or when the session is over.
-
-    names: of options that are called otherwise than their fields.
-    """
+def check_same(given: Any, read: Read) -> None:
+    """BadInput when a command that goes on with a session names options, too, or when the session is over."""
     for name, value in asdict(given).items():
         if value != getattr(type(given)(), name):
-            option, folder = names.get(name, f"--{name}"), read.path.parent
+            option, folder = given.typed.get(name, f"--{name}"), read.path.parent
             raise BadInput(f"{option} beside --resume {folder}: a session goes on as it was begun: leave it away")
     read.check_goes_on()
-
-
-def resume_command(folder: Path | None, toolbox: Toolbox, command: str = "teach") -> str:
-    """The command that goes on with a session."""
-    box = "" if toolbox.folder == default_folder() else f" --toolbox {quote(str(toolbox.folder))}"
-    return f"lab {command} --resume {quote(str(folder))}{box}"
-
-
-def worth_of(folder: Path | None, made: Receipt) -> dict[str, Any]:
-    """Where a session is kept, and what its advice was worth; the receipt is written beside the journal."""
-    assert folder is not None
-    write_whole(folder / "receipt.json", json.dumps(made.to_json(), indent=1, allow_nan=False) + "\n")
-    return {"session": str(folder), "receipt": made.to_json() | {"lines": made.lines()}}
-
-
-def replayed(read: Read, seed: int, made: Receipt) -> dict[str, Any]:
-    """The document of `lab replay --json`."""
-    return {
-        "session": str(read.path.parent),
-        "problem": read.session.problem,
-        "words": read.session.words,
-        "seed": seed,
-        "lab": read.session.lab,
-        "closed": None if read.closed is None else asdict(read.closed),
-        "cut": read.cut,
-        "events": [json.loads(line_of(entry)) for entry in read.entries],
-        "receipt": made.to_json() | {"lines": made.lines()},
-    }
 
 
 def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:
@@ -246,11 +259,3 @@ def check_new(folder: Path) -> None:
     what, then = ("is over", "look at it again") if is_over else ("is not over", "go on with it")
     command = f"lab replay {quote(str(folder))}" if is_over else f"lab teach --resume {quote(str(folder))}"
     raise BadInput(f"'{folder}' (--out) holds a session that {what}: {then} ({command}), or choose another folder")
-
-
-def lab_version() -> str:
-    """The version of the lab that runs."""
-    try:
-        return version("teaching-lab")
-    except PackageNotFoundError:  # run from a source folder
-        return "unknown"

@@ -12,7 +12,7 @@ from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.mdp import BoolArray
 from lab.tasks.record import Learned
 from lab.teaching.events import ScenePrepared, Tell
-from lab.teaching.kept_session import KeptSession, NewSession, check_new, replayed, resume_command, worth_of
+from lab.teaching.kept_session import KeptSession, NewSession, check_new
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.lesson_plan import Interrupted, Lesson, LessonPlan
 from lab.teaching.teacher import Teacher, check_name
@@ -72,8 +72,8 @@ def teach(
         if session.journal is None:
             raise
         what = str(stopped) or "stopped by Ctrl-C; the journal has all that was said"
-        raise Interrupted(f"{what}; go on with: {resume_command(session.folder, teacher.toolbox)}") from None
-    return document | worth_of(session.folder, session.receipt())
+        raise Interrupted(f"{what}{session.resume_command(teacher.toolbox)}") from None
+    return document | session.worth()
 
 
 def one_lesson(
@@ -102,7 +102,7 @@ def replay(kept: KeptSession, subject: Subject, tell: Tell) -> dict[str, Any]:
 
     Returns the document of `lab replay --json`. Raises KeyboardInterrupt on Ctrl-C.
     """
-    options, read = kept.options, kept.read
+    options = kept.options
     advising = options.advising(dict.fromkeys(PEOPLE, _nobody))  # the journal answers for them
     with TemporaryDirectory() as folder:
         teacher = Teacher(Toolbox(folder), advising, options.seed, tell, keep=kept.keep, begun=kept.begun)
@@ -111,7 +111,7 @@ def replay(kept: KeptSession, subject: Subject, tell: Tell) -> dict[str, Any]:
         except Interrupted:  # by the journal's end, when it was not over, or by Ctrl-C
             if kept.journal is None or kept.journal.folding:
                 raise KeyboardInterrupt from None
-    return replayed(read, options.seed, kept.receipt())
+    return kept.replayed()
 
 
 def _nobody(request: AdviceRequest) -> int | None:
@@ -128,7 +128,7 @@ def _document(problem: Problem, lesson: Lesson, teacher: Teacher) -> dict[str, A
         "task": policy.task,
         "learner": policy.learner["learner"],
         "gate": policy.gate["gate"],
-        "advisor": teacher.advisor,
+        "advisor": str(teacher.advising),
         "memory": policy.gate["memory"],
         "seed": teacher.seed,
         "episodes": len(result.steps),

@@ -1,9 +1,9 @@
-"""The options of a lesson as one record: typed by a person, or read from a journal's head."""
+"""The options of a session as one record: typed by a person, or read from a journal's head."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from annotated_types import Ge, Le
 
@@ -18,13 +18,52 @@ DEFAULT_ADVISORS = ("expert",)
 Settings = TypeVar("Settings", bound=Learned)
 
 
+class SessionOptions:
+    """What the options of every command have that keeps a session; a journal holds them by name.
+
+    command: whose they are; wanted: what is said of a session of another one; typed: the options that are called
+    otherwise than their fields.
+    """
+
+    command: ClassVar[str]
+    wanted: ClassVar[str]
+    typed: ClassVar[Mapping[str, str]]
+    seed: int
+
+    @classmethod
+    def from_json(cls, record: dict[str, Any], where: str) -> Self:
+        """What `to_json` wrote; BadInput, naming where it stands, for anything else."""
+        from pydantic import TypeAdapter, ValidationError
+
+        try:
+            return TypeAdapter(cls).validate_python(record)
+        except ValidationError as error:
+            why = " ".join(str(error).split())[:160]
+            raise BadInput(f"{where}: its options are none of lab {cls.command}: {why}") from None
+
+
+def whole_path(name: str | None) -> str | None:
+    """The whole path of a file, so that it is found from another folder; any other name is itself."""
+    is_file = name is not None and names_file(name) and Path(name).is_file()
+    return str(Path(name).absolute()) if name is not None and is_file else name
+
+
 @dataclass(frozen=True)
-class LessonOptions:
-    """The options of `lab teach` that a session depends on, by name; None or empty: not given. A journal keeps them.
+class LessonOptions(SessionOptions):
+    """The options of `lab teach` that a session depends on, by name; None or empty: not given.
 
     view: where in a world the advisor sees (--sight); toasts and sessions: how many slices, and at most how many
     sessions, the lesson of a `lab run` had.
     """
+
+    command = "teach"
+    wanted = "it is advice on an order: wanted a session of lab teach"
+    typed: ClassVar[Mapping[str, str]] = {
+        "subtask": "SUBTASK",
+        "advisors": "--advisor",
+        "asked": "--ask",
+        "view": "--sight",
+    }
 
     subtask: str = ""
     task: str | None = None
@@ -58,26 +97,9 @@ class LessonOptions:
     def to_json(self) -> dict[str, Any]:
         """A plain dict, files by their whole paths, so that they are found from another folder."""
 
-        def whole(name: str | None) -> str | None:
-            return (
-                str(Path(name).absolute()) if name is not None and names_file(name) and Path(name).is_file() else name
-            )
-
         def recorded(name: str) -> str:
             head, _, path = name.partition("recorded:")
             return f"recorded:{Path(path).absolute()}" if path and not head else name
 
-        changed = {"subtask": whole(self.subtask), "task": whole(self.task)}
+        changed = {"subtask": whole_path(self.subtask), "task": whole_path(self.task)}
         return asdict(self) | changed | {"advisors": [recorded(name) for name in self.advisors]}
-
-    @classmethod
-    def from_json(cls, record: dict[str, Any], where: str) -> "LessonOptions":
-        """What `to_json` wrote; BadInput, naming where it stands, for anything else."""
-        from pydantic import TypeAdapter, ValidationError
-
-        try:
-            return TypeAdapter(cls).validate_python(record | {"advisors": tuple(record.get("advisors", ()))})
-        except (ValidationError, TypeError) as error:
-            raise BadInput(
-                f"{where}: its options are none of lab teach: {' '.join(str(error).split())[:160]}"
-            ) from None

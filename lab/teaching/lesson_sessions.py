@@ -9,12 +9,12 @@ import numpy as np
 
 from lab.advice.advising import Advising
 from lab.advice.journal import Again, Journal
-from lab.learning import events as session
+from lab.learning import session_events as session
 from lab.learning.environment import TableEnvironment, unreached
-from lab.learning.events import AdviceEnded, AdviceRejected
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Request, Walked
 from lab.learning.session import Session, SessionResult
+from lab.learning.session_events import AdviceEnded, AdviceRejected
 from lab.learning.settings import LearnerSettings
 from lab.mdp import FloatArray, greedy_path
 from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, Tell

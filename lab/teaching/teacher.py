@@ -36,11 +36,6 @@ class Teacher:
     begun: Callable[[Problem], Policy | None] | None = None
     trial: Trial | None = None
 
-    @property
-    def advisor(self) -> str:
-        """Who advises, in words."""
-        return str(self.advising)
-
     def find_or_teach(self, plan: LessonPlan, known: Mapping[tuple[str, str], Policy]) -> Lesson:
         """A policy that reaches the goal in exactly this problem: from `known`, by (sub-task, signature), or learned now.
 
@@ -91,8 +86,8 @@ class Teacher:
         """Whether a policy was learned in this way, or broken off before anything can be said of its gate and advisor."""
         length = {"episodes": 0}
         broken_off = len(policy.curve) < policy.learner.get("episodes", 0)
-        gate = asdict(plan.gate)
-        alike = (gate | policy.gate, policy.advisor) == (gate, self.advisor)  # an older one does not know all settings
+        gate, advisor = asdict(plan.gate), str(self.advising)
+        alike = gate | policy.gate == gate and policy.advisor == advisor  # an older one does not know all settings
         return policy.learner | length == asdict(plan.learner) | length and (alike or broken_off)
 
     def teach(self, plan: LessonPlan) -> Lesson:
@@ -103,7 +98,7 @@ class Teacher:
         try:
             result = learn(plan, self.advising, self.seed, journal, self.tell)
             name = plan.name or self._free_name(problem, result.solved)
-            origin = Origin(name, problem.subtask, plan.task, self.advisor, self.seed)
+            origin = Origin(name, problem.subtask, plan.task, str(self.advising), self.seed)
             policy = Policy.of(joined(unfinished, result), problem.mdp, plan.learner, plan.gate, origin)
             failure = None
             if not (result.interrupted or journal.read_only):
@@ -123,7 +118,7 @@ class Teacher:
             raise Interrupted(f"stopped by Ctrl-C after {length} of '{problem.name}'; what was learned is kept")
         if plan.sessions > 1 and not journal.read_only and not fits(result.q, problem, plan.learner):
             raise WorkFailed(
-                f"'{problem.name}' was not learned in {length} with the advisor '{self.advisor}'; "
+                f"'{problem.name}' was not learned in {length} with the advisor '{self.advising}'; "
                 "what was learned is kept: try a better advisor, or more episodes in the task file"
             )
         return Lesson(policy, "learned" if unfinished is None else "continued", result, failure)

@@ -16,11 +16,6 @@ from lab.toolbox.policy import Policy
 SIGHTS = ("full", "limited")
 
 
-def world_problem(world: GridWorld) -> Problem:
-    """What a grid world sets to learn; BadInput when that cannot be learned (see `GridWorld.check`)."""
-    return Problem(world.name, "world", world.check())
-
-
 @dataclass
 class WorldSubject(Subject):
     """A grid world, in which nothing is simulated; with the sight "limited" advice comes from the region in its file only.
@@ -50,8 +45,8 @@ class WorldSubject(Subject):
         return cls(options.changed(world), options.view or "full")
 
     def prepare(self, seed: int) -> Problem:
-        """What the world sets to learn."""
-        return world_problem(self.world)
+        """What the world sets to learn; BadInput when that cannot be learned (see `GridWorld.check`)."""
+        return Problem(self.name, "world", self.world.check())
 
     def facts(self) -> dict[str, Any]:
         """Where the advisor saw the robot."""

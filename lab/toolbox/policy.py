@@ -4,12 +4,13 @@ import platform
 import re
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from math import prod
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
 import numpy as np
+from annotated_types import Ge
 
+from lab import __version__
 from lab.errors import BadInput
 from lab.mdp import FloatArray, TabularMDP
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from lab.learning.settings import GateSettings, LearnerSettings
 
 MAX_NAME_LENGTH = 100
+Count = Annotated[int, Ge(0)]
 _SIGNATURE = re.compile(r"[0-9a-f]{16}")
 
 
@@ -48,19 +50,19 @@ class Policy:
     q: FloatArray
     visits: "CountArray"
     action_labels: tuple[str, ...]
-    shape: tuple[int, ...]
-    start: int
+    shape: tuple[Count, ...]
+    start: Count
     signature: str
     learner: dict[str, Any]
     gate: dict[str, Any]
     advisor: str
     seed: int
-    curve: list[int]
+    curve: list[Count]
     guided: list[bool]
-    helped_steps: int
-    requests: int
-    optimal_steps: int | None
-    final_steps: int | None
+    helped_steps: Count
+    requests: Count
+    optimal_steps: Count | None
+    final_steps: Count | None
     solved: bool
     created: str
     versions: dict[str, str]
@@ -98,12 +100,7 @@ class Policy:
 
     @classmethod
     def of(
-        cls,
-        result: "SessionResult",
-        mdp: TabularMDP,
-        learner: "LearnerSettings",
-        gate: "GateSettings",
-        origin: Origin,
+        cls, result: "SessionResult", mdp: TabularMDP, learner: "LearnerSettings", gate: "GateSettings", origin: Origin
     ) -> Self:
         """The policy that a session learned in a problem, stamped with the time and the versions of now."""
         return cls(
@@ -124,18 +121,10 @@ class Policy:
             final_steps=result.final_steps,
             solved=result.solved,
             created=datetime.now(UTC).isoformat(timespec="microseconds"),
-            versions=_versions(),
+            versions={"teaching-lab": __version__, "python": platform.python_version(), "numpy": np.__version__},
         )
 
 
 def is_name(name: str) -> bool:
     """Whether a policy may have this name: 1 to 100 printable characters, not only blanks."""
     return bool(name.strip()) and len(name) <= MAX_NAME_LENGTH and name.isprintable()
-
-
-def _versions() -> dict[str, str]:
-    try:
-        lab = version("teaching-lab")
-    except PackageNotFoundError:  # run from a source folder
-        lab = "unknown"
-    return {"teaching-lab": lab, "python": platform.python_version(), "numpy": np.__version__}

@@ -9,11 +9,12 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import fields
 from datetime import datetime
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, NonNegativeInt, ValidationError, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, create_model
 
 from lab import files
 from lab.errors import BadInput, WorkFailed, unknown
@@ -30,7 +31,6 @@ Report = list[tuple[Path, bool, str]]  # path, whether it is sound, what is wron
 
 _TENSORS = {"q": "F64", "visits": "I64"}
 _METADATA = tuple(field.name for field in fields(Policy) if field.name not in _TENSORS)
-_Setting = str | bool | int | float
 _NOT_WRITABLE = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EEXIST, errno.EISDIR, errno.ENAMETOOLONG}
 
 
@@ -217,37 +217,18 @@ def _reject_constant(text: str) -> None:
     raise ValueError(f"{text} is not allowed")
 
 
-class _Metadata(BaseModel):
-    """What a policy's file holds beside its tables."""
+def _date(text: str) -> str:
+    datetime.fromisoformat(text)
+    return text
 
-    model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
-    name: str
-    subtask: str
-    task: str
-    signature: str
-    advisor: str
-    start: NonNegativeInt
-    helped_steps: NonNegativeInt
-    requests: NonNegativeInt
-    learner: dict[str, _Setting]
-    gate: dict[str, _Setting]
-    seed: int
-    optimal_steps: NonNegativeInt | None
-    final_steps: NonNegativeInt | None
-    solved: bool
-    created: str
-    versions: dict[str, str]
-    action_labels: tuple[str, ...]
-    shape: tuple[NonNegativeInt, ...]
-    curve: list[NonNegativeInt]
-    guided: list[bool]
-
-    @field_validator("created")
-    @classmethod
-    def _is_a_date(cls, text: str) -> str:
-        datetime.fromisoformat(text)
-        return text
+@cache
+def _metadata() -> type[BaseModel]:
+    """What a policy's file holds beside its tables: the fields of `Policy`."""
+    held: dict[str, Any] = {field.name: (field.type, ...) for field in fields(Policy) if field.name in _METADATA}
+    held["created"] = (Annotated[str, AfterValidator(_date)], ...)
+    held["learner"] = held["gate"] = (dict[str, str | bool | int | float], ...)
+    return create_model("Metadata", __config__=ConfigDict(strict=True, allow_inf_nan=False), **held)
 
 
 def _encode(policy: Policy) -> bytes:
@@ -293,7 +274,7 @@ def _read_metadata(metadata: dict[str, str]) -> dict[str, Any]:
         name: json.loads(metadata[name], parse_constant=_reject_constant) for name in _METADATA if name in metadata
     }
     try:
-        found = _Metadata.model_validate_json(json.dumps(values))
+        found = _metadata().model_validate_json(json.dumps(values))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         field, why = ".".join(map(str, first["loc"][:1])), first["msg"]

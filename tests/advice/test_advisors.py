@@ -19,9 +19,9 @@ from lab.advice.journal import Journal
 from lab.advice.order_level import OrderLevel
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
-from lab.learning.events import AdviceGiven
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft
 from lab.learning.selection import softmax
+from lab.learning.session_events import AdviceGiven
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.mdp import FloatArray, TabularMDP, grid, optimal_values, shortest_steps
 from lab.sequencing.request import SequenceRequest, state_of

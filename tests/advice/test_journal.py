@@ -31,9 +31,9 @@ from lab.advice.journal import Again, Journal, Undo
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment
-from lab.learning.events import AdviceGiven, Ending, EpisodeEnded, Event, Verdict
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Ask
 from lab.learning.session import SessionResult, run_session
+from lab.learning.session_events import AdviceGiven, Ending, EpisodeEnded, Event, Verdict
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 

@@ -10,10 +10,10 @@ from lab.advice.advisors import AdvisorName
 from lab.advice.panel import ASKED, DECISIONS, Panel, PanelSettings, decided, members_of
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
-from lab.learning.events import AdviceGiven, AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Walked
 from lab.learning.selection import uniforms
 from lab.learning.session import SessionResult, run_session
+from lab.learning.session_events import AdviceGiven, AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 

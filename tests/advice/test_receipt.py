@@ -15,7 +15,9 @@ from lab.advice.journal import Journal
 from lab.advice.panel import Panel, PanelSettings, members_of
 from lab.advice.receipt import OVERRULED, SILENT, UNHEARD, WIDTH, Receipt, receipt
 from lab.advice.table_level import TableLevel
-from lab.learning.events import (
+from lab.learning.requests import AdviceRequest, AdvisorLeft
+from lab.learning.session import run_session
+from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
     AdviceRejected,
@@ -29,8 +31,6 @@ from lab.learning.events import (
     Event,
     Verdict,
 )
-from lab.learning.requests import AdviceRequest, AdvisorLeft
-from lab.learning.session import run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid, optimal_values
 

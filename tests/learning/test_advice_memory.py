@@ -21,7 +21,7 @@ from lab.learning.advice_memory import (
     Memory,
     Recall,
 )
-from lab.learning.events import AdviceEnded, AdviceRemembered
+from lab.learning.session_events import AdviceEnded, AdviceRemembered
 
 GOAL, PIT = 8, 9  # of states 0..9
 EPISODES, WINDOW = 20, 2  # the last 15 %: episodes 17 to 19, and 20 is the very last

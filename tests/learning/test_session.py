@@ -10,7 +10,11 @@ from lab.advice.advisors import PEOPLE, AdvisorName, named
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.environment import Judged, Step, TableEnvironment
-from lab.learning.events import (
+from lab.learning.gates import GATES
+from lab.learning.requests import AdviceRequest, AdvisorLeft
+from lab.learning.selection import SELECTIONS, Draw
+from lab.learning.session import Session, SessionResult, run_session
+from lab.learning.session_events import (
     AdviceEnded,
     AdviceRejected,
     AdviceRemembered,
@@ -19,10 +23,6 @@ from lab.learning.events import (
     Event,
     Improvement,
 )
-from lab.learning.gates import GATES
-from lab.learning.requests import AdviceRequest, AdvisorLeft
-from lab.learning.selection import SELECTIONS, Draw
-from lab.learning.session import Session, SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES
 from lab.mdp import FloatArray, Rewards, TabularMDP, coverage, greedy_path, grid, optimal_values

@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from lab.learning.events import Improvement
 from lab.learning.requests import AdviceRequest
+from lab.learning.session_events import Improvement
 from lab.mdp import TabularMDP, coverage, grid
-from lab.seat.grid_text import Marks, Picture, bracketed, direction_of, draw, picture_of, safe_ansi, window
+from lab.seat.grid_text import Marks, Picture, bracketed, direction_of, picture_of, safe_ansi, window
+from lab.view.grid_planes import GridPlanes
 
 CUBE = ("left", "right", "backward", "forward", "down", "up")
 SKY = ("south", "north", "east", "west", "pick up")
@@ -52,9 +53,9 @@ def cube(levels: int = 5) -> TabularMDP:
 
 
 def picture(asked: AdviceRequest) -> list[str]:
-    drawn = draw(asked)
-    assert drawn is not None
-    return [line.strip() for line in drawn.plain.splitlines()]
+    """The robot's own layer, without its title, and what the marks mean."""
+    found = fitting(asked, 2 * GridPlanes(asked.mdp).columns, 99)
+    return [*(line.plain.strip() for line in found.lines if "level" not in line.plain), found.legend]
 
 
 def fitting(asked: AdviceRequest, width: int, height: int) -> Picture:
@@ -112,7 +113,6 @@ def test_a_map_is_seen_from_above_with_y_upwards() -> None:
 def test_states_without_a_grid_have_no_picture() -> None:
     end = np.array([False, True])
     mdp = TabularMDP(np.array([[0, 1], [1, 1]]), np.zeros((2, 2)), end, end, 0, ("wait", "go"))
-    assert draw(request(mdp, 0)) is None
     assert picture_of(request(mdp, 0), Marks(), 80, 24) is None
 
 

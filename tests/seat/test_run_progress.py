@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from lab.learning.events import AdviceRejected, AdviceRequested
 from lab.learning.session import SessionResult, run_session
+from lab.learning.session_events import AdviceRejected, AdviceRequested
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.run_progress import RunProgress

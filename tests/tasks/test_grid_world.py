@@ -12,7 +12,7 @@ from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest
 from lab.learning.settings import LearnerSettings
 from lab.mdp import NoPath, Rewards, greedy_path, optimal_values, shortest_steps
-from lab.seat.grid_text import draw
+from lab.seat.grid_text import Marks, picture_of
 from lab.seat.terminal.typed_answer import understand
 from lab.tasks.grid_world import (
     MAX_DENSITY,
@@ -250,15 +250,15 @@ def request(world: GridWorld, cell: tuple[int, ...], action: int) -> AdviceReque
 
 
 def test_a_person_sees_a_text_grid_as_it_stands() -> None:
-    picture = draw(request(SMALL, (1, 0), 3), free=".")
+    picture = picture_of(request(SMALL, (1, 0), 3), Marks(free="."), 80, 24)
     assert picture is not None
-    assert picture.plain.splitlines()[:2] == [" . # G", " R → ."]
+    assert [line.plain for line in picture.lines] == [" . # G", " R → ."]
     assert [understand(word, SMALL.mdp()) for word in ("up", "d", "←", "right")] == [0, 1, 2, 3]
 
 
 def test_a_person_sees_a_cube_from_above() -> None:
     cube = GridWorld(name="cube", shape=(3, 2, 2), start=(0, 0, 0), goal=(2, 1, 1), obstacles=((1, 1, 0),))
-    picture = draw(request(cube, (0, 0, 0), 3), free=".")
+    picture = picture_of(request(cube, (0, 0, 0), 3), Marks(free="."), 80, 24)
     assert picture is not None
-    assert picture.plain.splitlines()[:2] == [" ↑ # g", " R . ."]
+    assert [line.plain[:6] for line in picture.lines[1:3]] == [" ↑ # g", " R . ."]
     assert [understand(word, cube.mdp()) for word in ("left", "back", "forward", "↑", "up")] == [0, 2, 3, 3, 5]

@@ -45,6 +45,16 @@ def test_a_session_that_was_stopped_goes_on_bit_for_bit(lab: Lab, cut: int) -> N
     assert lab("sequence", "--resume", folder).code == 2, "it is over"
 
 
+def test_a_line_that_was_cut_off_is_said(lab: Lab) -> None:
+    """As of a lesson: when it is gone on with, and when it is shown."""
+    folder = advised(lab, "2", "1", "quit").err.rsplit("--resume ", 1)[1].split()[0]
+    with (Path(folder) / FILE).open("a", encoding="utf-8") as journal:
+        journal.write('{"kind": "answ')
+    for words in (("replay", folder, "--json"), ("sequence", "--resume", folder, "--json")):
+        ran = lab(*words, stdin=said("auto"))
+        assert (ran.code, "its last line was cut off and is left out: '{" in ran.err) == (0, True), ran.err
+
+
 def test_an_answer_is_taken_back(lab: Lab) -> None:
     ran, straight = advised(lab, "2", "1", "undo", "3", "auto"), advised(lab, "2", "3", "auto")
     assert ran.code == 0, ran.err

@@ -15,8 +15,8 @@ from lab.advice.entries import FILE, Answer, Session, read_journal
 from lab.advice.journal import Journal
 from lab.advice.receipt import SILENT
 from lab.errors import BadInput
-from lab.learning.events import AdviceGiven
 from lab.learning.requests import AdviceRequest, Ask
+from lab.learning.session_events import AdviceGiven
 from lab.tasks.task_file import load_world
 from lab.teaching.events import Event, LessonEvent, QuestionAnswered, unheard
 from lab.teaching.kept_session import SESSIONS, KeptSession, check_new, session_rows

@@ -9,10 +9,10 @@ import pytest
 
 from lab.advice.advising import Advising
 from lab.errors import WorkFailed
-from lab.learning.events import AdviceRejected, EpisodeEnded, Event
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.session import Session, SessionResult
+from lab.learning.session_events import AdviceRejected, EpisodeEnded, Event
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, greedy_path, grid
 from lab.teaching.events import Event as LessonsEvent

@@ -5,9 +5,8 @@ from lab.learning.gates.ccrl import Ccrl, Combined
 from lab.learning.gates.constant_performance import ConstantPerformance
 from lab.learning.gates.gate import Gate, GateClass, Never, Surroundings
 from lab.learning.gates.gate_rules import CompiledGate, Steps, improvement
-from lab.learning.gates.random_share import Random
+from lab.learning.gates.per_step import Importance, Introspection, Random
 from lab.learning.gates.uncertainty import Uncertainty, deviation
-from lab.learning.gates.values import Importance, Introspection
 from lab.learning.members import Member
 
 __all__ = ["GATES", "Gate", "Steps", "Surroundings", "deviation", "improvement"]

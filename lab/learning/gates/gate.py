@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from lab.learning.events import Verdict
 from lab.learning.gates.gate_rules import Steps
 from lab.learning.reasons import Reason
 from lab.learning.selection import Draw
+from lab.learning.session_events import Verdict
 from lab.learning.settings import GateSettings
 from lab.learning.updates.update import Update
 
@@ -69,14 +69,6 @@ class Never(Gate):
     def opens(self, episode: int, steps: Steps) -> bool:
         """No episode asks."""
         return False
-
-
-class PerStep(Gate):
-    """From episode X on, whether to ask is decided at each step."""
-
-    def opens(self, episode: int, steps: Steps) -> bool:
-        """Every episode from X on may ask."""
-        return episode >= self.settings.first_episode
 
 
 GateClass = Callable[[GateSettings, int, int, Surroundings | None], Gate]

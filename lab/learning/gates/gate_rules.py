@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from lab.learning.events import Improvement
+from lab.learning.session_events import Improvement
 
 Steps = Sequence[float]  # whole numbers, unless the high level compares makespans
 

@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
-from lab.learning.gates.gate import PerStep, Surroundings, Values
+from lab.learning.gates.gate import Surroundings, Values
 from lab.learning.gates.gate_rules import Steps
+from lab.learning.gates.per_step import PerStep
 from lab.learning.reasons import TablesDiffer
 from lab.learning.settings import GateSettings
 from lab.learning.updates.update import Update

@@ -17,14 +17,10 @@ if TYPE_CHECKING:
 
 
 class LessonScene(Protocol):
-    """What a page shows of a lesson; it belongs to one thread."""
+    """What a page shows of a lesson: all bodies, and a camera that has all cells in sight; it belongs to one thread."""
 
-    @property
-    def camera(self) -> Viewpoint:
-        """Where to look from: all cells are in sight."""
-
-    def bodies(self) -> tuple[Body, ...]:
-        """What there is to see."""
+    bodies: tuple[Body, ...]
+    camera: Viewpoint
 
     def frame(self, state: int) -> Frame:
         """What has moved now that the learner is in `state`; the first frame places everything, times count up."""

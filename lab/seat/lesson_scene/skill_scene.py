@@ -53,8 +53,8 @@ class SkillScene:
             self._bench = Bench(Scene(self._world, task, toasts, layout))
             self._ghosts = self._set_up(task)
             self._extra = OnSlice(skill, self._world) if skill.on_slice(NUMBER) else self._marks()
-            self._bodies = (*self._world.bodies(), *self._goal(), *self._extra.bodies())
-            self._camera = self._look()
+            self.bodies: tuple[Body, ...] = (*self._world.bodies(), *self._goal(), *self._extra.bodies())
+            self.camera = self._camera()
         except BaseException:
             self.close()
             raise
@@ -108,12 +108,8 @@ class SkillScene:
         at = self._place(int(np.flatnonzero(self._mdp.goal)[0]))
         return (Body("goal", (Shape("sphere", (0.35 * self._size(),), None, GREEN, at),)),)
 
-    @property
-    def camera(self) -> Viewpoint:
+    def _camera(self) -> Viewpoint:
         """From the front, of the slice or of the whole cell; a little from the right, so that nothing hides the rest."""
-        return self._camera
-
-    def _look(self) -> Viewpoint:
         free = np.flatnonzero(~self._mdp.terminal | self._mdp.goal)
         places = np.array([self._place(int(state)) for state in free])
         azimuth, elevation = (radians(angle) for angle in self._skill.looks_from)
@@ -124,10 +120,6 @@ class SkillScene:
         yaw = self._skill.surveys.task.station(self._skill.station).pose[2]
         seen = corners(places.min(axis=0) - _ROOM, places.max(axis=0) + _ROOM)
         return camera_for(seen, yaw + azimuth, elevation)
-
-    def bodies(self) -> tuple[Body, ...]:
-        """The cell as a run shows it, and the marks of the lesson."""
-        return self._bodies
 
     def frame(self, state: int) -> Frame:
         """Everything where it is in `state`."""

@@ -45,7 +45,8 @@ class WorldScene:
         self._marks = EpisodeTrail(mdp, self.place, 0.3 * self._ball, 1.6 * self._ball)
         self._folder = TemporaryDirectory(prefix="lab-scene-")  # of the mesh, until the scene is closed
         made = (self._ground(), self._room(), self._obstacles(), self._ends(), self._robot(), self._marks.bodies())
-        self._bodies = tuple(body for bodies in made for body in bodies)
+        self.bodies = tuple(body for bodies in made for body in bodies)
+        self.camera = self._camera()
 
     def centres(self, cells: ArrayLike) -> FloatArray:
         """The middles (n, 3) [m] of cells (n, axes)."""
@@ -73,8 +74,7 @@ class WorldScene:
         edge = _FULL * self._size
         return (edge, edge, edge * (_LOW if self._flat else 1.0))
 
-    @property
-    def camera(self) -> Viewpoint:
+    def _camera(self) -> Viewpoint:
         """From the front: steeply onto a board, a little from the right into a room."""
         x, y, z = self._extent
         seen = corners((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))
@@ -146,10 +146,6 @@ class WorldScene:
         if self._flat:
             return (ball,)
         return (ball, Body("below", (Shape("cylinder", (self._ball, _FLAT * self._size), None, SHADE),)))
-
-    def bodies(self) -> tuple[Body, ...]:
-        """Ground, obstacles, start, goal, robot and marks."""
-        return self._bodies
 
     def frame(self, state: int) -> Frame:
         """The robot in the cell of `state`."""

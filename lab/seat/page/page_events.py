@@ -1,6 +1,6 @@
 """What a session tells, taken over into what the teaching page shows: counts, the curve, and notices."""
 
-from lab.learning.events import (
+from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
     AdviceRejected,
@@ -9,13 +9,13 @@ from lab.learning.events import (
     EpisodeEnded,
     Event,
 )
-from lab.seat.page.page_state import Learning
+from lab.seat.page.page_state import ShownLesson
 
 STEP = ("standing", "robot", "slice")
 EPISODE = ("standing", "curve", "slice", "notices")
 
 
-def hear(learning: Learning, event: Event) -> tuple[str, ...]:
+def hear(learning: ShownLesson, event: Event) -> tuple[str, ...]:
     """Take an event over; the parts of the document that it has changed. Called for every answer, so it does little."""
     kind = type(event)
     if kind is AdviceGiven:
@@ -40,7 +40,7 @@ def hear(learning: Learning, event: Event) -> tuple[str, ...]:
     return ("standing", "notices")
 
 
-def _given(learning: Learning, event: AdviceGiven) -> tuple[str, ...]:
+def _given(learning: ShownLesson, event: AdviceGiven) -> tuple[str, ...]:
     if event.action is None:
         learning.skipped += 1
     else:
@@ -50,7 +50,7 @@ def _given(learning: Learning, event: AdviceGiven) -> tuple[str, ...]:
     return STEP
 
 
-def _episode(learning: Learning, event: EpisodeEnded) -> tuple[str, ...]:
+def _episode(learning: ShownLesson, event: EpisodeEnded) -> tuple[str, ...]:
     learning.curve.add(event.steps, event.guided)
     learning.lately.append(event.steps)
     learning.rate = event.improvement_rate

@@ -39,10 +39,8 @@ def place_of(mdp: TabularMDP) -> Json | None:
     if not shape or (planes := _planes(mdp)).rows * planes.columns > MOST_CELLS:
         return None
     goals = [] if mdp.coverage_shape else [spot(mdp, int(s)) for s in np.flatnonzero(mdp.goal)[:MOST_GOALS]]
-    labels = mdp.action_labels
-    along = labels[4:6] if len(labels) == 2 * len(shape) and len(shape) == 3 else ("-", "+")
     sizes = {"rows": planes.rows, "columns": planes.columns, "layers": planes.layers}
-    return {**sizes, "along": list(along), "goals": goals, "directions": directions(mdp)}
+    return {**sizes, "goals": goals, "directions": directions(mdp)}
 
 
 def spot(mdp: TabularMDP, state: int) -> list[int]:

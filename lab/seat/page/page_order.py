@@ -13,12 +13,14 @@ Json = dict[str, Any]
 
 
 def order_of(request: SequenceRequest) -> Json:
-    """Where the work stands, and which moves are allowed."""
+    """Where the work stands, which moves are allowed, and what it would do."""
+    own = move_of(request, request.own)
     return {
         "kind": "order",
         "title": title(request),
         "at": [],
         "moves": [_allowed(move_of(request, decision)) for decision in request.allowed],
+        "would": f"Alone it would move {own.name} from {own.origin} to {own.target}.",
         "picture": [],
     }
 
@@ -48,17 +50,13 @@ def bars_of(moves: Sequence[Move], now_s: float | None = None) -> Json:
     bars: list[list[Any]] = []
     rows = [ROBOT]
     for number, move in enumerate(moves):
-        bars += _robot_bars(move)
+        bars += [[ROBOT, did.kind, move.part, _s(did.start_s), _s(did.end_s)] for did in robot_activities(move)]
         if move.process_s > 0:
             rows += [move.target] if move.target not in rows else []
             bars += _machine_bars(moves, number)
     end_s = max((bar[4] for bar in bars), default=0.0)
     last_s = moves[-1].drop_s if moves else 0.0
     return {"rows": rows, "bars": bars, "now_s": last_s if now_s is None else now_s, "end_s": end_s}
-
-
-def _robot_bars(move: Move) -> list[list[Any]]:
-    return [[ROBOT, did.kind, move.part, _s(did.start_s), _s(did.end_s)] for did in robot_activities(move)]
 
 
 def _machine_bars(moves: Sequence[Move], number: int) -> list[list[Any]]:

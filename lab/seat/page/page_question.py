@@ -4,10 +4,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from lab.learning.requests import AdviceRequest, Request
-from lab.mdp import TabularMDP
-from lab.seat.grid_text import safe_ansi
+from lab.seat.grid_text import Marks, safe_ansi
 from lab.seat.page.page_grid import directions, spot
 from lab.seat.page.page_order import order_of
+from lab.seat.request_text import choice, outcome
 from lab.sequencing.request import SequenceRequest
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ def question_of(request: Request) -> Json:
     return shown | {
         "own": request.own,
         "why": str(request.reason or ""),
-        "undoable": request.undoable,
         "rate": None if known is None else known.rate,
         "current": None if known is None else known.current_mean,
         "previous": None if known is None else known.previous_mean,
@@ -42,6 +41,7 @@ def step_of(request: AdviceRequest) -> Json:
         "title": f"Episode {request.episode}, step {request.step}: at {mdp.state_label(state)}",
         "at": spot(mdp, state),
         "moves": moves_of(request),
+        "would": choice(request, Marks()),
         "temperature": request.temperature,
         "selection": request.selection,
         "picture": picture_of(request.picture),
@@ -59,20 +59,10 @@ def moves_of(request: AdviceRequest) -> list[Json]:
             "direction": direction,
             "chance": round(chance, 3),
             "value": float(f"{value:.4g}"),
-            "leads": "" if request.picture else leads_to(mdp, state, action),
+            "leads": "" if request.picture else outcome(request, action),
         }
         for action, (label, direction, chance, value) in enumerate(rows)
     ]
-
-
-def leads_to(mdp: TabularMDP, state: int, action: int) -> str:
-    """What an action leads to, in a word: "nowhere", "goal", "obstacle", "" for a free cell."""
-    entered = int(mdp.successor[state, action])
-    if entered == state:
-        return "nowhere"
-    if mdp.goal[entered]:
-        return "goal"
-    return "obstacle" if mdp.terminal[entered] else ""
 
 
 def picture_of(drawing: str) -> list[list[list[str]]]:

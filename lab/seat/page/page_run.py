@@ -2,20 +2,17 @@
 
 from dataclasses import replace
 
-from lab.seat.event_text import run_text
+from lab.seat.event_text import PARTS_DONE, run_text
 from lab.seat.page.page_order import bars_of
-from lab.seat.page.page_state import MOST_LINES, Known, Learning, Progress
+from lab.seat.page.page_state import MOST_LINES, Known, Progress, ShownLesson
 from lab.sequencing.search import EpisodeSequenced
 from lab.teaching.events import (
     ORDER,
     Event,
     LessonContinued,
     MoveMade,
-    MoveTimed,
     PhaseBegan,
-    SequenceFound,
     SequencingBegan,
-    SkillReady,
 )
 
 
@@ -30,16 +27,7 @@ def hear_run(known: Known, event: Event) -> None:
         case SequencingBegan():
             known.work = None
             optimal = None if event.reference is None else event.reference.bound
-            known.begin(
-                Learning(
-                    ORDER,
-                    "order",
-                    "s",
-                    gate=event.gate,
-                    episodes=event.episodes,
-                    optimal=optimal,
-                )
-            )
+            known.begin(ShownLesson(ORDER, "order", gate=event.gate, episodes=event.episodes, optimal=optimal))
         case EpisodeSequenced():
             if known.learning.gate is None:  # else the session itself tells of it, and whether it was guided
                 known.learning.curve.add(event.cost, False)
@@ -49,6 +37,6 @@ def hear_run(known: Known, event: Event) -> None:
             known.work = bars_of(known.moves)
             known.changed("work")
     if text and not isinstance(event, LessonContinued):  # that is no part of a run
-        done = before.done + isinstance(event, SkillReady | MoveTimed | SequenceFound | MoveMade)
+        done = before.done + isinstance(event, PARTS_DONE)
         known.progress = replace(before, done=done, lines=(*before.lines[1 - MOST_LINES :], text))
         known.changed("progress")

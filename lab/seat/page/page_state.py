@@ -1,6 +1,6 @@
 """All that the teaching page shows, as one plain document: what is known, and the functions that write it down.
 
-Nothing here waits, sends or draws. `document` says all; `Known.since` finds what has changed.
+Nothing here waits, sends or draws. PARTS say all; `Known.since` finds what has changed.
 """
 
 from collections import deque
@@ -10,7 +10,7 @@ from typing import Any
 
 from lab.learning.gates import improvement
 from lab.learning.requests import Request, Standing
-from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.settings import GateSettings
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
 from lab.seat.event_text import SessionText, Told
@@ -20,7 +20,6 @@ from lab.seat.page.page_question import question_of
 from lab.sequencing.cell.schedule import Move
 
 Json = dict[str, Any]
-UNLIMITED = 1_000_000_000  # a budget of this many steps is none
 MOST_NOTICES = 60
 MOST_LINES = 80
 
@@ -59,14 +58,12 @@ class Notice:
 
 
 @dataclass
-class Learning:
+class ShownLesson:
     """One lesson, or the sessions of a sequencer: how it goes, and what the learner has said about it."""
 
     title: str = ""
     kind: str = "steps"  # or "order"
-    unit: str = "steps"
     mdp: TabularMDP | None = None
-    learner: LearnerSettings | None = None
     gate: GateSettings | None = None
     episodes: int = 0
     optimal: float | None = None
@@ -116,7 +113,7 @@ class Known:
     """All that the page may have to show. `changed` says what is new; versions are counted, so that nothing is sent twice."""
 
     title: str
-    learning: Learning = field(default_factory=Learning)
+    learning: ShownLesson = field(default_factory=ShownLesson)
     progress: Progress | None = None
     pending: Pending | None = None
     work: Json | None = None  # bars of the order
@@ -133,7 +130,7 @@ class Known:
         """These parts of the document are not what they were."""
         self.touched.update(parts)
 
-    def begin(self, learning: Learning) -> None:
+    def begin(self, learning: ShownLesson) -> None:
         """A lesson, or a sequencer's session, begins."""
         self.learning = learning
         self.changed("lesson", "place", "robot", "curve", "standing", "notices", "slice")
@@ -157,14 +154,10 @@ def _lesson(known: Known, now_s: float) -> Json:
         "title": learning.title,
         "page": known.title,
         "kind": learning.kind,
-        "unit": learning.unit,
+        "unit": "s" if learning.kind == "order" else "steps",
         "episodes": learning.episodes,
         "optimal": learning.optimal,
-        "learner": None if learning.learner is None else learning.learner.learner,
-        "gate": None if gate is None else gate.gate,
         "threshold": None if gate is None else gate.lambda_threshold,
-        "window": None if gate is None else gate.window,
-        "first_episode": None if gate is None else gate.first_episode,
     }
 
 
@@ -184,7 +177,6 @@ def _question(known: Known, now_s: float) -> Json | None:
     left_s = None if pending.until_s is None else round(max(0.0, pending.until_s - now_s), 1)
     return question_of(pending.request) | {
         "number": pending.number,
-        "wait_s": pending.wait_s,
         "left_s": left_s,
         "words": list(pending.words),
         "offered": pending.offered,
@@ -196,7 +188,7 @@ def _standing(known: Known, now_s: float) -> Json:
     gate = learning.gate
     means = improvement([*learning.lately], gate.window) if gate is not None else None
     current, previous = learning.means if means is None else (means.current_mean, means.previous_mean)
-    budget = None if gate is None or gate.budget >= UNLIMITED else gate.budget
+    budget = None if gate is None or gate.budget >= GateSettings.budget else gate.budget
     return {
         "rate": learning.rate,
         "current": current,
@@ -229,11 +221,6 @@ PARTS: dict[str, Callable[[Known, float], Any]] = {
 }
 
 
-def document(known: Known, now_s: float = 0.0, layer: int | None = None) -> Json:
-    """The whole document, with the slice of one layer, by default the robot's. now_s: the clock of `Pending.until_s`."""
-    return {name: part(known, now_s) for name, part in PARTS.items()} | {"slice": layer_of(known, layer)}
-
-
 def layer_of(known: Known, layer: int | None = None) -> Json | None:
     """What stands in a layer's cells and what they are worth, by default the robot's; None when there is no grid."""
     learning, mdp = known.learning, known.learning.mdp
@@ -246,7 +233,7 @@ def layer_of(known: Known, layer: int | None = None) -> Json | None:
     return slice_of(mdp, state, wanted, learning.q, learning.selection, learning.temperature)
 
 
-def standing_of(learning: Learning, standing: Standing) -> None:
+def standing_of(learning: ShownLesson, standing: Standing) -> None:
     """Take over how advice stands with the learner; what has become worse is said."""
     if standing.misleads > learning.misleads:
         text = f"The last lesson did not help: {standing.misleads} so far, {standing.omega} are tolerated."

@@ -20,7 +20,7 @@ from lab.seat.page.page_messages import Answer
 from lab.seat.page.page_order import bars_of, made_until
 from lab.seat.page.page_panel import CLOSED, SeatPanel
 from lab.seat.page.page_run import hear_run
-from lab.seat.page.page_state import Learning, Pending, standing_of
+from lab.seat.page.page_state import Pending, ShownLesson, standing_of
 from lab.sequencing.request import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonBegan, LessonEvent
 from lab.teaching.lesson_plan import LessonPlan
@@ -37,21 +37,12 @@ class SeatPage(LiveView):
     the session's thread. Entering raises BadInput for a port that it cannot have, and for a `wait_s` that is no time.
     """
 
-    def __init__(self, port: int = 0, *, title: str = TITLE, wait_s: float | None = None) -> None:
+    def __init__(self, port: int = 0, *, wait_s: float | None = None) -> None:
         if wait_s is not None and not 0 < wait_s < inf:
             raise BadInput(f"time to wait for an answer, {wait_s} s: must be finite and above 0")
-        super().__init__(port, title=title)
+        super().__init__(port, title=TITLE)
         self._wait_s = wait_s
-        self._panel: SeatPanel = SeatPanel(title)
-
-    @property
-    def on_word(self) -> Callable[[str], None] | None:
-        """Called from the server's thread with the answer to an offered question, as a word that the terminal knows."""
-        return self._panel.on_word
-
-    @on_word.setter
-    def on_word(self, callback: Callable[[str], None] | None) -> None:
-        self._panel.on_word = callback
+        self._panel: SeatPanel = SeatPanel(TITLE)
 
     def close(self) -> None:
         """Stop serving; who waits for an answer learns that there is nobody any more. Safe to call again."""
@@ -73,8 +64,12 @@ class SeatPage(LiveView):
             self.withdraw()
         return _said(pending, answer)
 
-    def offer(self, request: Request) -> None:
-        """Show a question that is answered elsewhere, too; an answer on the page goes to `on_word`. Returns at once."""
+    def offer(self, request: Request, on_word: Callable[[str], None] | None = None) -> None:
+        """Show a question that is answered elsewhere, too; returns at once.
+
+        on_word: called from the server's thread with the answer on the page, as a word that the terminal knows.
+        """
+        self._panel.on_word = on_word
         self._pose(request, offered=True)
 
     def look(self, request: Request) -> None:
@@ -112,7 +107,7 @@ class SeatPage(LiveView):
     def _see_table(self, request: AdviceRequest) -> None:
         known = self._panel.known
         if known.learning.mdp not in (None, request.mdp):
-            known.begin(Learning())
+            known.begin(ShownLesson())
         learning = known.learning
         if learning.mdp is None:
             learning.mdp = request.mdp
@@ -123,7 +118,7 @@ class SeatPage(LiveView):
     def _see_order(self, request: SequenceRequest) -> None:
         known = self._panel.known
         if known.learning.kind != "order":
-            known.begin(Learning(ORDER, "order", "s"))
+            known.begin(ShownLesson(ORDER, "order"))
         known.work = bars_of(made_until(request), request.run.now_s)
         known.changed("work", "standing")
 
@@ -135,7 +130,7 @@ class SeatPage(LiveView):
         if type(event) is LessonEvent:
             with self._panel.guard:  # quicker than the condition's own way
                 if event.lesson != known.learning.title:  # one of another skill begins a new curve
-                    known.begin(Learning(event.lesson))
+                    known.begin(ShownLesson(event.lesson))
                 known.touched.update(hear(known.learning, event.event))
             return
         made = _lesson(event.plan) if isinstance(event, LessonBegan) else None
@@ -187,10 +182,10 @@ def _said(pending: Pending, answer: Answer | None) -> int | None:
     return answer.action
 
 
-def _lesson(plan: LessonPlan) -> Learning:
+def _lesson(plan: LessonPlan) -> ShownLesson:
     """A lesson that begins, beside the fewest steps of a certain problem, counted as the learner counts, where they are known."""
     mdp, learner = plan.problem.mdp, plan.learner
-    made = Learning(plan.problem.name, mdp=mdp, learner=learner, gate=plan.gate, episodes=learner.episodes)
+    made = ShownLesson(plan.problem.name, mdp=mdp, gate=plan.gate, episodes=learner.episodes)
     if mdp.n_states <= MOST_STATES and (mdp.shape or mdp.coverage_shape):
         with suppress(NoPath):
             made.optimal = shortest_steps(mdp) + learner.count_start

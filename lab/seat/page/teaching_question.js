@@ -47,7 +47,6 @@ const seat = (() => {
 
   const { make, percent } = seatStatus;
   const named = (move) => `${move.direction === null ? "" : `${ARROWS[move.direction]} `}${move.label}`;
-  const ownMove = () => shown.moves.find((move) => move.action === shown.own);
 
   // ---- the question
 
@@ -82,19 +81,7 @@ const seat = (() => {
     return `${episode}: ${why || "it works alone, and asks when it stops improving"}.`;
   }
 
-  function detail() {
-    const own = ownMove(), leads = { nowhere: ", which leads nowhere", goal: ", to the goal", obstacle: ", into an obstacle" }[own.leads] || "";
-    const would = shown.kind === "order" ? `Alone it would move ${own.label} from ${own.from} to ${own.to}.` : `Alone it would now go ${named(own)}${rated(own)}${leads}.`;
-    return `${would}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered ? " The terminal asks, too." : ""}`;
-  }
-
-  // What was drawn for this step, beside the move it rates best
-  function rated(own) {
-    const chances = shown.moves.map((move) => move.chance), top = Math.max(...chances);
-    if (chances.length > 1 && top === Math.min(...chances)) return `, drawn at random: all moves are alike to it here (${percent(top)} each)`;
-    if (own.chance === top) return `, the move it rates best (${percent(top)})`;
-    return `, drawn at random (${percent(own.chance)}; it rates ${named(shown.moves.find((move) => move.chance === top))} best, ${percent(top)})`;
-  }
+  const detail = () => `${shown.would}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered ? " The terminal asks, too." : ""}`;
 
   function countDown() {
     const left = until === null || !shown ? null : Math.max(0, Math.ceil((until - performance.now()) / 1000));
@@ -115,7 +102,7 @@ const seat = (() => {
     head.append(...["move", "its value", "its chance", "leads"].map((text) => make("th", text)));
     table.append(head, ...shown.moves.map((move) => {
       const row = make("tr");
-      row.append(...[named(move), String(move.value), percent(move.chance), { nowhere: "nowhere", goal: "to the goal", obstacle: "into an obstacle" }[move.leads] || "on"].map((text) => make("td", text)));
+      row.append(...[named(move), String(move.value), percent(move.chance), move.leads || "on"].map((text) => make("td", text)));
       return row;
     }));
     because.append(table);
@@ -161,7 +148,7 @@ const seat = (() => {
     }
     text("chance", `${own ? "★ " : ""}${percent(move.chance)}`);
     button.querySelector(".sure").style.width = move.chance < 0.01 ? "0" : `${100 * move.chance}%`;
-    button.setAttribute("aria-label", `${move.label}: chance ${percent(move.chance)}${own ? ", its own choice" : ""}${move.leads ? `, leads ${move.leads === "nowhere" ? "nowhere" : `to the ${move.leads}`}` : ""}`);
+    button.setAttribute("aria-label", `${move.label}: chance ${percent(move.chance)}${own ? ", its own choice" : ""}${move.leads ? `, leads ${move.leads}` : ""}`);
   }
 
   // ---- answers

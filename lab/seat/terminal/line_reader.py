@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol, TextIO, cast
 from rich.console import Console
 from rich.text import Text
 
+from lab.errors import printable
 from lab.seat.grid_text import ARROWS, DIRECTIONS
 
 if TYPE_CHECKING:
@@ -117,8 +118,7 @@ class PlainReader:
             self._console.print()  # what comes next begins a line
             raise
         if not typed or not line:
-            shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line.rstrip("\r\n"))
-            self._console.print(Text(shown), soft_wrap=True)
+            self._console.print(Text(printable(line.rstrip("\r\n"))), soft_wrap=True)
         if not line:
             raise EOFError
         return line

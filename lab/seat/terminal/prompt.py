@@ -9,10 +9,10 @@ from rich.table import Table
 from rich.text import Text
 
 from lab.advice.journal import Undo
-from lab.errors import counted
-from lab.learning.events import EpisodeEnded
+from lab.errors import counted, printable
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
-from lab.seat import request_text as facts
+from lab.learning.session_events import EpisodeEnded
+from lab.seat import request_text
 from lab.seat.event_text import SessionText
 from lab.seat.terminal.line_reader import Outside, ReadLine, default_reader
 from lab.seat.terminal.order_question import OrderQuestion
@@ -159,7 +159,7 @@ class TeachingPrompt:
             self._guided, self._misleads = min(self._guided, now.misleads), now.misleads
         if now.misleads > self._misleads:
             self._misleads = now.misleads
-            self._say(f"{facts.misled(now.misleads, self._guided)}; it tolerates {now.omega}.", "yellow")
+            self._say(f"{request_text.misled(now.misleads, self._guided)}; it tolerates {now.omega}.", "yellow")
 
     def _help(self, request: Request) -> None:
         width, way = room(self._console)[0], self._way(request)
@@ -190,8 +190,7 @@ class TeachingPrompt:
             self._say(told.text, STYLES[told.tone])
 
     def _say(self, text: str, style: str = "") -> None:
-        clean = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-        self._print(folded([clean], room(self._console)[0], style))
+        self._print(folded([printable(text)], room(self._console)[0], style))
 
     def _print(self, lines: Iterable[RenderableType]) -> None:
         for line in lines:
@@ -216,7 +215,7 @@ class _Path:
             return False
         if begun.mdp is not request.mdp or begun.episode != request.episode:
             return False
-        return request.state == self._state if facts.is_known(request.mdp) else request.step == self._step
+        return request.state == self._state if request_text.is_known(request.mdp) else request.step == self._step
 
     def step(self) -> int:
         """The next move."""

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.text import Text
 
 from lab.learning.requests import AdviceRequest
-from lab.seat import request_text as facts
+from lab.seat import request_text
 from lab.seat.grid_text import GAP, Marks, Picture, picture_of
 
 Parts = dict[str, list[Text]]
@@ -72,11 +72,11 @@ def screen(request: AdviceRequest, marks: Marks, width: int, height: int) -> lis
 def _beside(request: AdviceRequest, marks: Marks, whole: Picture, width: int, height: int) -> list[Text]:
     """The numbers to the right of the picture, what the picture means below it."""
     panel = width - whole.width - GAP
-    texts = [facts.choice(request, marks), "", *facts.progress(request), facts.standing(request)]
-    numbers = [*facts.bars(request, marks), Text(), *folded(texts, panel)]
+    texts = [request_text.choice(request, marks), "", *request_text.progress(request), request_text.standing(request)]
+    numbers = [*request_text.bars(request, marks), Text(), *folded(texts, panel)]
     notes = folded([whole.legend] * bool(whole.legend), width, "dim")
     picture = picture_of(request, marks, width, height - len(notes) - 1) or whole
-    note = facts.beyond(request, picture)
+    note = request_text.beyond(request, picture)
     lines = []
     for drawn, number in zip_longest(picture.lines, numbers):
         left = drawn.copy() if drawn is not None else Text()
@@ -93,10 +93,10 @@ def _below(request: AdviceRequest, marks: Marks, whole: Picture | None, width: i
     parts: Parts = {
         "legend": folded([whole.legend] if whole and whole.legend else [], width, "dim"),
         "note": [],
-        "moves": packed(facts.moves(request, marks), width),
-        "choice": folded(filter(None, [facts.choice(request, marks, brief)]), width),
-        "progress": folded(facts.progress(request, brief), width, "dim"),
-        "standing": folded([facts.standing(request, brief)], width, "dim"),
+        "moves": packed(request_text.moves(request, marks), width),
+        "choice": folded(filter(None, [request_text.choice(request, marks, brief)]), width),
+        "progress": folded(request_text.progress(request, brief), width, "dim"),
+        "standing": folded([request_text.standing(request, brief)], width, "dim"),
     }
     whole = whole or Picture([])
     if whole.is_fixed and len(whole.lines) + len(parts["moves"]) > height:
@@ -124,7 +124,7 @@ def _under_its_note(
     picture, parts["note"] = whole, []
     for _ in range(4):
         picture = picture_of(request, marks, width, height - len(_all(parts))) or whole
-        note = facts.beyond(request, picture, width < BRIEF)
+        note = request_text.beyond(request, picture, width < BRIEF)
         parts["note"] = folded([note] * bool(note), width)
         if len(picture.lines) + len(_all(parts)) <= height:
             break

@@ -4,7 +4,7 @@ from rich.console import Console, RenderableType
 from rich.text import Text
 
 from lab.learning.requests import AdviceRequest
-from lab.seat import request_text as facts
+from lab.seat import request_text
 from lab.seat.grid_text import Marks
 from lab.seat.terminal.screen import folded, question, room, screen
 from lab.seat.terminal.typed_answer import Understood, explained, understand
@@ -23,7 +23,7 @@ class TableQuestion:
 
     def __init__(self, console: Console, plain: bool) -> None:
         self._console, self._plain = console, plain
-        self.marks = facts.WORDS_ONLY if plain else Marks.of(console)
+        self.marks = request_text.WORDS_ONLY if plain else Marks.of(console)
 
     def subject(self, request: AdviceRequest) -> object:
         """What is learned."""
@@ -37,7 +37,7 @@ class TableQuestion:
         """Where the learner is, what it would do, and how it has been doing."""
         width, height = room(self._console)
         if self._plain:
-            return [Text(), *folded(facts.sentences(request), width)]
+            return [Text(), *folded(request_text.sentences(request), width)]
         gap = [Text()] * (height >= ROOMY)
         left = height - len(gap) - 1 - len(self.asked(request)) // width
         return [*gap, *screen(request, self.marks, width, left)]
@@ -48,13 +48,17 @@ class TableQuestion:
 
     def warned(self, request: AdviceRequest, action: int) -> str:
         """What is said of an action that leads nowhere, "" for any other."""
-        if facts.outcome(request, action) not in (facts.NOWHERE, facts.OBSTACLE, facts.DEAD_END):
+        if request_text.outcome(request, action) not in (
+            request_text.NOWHERE,
+            request_text.OBSTACLE,
+            request_text.DEAD_END,
+        ):
             return ""
-        return f"{self.named(request, action)}: that {facts.leads(request, action)}: given all the same."
+        return f"{self.named(request, action)}: that {request_text.leads(request, action)}: given all the same."
 
     def why(self, request: AdviceRequest, guided: int) -> list[str]:
         """Why it asks, with all its numbers; guided: the episodes that were given advice until now."""
-        return facts.reasons(request, self.marks, guided)
+        return request_text.reasons(request, self.marks, guided)
 
     def explained(self, request: AdviceRequest) -> list[tuple[str, str]]:
         """What can be typed, and what it does."""

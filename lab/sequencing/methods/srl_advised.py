@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from lab.errors import BadInput, unknown
-from lab.learning.events import AdviceEnded, AdviceGiven, AdviceRejected, AdviceRequested, EpisodeEnded, Event
 from lab.learning.gates import GATES, Gate, improvement
 from lab.learning.requests import Advisor, AdvisorLeft, Standing, allowed_words
+from lab.learning.session_events import AdviceEnded, AdviceGiven, AdviceRejected, AdviceRequested, EpisodeEnded, Event
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from lab.advice.advisors import SKILL_TAUS
 from lab.advice.panel import DECISIONS, Panel, PanelSettings, members_of
-from lab.learning.events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.learning.requests import Advisor
 from lab.learning.selection import uniforms
 from lab.learning.session import run_session
+from lab.learning.session_events import AdvisorDropped, AdvisorReadmitted, AdvisorsDisagreed, Event
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, share_row, those, varying_row

@@ -25,7 +25,7 @@ from lab.skills.prepared_scene import prepare
 from lab.skills.skill import Skill
 from lab.tasks.grid_world import GridWorld, random_world
 from lab.tasks.task_file import load, load_world
-from lab.teaching.world_subject import world_problem
+from lab.teaching.world_subject import WorldSubject
 from lab.view.scene_data import describe
 
 SKILLS = (
@@ -101,7 +101,7 @@ def test_a_board_by_hand() -> None:
         cell = WORLD_M / 3
         assert place(scene.frame(0), "robot") == pytest.approx([-cell, cell / 2, cell / 2])  # (0, 0): left, behind
         assert place(scene.frame(5), "robot") == pytest.approx([cell, -cell / 2, cell / 2])  # (1, 2): right, in front
-        boxes = {body.name: body.shapes for body in scene.bodies()}
+        boxes = {body.name: body.shapes for body in scene.bodies}
         assert [shape.position[:2] for shape in boxes["obstacles"]] == [pytest.approx((0.0, cell / 2))]
         assert boxes["goal"][0].position == pytest.approx((cell, -cell / 2, cell / 2))
         assert boxes["start"][0].position[:2] == pytest.approx((-cell, cell / 2))
@@ -144,7 +144,7 @@ def test_the_robot_is_in_the_world_and_in_the_picture_and_never_in_an_obstacle_u
     with closing(world_scene(world)) as scene:
         frame = scene.frame(state)
         at = place(frame, "robot")
-        bodies = {body.name: body.shapes for body in scene.bodies()}
+        bodies = {body.name: body.shapes for body in scene.bodies}
         assert np.all(abs(at[:2]) <= WORLD_M / 2 - size / 2 + 1e-9)
         assert size / 2 <= at[2] + 1e-9 <= WORLD_M
         assert in_picture(scene.camera, at + size / 2 * np.array(list(np.ndindex(3, 3, 3))) - size / 2)
@@ -162,7 +162,7 @@ def test_whatever_the_states_the_frames_fit_the_bodies_and_times_count_up(
     states = data.draw(st.lists(st.integers(0, world.mdp().n_states - 1), min_size=1, max_size=20))
     with closing(world_scene(world)) as scene:
         frames = [scene.frame(state) for state in states]
-        Recording(scene.bodies(), frames, scene.camera).check()
+        Recording(scene.bodies, frames, scene.camera).check()
         assert all(before.time_s < after.time_s for before, after in pairwise(frames))
 
 
@@ -204,14 +204,14 @@ def boxes_of(shape: Shape) -> FloatArray:
 def test_hundreds_of_obstacles_are_one_mesh_that_goes_with_the_scene() -> None:
     world = random_world((60, 50), 0.3, 1)
     with closing(world_scene(world)) as scene:
-        (body,) = (body for body in scene.bodies() if body.name == "obstacles")
+        (body,) = (body for body in scene.bodies if body.name == "obstacles")
         (shape,) = body.shapes
         expected = scene.centres(world.obstacles)
         found = boxes_of(shape)
         assert len(found) == len(world.obstacles) == 900
         assert found[:, :2] == pytest.approx(expected[:, :2], abs=1e-6)
-        assert len(scene.bodies()) < 70
-        assert len(describe(scene.bodies(), scene.camera)["geometries"]) < 20
+        assert len(scene.bodies) < 70
+        assert len(describe(scene.bodies, scene.camera)["geometries"]) < 20
         assert shape.mesh is not None
         assert shape.mesh.is_file()
     assert not shape.mesh.exists()
@@ -224,7 +224,7 @@ def test_of_too_many_obstacles_in_a_room_those_near_the_shortest_ways_are_drawn(
     ends = np.array([world.start, world.goal])
     detours = np.abs(np.array(world.obstacles)[:, None] - ends).sum(axis=(1, 2))
     with closing(world_scene(world)) as scene:
-        (body,) = (body for body in scene.bodies() if body.name == "obstacles")
+        (body,) = (body for body in scene.bodies if body.name == "obstacles")
         found = boxes_of(body.shapes[0])
         size, middle = WORLD_M / 20, np.array([9.5, 9.5, -0.5])
         cells = np.round(found / size + middle)
@@ -236,12 +236,12 @@ def test_of_too_many_obstacles_in_a_room_those_near_the_shortest_ways_are_drawn(
 @pytest.mark.parametrize("name", ["world-1", "world-2"])
 def test_the_shipped_worlds_have_a_scene_that_the_page_can_draw(name: str) -> None:
     world = load_world(name)
-    problem = world_problem(world)
+    problem = WorldSubject(world).prepare(0)
     with closing(world_scene(world)) as scene:
-        drawn = describe(scene.bodies(), scene.camera)
+        drawn = describe(scene.bodies, scene.camera)
         assert {"robot", "goal", "start", "ground", "obstacles"} <= {body["name"] for body in drawn["bodies"]}
         (goal,) = np.flatnonzero(problem.mdp.goal)
-        (box,) = next(body.shapes for body in scene.bodies() if body.name == "goal")
+        (box,) = next(body.shapes for body in scene.bodies if body.name == "goal")
         assert place(scene.frame(int(goal)), "robot") == pytest.approx(np.array(box.position))
 
 
@@ -280,7 +280,7 @@ def test_frames_of_a_skill_fit_its_bodies(name: str, data: st.DataObject) -> Non
     scene, _, mdp = lesson(name)
     states = data.draw(st.lists(st.integers(0, mdp.n_states - 1), min_size=1, max_size=8))
     frames = [scene.frame(state) for state in states]
-    Recording(scene.bodies(), frames, scene.camera).check()
+    Recording(scene.bodies, frames, scene.camera).check()
     assert all(before.time_s < after.time_s for before, after in pairwise(frames))
 
 
@@ -307,7 +307,7 @@ def test_right_is_to_the_right_in_the_picture(name: str) -> None:
 @every_skill
 def test_the_page_can_draw_a_skill(name: str) -> None:
     scene, skill, _ = lesson(name)
-    drawn = {body["name"] for body in describe(scene.bodies(), scene.camera)["bodies"]}
+    drawn = {body["name"] for body in describe(scene.bodies, scene.camera)["bodies"]}
     assert {"table", "robot tool", "slice 1", "slice 2"} <= drawn
     assert ("goal" in drawn) == (skill.subtask in ("insert", "transfer", "place"))
 

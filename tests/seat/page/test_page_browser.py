@@ -13,10 +13,10 @@ import pytest
 
 from lab.advice.advisors import Person
 from lab.advice.journal import Undo
-from lab.learning.events import AdviceEnded, Event
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest
 from lab.learning.session import SessionResult, run_session
+from lab.learning.session_events import AdviceEnded, Event
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.page.teaching_page import SeatPage
@@ -113,7 +113,7 @@ def test_a_whole_session_by_keys(tab: "Page", page: SeatPage, until: Until) -> N
     session = Teaching(page).start()
     until(tab, says(1))
     assert tab.inner_text("#chair") == "You answer here"
-    assert "drawn at random: all moves are alike to it here (25 % each)" in tab.inner_text("#detail")
+    assert "drawn at random: all moves are alike to it here (25% each)" in tab.inner_text("#detail")
     for step, key in enumerate(["ArrowRight", "ArrowRight", "ArrowDown"], start=1):
         until(tab, says(step))
         tab.keyboard.press(key)

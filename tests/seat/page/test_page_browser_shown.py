@@ -11,9 +11,9 @@ import pytest
 
 from lab.advice.entries import Entry
 from lab.advice.receipt import receipt
-from lab.learning.events import AdviceGiven, AdviceRequested, EpisodeEnded, Improvement
 from lab.learning.reasons import Reason, TooSlow
 from lab.learning.requests import AdviceRequest
+from lab.learning.session_events import AdviceGiven, AdviceRequested, EpisodeEnded, Improvement
 from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP, grid, optimal_values
 from lab.seat.page.teaching_page import SeatPage

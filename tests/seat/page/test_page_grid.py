@@ -28,7 +28,7 @@ def test_a_map_is_shown_from_above_layer_by_layer() -> None:
     mdp = grid((2, 3, 2), blocked, (0, 0, 0), (1, 2, 1), action_labels=SPACE)
     place = place_of(mdp)
     assert place is not None
-    assert (place["rows"], place["columns"], place["layers"], place["along"]) == (3, 2, 2, ["down", "up"])
+    assert (place["rows"], place["columns"], place["layers"]) == (3, 2, 2)
     assert place["goals"] == [[0, 1, 1]]
     assert place["directions"] == [2, 3, 1, 0, LOWER, HIGHER]
     assert spot(mdp, mdp.start) == [2, 0, 0]

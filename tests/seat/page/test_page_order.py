@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lab.advice.advisors import Person
-from lab.learning.events import Improvement
 from lab.learning.reasons import TooSlow
+from lab.learning.session_events import Improvement
 from lab.learning.settings import GateSettings
 from lab.seat.page.page_order import bars_of, made_until
 from lab.seat.page.page_question import question_of

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.learning.events import EpisodeEnded
 from lab.learning.requests import AdviceRequest
+from lab.learning.session_events import EpisodeEnded
 from lab.mdp import TabularMDP, grid
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_messages import Answer
 from lab.seat.page.page_panel import SeatPanel, plain_json, word_of
-from lab.seat.page.page_state import PARTS, Learning, Pending
+from lab.seat.page.page_state import PARTS, Pending, ShownLesson
 
 LABELS = ("up", "down", "left", "right")
 
@@ -33,7 +33,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 @pytest.fixture
 def panel(mdp: TabularMDP, clock: list[float]) -> SeatPanel:
     made = SeatPanel("the page")
-    made.known.learning = Learning("row", mdp=mdp, q=[[0.0, 0.0, 0.0, 1.0]] * 3)
+    made.known.learning = ShownLesson("row", mdp=mdp, q=[[0.0, 0.0, 0.0, 1.0]] * 3)
     made.joined(1)
     return made
 

@@ -3,11 +3,14 @@
 import json
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from lab.learning.events import (
+from lab.learning.reasons import TooSlow
+from lab.learning.requests import AdviceRequest, Standing
+from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
     AdviceRejected,
@@ -21,14 +24,12 @@ from lab.learning.events import (
     Improvement,
     Verdict,
 )
-from lab.learning.reasons import TooSlow
-from lab.learning.requests import AdviceRequest, Standing
-from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.page.page_curve import MOST, Curve
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_question import picture_of
-from lab.seat.page.page_state import PARTS, Known, Learning, Pending, document, standing_of
+from lab.seat.page.page_state import PARTS, Known, Pending, ShownLesson, layer_of, standing_of
 
 LABELS = ("up", "down", "left", "right")
 
@@ -46,7 +47,7 @@ def mdp() -> TabularMDP:
 @pytest.fixture
 def known(mdp: TabularMDP) -> Known:
     gate = GateSettings(window=2, first_episode=4, omega=1)
-    return Known("the page", Learning("maze", mdp=mdp, learner=LearnerSettings(episodes=9), gate=gate, episodes=9))
+    return Known("the page", ShownLesson("maze", mdp=mdp, gate=gate, episodes=9))
 
 
 def request_in(mdp: TabularMDP) -> AdviceRequest:
@@ -64,6 +65,11 @@ def request_in(mdp: TabularMDP) -> AdviceRequest:
         improvement=Improvement(-0.25, 50.0, 40.0),
         allowed=range(mdp.n_actions),
     )
+
+
+def document(known: Known, now_s: float = 0.0, layer: int | None = None) -> dict[str, Any]:
+    """All that the page shows, with the slice of one layer, by default the robot's."""
+    return {name: part(known, now_s) for name, part in PARTS.items()} | {"slice": layer_of(known, layer)}
 
 
 def tell(known: Known, events: Sequence[Event]) -> list[str]:
@@ -94,9 +100,9 @@ def test_a_question_says_where_what_and_why(known: Known, mdp: TabularMDP) -> No
     assert asked["title"] == "Episode 30, step 2: at (0, 1)"
     assert (asked["number"], asked["kind"], asked["own"], asked["at"]) == (7, "step", 3, [0, 1, 0])
     assert (asked["why"], asked["rate"]) == ("its improvement is -25.0%, below 5%", -0.25)
-    assert (asked["wait_s"], asked["left_s"]) == (10.0, 3.5)
+    assert asked["left_s"] == 3.5
     assert asked["words"] == ["skip", "auto", "quit", "undo"]
-    assert [move["leads"] for move in asked["moves"]] == ["nowhere", "nowhere", "", "goal"]
+    assert [move["leads"] for move in asked["moves"]] == ["nowhere", "nowhere", "", "to the goal"]
     assert [move["chance"] for move in asked["moves"]] == [0.0, 0.0, 0.0, 1.0]
     assert [move["direction"] for move in asked["moves"]] == [0, 1, 2, 3]
 
@@ -106,7 +112,22 @@ def test_the_way_into_an_obstacle_is_said(known: Known) -> None:
     known.pending = Pending(
         AdviceRequest(mdp=near, q=[[0.0] * 4] * 4, state=0, episode=1, step=1, own=3, allowed=range(near.n_actions))
     )
-    assert [move["leads"] for move in document(known)["question"]["moves"]] == ["nowhere", "", "nowhere", "obstacle"]
+    assert [move["leads"] for move in document(known)["question"]["moves"]] == [
+        "nowhere",
+        "",
+        "nowhere",
+        "into an obstacle",
+    ]
+
+
+def test_where_no_table_says_where_moves_lead_the_page_does_not_either(known: Known) -> None:
+    """Of an environment without a model: its table stays where it is, and has no goal."""
+    stays, no = np.array([[0, 0], [1, 1]]), np.zeros(2, bool)
+    unknown = TabularMDP(stays, np.zeros((2, 2)), no, no, 0, ("hit", "stick"))
+    known.pending = Pending(
+        AdviceRequest(mdp=unknown, q=[[0.0] * 2] * 2, state=0, episode=1, step=1, own=1, allowed=range(2))
+    )
+    assert [move["leads"] for move in document(known)["question"]["moves"]] == ["", ""]
 
 
 def test_an_environments_own_drawing_keeps_its_colours(mdp: TabularMDP, known: Known) -> None:
@@ -126,11 +147,7 @@ def test_the_lesson_and_the_map_are_there_before_any_question(known: Known) -> N
         "unit": "steps",
         "episodes": 9,
         "optimal": None,
-        "learner": "q-lambda",
-        "gate": "ccrl",
         "threshold": 0.05,
-        "window": 2,
-        "first_episode": 4,
     }
     assert shown["slice"]["marks"] == "..G#"
     assert shown["robot"] is None
@@ -139,7 +156,7 @@ def test_the_lesson_and_the_map_are_there_before_any_question(known: Known) -> N
 
 def test_a_problem_without_a_grid_has_no_map() -> None:
     mdp = TabularMDP(np.array([[1], [1]]), np.zeros((2, 1)), np.array([0, 1]), np.array([0, 1]), 0, ("go",))
-    known = Known("", Learning("steps", mdp=mdp))
+    known = Known("", ShownLesson("steps", mdp=mdp))
     assert document(known)["place"] is None
     assert document(known)["slice"] is None
 

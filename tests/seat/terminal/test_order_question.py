@@ -9,9 +9,9 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from rich.console import Console
 
-from lab.learning.events import Improvement
 from lab.learning.reasons import TooSlow
 from lab.learning.requests import AdvisorLeft
+from lab.learning.session_events import Improvement
 from lab.seat.terminal.line_reader import TerminalReader
 from lab.seat.terminal.prompt import TeachingPrompt
 from lab.sequencing.request import SequenceRequest

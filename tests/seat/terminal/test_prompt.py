@@ -12,7 +12,9 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from rich.console import Console
 
-from lab.learning.events import (
+from lab.learning.reasons import TooSlow
+from lab.learning.requests import AdviceRequest, AdvisorLeft, Standing
+from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
     AdviceRejected,
@@ -23,8 +25,6 @@ from lab.learning.events import (
     EpisodeEnded,
     Improvement,
 )
-from lab.learning.reasons import TooSlow
-from lab.learning.requests import AdviceRequest, AdvisorLeft, Standing
 from lab.mdp import TabularMDP, grid
 from lab.seat.terminal.line_reader import PlainReader, TerminalReader
 from lab.seat.terminal.prompt import TeachingPrompt

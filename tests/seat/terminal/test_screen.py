@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from rich.console import Console
 from rich.text import Text
 
-from lab.learning.events import Improvement
 from lab.learning.reasons import TooSlow
 from lab.learning.requests import AdviceRequest, Standing
+from lab.learning.session_events import Improvement
 from lab.mdp import TabularMDP
 from lab.seat.grid_text import Marks
 from lab.seat.terminal.screen import folded, packed, question, room, screen

