@@ -146,8 +146,9 @@ def _photographed(prepared: Prepared) -> Skill | None:
 
 def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) -> None:
     """The pictures, the replay and the two JSON files."""
+    from lab.view.gantt import gantt
     from lab.view.meshcat import replay_html
-    from lab.view.plots import gantt, learning_curves, values_seen
+    from lab.view.plots import learning_curves, values_seen
     from lab.vision import write_picture
 
     paths = {name: folder / file for name, file in FILES.items()}

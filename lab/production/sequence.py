@@ -19,7 +19,7 @@ from lab.production.drawn_times import stochastic
 from lab.sequencing import SEQUENCERS, check_method, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
-from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective, cost
+from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective, cost, stuck_cost
 from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import follow, simulate
 from lab.tasks.cell import CellFile, order_from_word, toast_case
@@ -324,12 +324,13 @@ def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
 def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], files: dict[str, Path]) -> None:
     """The pictures that are asked for by name: "plot", the costs of the episodes, "gantt", the best sequence."""
     from lab.view.gantt import gantt
-    from lab.view.plots import sequence_plot
+    from lab.view.sequencing_plots import sequence_plot
 
     if "plot" in files:
         label = "makespan [s]" if document["objective"] == MAKESPAN else document["objective"]
         costs = [result.episode_costs for result in found]
-        sequence_plot(costs, document["optimal_cost"], files["plot"], ylabel=label)
+        stuck = stuck_cost(cell, document["objective"])
+        sequence_plot(costs, document["optimal_cost"], files["plot"], ylabel=label, deadlock=stuck)
     if "gantt" in files:
         gantt(simulate(cell, document["sequence"]), files["gantt"])
     document["files"] = {name: str(path) for name, path in files.items()}
