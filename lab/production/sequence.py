@@ -19,7 +19,15 @@ from lab.production.drawn_times import stochastic
 from lab.sequencing import SEQUENCERS, check_method, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
-from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective, cost, stuck_cost
+from lab.sequencing.cell.objectives import (
+    BUILT_IN,
+    MAKESPAN,
+    OBJECTIVES,
+    WITH_DUE_TIMES,
+    check_objective,
+    cost,
+    stuck_cost,
+)
 from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import follow, simulate
 from lab.tasks.cell import CellFile, order_from_word, toast_case
@@ -246,6 +254,8 @@ def reference(cell: Cell, objective: str) -> Reference:
     from lab.sequencing.methods.cp_sat import cp_sat, fits
 
     unit = "" if objective == "tardy-parts" else " s"
+    if objective not in BUILT_IN:
+        return Reference(0.0, False, "nothing: CP-SAT has no rule for this objective", unit)
     if not fits(cell):
         return Reference(0.0, False, "nothing: too many moves for CP-SAT", unit)
     opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)

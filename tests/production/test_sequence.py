@@ -339,6 +339,14 @@ def test_pictures_are_in_the_document(lab: Lab) -> None:
     assert "tardy-parts" in Path("p.svg").read_text(encoding="utf-8")
 
 
+def test_a_deadlock_is_a_mark_in_the_plot(lab: Lab) -> None:
+    """And no cost: it would be the highest of all."""
+    words = "crossing.toml --method random --episodes 8 --plot p.svg"
+    ran = lab("sequence", *words.split())
+    assert ran.code == 0, ran.err
+    assert " of 8 episodes)" in Path("p.svg").read_text(encoding="utf-8")
+
+
 # ---- a task: measured in simulation, then sequenced -----------------------------------------------------------------
 
 

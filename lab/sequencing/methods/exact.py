@@ -13,7 +13,7 @@ from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
 from lab.sequencing.methods.rules import first_come
-from lab.sequencing.search import Log, Search, SequenceResult, gap
+from lab.sequencing.search import Search, SequenceResult, gap, only_one
 from lab.sequencing.simulate.merged import MergedCell, MergedState
 from lab.sequencing.simulate.run import simulate
 
@@ -140,7 +140,4 @@ def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResul
         if found is None or fits(cell):
             other = cp_sat(cell, search.objective, hint=sequence or None)
             sequence, cost = min((cost, sequence), (other.cost, other.sequence))[::-1]
-    log = Log(search)
-    log.note(sequence, cost, complete=bool(sequence))
-    log.check(cell)
-    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+    return only_one(cell, search, sequence, cost, bool(sequence))

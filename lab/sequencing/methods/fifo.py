@@ -5,7 +5,7 @@ import numpy as np
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.routes import choice_of, part_of
-from lab.sequencing.search import Log, Search, SequenceResult
+from lab.sequencing.search import Search, SequenceResult, only_one
 from lab.sequencing.simulate.execution import WAIT, Choose, Observed, carry_out
 
 
@@ -17,10 +17,8 @@ def fifo(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult
     """
     search.check(cell)
     execution = carry_out(cell, lambda cell: _Queue(cell, stays=False))
-    log = Log(search)
-    log.note(tuple(execution.sequence), cost(execution.run, search.objective), execution.run.done)
-    log.check(cell)
-    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+    run = execution.run
+    return only_one(cell, search, tuple(execution.sequence), cost(run, search.objective), run.done)
 
 
 def first_in_first_out(cell: Cell) -> Choose:

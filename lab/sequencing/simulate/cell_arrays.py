@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lab.sequencing.cell.cell import ARRIVALS_AFTER, Cell
 from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance
-from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, machine_places, stuck_cost
+from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, check_built_in, machine_places, stuck_cost
 from lab.sequencing.cell.routes import from_the_ends
 
 Ints = NDArray[np.int64]
@@ -20,7 +20,7 @@ ENDLESS = 2**40  # room of a station that is never full
 NO_ARRIVALS = 0
 ARRIVAL_CODES = {name: code for code, name in enumerate(ARRIVALS_AFTER, 1)}
 LAW_CODES = {name: code for code, name in enumerate(LAWS)}
-OBJECTIVE_CODES = {name: code for code, name in enumerate(OBJECTIVES)}
+OBJECTIVE_CODES = {name: code for code, name in enumerate(BUILT_IN)}
 
 
 class CellArrays(NamedTuple):
@@ -79,7 +79,11 @@ class RunArrays(NamedTuple):
 
 
 def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANCE) -> CellArrays:
-    """The cell as arrays, to be judged by an objective that it has been checked for (`check_objective`)."""
+    """The cell as arrays, to be judged by an objective that it has been checked for (`check_objective`).
+
+    BadInput for an objective that the kernels do not know.
+    """
+    check_built_in(objective, "the compiled simulation")
     size, places = len(cell.stations), cell.positions
     options = [option for place in places for option in place.options]
     return CellArrays(
