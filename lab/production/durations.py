@@ -12,8 +12,8 @@ import numpy as np
 
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.files import assets_folder
+from lab.learning.sources import sources
 from lab.production.floor import Floor
-from lab.production.sources import sources
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import NeededMoves
 from lab.sim.scene import Layout
