@@ -67,13 +67,7 @@ class Wanted:
 
 
 def sequence_named(
-    name: str,
-    case: str | None,
-    toasts: int | None,
-    wanted: Wanted,
-    *,
-    teacher: Teacher,
-    files: dict[str, Path],
+    name: str, case: str | None, toasts: int | None, wanted: Wanted, *, teacher: Teacher, files: dict[str, Path]
 ) -> dict[str, Any]:
     """What `lab sequence` does: a cell file's cell, or a task's over durations measured in simulation, and its pictures.
 
@@ -137,12 +131,7 @@ def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher) -> 
 
 
 def sequence_cell(
-    cell: Cell,
-    settings: Sequencing,
-    wanted: Wanted,
-    chance: Chance,
-    *,
-    tell: Tell = unheard,
+    cell: Cell, settings: Sequencing, wanted: Wanted, chance: Chance, *, tell: Tell = unheard
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     """Sessions of one method on a cell, beside what cannot be beaten; the document of `lab sequence`, and the sessions.
 
@@ -199,7 +188,9 @@ def _sessions(
             tell(SequenceFound(found[-1], shown))
     document = _document(cell, method, search, found, known, wanted) | {"interrupted": interrupted}
     if wanted.stochastic and not interrupted:
-        document["stochastic"] = stochastic(cell, method, search, min(found, key=_cost), chance, wanted.seed)
+        document["stochastic"] = stochastic(
+            cell, method, search, min(found, key=lambda one: one.cost), chance, wanted.seed
+        )
     if journal is not None and not interrupted:
         proven = document["optimal_cost"]
         is_best = proven is not None and document["gap"] == 0.0
@@ -344,7 +335,3 @@ def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], 
     if "gantt" in files:
         gantt(simulate(cell, document["sequence"]), files["gantt"])
     document["files"] = {name: str(path) for name, path in files.items()}
-
-
-def _cost(result: SequenceResult) -> float:
-    return result.cost

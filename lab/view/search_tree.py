@@ -7,19 +7,7 @@ from typing import TYPE_CHECKING, Any
 from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.simulate.run import Run
-from lab.view.canvas import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PALE_GREEN,
-    PALE_GREY,
-    RED,
-    picture_bytes,
-    seconds,
-    tip,
-)
+from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PALE_GREEN, PALE_GREY, RED, picture_bytes, seconds, tip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -50,9 +50,8 @@ class _Search:
     def __init__(self, cell: Cell) -> None:
         self.merged = MergedCell(cell)
         self._least = LowerBound(self.merged)
-        self._waits = (
-            len(self.merged.slots) + self.merged.one_by_one
-        )  # what the clock brings is no wait: it comes anyway
+        # What the clock brings is no wait: it comes anyway.
+        self._waits = len(self.merged.slots) + self.merged.one_by_one
         self.expanded = self.bound = self._serial = 0
         self._fronts: dict[tuple[int, int], list[tuple[int, ...]]] = {}
         self._heap: list[tuple[int, int, MergedState]] = []

@@ -106,7 +106,7 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
         interval_s=np.array(cell.arrivals.interval_s if cell.arrivals else (0.0,) * cell.parts, np.float64),
         due_s=np.array(cell.due_s or (0.0,) * cell.parts, np.float64),
         robot_start=cell.index(cell.robot_start),
-        many=most_choices(cell) > 1,
+        many=cell.most_choices > 1,
         arrivals=ARRIVAL_CODES[cell.arrivals.after] if cell.arrivals else NO_ARRIVALS,
         machines=machine_places(cell),
         objective=OBJECTIVE_CODES[objective],
@@ -119,7 +119,7 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
 
 def run_arrays(cell: Cell) -> RunArrays:
     """Room for a run of the cell; `kernels.reset` fills it."""
-    decisions = cell.parts * most_choices(cell)
+    decisions = cell.parts * cell.most_choices
     return RunArrays(
         locations=np.zeros(cell.parts, np.int64),
         ready_s=np.zeros(cell.parts),
@@ -130,11 +130,6 @@ def run_arrays(cell: Cell) -> RunArrays:
         allowed=np.zeros(decisions, np.int64),
         options=np.zeros(decisions, np.int64),
     )
-
-
-def most_choices(cell: Cell) -> int:
-    """How many decisions a part may stand for at the most."""
-    return 1 + max(option.choice for place in cell.positions for option in place.options)
 
 
 def most_moves(cell: Cell) -> int:

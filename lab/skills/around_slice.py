@@ -69,3 +69,30 @@ class AroundSlice(Skill):
         yield from robot.follow(poses, blend=_BLEND_M, slow=SLOW)
 
 
+def free_above(what: str, survey: Survey, goal: tuple[int, ...]) -> tuple[int, ...]:
+    """The first free cell of the highest level; BadInput names what blocks them all, or the goal."""
+    top = [cell for cell in np.ndindex(*survey.causes.shape) if cell[2] == NEAR_SHAPE[2] - 1]
+    free = [cell for cell in top if not survey.blocked[cell]]
+    if survey.blocked[goal] or not free:
+        names = survey.names([goal] if survey.blocked[goal] else top)
+        raise BadInput(f"{what}: no room for gripper and slice; in the way: {', '.join(names)}")
+    return free[0]
+
+
+def from_above(mdp: TabularMDP) -> TabularMDP:
+    """The same problem with episodes that begin in any free cell of the highest level."""
+    levels = np.indices(mdp.shape)[2].ravel()
+    starts = np.flatnonzero((levels == NEAR_SHAPE[2] - 1) & ~mdp.terminal)
+    return replace(mdp, starts=tuple(int(s) for s in starts))
+
+
+def entry_cell(goal: ToolPose, tool: ToolPose) -> tuple[int, int, int, int]:
+    """The cell of the highest level that is nearest to where the tool is, seen from the slice."""
+    c, s = np.cos(goal.yaw), np.sin(goal.yaw)
+    dx, dy = tool.x - goal.x, tool.y - goal.y
+    along, across = c * dx + s * dy, -s * dx + c * dy
+    turn = (tool.yaw - goal.yaw + np.pi / 2) % np.pi - np.pi / 2
+    x = int(np.clip(round(along / NEAR_STEP_M[0]) + 2, 0, NEAR_SHAPE[0] - 1))
+    y = int(np.clip(round(across / NEAR_STEP_M[1]) + 2, 0, NEAR_SHAPE[1] - 1))
+    yaw = int(np.clip(round(turn / NEAR_YAW_STEP) + NEAR_YAWS // 2, 0, NEAR_YAWS - 1))
+    return (x, y, NEAR_SHAPE[2] - 1, yaw)
