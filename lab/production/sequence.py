@@ -30,7 +30,7 @@ from lab.sequencing.cell.objectives import (
 )
 from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import follow, simulate
-from lab.tasks.cell import CellFile, order_from_word, toast_case
+from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.tasks.task_file import Task, load_any

@@ -127,7 +127,7 @@ def optimum_s(case: str, toasts: int) -> float:
 @lru_cache(maxsize=16)
 def robot_cell(case: str, toasts: int) -> Cell:
     """The thesis's toast cell with the times of a case."""
-    from lab.tasks.cell import TOAST_CASES
+    from lab.tasks.cell_file import TOAST_CASES
     from lab.tasks.task_file import load_cell
 
     return load_cell(TOAST_CASES[case]).cell(toasts)
