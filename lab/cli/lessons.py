@@ -11,7 +11,7 @@ from lab.errors import BadInput, LabError
 
 if TYPE_CHECKING:
     from lab.learning.requests import Ask
-    from lab.production.sequence import Wanted
+    from lab.production.sequencing_job import Wanted
     from lab.seat.lesson_seat import LessonSeat
     from lab.teaching.kept_order import OrderSession
     from lab.teaching.kept_session import KeptSession
@@ -107,7 +107,7 @@ def subject_of(options: "LessonOptions", kept: "KeptSession | None" = None) -> "
 
 def wanted_of(kept: "OrderSession", people: "Mapping[str, Ask]") -> "Wanted":
     """What a session of `lab sequence` asks for, and whom."""
-    from lab.production.sequence import Wanted
+    from lab.production.sequencing_job import Wanted
 
     options = kept.options
     return Wanted(

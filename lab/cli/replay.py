@@ -66,7 +66,7 @@ def replay(
 def _replayed(kept: "OrderSession", seat: "LessonSeat", toolbox: Path | None) -> dict[str, Any]:
     """Advice on an order again: the session is run once more, and the journal answers for the people."""
     from lab.advice.advisors import PEOPLE
-    from lab.production.sequence import sequence_named
+    from lab.production.sequencing_job import sequence_named
     from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
 
     def nobody(request: "Request") -> int | None:

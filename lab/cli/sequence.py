@@ -69,7 +69,7 @@ def sequence(
 
     What a person advises is kept: --resume goes on with it, lab replay shows it again.
     """
-    from lab.production.sequence import sequence_named
+    from lab.production.sequencing_job import sequence_named
     from lab.teaching.kept_order import OrderOptions, OrderSession, gone_on
     from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
     from lab.toolbox.registry import Toolbox
