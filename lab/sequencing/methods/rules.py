@@ -90,12 +90,11 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         "nearest-ready": nearest_ready,
     }
 )
-WITH_DUE_TIMES = ("earliest-due",)
 
 
 def usable(cell: Cell) -> dict[str, Rule]:
     """The rules that this cell has the data for."""
-    return {name: rule for name, rule in RULES.items() if cell.due_s is not None or name not in WITH_DUE_TIMES}
+    return {name: rule for name, rule in RULES.items() if cell.due_s is not None or rule is not earliest_due}
 
 
 def dispatch(run: Run, rule: Rule) -> tuple[int, ...]:
