@@ -97,7 +97,7 @@ def sequenced(
     kept: "OrderSession", people: "Mapping[str, Ask]", seat: "LessonSeat", toolbox: Path | None, files: dict[str, Path]
 ) -> dict[str, Any]:
     """The document of a session of `lab sequence`, whom it may ask behind such names as "terminal", its pictures in files."""
-    from lab.production.sequence import Wanted, sequence_named
+    from lab.production.sequencing_job import Wanted, sequence_named
     from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
 
     options = kept.options

@@ -14,7 +14,7 @@ from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
 from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.cell.routes import entry
 from lab.sequencing.simulate.run import Run
-from lab.tasks.cell import order_from_word, toast_case
+from lab.tasks.cell_file import order_from_word, toast_case
 from lab.tasks.task_file import load, load_cell, load_world
 from lab.view.grid_planes import GridPlanes
 

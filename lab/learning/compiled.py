@@ -7,12 +7,9 @@ it, and of those. Where that folder cannot be made, nothing is kept and each run
 
 import hashlib
 import os
-import re
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
-from importlib.util import resolve_name
 from pathlib import Path
 from shutil import rmtree
 from typing import Any, TypeVar
@@ -20,10 +17,9 @@ from typing import Any, TypeVar
 import numba
 from platformdirs import user_cache_dir
 
+from lab.learning.sources import sources
+
 MOST_FOLDERS = 60  # of a few MB at the most each; a version of the lab has about ten
-# Without a parser, which would take longer than all else here; a word too many, such as of a comment, is no module.
-_IMPORTS = re.compile(r"^(?:from +(\.*)([\w.]*) +import +(?:\(([^)]*)\)|([^\n(]*))|import +([^\n]*))", re.MULTILINE)
-_WORD = re.compile(r"[\w.]+")
 _LEAN: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _CONFIG: Any = numba.config  # its types do not know what it holds
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -71,40 +67,10 @@ def cache_folder() -> Path:
 @cache
 def key(module: str) -> str:
     """The name of a loaded module and a hash of all sources that may be compiled into its functions."""
-    sources, pending = dict[str, bytes](), [module]
-    while pending:
-        name = pending.pop()
-        if name in sys.modules and name not in sources and _package(name) == _package(module):
-            sources[name], imported = source(name)
-            pending += imported
     digest = hashlib.sha256()
-    for name in sorted(sources):
-        digest.update(f"{name} {len(sources[name])} ".encode() + sources[name])
+    for name, text in sources([module], inside=False).texts.items():
+        digest.update(f"{name} {len(text)} {text}".encode())
     return f"{module}-{digest.hexdigest()[:16]}"
-
-
-@cache
-def source(module: str) -> tuple[bytes, tuple[str, ...]]:
-    """The source of a loaded module, and the modules that it imports at its top with names in them, which may be modules."""
-    file = sys.modules[module].__file__
-    read = b"" if file is None else Path(file).read_bytes()
-    return read, tuple(_imported(module, read.decode()))
-
-
-def _package(module: str) -> str:
-    return module.partition(".")[0]
-
-
-def _imported(module: str, text: str) -> Iterator[str]:
-    is_package = Path(sys.modules[module].__file__ or "").stem == "__init__"
-    inside = module if is_package else module.rpartition(".")[0]
-    for dots, base, several, one, plain in _IMPORTS.findall(text):
-        if plain:
-            yield from _WORD.findall(plain)
-            continue
-        base = resolve_name(dots + base, inside) if dots else base
-        yield base
-        yield from (f"{base}.{name}" for name in _WORD.findall(several or one))
 
 
 def _made(folder: Path) -> Path | None:

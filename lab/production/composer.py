@@ -191,12 +191,7 @@ def _slice(toast: int) -> str:
 
 
 def carry_out(
-    prepared: Prepared,
-    cell: Cell,
-    sequence: Sequence[int],
-    *,
-    viewer: Viewer | None = None,
-    tell: Tell = unheard,
+    prepared: Prepared, cell: Cell, sequence: Sequence[int], *, viewer: Viewer | None = None, tell: Tell = unheard
 ) -> tuple[Outcome, Recording]:
     """Carry `sequence` (toasts from 1, one entry a move) out in physics, from slices on the first station to the end.
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.files import assets_folder
+from lab.learning.sources import sources
 from lab.production.floor import Floor
-from lab.production.sources import sources
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import NeededMoves
 from lab.sim.scene import Layout
@@ -29,12 +29,7 @@ from lab.toolbox.registry import Toolbox
 RECORDS = "durations"  # the kind of record in the toolbox
 LONGEST_S = 86_400.0  # of a move or a process
 MEASURED_BY = (__name__,)  # the modules that carry moves out, with all that they import
-DECIDED_BY_RESULT = (
-    "lab.sequencing",
-    "lab.learning",
-    "lab.advice",
-    "lab.view",
-)  # what these decide is in moves and policies
+DECIDED_BY_RESULT = ("lab.sequencing", "lab.learning", "lab.advice", "lab.view")  # moves and policies hold it
 
 Pair = tuple[str, str]
 

@@ -12,6 +12,7 @@ from lab.files import draft
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
 from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
@@ -45,11 +46,8 @@ class Taught:
 class Report:
     """What a whole run came to; `began_s` is the clock's reading (`time.perf_counter`) when it began."""
 
-    task: str
-    seed: int
-    toasts: int
-    lessons: dict[str, Lesson]
-    durations: Durations
+    prepared: Prepared
+    taught: Taught
     sequenced: SequenceResult
     proven: Optimum
     outcome: Outcome
@@ -61,7 +59,7 @@ class Report:
     @property
     def success(self) -> bool:
         """Whether every toast was delivered."""
-        return self.outcome.failure is None and len(self.outcome.delivered) == self.toasts
+        return self.outcome.failure is None and len(self.outcome.delivered) == self.prepared.toasts
 
     @property
     def gap(self) -> float:
@@ -70,17 +68,17 @@ class Report:
 
     def to_json(self) -> dict[str, Any]:
         """The document of `lab run --json`."""
-        outcome = self.outcome
+        outcome, prepared = self.outcome, self.prepared
         return {
-            "task": self.task,
-            "seed": self.seed,
-            "toasts": self.toasts,
+            "task": prepared.task.name,
+            "seed": prepared.seed,
+            "toasts": prepared.toasts,
             "success": self.success,
             "delivered": len(outcome.delivered),
             "dropped": len(outcome.dropped),
             "failure": outcome.failure,
             "retries": list(outcome.retries),
-            "skills": [_skill_row(name, lesson) for name, lesson in self.lessons.items()],
+            "skills": [_skill_row(name, lesson) for name, lesson in self.taught.lessons.items()],
             "sequence": list(self.sequenced.sequence),
             "predicted_makespan_s": self.sequenced.cost,
             "measured_makespan_s": outcome.schedule.makespan_s if self.success else None,
@@ -89,7 +87,7 @@ class Report:
             "optimality_gap": self.gap,
             "optimum_proven": self.proven.proven,
             "camera_deviation_m": max(outcome.camera_deviations_m, default=None),
-            "sim_s": outcome.sim_s + self.durations.sim_s,
+            "sim_s": outcome.sim_s + self.taught.durations.sim_s,
             "wall_s": self.wall_s,
             "files": self.files,
         }
@@ -112,16 +110,16 @@ def _skill_row(name: str, lesson: Lesson) -> dict[str, Any]:
     }
 
 
-def write_files(prepared: Prepared, taught: Taught, report: Report, out: Path) -> None:
+def write_files(report: Report, out: Path) -> None:
     """Write what there is of `FILES` to `out`, all at once at the end: none is ever half written, none is left of a run before.
 
     Sets `report.files`. WorkFailed when `out` cannot be written.
     """
-    report.files = {name: str(out / FILES[name]) for name in _names(prepared, report)}
+    report.files = {name: str(out / FILES[name]) for name in _names(report)}
     try:
         out.mkdir(parents=True, exist_ok=True)
         with draft(out) as beside:
-            _draw_all(prepared, taught, report, beside)
+            _draw_all(report, beside)
             for name, file in FILES.items():
                 if name in report.files:
                     os.replace(beside / file, out / file)
@@ -131,10 +129,10 @@ def write_files(prepared: Prepared, taught: Taught, report: Report, out: Path) -
         raise WorkFailed(f"output folder '{out}' (--out) cannot be written: {error.strerror or error}") from error
 
 
-def _names(prepared: Prepared, report: Report) -> list[str]:
+def _names(report: Report) -> list[str]:
     """The files that this run can have: a Gantt chart needs a move, the camera's pictures need a skill that took one."""
     missing = set() if report.outcome.schedule.robot else {"gantt"}
-    if _photographed(prepared) is None:
+    if _photographed(report.prepared) is None:
         missing |= {"value_map", "overhead"}
     return [name for name in FILES if name not in missing]
 
@@ -144,12 +142,14 @@ def _photographed(prepared: Prepared) -> Skill | None:
     return next((skill for skill in prepared.skillset.skills.values() if skill.photo() is not None), None)
 
 
-def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) -> None:
+def _draw_all(report: Report, folder: Path) -> None:
     """The pictures, the replay and the two JSON files."""
+    from lab.view.gantt import gantt
     from lab.view.meshcat import replay_html
-    from lab.view.plots import gantt, learning_curves, values_seen
+    from lab.view.plots import learning_curves, values_seen
     from lab.vision import write_picture
 
+    prepared, taught = report.prepared, report.taught
     paths = {name: folder / file for name, file in FILES.items()}
     predicted = simulate(taught.cell, report.sequenced.sequence)
     if "gantt" in report.files:
@@ -164,7 +164,7 @@ def _draw_all(prepared: Prepared, taught: Taught, report: Report, folder: Path) 
         write_picture(paths["overhead"], photo.picture)
     title = f"{prepared.task.title or prepared.task.name}: {counted(prepared.toasts, 'toast')}"
     replay_html(report.recording, paths["replay"], title=title)
-    _write_json(paths["sequence"], _sequence_document(taught, report))
+    _write_json(paths["sequence"], _sequence_document(report, predicted))
     report.wall_s = time.perf_counter() - report.began_s
     _write_json(paths["run"], report.to_json() | {"schedule": report.outcome.schedule.to_json()})
 
@@ -180,16 +180,16 @@ def _curves(prepared: Prepared, lessons: dict[str, Lesson]) -> dict[str, Policy]
     }
 
 
-def _sequence_document(taught: Taught, report: Report) -> dict[str, Any]:
+def _sequence_document(report: Report, predicted: Schedule) -> dict[str, Any]:
     return {
         "sequence": list(report.sequenced.sequence),
         "makespan_s": report.sequenced.cost,
         "episode_makespans_s": list(report.sequenced.episode_costs),
         "optimal_s": report.proven.optimal_s,
         "optimal_sequence": list(report.proven.sequence),
-        "durations": taught.durations.to_json(),
-        "stations": [asdict(station) for station in taught.cell.stations],
-        "predicted": simulate(taught.cell, report.sequenced.sequence).to_json(),
+        "durations": report.taught.durations.to_json(),
+        "stations": [asdict(station) for station in report.taught.cell.stations],
+        "predicted": predicted.to_json(),
     }
 
 

@@ -71,18 +71,7 @@ def run(prepared: Prepared, teacher: Teacher, out: Path, *, viewer: Viewer | Non
     teacher.tell(SequenceFound(found, Reference(proven.bound_s, proven.proven, "A*")))
     teacher.tell(PhaseBegan("carry out", len(found.sequence)))
     outcome, recording = carry_out(prepared, taught.cell, found.sequence, viewer=viewer, tell=teacher.tell)
-    report = Report(
-        prepared.task.name,
-        prepared.seed,
-        prepared.toasts,
-        taught.lessons,
-        taught.durations,
-        found,
-        proven,
-        outcome,
-        recording,
-        began,
-    )
+    report = Report(prepared, taught, found, proven, outcome, recording, began)
     teacher.tell(PhaseBegan("draw", 1))
-    write_files(prepared, taught, report, out)
+    write_files(report, out)
     return report

@@ -79,7 +79,7 @@ def _cp_sat() -> Find:
 def _planned_anew(cell: "Cell", objective: str, seed: int) -> Reaction:
     from lab.sequencing.methods.rollout import replan
 
-    return Reaction(replan(objective=objective), "planned anew at every decision")
+    return Reaction(replan(objective), "planned anew at every decision")
 
 
 def _learned_on(cell: "Cell", objective: str, seed: int) -> Reaction:

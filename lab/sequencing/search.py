@@ -132,7 +132,7 @@ class Log:
     best: tuple[int, ...] = ()
     best_cost: float = inf
 
-    def note(self, sequence: tuple[int, ...], cost: float, complete: bool = True) -> None:
+    def note(self, sequence: tuple[int, ...], cost: float, complete: bool) -> None:
         """One episode; what ended in a deadlock is not complete, and never the best."""
         self.costs.append(cost)
         if complete and cost < self.best_cost:
@@ -140,9 +140,19 @@ class Log:
         if self.search.on_episode is not None:
             self.search.on_episode(EpisodeSequenced(len(self.costs), cost, self.best_cost, self.best))
 
-    def check(self, cell: Cell) -> None:
-        """WorkFailed when no sequence came to its end."""
+    def found(self, cell: Cell) -> tuple[tuple[int, ...], float, tuple[float, ...]]:
+        """The fields of a `SequenceResult`; WorkFailed when no sequence came to its end."""
         if not self.best:
             raise WorkFailed(
                 f"no sequence for {cell.parts} parts came to its end in {len(self.costs)} episodes: deadlocks"
             )
+        return self.best, self.best_cost, tuple(self.costs)
+
+
+def only_one(
+    cell: Cell, search: Search, sequence: tuple[int, ...], cost: float, complete: bool = True
+) -> SequenceResult:
+    """The result of a method that has one sequence; WorkFailed when that is not complete, which is a deadlock."""
+    log = Log(search)
+    log.note(sequence, cost, complete)
+    return SequenceResult(*log.found(cell))

@@ -28,12 +28,8 @@ MARKER_RADIUS = 0.017
 MARKER_THICK = 0.001  # thin: a side that the camera sees would shift the middle of what it sees
 
 WHITE, GRAPHITE, BLUE = (0.93, 0.93, 0.95, 1.0), (0.22, 0.23, 0.26, 1.0), (0.16, 0.30, 0.55, 1.0)
-STEEL, RUBBER, CRUST, CRUMB = (
-    (0.72, 0.73, 0.76, 1.0),
-    (0.12, 0.12, 0.12, 1.0),
-    (0.62, 0.42, 0.22, 1.0),
-    (0.93, 0.83, 0.64, 1.0),
-)
+STEEL, RUBBER = (0.72, 0.73, 0.76, 1.0), (0.12, 0.12, 0.12, 1.0)
+CRUST, CRUMB = (0.62, 0.42, 0.22, 1.0), (0.93, 0.83, 0.64, 1.0)
 MARKER_MAGENTA, MARKER_CYAN, MARKER_GREEN = (0.95, 0.0, 0.95, 1.0), (0.0, 0.85, 0.85, 1.0), (0.0, 0.80, 0.0, 1.0)
 
 
@@ -159,21 +155,11 @@ def bread() -> Model:
 
         return hull(trimesh.Trimesh([(x, y, z) for x, z in outline for y in (-depth / 2, depth / 2)]))
 
-    solid = Part(CRUST, SLICE, hidden=True)
-    return Model(
-        "slice",
-        [
-            Link(
-                "slice",
-                SLICE_KG,
-                [
-                    solid,
-                    Part(CRUST, mesh=profile(0.0, thick), ghost=True),
-                    Part(CRUMB, mesh=profile(0.007, thick + 0.0008), ghost=True),
-                ],
-            )
-        ],
-    )
+    seen = [
+        Part(CRUST, mesh=profile(0.0, thick), ghost=True),
+        Part(CRUMB, mesh=profile(0.007, thick + 0.0008), ghost=True),
+    ]
+    return Model("slice", [Link("slice", SLICE_KG, [Part(CRUST, SLICE, hidden=True), *seen])])
 
 
 MODELS = {"robot": robot, "toaster": toaster, "applier": applier, "slice": bread}

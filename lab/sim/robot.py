@@ -134,7 +134,7 @@ class Robot:
         world.gear(NAME, *FINGERS)
         self.closed = False
         self.hold(kinematics.HOME)
-        self._fingers(0.0, 200.0, at=FINGER_OPEN)
+        self.open_at_once()
 
     def hold(self, joints: Array) -> None:
         """Put the arm at `joints` (6,) [rad] at once and hold it there: for building and surveying a scene."""
@@ -150,11 +150,8 @@ class Robot:
 
     def open_at_once(self, opening: float = FINGER_OPEN) -> None:
         """Put the fingers at `opening` [m] from the middle at once: for building and surveying a scene."""
-        self._fingers(0.0, 200.0, at=opening)
-
-    def _fingers(self, squeeze: float, force: float, at: float) -> None:
-        self.world.set_joints(NAME, FINGERS, [at, at])
-        self.world.drive(NAME, FINGERS, [at - squeeze] * 2, force=force)
+        self.world.set_joints(NAME, FINGERS, [opening, opening])
+        self.world.drive(NAME, FINGERS, [opening, opening], force=200.0)
 
     def tool(self) -> ToolPose:
         """Where the finger tips are, as measured from the links' poses in physics."""

@@ -108,9 +108,7 @@ class Skill:
     moves_arm: ClassVar[bool] = True  # a machine's process does not
     tried: ClassVar[bool] = False  # whether a lesson ends with a trial in physics
     looks_from: ClassVar[tuple[float, float]] = (-72.0, 36.0)  # [deg] the camera of a lesson, azimuth and elevation
-    near: ClassVar[bool] = (
-        False  # whether all of it takes place around its station's first spot; looks_from is then its own
-    )
+    near: ClassVar[bool] = False  # whether all takes place around its station's first spot; looks_from is then its own
 
     station = ""  # where it takes place, if it is at one
     carries = False  # whether a slice is in the gripper meanwhile

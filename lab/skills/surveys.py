@@ -86,8 +86,9 @@ class Surveys:
             approach = self.approach(place)
             surveyor = Surveyor(scene, loaded=loaded, clearance=_DOCK_CLEARANCE)
             cause = surveyor.cause(approach)
-            for cell in [] if cause else self._free_cells_near(survey, approach):
-                if not any(surveyor.cause(pose) for pose in _between(self.cell_pose(cell), approach)):
+            for cell in [] if cause else self._cells_near(survey, approach):
+                way = _between(self.cell_pose(cell), approach)
+                if not survey.blocked[cell] and not any(surveyor.cause(pose) for pose in way):
                     return cell
         if not cause:
             cause = ", ".join(survey.names(self._cells_near(survey, approach))) or "the workspace's border"
@@ -101,9 +102,6 @@ class Surveys:
         at = {cell: self.cell_pose(cell) for cell in np.ndindex(*survey.causes.shape[:2], 1)}
         far = {cell: hypot(p.x - pose.x, p.y - pose.y) for cell, p in at.items()}
         return sorted((cell for cell in far if far[cell] <= reach), key=lambda cell: (far[cell], cell))
-
-    def _free_cells_near(self, survey: Survey, pose: ToolPose) -> list[Cell]:
-        return [cell for cell in self._cells_near(survey, pose) if not survey.blocked[cell]]
 
     def approach(self, place: str) -> ToolPose:
         """Where a transfer to or from `place` ends: above a station, or above the start of the insert grid ('insert')."""
@@ -261,6 +259,6 @@ def _far_from_grid(grid: InsertGrid, spot: Spot) -> float:
     return hypot(*(max(low - at, at - (low + count * grid.cell_m), 0.0) for at, low, count in sides))
 
 
-def _between(one: ToolPose, other: ToolPose, count: int = 8) -> list[ToolPose]:
-    parts = np.linspace(0.0, 1.0, count)
+def _between(one: ToolPose, other: ToolPose) -> list[ToolPose]:
+    parts = np.linspace(0.0, 1.0, 8)
     return [ToolPose(one.x + t * (other.x - one.x), one.y + t * (other.y - one.y), one.z, one.yaw) for t in parts]

@@ -65,7 +65,7 @@ def bars(
         handles, names = axes.get_legend_handles_labels()
         legend_below(figure, dict(sorted(zip(names, handles, strict=True), key=lambda item: item[0] == "printed")))
 
-    return picture_bytes(draw, max(5.0, 1.4 + 0.34 * len(groups) * (len(lines) + 1)), 3.8, "svg")
+    return picture_bytes(draw, max(5.0, 1.4 + 0.34 * len(groups) * (len(lines) + 1)), 3.8)
 
 
 def curve(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> None:

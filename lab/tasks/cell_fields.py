@@ -1,6 +1,6 @@
 """What cell files are made of: robot, stations, products, arrivals, chance, and how a sequence is looked for."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
@@ -17,16 +17,15 @@ Room = Annotated[int, Field(ge=1, le=1000)]
 Times = dict[str, dict[str, Seconds]]  # from -> to -> seconds
 
 
-def _known_kind(value: object) -> object:
-    if isinstance(value, str) and value not in STATION_KINDS:
-        raise ValueError(str(unknown("kind", value, STATION_KINDS, "station")))
-    return value
+def _known(label: str, names: Collection[str], where: str) -> BeforeValidator:
+    """Refuses a name that is none of these, and says which one it may have been meant for."""
 
+    def check(value: object) -> object:
+        if isinstance(value, str) and value not in names:
+            raise ValueError(str(unknown(label, value, names, where)))
+        return value
 
-def _known_law(value: object) -> object:
-    if isinstance(value, str) and value not in LAWS:
-        raise ValueError(str(unknown("law", value, LAWS, "stochastic")))
-    return value
+    return BeforeValidator(check)
 
 
 def _as_stage(value: object) -> object:
@@ -44,7 +43,7 @@ class CellStation(Record):
     """A place for parts: `capacity` in parts; a machine may have one processing time for all products [s]."""
 
     name: Name
-    kind: Annotated[Literal["storage", "buffer", "machine"], BeforeValidator(_known_kind)]
+    kind: Annotated[Literal["storage", "buffer", "machine"], _known("kind", STATION_KINDS, "station")]
     capacity: Room
     processing_s: Seconds | None = None
 
@@ -86,7 +85,7 @@ class CellArrivals(Record):
     after: Literal["clock", "pick"] = "clock"
 
 
-Law = Annotated[str, BeforeValidator(_known_law)]
+Law = Annotated[str, _known("law", LAWS, "stochastic")]
 
 
 class Stochastic(Record):

@@ -1,6 +1,6 @@
 """How a file wants the order of the robot's transfers to be found, and the search that it asks for."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -8,7 +8,7 @@ from pydantic import Field
 from lab.errors import BadInput, unknown
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES
-from lab.sequencing.search import EpisodeSequenced, Search, SrlSettings
+from lab.sequencing.search import Search, SrlSettings
 from lab.tasks.record import Record
 
 
@@ -42,14 +42,7 @@ class Sequencing(Record):
 
 
 def search_for(
-    settings: Sequencing,
-    *,
-    episodes: int | None = None,
-    objective: str | None = None,
-    chance: Chance = NO_CHANCE,
-    on_episode: Callable[[EpisodeSequenced], None] | None = None,
+    settings: Sequencing, *, episodes: int | None = None, objective: str | None = None, chance: Chance = NO_CHANCE
 ) -> Search:
     """What a file's settings ask of a sequencer, changed where something else is given."""
-    return Search(
-        episodes or settings.episodes, objective or settings.objective, chance, settings.settings(), on_episode
-    )
+    return Search(episodes or settings.episodes, objective or settings.objective, chance, settings.settings())

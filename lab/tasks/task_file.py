@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from lab.errors import BadInput, unknown
 from lab.files import tasks_folder
-from lab.tasks.cell import CellFile
+from lab.tasks.cell_file import CellFile
 from lab.tasks.grid_world import RANDOM, GridWorld, from_text, from_words
 from lab.tasks.record import MAX_SHORT_BYTES, Count, Learned, Name, Record, as_tuple, read_text
 from lab.tasks.sequencing import Sequencing

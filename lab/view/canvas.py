@@ -69,12 +69,10 @@ def picture_file(path: Path, width_inch: float, height_inch: float) -> Iterator[
         raise BadInput(f"picture '{path}' cannot be written: {error.strerror}") from error
 
 
-def picture_bytes(draw: Callable[["Figure"], None], width_inch: float, height_inch: float, form: str) -> bytes:
-    """What `draw` puts on a figure in the lab's style, as PNG or SVG bytes; BadInput for another form."""
-    if form not in FORMS:
-        raise BadInput(f"picture as '{form}': known: {', '.join(FORMS)}")
+def picture_bytes(draw: Callable[["Figure"], None], width_inch: float, height_inch: float) -> bytes:
+    """What `draw` puts on a figure in the lab's style, as SVG bytes."""
     drawn = BytesIO()
-    with _figure(drawn, form, width_inch, height_inch) as figure:
+    with _figure(drawn, "svg", width_inch, height_inch) as figure:
         draw(figure)
     return drawn.getvalue()
 

@@ -37,10 +37,10 @@ def gantt(schedule: Schedule, path: Path, predicted: Schedule | None = None) -> 
         draw(figure)
 
 
-def gantt_picture(schedule: Schedule, form: str = "svg", predicted: Schedule | None = None) -> bytes:
-    """The same as PNG or SVG bytes; BadInput for a schedule without activities, and for another form."""
-    draw, size_inch = _drawing(schedule, predicted)
-    return picture_bytes(draw, *size_inch, form)
+def gantt_picture(schedule: Schedule) -> bytes:
+    """The same as SVG bytes; BadInput for a schedule without activities."""
+    draw, size_inch = _drawing(schedule, None)
+    return picture_bytes(draw, *size_inch)
 
 
 def _drawing(schedule: Schedule, predicted: Schedule | None) -> tuple[Callable[["Figure"], None], tuple[float, float]]:

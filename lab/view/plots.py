@@ -1,4 +1,4 @@
-"""Pictures of what happened: Gantt chart, sequencing episodes, learning curves (PNG or SVG), value map (PNG)."""
+"""Pictures of what was learned: learning curves (PNG or SVG), value map (PNG)."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,25 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from lab.errors import BadInput
 from lab.mdp import FloatArray, TabularMDP, greedy_path
 from lab.view.canvas import BLUE, INK, ORANGE, RED, SKY, check_png, picture_file
-from lab.view.gantt import gantt
-from lab.view.sequencing_plots import sequence_plot, success_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from lab.vision import GridView, View
-
-__all__ = [
-    "Curve",
-    "Places",
-    "cell_corners",
-    "gantt",
-    "learning_curves",
-    "sequence_plot",
-    "success_picture",
-    "value_map",
-    "values_seen",
-]
 
 
 class Places(NamedTuple):
@@ -83,7 +69,6 @@ def value_map(
     *,
     corners: ArrayLike | None = None,
     places: Places = NOTHING,
-    title: str = "What each cell is worth",
 ) -> None:
     """Values (rows, columns) of grid cells, such as max_a Q, half-transparent over a picture (H, W, 3) RGB, or alone.
 
@@ -113,7 +98,7 @@ def value_map(
             axes.locator_params(integer=True)
         else:
             axes.set_axis_off()
-        axes.set_title(title)
+        axes.set_title("What each cell is worth")
         if axes.get_legend_handles_labels()[0]:
             figure.legend(loc="outside lower center", ncols=4)
 
@@ -153,13 +138,13 @@ def values_seen(q: FloatArray, mdp: TabularMDP, picture: NDArray[np.uint8], seen
     )
 
 
-def cell_corners(view: "View", height_m: float = 0.0) -> NDArray[np.float64]:
-    """Pixels (rows + 1, columns + 1, 2) of the crossings of an overhead view's grid lines at a height [m]."""
+def cell_corners(view: "View") -> NDArray[np.float64]:
+    """Pixels (rows + 1, columns + 1, 2) of the crossings of an overhead view's grid lines."""
     along_x, along_y = (
         start + view.cell_m * np.arange(count + 1) for start, count in zip(view.origin_m, view.shape, strict=True)
     )
     x, y = np.meshgrid(along_x, along_y, indexing="ij")
-    return view.pixel(np.stack([x, y, np.full_like(x, height_m)], axis=-1))
+    return view.pixel(np.stack([x, y, np.zeros_like(x)], axis=-1))
 
 
 def _draw_curve(axes: "Axes", policy: Curve) -> None:

@@ -6,21 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.chance import Episode
 from lab.sequencing.simulate.run import Run
-from lab.view.canvas import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PALE_GREEN,
-    PALE_GREY,
-    RED,
-    picture_bytes,
-    seconds,
-    tip,
-)
+from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PALE_GREEN, PALE_GREY, RED, picture_bytes, seconds, tip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,14 +79,14 @@ FEW, MANY = Scale(0.42, 0.34, 0.4, 8.0, 0.067, "\n"), Scale(0.125, 0.1, 0.45, 5.
 FEW_LEAVES = 40
 
 
-def branch_picture(branches: Sequence[Branch], form: str = "svg", *, title: str = "", near: bool = False) -> bytes:
-    """A tree as PNG or SVG bytes, from the root at the left, one column a move; the way to the optimum bold, cuts pale.
+def branch_picture(branches: Sequence[Branch], *, title: str = "", near: bool = False) -> bytes:
+    """A tree as SVG bytes, from the root at the left, one column a move; the way to the optimum bold, cuts pale.
 
     near: only the way to the optimum and what branches off it, as fig. IV.3. Raises BadInput for no nodes, more than
-    MAX_NODES of them, a parent that does not come before its child, and another form. Source: thesis figs. IV.2, IV.3.
+    MAX_NODES of them, and a parent that does not come before its child. Source: thesis figs. IV.2, IV.3.
     """
     draw, size_inch = _drawing(branches, title, near)
-    return picture_bytes(draw, *size_inch, form)
+    return picture_bytes(draw, *size_inch)
 
 
 def _drawing(
@@ -137,9 +124,7 @@ def _drawing(
     return draw, (width_inch, height_inch)
 
 
-def branches_of(
-    cell: Cell, nodes: Iterable[tuple[Sequence[int], str]], optimal: Sequence[int], times: Episode | None = None
-) -> list[Branch]:
+def branches_of(cell: Cell, nodes: Iterable[tuple[Sequence[int], str]], optimal: Sequence[int]) -> list[Branch]:
     """The nodes of a search as they are drawn, from the decisions that lead to each and why the search ended there.
 
     nodes: each after its parent, the root, with no decisions, first; optimal: the decisions of the optimum. Raises
@@ -152,7 +137,7 @@ def branches_of(
         if taken and taken[:-1] not in index:
             raise BadInput(f"search tree: node {list(taken)} comes before its parent {list(taken[:-1])}")
         index[taken] = len(found)
-        run = Run(cell, times)
+        run = Run(cell)
         move = [run.move(decision) for decision in taken][-1:]
         name = f"{cell.part_name(move[0].part)} \N{RIGHTWARDS ARROW} {move[0].target}" if move else "start"
         if move and move[0].carries == "pallet":

@@ -1,55 +1,21 @@
-"""Pictures of how sequences were found: one session or many, and how often a session finds the optimum."""
+"""Pictures of how sequences were found: one session or many."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted
-from lab.view.canvas import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PURPLE,
-    RED,
-    SKY,
-    picture_bytes,
-    picture_file,
-    seconds,
-    tip,
-)
+from lab.view.canvas import BLUE, GREY, INK, RED, SKY, picture_file, seconds, tip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-METHODS = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED, GREY, INK)
-MARKERS = "os^vXPD*"
 SIZE_INCH = 7.0, 4.0
-PERCENT = (0.0, 104.0)
 
 FloatArray = NDArray[np.float64]
-# session lengths (n,), what was measured at each (n,), and low and high end of its interval (n, 2), NaN where there is none
-Curve = tuple[Sequence[float], Sequence[float], Sequence[tuple[float, float]]]
-Printed = tuple[Sequence[float], Sequence[float]]  # session lengths (n,), what is printed for each (n,)
-
-
-class Around(TypedDict, total=False):
-    """What a picture of success may show beside the curves.
-
-    printed: by method, what is printed; optimal: a proven optimum, as a line; ylabel and ylim (None: as the data have
-    it): for other measures than percentages, such as the mean best makespan.
-    """
-
-    printed: Mapping[str, Printed]
-    optimal: float
-    title: str
-    ylabel: str
-    ylim: tuple[float, float] | None
 
 
 def sequence_plot(
@@ -66,6 +32,8 @@ def sequence_plot(
     episode. deadlock: the cost of episodes that ended in one (`stuck_cost`), drawn as marks at the upper edge; they
     count in no mean. Raises BadInput without episodes, and as all plots here do. Source: thesis fig. 7.3.
     """
+    from matplotlib.ticker import MaxNLocator
+
     sessions = _sessions(episode_costs)
     if not sessions or not all(map(len, sessions)):
         raise BadInput("sequencing plot: there are no episodes")
@@ -83,38 +51,11 @@ def sequence_plot(
             label = f"proven optimum: {_number(optimal, unit)}"
             axes.axhline(optimal, color=RED, linestyle="--", linewidth=1.4, label=label)
         _draw_stuck(axes, stuck)
-        _dress(axes, "episode", ylabel, costs.shape[1])
+        axes.set(xlabel="episode", ylabel=ylabel, xlim=(0, 1.02 * max(2, costs.shape[1])))
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.grid()
         axes.set_title("Sequences tried" if len(sessions) == 1 else f"Sequences tried in {len(sessions)} sessions")
         figure.legend(loc="outside lower center", ncols=3)
-
-
-def success_picture(rows: Mapping[str, Curve], form: str = "svg", **around: Unpack[Around]) -> bytes:
-    """Success of each method by session length, with intervals, as PNG or SVG bytes; what is printed as open markers.
-
-    rows: method -> (lengths, percent, ci95), see `Curve`; around: see `Around`. Raises BadInput without rows, for more
-    than eight methods, for lengths that do not fit, and for another form. Source: thesis figs. 7.7-7.12.
-    """
-    return picture_bytes(lambda figure: _draw_success(figure, rows, around), *SIZE_INCH, form)
-
-
-def _draw_success(figure: "Figure", rows: Mapping[str, Curve], around: Around) -> None:
-    printed, optimal = around.get("printed", {}), around.get("optimal")
-    names = list(dict.fromkeys([*rows, *printed]))
-    if not rows or len(names) > len(METHODS):
-        raise BadInput(f"success by session length: {len(names)} methods; allowed are 1 to {len(METHODS)}")
-    axes = figure.add_subplot()
-    for name, colour, marker in zip(names, METHODS, MARKERS, strict=False):
-        if name in rows:
-            _draw_curve(axes, name, _columns(name, *rows[name]), colour, marker)
-        if name in printed:
-            _draw_printed(axes, name, *printed[name], colour, marker)
-    if printed:
-        axes.plot([], [], linestyle="none", marker="o", color=INK, markerfacecolor="white", label="printed")
-    if optimal is not None:
-        axes.axhline(optimal, color=RED, linestyle="--", linewidth=1.2, label=f"proven optimum: {optimal:g}")
-    _dress(axes, "episodes in a session", around.get("ylabel", "sessions that find the optimum [%]"), None)
-    axes.set(title=around.get("title", ""), ylim=around.get("ylim", PERCENT) or (None, None))
-    figure.legend(loc="outside lower center", ncols=4)
 
 
 def _sessions(costs: Sequence[float] | Sequence[Sequence[float]]) -> list[Sequence[float]]:
@@ -161,33 +102,6 @@ def _draw_stuck(axes: "Axes", stuck: NDArray[np.bool_]) -> None:
         axes.plot(where + 1, np.ones(len(where)), transform=axes.get_xaxis_transform(), label=label, **look)
 
 
-def _draw_curve(axes: "Axes", name: str, columns: FloatArray, colour: str, marker: str) -> None:
-    """One method's (lengths, values, lows, highs)."""
-    lengths, values, low, high = columns
-    axes.fill_between(lengths, low, high, color=colour, alpha=0.15, linewidth=0)
-    axes.plot(lengths, values, color=colour, marker=marker, markersize=5, linewidth=1.5, label=name, zorder=3)
-
-
-def _draw_printed(
-    axes: "Axes", name: str, lengths: Sequence[float], values: Sequence[float], colour: str, marker: str
-) -> None:
-    """What is printed of one method: open markers on a dotted line."""
-    if len(lengths) != len(values):
-        raise BadInput(f"success of '{name}': {len(lengths)} printed lengths, {len(values)} values")
-    look: dict[str, Any] = {"markerfacecolor": "white", "markersize": 6, "linestyle": ":", "linewidth": 0.9}
-    axes.plot(lengths, values, color=colour, marker=marker, zorder=2.5, **look)
-
-
-def _columns(
-    name: str, lengths: Sequence[float], values: Sequence[float], ends: Sequence[tuple[float, float]]
-) -> FloatArray:
-    """(4, n): lengths, values, low and high ends, by length; BadInput when they are not equally many, or none."""
-    if not len(lengths) or not len(lengths) == len(values) == len(ends):
-        raise BadInput(f"success of '{name}': {len(lengths)} lengths, {len(values)} values, {len(ends)} intervals")
-    table = np.column_stack([lengths, values, np.asarray(ends, dtype=np.float64).reshape(-1, 2)]).astype(np.float64)
-    return table[np.argsort(table[:, 0], kind="stable")].T
-
-
 def _best_so_far(costs: FloatArray) -> FloatArray:
     """The lowest cost up to each episode, along the last axis; NaN until there is one."""
     best: FloatArray = np.fmin.accumulate(costs, axis=1)
@@ -199,16 +113,6 @@ def _mean(costs: FloatArray) -> FloatArray:
     there = np.isfinite(costs)
     count = there.sum(axis=0)
     return np.where(count > 0, np.where(there, costs, 0).sum(axis=0) / np.maximum(1, count), np.nan)
-
-
-def _dress(axes: "Axes", xlabel: str, ylabel: str, episodes: int | None) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    axes.set(xlabel=xlabel, ylabel=ylabel)
-    if episodes is not None:
-        axes.set_xlim(0, 1.02 * max(2, episodes))
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.grid()
 
 
 def _number(value: float, unit: str) -> str:

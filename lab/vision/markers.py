@@ -97,13 +97,12 @@ def see(image: Image, view: View | None = None, *, shape: Cell = (12, 12), where
     return GridView(view.shape, gripper.cell, toaster.cell, tuple(sorted(obstacles)), markers, view)
 
 
-def locate(image: Image, view: View, kind: str, *, where: str = "picture") -> Marker:
+def locate(image: Image, view: View, kind: str) -> Marker:
     """The one marker of `kind` in a picture (H, W, 3), to compare where the gripper is with where it should be.
 
-    Raises BadInput, naming `where`, when there is none or more than one, or for a picture of another shape or dtype.
+    Raises BadInput when there is none or more than one, or for a picture of another shape or dtype.
     """
-    check_picture(image, where)
-    return _single(*find_markers(image, view), kind, where)
+    return _single(*find_markers(image, view), kind, "picture")
 
 
 def _single(markers: tuple[Marker, ...], ignored: int, kind: str, where: str) -> Marker:

@@ -17,7 +17,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.methods.exact import optimum
 from lab.skills.prepared_scene import prepare
-from lab.tasks.cell import CellFile
+from lab.tasks.cell_file import CellFile
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.task_file import load, load_cell, load_world
 from lab.tasks.toml_text import TomlText

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from lab.production.sequence import (
+from lab.production.sequencing_job import (
     Wanted,
     sequence_cell,
 )

@@ -173,8 +173,8 @@ def test_a_key_that_cannot_be_made_is_an_error(task: Task, motion: Path) -> None
 
 
 def test_all_that_moves_the_arm_is_in_the_key() -> None:
+    from lab.learning.sources import sources
     from lab.production.durations import DECIDED_BY_RESULT, MEASURED_BY
-    from lab.production.sources import sources
 
     package = Path(lab.__file__).parent
     rooms = [*package.glob("sim/*.py"), *package.glob("skills/*.py")]

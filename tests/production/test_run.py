@@ -302,17 +302,14 @@ def test_methods_of_sequencing(prepared: Prepared, toolbox: Toolbox, method: str
 
 
 @pytest.fixture
-def report(prepared: Prepared, toolbox: Toolbox) -> tuple[Taught, Report]:
+def failed(prepared: Prepared, toolbox: Toolbox) -> Report:
     """A run whose second step failed."""
     taught = teach_all(prepared, Teacher(toolbox))
     why = "toast 1 at 'plate': slice 1 is not in the gripper after grasping at 'plate' (tried 3 times)"
     outcome = Outcome(Schedule.from_moves(taught.cell, []), (), (1,), ("try 1",), why, 30.0, ())
     settings = prepared.task.sequencing
     found = find_sequence(taught.cell, settings.method, search_for(settings), 0)
-    made = Report(
-        "toast", 0, 1, taught.lessons, taught.durations, found, optimum(taught.cell), outcome, Recording((), []), 0.0
-    )
-    return taught, made
+    return Report(prepared, taught, found, optimum(taught.cell), outcome, Recording((), []), 0.0)
 
 
 def drawn(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) -> list[str]:
@@ -330,10 +327,9 @@ def drawn(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) ->
 
 
 def test_a_failed_run_says_so_and_leaves_no_old_chart(
-    prepared: Prepared, report: tuple[Taught, Report], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    failed: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its lessons are drawn once for each table."""
-    taught, failed = report
     document = failed.to_json()
     assert (document["success"], document["delivered"], document["dropped"]) == (False, 0, 1)
     assert (document["measured_makespan_s"], document["camera_deviation_m"]) == (None, None)
@@ -344,28 +340,26 @@ def test_a_failed_run_says_so_and_leaves_no_old_chart(
     (out / "gantt.png").write_text("old")
     (out / "mine.txt").write_text("mine")
     curves = drawn(monkeypatch)
-    write_files(prepared, taught, failed, out)
+    write_files(failed, out)
     assert sorted(failed.files) == sorted(set(FILES) - {"gantt"})
     assert sorted(os.listdir(out)) == sorted(["mine.txt", *map(FILES.__getitem__, failed.files)])
-    assert len(curves) == len({lesson.policy.name for lesson in taught.lessons.values()})
+    assert len(curves) == len({lesson.policy.name for lesson in failed.taught.lessons.values()})
     assert {"grasp at plate, starts vary", "insert at toaster"} < set(curves)
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt(), OSError(28, "No space left on device")])
 def test_nothing_is_half_written(
-    prepared: Prepared,
-    report: tuple[Taught, Report],
+    failed: Report,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     stop: BaseException,
 ) -> None:
-    taught, failed = report
     out = tmp_path / "out"
     out.mkdir()
     (out / "run.json").write_text("old")
     drawn(monkeypatch, stop)
     with pytest.raises((KeyboardInterrupt, WorkFailed)):
-        write_files(prepared, taught, failed, out)
+        write_files(failed, out)
     assert {path.name: path.read_text() for path in out.iterdir()} == {"run.json": "old"}
 
 

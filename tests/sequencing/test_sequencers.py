@@ -116,3 +116,15 @@ def test_a_method_is_one_row(oven_cell: CellMaker, monkeypatch: pytest.MonkeyPat
     assert find_sequence(oven_cell(2), "one-by-one", Search(1), 0).cost == 29.0
     with pytest.raises(BadInput, match="did you mean 'one-by-one'"):
         find_sequence(oven_cell(2), "one-by-on", Search(1), 0)
+
+
+@pytest.mark.parametrize("method", ["srl", "mc", "random", "srl-time", "cp-sat"])
+def test_an_objective_without_a_rule_is_refused_in_words(
+    oven_cell: Callable[..., Cell], monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    """It is not taken for another one; who looks at finished runs only can be judged by it."""
+    monkeypatch.setitem(OBJECTIVES, "lateness-squared", lambda run: run.now_s**2)
+    search = Search(10, "lateness-squared")
+    with pytest.raises(BadInput, match=r"^objective 'lateness-squared': .* has no rule for it, only for makespan, "):
+        find_sequence(oven_cell(2), method, search, 0)
+    assert find_sequence(oven_cell(2), "fifo", search, 0).cost == 29.0**2

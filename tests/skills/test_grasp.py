@@ -11,7 +11,8 @@ from lab.mdp import grid
 from lab.sim.kinematics import ToolPose
 from lab.sim.scene import Layout, Spot, spots
 from lab.skills import Grasp, Place
-from lab.skills.grasp import ACTIONS, GOAL, entry_cell, from_above
+from lab.skills.around_slice import entry_cell, from_above
+from lab.skills.grasp import ACTIONS, GOAL
 from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, Surveys, near_pose
 from lab.tasks.task_file import Obstacle, Task

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.files import tasks_folder
 from lab.sequencing.cell.cell import Cell
-from lab.tasks.cell import CellFile
 from lab.tasks.cell_faults import MAX_STAGES, SHOWN, loc_of
+from lab.tasks.cell_file import CellFile
 from lab.tasks.toml_text import TomlText
 
 FMS = (tasks_folder() / "fms.toml").read_text(encoding="utf-8")

@@ -12,6 +12,5 @@ def test_a_search_as_the_file_says_or_changed() -> None:
     )
     srl = SrlSettings(0.2, 0.8, 2.0, "A", "pairs", "stations")
     assert search_for(settings) == Search(7, "makespan", NO_CHANCE, srl)
-    told: list[object] = []
-    changed = search_for(settings, episodes=3, objective="robot-idle", chance=Chance(), on_episode=told.append)
-    assert changed == Search(3, "robot-idle", Chance(), srl, told.append)
+    changed = search_for(settings, episodes=3, objective="robot-idle", chance=Chance())
+    assert changed == Search(3, "robot-idle", Chance(), srl)

@@ -1,4 +1,4 @@
-"""Pictures of sequencing: what they say, for one session and for many, with deadlocks and with printed figures."""
+"""Pictures of sequencing: what they say, for one session and for many, and with deadlocks."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,17 +8,10 @@ from xml.etree import ElementTree
 import pytest
 
 from lab.errors import BadInput
-from lab.view.plots import sequence_plot, success_picture
-from lab.view.sequencing_plots import METHODS
+from lab.view.sequencing_plots import sequence_plot
 
 SVG = "{http://www.w3.org/2000/svg}"
 COSTS = [30.0, 28.5, 29.0, 25.0, 27.0]
-LENGTHS = [15, 30, 60]
-ROWS = {
-    "SRL": (LENGTHS, [30.0, 70.0, 99.0], [(25.0, 35.0), (65.0, 75.0), (97.0, 100.0)]),
-    "random": ([30, 15, 60], [60.0, 40.0, 80.0], [(float("nan"), float("nan"))] * 3),
-}
-PRINTED = {"SRL": (LENGTHS, [29, 73, 100]), "MC": ([15, 60], [34, 65])}
 
 
 def words(svg: bytes) -> list[str]:
@@ -96,39 +89,3 @@ def test_no_episodes(tmp_path: Path, costs: Any) -> None:
     with pytest.raises(BadInput, match="no episodes"):
         sequence_plot(costs, None, tmp_path / "plot.png")
     assert not list(tmp_path.iterdir())
-
-
-def test_success_names_methods_and_what_is_printed() -> None:
-    said = words(success_picture(ROWS, printed=PRINTED, title="3 toasts"))
-    assert {"SRL", "random", "printed", "3 toasts", "sessions that find the optimum [%]"} <= set(said)
-    assert "printed" not in words(success_picture(ROWS))
-    assert success_picture(ROWS) == success_picture(ROWS)
-    assert success_picture(ROWS, "png").startswith(b"\x89PNG")
-
-
-def test_other_measures_by_session_length() -> None:
-    rows = {"SRL": (LENGTHS, [560.0, 540, 520], [(550.0, 570.0)] * 3)}
-    said = words(success_picture(rows, ylabel="mean best makespan [s]", ylim=None, optimal=513))
-    assert {"mean best makespan [s]", "proven optimum: 513"} <= set(said)
-    assert "100" not in said
-
-
-@pytest.mark.parametrize(
-    ("rows", "says"),
-    [
-        ({}, "0 methods; allowed are 1 to 8"),
-        ({str(number): ROWS["SRL"] for number in range(len(METHODS) + 1)}, "9 methods"),
-        ({"SRL": ([], [], [])}, "'SRL': 0 lengths"),
-        ({"SRL": ([15, 30], [1.0], [(0.0, 2.0)] * 2)}, "2 lengths, 1 values, 2 intervals"),
-    ],
-)
-def test_rows_that_do_not_fit(rows: Any, says: str) -> None:
-    with pytest.raises(BadInput, match=says):
-        success_picture(rows)
-
-
-def test_printed_figures_that_do_not_fit() -> None:
-    with pytest.raises(BadInput, match="2 printed lengths, 1 values"):
-        success_picture(ROWS, printed={"SRL": ([15, 30], [29])})
-    with pytest.raises(BadInput, match="picture as 'pdf'"):
-        success_picture(ROWS, "pdf")

@@ -97,6 +97,11 @@ class Cell:
         return needed_moves(self.stations, self.products, self.robot_start, self.parts, self.buffers)
 
     @cached_property
+    def most_choices(self) -> int:
+        """How many decisions a part may stand for at the most."""
+        return 1 + max(option.choice for place in self.positions for option in place.options)
+
+    @cached_property
     def longest_s(self) -> float:
         """A time that no sequence exceeds: everything slowest, one after the other [s]."""
         slowest_s = sum(float(np.nanmax(table, initial=0.0)) for table in (self.empty_s, self.loaded_s))

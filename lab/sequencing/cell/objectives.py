@@ -63,6 +63,7 @@ OBJECTIVES: dict[str, Callable[[Run], float]] = {
     "robot-idle": _robot_idle,
     "machine-idle": _machine_idle,
 }
+BUILT_IN = tuple(OBJECTIVES)  # others that are added know finished runs only
 
 
 def check_objective(name: str, cell: Cell) -> None:
@@ -72,6 +73,12 @@ def check_objective(name: str, cell: Cell) -> None:
     if name in WITH_DUE_TIMES and cell.due_s is None:
         untimed = [other for other in OBJECTIVES if other not in WITH_DUE_TIMES]
         raise BadInput(f"objective '{name}': the cell has no due times (due_s); without them: {', '.join(untimed)}")
+
+
+def check_built_in(name: str, who: str) -> None:
+    """BadInput for an objective that was added to OBJECTIVES: what is compiled, or goes step by step, has no rule for it."""
+    if name not in BUILT_IN:
+        raise BadInput(f"objective '{name}': {who} has no rule for it, only for {', '.join(BUILT_IN)}")
 
 
 def cost(run: Run, objective: str) -> float:

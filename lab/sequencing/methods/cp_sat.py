@@ -10,10 +10,10 @@ from ortools.sat.python import cp_model
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.objectives import MAKESPAN, check_objective, cost
+from lab.sequencing.cell.objectives import MAKESPAN, check_built_in, check_objective, cost
 from lab.sequencing.methods.cp_sat_model import Model
 from lab.sequencing.methods.rules import first_come
-from lab.sequencing.search import Log, Search, SequenceResult
+from lab.sequencing.search import Search, SequenceResult, only_one
 from lab.sequencing.simulate.run import follow
 
 TIME_LIMIT_S = 60.0
@@ -59,6 +59,7 @@ def cp_sat(
     more than MOST_MOVES moves. Source: circuit and interval constraints of OR-Tools CP-SAT.
     """
     check_objective(objective, cell)
+    check_built_in(objective, "CP-SAT")
     if not fits(cell):
         allowed = f"allowed are {MOST_MOVES}; order fewer parts"
         raise BadInput(f"CP-SAT: the {cell.parts} parts have {possible_moves(cell)} moves to choose from; {allowed}")
@@ -83,10 +84,8 @@ def cp_sat(
 def cp_sat_sequencer(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
     """CP-SAT as a sequencer: one sequence, found by the mean times within TIME_LIMIT_S; it draws nothing from `rng`."""
     search.check(cell)
-    found, log = cp_sat(cell, search.objective), Log(search)
-    log.note(found.sequence, found.cost, complete=found.status != "unknown")
-    log.check(cell)
-    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+    found = cp_sat(cell, search.objective)
+    return only_one(cell, search, found.sequence, found.cost, found.status != "unknown")
 
 
 def fits(cell: Cell) -> bool:

@@ -13,7 +13,7 @@ from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
 from lab.sequencing.methods.rules import first_come
-from lab.sequencing.search import Log, Search, SequenceResult, gap
+from lab.sequencing.search import Search, SequenceResult, gap, only_one
 from lab.sequencing.simulate.merged import MergedCell, MergedState
 from lab.sequencing.simulate.run import simulate
 
@@ -50,9 +50,8 @@ class _Search:
     def __init__(self, cell: Cell) -> None:
         self.merged = MergedCell(cell)
         self._least = LowerBound(self.merged)
-        self._waits = (
-            len(self.merged.slots) + self.merged.one_by_one
-        )  # what the clock brings is no wait: it comes anyway
+        # What the clock brings is no wait: it comes anyway.
+        self._waits = len(self.merged.slots) + self.merged.one_by_one
         self.expanded = self.bound = self._serial = 0
         self._fronts: dict[tuple[int, int], list[tuple[int, ...]]] = {}
         self._heap: list[tuple[int, int, MergedState]] = []
@@ -140,7 +139,4 @@ def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResul
         if found is None or fits(cell):
             other = cp_sat(cell, search.objective, hint=sequence or None)
             sequence, cost = min((cost, sequence), (other.cost, other.sequence))[::-1]
-    log = Log(search)
-    log.note(sequence, cost, complete=bool(sequence))
-    log.check(cell)
-    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+    return only_one(cell, search, sequence, cost, bool(sequence))

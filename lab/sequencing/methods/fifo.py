@@ -5,7 +5,7 @@ import numpy as np
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.routes import choice_of, part_of
-from lab.sequencing.search import Log, Search, SequenceResult
+from lab.sequencing.search import Search, SequenceResult, only_one
 from lab.sequencing.simulate.execution import WAIT, Choose, Observed, carry_out
 
 
@@ -17,10 +17,8 @@ def fifo(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult
     """
     search.check(cell)
     execution = carry_out(cell, lambda cell: _Queue(cell, stays=False))
-    log = Log(search)
-    log.note(tuple(execution.sequence), cost(execution.run, search.objective), execution.run.done)
-    log.check(cell)
-    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+    run = execution.run
+    return only_one(cell, search, tuple(execution.sequence), cost(run, search.objective), run.done)
 
 
 def first_in_first_out(cell: Cell) -> Choose:
@@ -50,7 +48,7 @@ class _Queue:
                 tasks.setdefault(part_of(decision, parts), decision)
         self._room_since_s = {part: self._room_since_s.get(part, seen.now_s) for part in tasks}
         waiting = {part for part, decision in tasks.items() if _waits(seen, decision) and not seen.ready[part - 1]}
-        if self._stays and len(waiting) == len(tasks) and _something_comes(seen):
+        if self._stays and len(waiting) == len(tasks) and something_comes(seen):
             return WAIT
         if not tasks:
             return allowed[0]
@@ -79,13 +77,12 @@ def _waits(seen: Observed, decision: int) -> bool:
     return option is None or option.waits
 
 
-def _something_comes(seen: Observed) -> bool:
-    """Whether an event is still to come by itself: an arrival, the end of a process."""
-    arrivals = seen.cell.arrivals
-    to_arrive = arrivals is not None and seen.fetched < seen.cell.parts and not seen.ready[seen.fetched]
-    return to_arrive or any(
-        not ready and location != start
-        for ready, location, start in zip(seen.ready, seen.locations, seen.cell.starts, strict=True)
+def something_comes(seen: Observed) -> bool:
+    """Whether an event is still to come by itself: the end of a process, or a part that is on its way."""
+    starts = seen.cell.starts
+    return any(
+        not ready and (location != start or part == seen.fetched)
+        for part, (ready, location, start) in enumerate(zip(seen.ready, seen.locations, starts, strict=True))
     )
 
 

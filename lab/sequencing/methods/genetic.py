@@ -27,24 +27,18 @@ def genetic(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceRes
     Source: Gonçalves and Resende 2011, as pymoo has it; random keys: Bean 1994.
     """
     search.check(cell)
-    algorithm, log = _algorithm(genes(cell), search.episodes, drawn_seed(rng)), Log(search)
+    algorithm, log = _algorithm(most_moves(cell), search.episodes, drawn_seed(rng)), Log(search)
     while len(log.costs) < search.episodes:
         population = algorithm.ask()
         values = [_episode(cell, search, rng, keys, log) for keys in population.get("X")]
         if None not in values:  # else the session has ended within a generation
             population.set("F", np.array(values)[:, None])
             algorithm.tell(infills=population)
-    log.check(cell)
-    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
-
-
-def genes(cell: Cell) -> int:
-    """How many keys a chromosome has: one for each decision of the longest sequence."""
-    return most_moves(cell)
+    return SequenceResult(*log.found(cell))
 
 
 def decode(run: Run, keys: NDArray[np.float64]) -> tuple[int, ...]:
-    """The decisions that keys (genes,), each 0 to 1, stand for; the run is moved to its end, or to a deadlock.
+    """The decisions that keys (most moves,), each 0 to 1, stand for; the run is moved to its end, or to a deadlock.
 
     The n-th key is a share of the list of decisions allowed at step n, ascending, and takes the one that it falls on.
     So every set of keys stands for an allowed sequence, every sequence for some keys, and even keys for an even draw.

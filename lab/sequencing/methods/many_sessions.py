@@ -47,20 +47,20 @@ class Sessions(NamedTuple):
 
 
 def run_sessions(
-    cell: Cell, method: str, search: Search, sessions: int, seed: int, *, first: int = 0, keep_costs: bool = False
+    cell: Cell, method: str, search: Search, sessions: int, seed: int, *, keep_costs: bool = False
 ) -> Sessions:
-    """Sessions number `first` and on of a seed, from 0, by a method of METHODS; nobody is told of their episodes.
+    """So many sessions of a seed by a method of METHODS; nobody is told of their episodes.
 
-    Session n has the same random numbers whatever `first` and `sessions` are: workers may share them out. With chance,
-    every episode of every session meets times of its own.
+    Session n has the same random numbers however many there are. With chance, every episode of every session meets times
+    of its own.
     Raises BadInput for an unknown method, fewer than 1 session, and as `learn` does.
     """
     if method not in METHODS:
         raise unknown("method", method, METHODS, "sessions")
-    if sessions < 1 or first < 0:
-        raise BadInput(f"sessions = {sessions} from number {first}: allowed are at least 1, from number 0")
+    if sessions < 1:
+        raise BadInput(f"sessions = {sessions}: allowed are whole numbers from 1")
     search.check(cell)
-    seeds = session_seeds(seed, first + sessions)[first:]
+    seeds = session_seeds(seed, sessions)
     size = max(1, CHUNK // search.episodes)
     found = []
     for n in range(0, sessions, size):

@@ -49,6 +49,4 @@ def monte_carlo(cell: Cell, search: Search, rng: np.random.Generator) -> MonteCa
     WorkFailed when every episode ended in a deadlock. Source: thesis ch. 7.6 and its listing (Q = 1 at the start).
     """
     learned = learn(cell, search, drawn_seed(rng), MonteCarlo)
-    log = learned.log
-    log.check(cell)
-    return MonteCarloResult(log.best, log.best_cost, tuple(log.costs), learned.final_cost, learned.table)
+    return MonteCarloResult(*learned.log.found(cell), learned.final_cost, learned.table)

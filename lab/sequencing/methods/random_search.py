@@ -14,6 +14,4 @@ def random_search(cell: Cell, search: Search, rng: np.random.Generator) -> Seque
     By chance, each sequence is judged by the times of its own episode. Raises BadInput for an objective that the cell
     does not allow, WorkFailed when every sequence ends in a deadlock. Source: thesis 7.6, random search.
     """
-    log = learn(cell, search, drawn_seed(rng), SessionLearner).log
-    log.check(cell)
-    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+    return SequenceResult(*learn(cell, search, drawn_seed(rng), SessionLearner).log.found(cell))

@@ -1,16 +1,11 @@
 """Policies that look ahead: a rule asked at every decision, and the rest of the work planned anew."""
 
-from collections.abc import Callable, Sequence
-
-from lab.errors import WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective, cost
 from lab.sequencing.cell.routes import choice_of, part_of
-from lab.sequencing.methods.rules import Rule, usable
-from lab.sequencing.simulate.execution import Choose, Observed, Policy
+from lab.sequencing.methods.rules import Rule, dispatch, usable
+from lab.sequencing.simulate.execution import Choose, Policy
 from lab.sequencing.simulate.run import Run, branch
-
-Plan = Callable[[Run], Sequence[int]]  # the decisions from a run on, by the run's own times
 
 
 def by_rule(rule: Rule) -> Policy:
@@ -18,24 +13,15 @@ def by_rule(rule: Rule) -> Policy:
     return lambda cell: rule
 
 
-def replan(plan: Plan | None = None, objective: str = MAKESPAN) -> Policy:
-    """A policy that plans the rest of the work anew at every decision, by mean times, and takes the first step of it.
+def replan(objective: str = MAKESPAN) -> Policy:
+    """A policy that plans the rest of the work anew at every decision (`rollout`), and takes the first step of it.
 
-    plan: called with the observed run, to be branched, not moved; None: `rollout` for the objective. A run of the policy
-    raises BadInput for an objective that the cell does not allow and for a plan that begins with what may not be done,
-    WorkFailed for one of nothing.
+    It plans by mean times. A run of the policy raises BadInput for an objective that the cell does not allow.
     """
 
     def policy(cell: Cell) -> Choose:
         check_objective(objective, cell)
-
-        def choose(seen: Observed, allowed: tuple[int, ...]) -> int:
-            decisions = rollout(seen, objective) if plan is None else plan(seen)
-            if not decisions:
-                raise WorkFailed(f"the planner found nothing to do at {seen.now_s:g} s; parts are left")
-            return decisions[0]
-
-        return choose
+        return lambda seen, allowed: rollout(seen, objective)[0]
 
     return policy
 
@@ -75,8 +61,6 @@ def _distinct(run: Run) -> list[int]:
 
 
 def _finish(run: Run, rule: Rule, objective: str) -> tuple[float, tuple[int, ...]]:
-    ahead, tail = branch(run), []
-    while allowed := ahead.allowed():
-        tail.append(rule(ahead, allowed))
-        ahead.move(tail[-1])
-    return cost(ahead, objective), tuple(tail)
+    ahead = branch(run)
+    tail = dispatch(ahead, rule)
+    return cost(ahead, objective), tail

@@ -10,10 +10,9 @@ from types import MappingProxyType
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.routes import Option, from_the_ends, part_of
-from lab.sequencing.search import Log, Search, SequenceResult
+from lab.sequencing.search import Search, SequenceResult, only_one
 from lab.sequencing.simulate.run import Run
 
 Rule = Callable[[Run, tuple[int, ...]], int]
@@ -91,21 +90,20 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         "nearest-ready": nearest_ready,
     }
 )
-WITH_DUE_TIMES = ("earliest-due",)
 
 
 def usable(cell: Cell) -> dict[str, Rule]:
     """The rules that this cell has the data for."""
-    return {name: rule for name, rule in RULES.items() if cell.due_s is not None or name not in WITH_DUE_TIMES}
+    return {name: rule for name, rule in RULES.items() if cell.due_s is not None or rule is not earliest_due}
 
 
-def dispatch(cell: Cell, rule: Rule, times: Episode | None = None) -> tuple[Run, tuple[int, ...]]:
-    """The run that a rule makes of a cell, to the end or to a deadlock, and its decisions."""
-    run, sequence = Run(cell, times), []
+def dispatch(run: Run, rule: Rule) -> tuple[int, ...]:
+    """Goes on with a run as a rule says, to its end or to a deadlock; the decisions."""
+    sequence = []
     while allowed := run.allowed():
         sequence.append(rule(run, allowed))
         run.move(sequence[-1])
-    return run, tuple(sequence)
+    return tuple(sequence)
 
 
 def dispatched(cell: Cell, rule: Rule, search: Search) -> SequenceResult:
@@ -114,11 +112,9 @@ def dispatched(cell: Cell, rule: Rule, search: Search) -> SequenceResult:
     Raises BadInput for an objective or a rule that the cell has no data for, WorkFailed when it ends in a deadlock.
     """
     search.check(cell)
-    run, sequence = dispatch(cell, rule)
-    log = Log(search)
-    log.note(sequence, cost(run, search.objective), run.done)
-    log.check(cell)
-    return SequenceResult(log.best, log.best_cost, tuple(log.costs))
+    run = Run(cell)
+    sequence = dispatch(run, rule)
+    return only_one(cell, search, sequence, cost(run, search.objective), run.done)
 
 
 def first_come(cell: Cell) -> tuple[int, ...]:
@@ -126,13 +122,13 @@ def first_come(cell: Cell) -> tuple[int, ...]:
 
     One part alone never meets a full station: its routes are sound, and every station has room for one.
     """
-    run, sequence = Run(cell), list[int]()
-    while allowed := run.allowed():
-        sequence.append(min(allowed, key=lambda decision: run.ready_s[part_of(decision, cell.parts) - 1]))
-        run.move(sequence[-1])
+    run = Run(cell)
+    ready_first = dispatch(
+        run, lambda run, allowed: min(allowed, key=lambda d: run.ready_s[part_of(d, cell.parts) - 1])
+    )
     if run.done:
-        return tuple(sequence)
-    run, sequence = Run(cell), []
+        return ready_first
+    run, sequence = Run(cell), list[int]()
     for part in range(1, cell.parts + 1):
         while run.finished_s[part - 1] is None:
             sequence.append(next(one for one in run.allowed() if part_of(one, cell.parts) == part))

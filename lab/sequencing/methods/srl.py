@@ -72,6 +72,4 @@ def srl(cell: Cell, search: Search, rng: np.random.Generator) -> SrlResult:
     WorkFailed when every episode ended in a deadlock. Source: thesis fig. 5.1, eq. 5.1 to 5.4.
     """
     learned = learn(cell, search, drawn_seed(rng), Srl)
-    log = learned.log
-    log.check(cell)
-    return SrlResult(log.best, log.best_cost, tuple(log.costs), learned.final_cost, learned.table)
+    return SrlResult(*learned.log.found(cell), learned.final_cost, learned.table)

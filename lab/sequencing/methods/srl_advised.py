@@ -58,12 +58,8 @@ def advised_srl(
     check_gate(gate.gate)
     session = _Advised(GATES[gate.gate].make(gate, search.episodes, NEVER_REACHED, None), gate, advisor, tell)
     learned = learn_readably(cell, search, drawn_seed(rng), Srl, session)
-    log = learned.log
-    log.check(cell)
     return AdvisedResult(
-        log.best,
-        log.best_cost,
-        tuple(log.costs),
+        *learned.log.found(cell),
         learned.final_cost,
         session.requests,
         session.helped_steps,

@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, machine_places, stuck_cost
+from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, check_built_in, machine_places, stuck_cost
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
 from lab.sequencing.search import SAME, LearnedSequence, Log, Search
@@ -62,8 +62,7 @@ def srl_time(cell: Cell, search: Search, rng: np.random.Generator) -> SrlTimeRes
     for _ in range(left):
         log.note(*learner.episode())
     final = min(final, learner.episode(learns=False)[1])
-    log.check(cell)
-    return SrlTimeResult(log.best, log.best_cost, tuple(log.costs), final, learner.q)
+    return SrlTimeResult(*log.found(cell), final, learner.q)
 
 
 def _many_alike(cell: Cell) -> bool:
@@ -75,6 +74,7 @@ class TimeLearner:
     """The table, and how an episode goes. distinct: alike parts are told apart, which due times make necessary."""
 
     def __init__(self, cell: Cell, objective: str, rng: np.random.Generator) -> None:
+        check_built_in(objective, "srl-time")
         self.q: Table = {}
         self.merged = MergedCell(cell)
         self.distinct = objective in WITH_DUE_TIMES

@@ -11,7 +11,7 @@ from lab.sequencing.simulate.execution import Choose, Observed, Policy
 PRACTICE = 20  # simulated episodes before each decision
 
 
-def reacting(cell: Cell, objective: str = MAKESPAN, seed: int = 0, practice: int = PRACTICE) -> Policy:
+def reacting(cell: Cell, objective: str = MAKESPAN, seed: int = 0) -> Policy:
     """A policy that, before each decision, learns in a few simulated episodes from what can be seen to the end.
 
     It sees what stands where and for how long machines have been at work, and takes the mean for what is left. The table
@@ -25,7 +25,7 @@ def reacting(cell: Cell, objective: str = MAKESPAN, seed: int = 0, practice: int
         if len(allowed) == 1:
             return allowed[0]
         here = learner.merged.of_run(seen)
-        for _ in range(practice):
+        for _ in range(PRACTICE):
             learner.episode(here)
         place, choice, wanted = learner.greedy(here)
         parts = cell.parts

@@ -7,7 +7,7 @@ import numpy as np
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Position, entry, part_of
 from lab.sequencing.search import SrlSettings
-from lab.sequencing.simulate.cell_arrays import Ints, most_choices
+from lab.sequencing.simulate.cell_arrays import Ints
 from lab.sequencing.simulate.run import Run
 
 State = tuple[int, ...]
@@ -60,7 +60,7 @@ def keys_of(cell: Cell, values: str, state: str) -> Keys | None:
     scale = [1]
     for digits in radix:
         scale.append(scale[-1] * digits)
-    labels = 1 if values == "states" else (size if merged else cell.parts) * most_choices(cell)
+    labels = 1 if values == "states" else (size if merged else cell.parts) * cell.most_choices
     if scale[-1] * labels > MAX_KEY:
         return None
     done = [0] * size

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lab.sequencing.cell.cell import ARRIVALS_AFTER, Cell
 from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance
-from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, machine_places, stuck_cost
+from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, check_built_in, machine_places, stuck_cost
 from lab.sequencing.cell.routes import from_the_ends
 
 Ints = NDArray[np.int64]
@@ -20,7 +20,7 @@ ENDLESS = 2**40  # room of a station that is never full
 NO_ARRIVALS = 0
 ARRIVAL_CODES = {name: code for code, name in enumerate(ARRIVALS_AFTER, 1)}
 LAW_CODES = {name: code for code, name in enumerate(LAWS)}
-OBJECTIVE_CODES = {name: code for code, name in enumerate(OBJECTIVES)}
+OBJECTIVE_CODES = {name: code for code, name in enumerate(BUILT_IN)}
 
 
 class CellArrays(NamedTuple):
@@ -79,7 +79,11 @@ class RunArrays(NamedTuple):
 
 
 def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANCE) -> CellArrays:
-    """The cell as arrays, to be judged by an objective that it has been checked for (`check_objective`)."""
+    """The cell as arrays, to be judged by an objective that it has been checked for (`check_objective`).
+
+    BadInput for an objective that the kernels do not know.
+    """
+    check_built_in(objective, "the compiled simulation")
     size, places = len(cell.stations), cell.positions
     options = [option for place in places for option in place.options]
     return CellArrays(
@@ -102,7 +106,7 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
         interval_s=np.array(cell.arrivals.interval_s if cell.arrivals else (0.0,) * cell.parts, np.float64),
         due_s=np.array(cell.due_s or (0.0,) * cell.parts, np.float64),
         robot_start=cell.index(cell.robot_start),
-        many=most_choices(cell) > 1,
+        many=cell.most_choices > 1,
         arrivals=ARRIVAL_CODES[cell.arrivals.after] if cell.arrivals else NO_ARRIVALS,
         machines=machine_places(cell),
         objective=OBJECTIVE_CODES[objective],
@@ -115,7 +119,7 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
 
 def run_arrays(cell: Cell) -> RunArrays:
     """Room for a run of the cell; `kernels.reset` fills it."""
-    decisions = cell.parts * most_choices(cell)
+    decisions = cell.parts * cell.most_choices
     return RunArrays(
         locations=np.zeros(cell.parts, np.int64),
         ready_s=np.zeros(cell.parts),
@@ -126,11 +130,6 @@ def run_arrays(cell: Cell) -> RunArrays:
         allowed=np.zeros(decisions, np.int64),
         options=np.zeros(decisions, np.int64),
     )
-
-
-def most_choices(cell: Cell) -> int:
-    """How many decisions a part may stand for at the most."""
-    return 1 + max(option.choice for place in cell.positions for option in place.options)
 
 
 def most_moves(cell: Cell) -> int:

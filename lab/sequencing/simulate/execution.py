@@ -119,12 +119,7 @@ def carry_out(cell: Cell, policy: Policy, times: Episode | None = None) -> Execu
 
 
 def replicate(
-    cell: Cell,
-    how: Policy | Sequence[int],
-    chance: Chance,
-    episodes: int,
-    seed: int,
-    objective: str = MAKESPAN,
+    cell: Cell, how: Policy | Sequence[int], chance: Chance, episodes: int, seed: int, objective: str = MAKESPAN
 ) -> NDArray[np.float64]:
     """The cost of a policy, or of a fixed list, in each of so many episodes (episodes,); in seconds, for most objectives.
 

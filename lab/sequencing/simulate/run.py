@@ -94,7 +94,7 @@ class Run:
     def refusal(self, decision: int) -> str:
         """Why the decision may not be taken now, in words; empty when it may."""
         cell, part = self.cell, part_of(decision, self.cell.parts)
-        if decision < 1 or choice_of(decision, cell.parts) > self._most_choices():
+        if decision < 1 or choice_of(decision, cell.parts) >= cell.most_choices:
             return f"there is no part {decision}, only 1 to {cell.parts}"
         if self.option(decision) is not None:
             return ""
@@ -137,9 +137,6 @@ class Run:
     def _full(self) -> list[bool]:
         """Whether each station is."""
         return [taken >= most for taken, most in zip(self.occupied, self.cell.capacities, strict=True)]
-
-    def _most_choices(self) -> int:
-        return max(option.choice for place in self.cell.positions for option in place.options)
 
 
 def simulate(cell: Cell, sequence: Sequence[int], times: Episode | None = None) -> Schedule:

@@ -83,7 +83,7 @@ def _panels(rows: Sequence[Row], draw: Any, keys: Sequence[Any]) -> bytes:
         panels[0].set_ylabel(YLABEL)
         legend_below(figure, {key.get_label(): key for key in keys})
 
-    return picture_bytes(whole, len(by_world) * PANEL_INCH[0], PANEL_INCH[1], "svg")
+    return picture_bytes(whole, len(by_world) * PANEL_INCH[0], PANEL_INCH[1])
 
 
 def _name_ticks(axes: "Axes") -> None:

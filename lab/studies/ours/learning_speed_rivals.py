@@ -19,14 +19,7 @@ from lab.learning.settings import LearnerSettings
 from lab.mdp import TabularMDP
 from lab.studies.ours.learning_speed_jax import jax_lock_step
 from lab.studies.ours.learning_speed_numpy import numpy_lock_step
-from lab.studies.ours.learning_speed_session import (
-    MOVES,
-    Measured,
-    Missing,
-    Rival,
-    Session,
-    session_of,
-)
+from lab.studies.ours.learning_speed_session import MOVES, Measured, Missing, Rival, Session, session_of
 
 if TYPE_CHECKING:
     from gymnasium import Env

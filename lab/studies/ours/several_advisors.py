@@ -39,9 +39,8 @@ PANELS: tuple[tuple[str, ...], ...] = (
 IN_TURN, BEST, WORST = "in turn", "best alone", "worst alone"
 WAYS = (*DECISIONS, IN_TURN, BEST, WORST)
 MOST = 100  # sessions a setting: they are run one by one in plain Python
-POINTS = (
-    2.0  # of success that a panel may stay below the best of its members alone and still be called as good [points]
-)
+# points of success that a panel may stay below the best of its members alone and still be called as good
+POINTS = 2.0
 
 MEASURES = (
     "SP: sessions whose last episode took the shortest way. HS: helped steps. Dropped and readmitted: how often advisors were, "

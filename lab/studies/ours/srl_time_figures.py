@@ -100,7 +100,7 @@ def _grid(panels: Mapping[str, Sequence[Row]], columns: int, draw: Any, ylabel: 
         legend_below(figure)
 
     size_inch = columns * PANEL_INCH[0], lines * PANEL_INCH[1] * tall + 0.5
-    return picture_bytes(whole, *size_inch, "svg")
+    return picture_bytes(whole, *size_inch)
 
 
 def _curves(axes: "Axes", rows: Sequence[Row]) -> None:

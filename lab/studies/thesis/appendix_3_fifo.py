@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import choice_of, part_of
+from lab.sequencing.methods.fifo import something_comes
 from lab.sequencing.simulate.execution import WAIT, Observed, Policy
 
 MACHINES = ("mill", "lathe-1", "lathe-2")  # of tasks that become possible together those of the mill go first
@@ -52,7 +53,7 @@ class _Fifo:
         joining = [task for task in ready if task not in self._queue]
         self._queue += sorted(joining, key=lambda task: (self._joins_s(seen, task), task))
         self._possible, self._looked_s = possible, seen.now_s
-        if not self._queue or (self._idle and self._sleeps and _something_comes(seen)):
+        if not self._queue or (self._idle and self._sleeps and something_comes(seen)):
             self._idle = True
             return WAIT
         head = self._queue.pop(0)
@@ -95,12 +96,3 @@ class _Fifo:
         event_s = seen.ready_s[task.part]
         before = task in self._possible or (task.kind == FETCH and self._fetched)
         return event_s if task.kind in BY_EVENTS and before and event_s > self._looked_s else inf
-
-
-def _something_comes(seen: Observed) -> bool:
-    """Whether a process goes on, or a part is on its way."""
-    starts = seen.cell.starts
-    return any(
-        not ready and (location != start or part == seen.fetched)
-        for part, (ready, location, start) in enumerate(zip(seen.ready, seen.locations, starts, strict=True))
-    )

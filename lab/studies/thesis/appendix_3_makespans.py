@@ -56,7 +56,7 @@ class Made:
 @lru_cache(maxsize=64)
 def fms(order: str, mean_s: float) -> Cell:
     """The system with an order to make, parts arriving one at a time, after the pick of the one before."""
-    from lab.tasks.cell import order_from_word
+    from lab.tasks.cell_file import order_from_word
     from lab.tasks.task_file import load_cell
 
     file = load_cell("fms")

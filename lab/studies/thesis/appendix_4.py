@@ -16,7 +16,7 @@ def pictures() -> dict[str, bytes]:
     branches = branches_of(cell, ((node.decisions, node.end) for node in tree.nodes), tree.optimal)
     title = f"Case {CASE}, {TOASTS} toasts, alike ones counted as one: {len(tree.nodes)} nodes"
     return {
-        "Figure IV.1: the best order as a Gantt chart": gantt_picture(simulate(cell, tree.optimal), "svg"),
+        "Figure IV.1: the best order as a Gantt chart": gantt_picture(simulate(cell, tree.optimal)),
         "Figure IV.2: the branch and bound tree": branch_picture(branches, title=title),
         "Figure IV.3: the way to the optimum, and what branches off it": branch_picture(
             branches, title=title, near=True

@@ -25,7 +25,6 @@ Environment = Literal["deterministic", "stochastic"]
 Factor = Literal["A", "B"]
 
 SESSION_LENGTHS, DECAY_FACTORS = "tables-7.4-7.6-iv.2.csv", "table-iv.1.csv"
-TASKS = {"I": "toast-case-1", "II": "toast-case-2", "III": "toast-case-3"}
 SPREAD = 0.1  # section 7.6: the standard deviation of processing times as a share of their mean
 REPLICATIONS = 10  # section 7.6
 DECAY_EPISODES = 200  # section 7.6, the test of beta
@@ -128,9 +127,10 @@ def optimum_s(case: str, toasts: int) -> float:
 @lru_cache(maxsize=16)
 def robot_cell(case: str, toasts: int) -> Cell:
     """The thesis's toast cell with the times of a case."""
+    from lab.tasks.cell_file import TOAST_CASES
     from lab.tasks.task_file import load_cell
 
-    return load_cell(TASKS[case]).cell(toasts)
+    return load_cell(TOAST_CASES[case]).cell(toasts)
 
 
 def epsilons(setting: SequencingSetting) -> Floats:

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.simulate.run import simulate
-from lab.studies.charts import PRINTED, bars, curve, legend_below
+from lab.studies.charts import PRINTED, Look, bars, curve, legend_below
 from lab.studies.findings import Row, those
 from lab.studies.runner import seeds_of
 from lab.studies.thesis.chapter_7_cells import READINGS, SequencingSetting, epsilons, listed, optimum_s, robot_cell
 from lab.studies.thesis.chapter_7_listing import run_sessions
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED, picture_bytes
-from lab.view.sequencing_plots import success_picture
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SESSION = SequencingSetting("II", 3, "srl", 200, reward_factor="A", beta=1.5)  # of figs. 7.3 and 7.4
@@ -68,25 +68,36 @@ def lengths(rows: Sequence[Row], wanted: Mapping[str, Compared]) -> dict[str, by
 
 
 def _by_length(rows: Sequence[Row], shown: Compared) -> bytes:
-    curves, printed = {}, {}
-    for name in shown.names:
-        of = {
-            one["episodes"]: one
-            for one in those(rows, case=shown.case, toasts=shown.toasts, environment=shown.environment)
-            if one["thesis"] is not None
-            and _method(one) == name
-            and one["measure"] in ("SP_percent", "BR_s")
-            and one["table"] != "Table IV.1"
-        }
-        points = [of[episodes] for episodes in sorted(of)]
-        numbers = [one["episodes"] for one in points]
-        curves[NAMES[name]] = numbers, [one["value"] for one in points], [tuple(one["ci95"]) for one in points]
-        printed[NAMES[name]] = numbers, [one["thesis"] for one in points]
-    title = f"{shown.toasts} toasts, case {shown.case}"
-    if shown.environment == "deterministic":
-        return success_picture(curves, printed=printed, title=title)
-    drawn = f"{title}, processing times drawn"
-    return success_picture(curves, printed=printed, title=drawn, ylabel="mean best makespan [s]", ylim=None)
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        for name, colour, marker in zip(shown.names, COLOURS, "os^", strict=False):
+            of = {
+                one["episodes"]: one
+                for one in those(rows, case=shown.case, toasts=shown.toasts, environment=shown.environment)
+                if one["thesis"] is not None
+                and _method(one) == name
+                and one["measure"] in ("SP_percent", "BR_s")
+                and one["table"] != "Table IV.1"
+            }
+            _beside_print(axes, [of[episodes] for episodes in sorted(of)], "episodes", (colour, marker, NAMES[name]))
+        title = f"{shown.toasts} toasts, case {shown.case}"
+        axes.set(xlabel="episodes in a session")
+        if shown.environment == "deterministic":
+            axes.set(title=title, ylabel="sessions that find the optimum [%]", ylim=(0, 104))
+        else:
+            axes.set(title=f"{title}, processing times drawn", ylabel="mean best makespan [s]")
+        axes.plot([], [], label="printed", **(PRINTED | {"marker": "o"}))
+        axes.grid()
+        legend_below(figure)
+
+    return picture_bytes(draw, *SIZE_INCH)
+
+
+def _beside_print(axes: "Axes", rows: Sequence[Row], by: str, look: Look) -> None:
+    """The values of rows against one of their settings, and what is printed as open markers on a dotted line."""
+    curve(axes, rows, by, look)
+    printed = PRINTED | {"marker": look[1], "linestyle": ":", "linewidth": 0.9, "markeredgecolor": look[0]}
+    axes.plot([one[by] for one in rows], [one["thesis"] for one in rows], color=look[0], **printed)
 
 
 def by_beta(rows: Sequence[Row]) -> bytes:
@@ -103,9 +114,7 @@ def by_beta(rows: Sequence[Row]) -> bytes:
         ):
             for colour, marker, case in zip(COLOURS, "os^", ("I", "II", "III"), strict=False):
                 of = those(shown, measure=measure, case=case)
-                curve(axes, of, "beta", (colour, marker, f"case {case}"))
-                look = PRINTED | {"marker": marker, "linestyle": ":", "linewidth": 0.9, "markeredgecolor": colour}
-                axes.plot([one["beta"] for one in of], [one["thesis"] for one in of], color=colour, **look)
+                _beside_print(axes, of, "beta", (colour, marker, f"case {case}"))
             axes.set(xlabel="β (episode n explores with probability $n^{-β}$)", ylabel=label, xticks=BETAS)
             axes.grid()
         left.yaxis.set_major_locator(MaxNLocator(integer=True))
@@ -114,7 +123,7 @@ def by_beta(rows: Sequence[Row]) -> bytes:
         left.plot([], [], label="printed", **(PRINTED | {"marker": "o"}))
         legend_below(figure)
 
-    return picture_bytes(draw, 8.0, 3.6, "svg")
+    return picture_bytes(draw, 8.0, 3.6)
 
 
 def alone(seed: int) -> dict[str, bytes]:
@@ -154,7 +163,7 @@ def convergence(times_s: NDArray[np.float64]) -> bytes:
         axes.grid()
         legend_below(figure)
 
-    return picture_bytes(draw, *SIZE_INCH, "svg")
+    return picture_bytes(draw, *SIZE_INCH)
 
 
 def _places(cell: Cell, sequence: Sequence[int]) -> bytes:
@@ -177,7 +186,7 @@ def _places(cell: Cell, sequence: Sequence[int]) -> bytes:
         axes.grid()
         legend_below(figure)
 
-    return picture_bytes(draw, *SIZE_INCH, "svg")
+    return picture_bytes(draw, *SIZE_INCH)
 
 
 def _exploration() -> bytes:
@@ -192,7 +201,7 @@ def _exploration() -> bytes:
         axes.grid()
         legend_below(figure)
 
-    return picture_bytes(draw, 6.0, 3.4, "svg")
+    return picture_bytes(draw, 6.0, 3.4)
 
 
 def readings(rows: Sequence[Row]) -> dict[str, bytes]:

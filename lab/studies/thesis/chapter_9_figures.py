@@ -145,7 +145,7 @@ def by_beta(rows: Sequence[Row]) -> bytes:
         axes.grid()
         legend_below(figure)
 
-    return picture_bytes(draw, 6, 3.8, "svg")
+    return picture_bytes(draw, 6, 3.8)
 
 
 def ranked(rows: Sequence[Row]) -> bytes:
@@ -171,7 +171,7 @@ def convergence(steps: Sequence[int], guided: Sequence[bool], optimum: int, thre
         draw_rate(below, list(steps), WINDOW, threshold)
         legend_below(figure)
 
-    return picture_bytes(draw, 7, 4.6, "svg")
+    return picture_bytes(draw, 7, 4.6)
 
 
 def draw_steps(axes: "Axes", steps: NDArray[np.int64], guided: NDArray[np.bool_], optimum: int) -> None:

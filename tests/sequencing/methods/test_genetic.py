@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Chance
-from lab.sequencing.methods.genetic import decode, genes, genetic
+from lab.sequencing.methods.genetic import decode, genetic
 from lab.sequencing.search import EpisodeSequenced, Search
+from lab.sequencing.simulate.cell_arrays import most_moves
 from lab.sequencing.simulate.run import Run, simulate
 
 CellMaker = Callable[..., Cell]
@@ -24,7 +25,7 @@ def rng(seed: int = 0) -> np.random.Generator:
 def test_keys_by_hand(toast_cell: CellMaker) -> None:
     """Two slices. 0.5 of (1, 2) is 2, 0.4 of (1, 2) is 1; then 1 is in the buffer and waits: 2 is the only one, twice."""
     cell = toast_cell("I", 2)
-    keys = np.zeros(genes(cell))
+    keys = np.zeros(most_moves(cell))
     keys[:2] = 0.5, 0.4
     run = Run(cell)
     assert decode(run, keys)[:3] == (2, 1, 2)
@@ -32,18 +33,18 @@ def test_keys_by_hand(toast_cell: CellMaker) -> None:
 
 
 def test_the_last_key_stays_within_the_list(oven_cell: CellMaker) -> None:
-    assert decode(Run(oven_cell(2)), np.ones(genes(oven_cell(2)))) == (2, 2, 1, 1)
+    assert decode(Run(oven_cell(2)), np.ones(most_moves(oven_cell(2)))) == (2, 2, 1, 1)
 
 
 def test_a_gene_for_every_decision(oven_cell: CellMaker, toast_cell: CellMaker, fms_cell: CellMaker) -> None:
     """Oven: in and out. A slice by both buffers: five moves. Rooks and signs: five moves each."""
-    assert (genes(oven_cell(3)), genes(toast_cell("I", 4)), genes(fms_cell("RSS"))) == (6, 20, 15)
+    assert (most_moves(oven_cell(3)), most_moves(toast_cell("I", 4)), most_moves(fms_cell("RSS"))) == (6, 20, 15)
 
 
 @given(data=st.data())
 def test_every_sequence_has_keys(cells: Callable[..., st.SearchStrategy[Cell]], data: st.DataObject) -> None:
     cell = data.draw(cells(max_machines=2, max_parts=4, many=True))
-    run, keys = Run(cell), np.zeros(genes(cell))
+    run, keys = Run(cell), np.zeros(most_moves(cell))
     sequence: list[int] = []
     while allowed := run.allowed():
         index = data.draw(st.integers(0, len(allowed) - 1))

@@ -118,7 +118,8 @@ def test_ties_go_to_the_lowest(name: str) -> None:
 
 
 def test_a_run_of_a_rule(oven_cell: CellMaker) -> None:
-    run, sequence = dispatch(oven_cell(2), RULES["nearest-ready"])
+    run = Run(oven_cell(2))
+    sequence = dispatch(run, RULES["nearest-ready"])
     assert (sequence, run.now_s) == ((1, 1, 2, 2), 29.0)
 
 
@@ -141,7 +142,8 @@ def test_every_rule_comes_to_the_end(
 
 def test_a_rule_may_end_in_a_deadlock() -> None:
     """Both parts go into their first machine, and then stand in each other's way."""
-    run, sequence = dispatch(opposite(), RULES["nearest-ready"])
+    run = Run(opposite())
+    sequence = dispatch(run, RULES["nearest-ready"])
     assert (run.done, sequence) == (False, (1, 2))
     with pytest.raises(WorkFailed, match=r"2 parts .* deadlock"):
         dispatched(opposite(), RULES["nearest-ready"], Search())

@@ -95,7 +95,7 @@ def test_deadlocks_are_learned_from_and_never_the_best(method: str, crossing_cel
         if log.costs == [stuck]:
             assert (log.best, log.best_cost) == ((), math.inf)
             with pytest.raises(WorkFailed, match="deadlocks"):
-                log.check(cell)
+                log.found(cell)
     batch = run_sessions(cell, method, Search(1), 12, 0, keep_costs=True)
     ended = batch.costs[:, 0] < stuck
     assert set(ended.tolist()) == {True, False}

@@ -194,7 +194,7 @@ def _picture(rows: Sequence[Row]) -> bytes:
         plots[0].set_ylabel("makespan [steps]")
         legend_below(figure)
 
-    return picture_bytes(draw, 3.4 * len(TOASTS), 3.9, "svg")
+    return picture_bytes(draw, 3.4 * len(TOASTS), 3.9)
 
 
 def _draw(axes: "Axes", rows: Sequence[Row]) -> None:

@@ -11,6 +11,7 @@ from lab.learning.session import run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import greedy_path
 from lab.sequencing.cell.cell import Cell
+from lab.sequencing.methods.rules import dispatch
 from lab.sequencing.methods.srl_time import srl_time
 from lab.sequencing.search import Search
 from lab.sequencing.simulate.run import Run
@@ -134,6 +135,5 @@ class TwoLevels:
 def one_after_another(cell: Cell) -> int:
     """The steps when every toast is brought to its end before the next one is begun."""
     run = Run(cell)
-    while allowed := run.allowed():
-        run.move(allowed[0])
+    dispatch(run, lambda run, allowed: allowed[0])
     return round(run.now_s)

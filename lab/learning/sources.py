@@ -4,6 +4,7 @@ import ast
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.util import find_spec, resolve_name
 
 from lab.errors import WorkFailed
@@ -17,10 +18,11 @@ class Sources:
     libraries: frozenset[str]
 
 
-def sources(roots: Sequence[str], without: Sequence[str] = ()) -> Sources:
-    """All modules of the roots' own packages that `roots` import, also inside functions, and the packages they lie in.
+def sources(roots: Sequence[str], without: Sequence[str] = (), *, inside: bool = True) -> Sources:
+    """All modules of the roots' own packages that `roots` import, and the packages they lie in.
 
-    `without`: packages and modules that are left out, with what only they import. WorkFailed for a module whose source
+    `without`: packages and modules that are left out, with what only they import. inside: also what is imported inside
+    functions, which may never be loaded. WorkFailed for a module whose source
     cannot be found, such as one that is there compiled only.
     """
     own = {root.partition(".")[0] for root in roots}
@@ -31,7 +33,7 @@ def sources(roots: Sequence[str], without: Sequence[str] = ()) -> Sources:
             continue
         texts[module] = source(module)
         pending += [module.rpartition(".")[0]] if "." in module else []
-        for target in _imports(module, texts[module]):
+        for target in _imports(module, texts[module], inside):
             if target.partition(".")[0] in own:
                 pending.append(_module(target))
             else:
@@ -48,17 +50,24 @@ def source(module: str) -> str:
     return str(text)
 
 
-def _imports(module: str, text: str) -> Iterator[str]:
+@lru_cache(maxsize=256)
+def _imports(module: str, text: str, inside: bool) -> tuple[str, ...]:
     """Absolute dotted names; of `from a import b` it is 'a.b', whether b is a module or not."""
-    tree = ast.parse(text)
-    unseen = {id(only) for node in ast.walk(tree) if _is_type_checking(node) for only in ast.walk(node)}
-    for node in (node for node in ast.walk(tree) if id(node) not in unseen):
+    tree, found = ast.parse(text), list[str]()
+    for node in _seen(tree) if inside else tree.body:
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             base = f"{'.' * node.level}{node.module or ''}"
             base = resolve_name(base, _package(module)) if node.level else base
-            yield from (f"{base}.{alias.name}" for alias in node.names)
+            found += [f"{base}.{alias.name}" for alias in node.names]
+    return tuple(found)
+
+
+def _seen(tree: ast.AST) -> Iterator[ast.AST]:
+    """What may be run: all but what only a type checker sees."""
+    unseen = {id(only) for node in ast.walk(tree) if _is_type_checking(node) for only in ast.walk(node)}
+    return (node for node in ast.walk(tree) if id(node) not in unseen)
 
 
 def _package(module: str) -> str:

@@ -19,10 +19,18 @@ from lab.production.drawn_times import stochastic
 from lab.sequencing import SEQUENCERS, check_method, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
-from lab.sequencing.cell.objectives import MAKESPAN, OBJECTIVES, WITH_DUE_TIMES, check_objective, cost
+from lab.sequencing.cell.objectives import (
+    BUILT_IN,
+    MAKESPAN,
+    OBJECTIVES,
+    WITH_DUE_TIMES,
+    check_objective,
+    cost,
+    stuck_cost,
+)
 from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import follow, simulate
-from lab.tasks.cell import CellFile, order_from_word, toast_case
+from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.tasks.task_file import Task, load_any
@@ -59,13 +67,7 @@ class Wanted:
 
 
 def sequence_named(
-    name: str,
-    case: str | None,
-    toasts: int | None,
-    wanted: Wanted,
-    *,
-    teacher: Teacher,
-    files: dict[str, Path],
+    name: str, case: str | None, toasts: int | None, wanted: Wanted, *, teacher: Teacher, files: dict[str, Path]
 ) -> dict[str, Any]:
     """What `lab sequence` does: a cell file's cell, or a task's over durations measured in simulation, and its pictures.
 
@@ -129,12 +131,7 @@ def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher) -> 
 
 
 def sequence_cell(
-    cell: Cell,
-    settings: Sequencing,
-    wanted: Wanted,
-    chance: Chance,
-    *,
-    tell: Tell = unheard,
+    cell: Cell, settings: Sequencing, wanted: Wanted, chance: Chance, *, tell: Tell = unheard
 ) -> tuple[dict[str, Any], list[SequenceResult]]:
     """Sessions of one method on a cell, beside what cannot be beaten; the document of `lab sequence`, and the sessions.
 
@@ -191,7 +188,9 @@ def _sessions(
             tell(SequenceFound(found[-1], shown))
     document = _document(cell, method, search, found, known, wanted) | {"interrupted": interrupted}
     if wanted.stochastic and not interrupted:
-        document["stochastic"] = stochastic(cell, method, search, min(found, key=_cost), chance, wanted.seed)
+        document["stochastic"] = stochastic(
+            cell, method, search, min(found, key=lambda one: one.cost), chance, wanted.seed
+        )
     if journal is not None and not interrupted:
         proven = document["optimal_cost"]
         is_best = proven is not None and document["gap"] == 0.0
@@ -246,6 +245,8 @@ def reference(cell: Cell, objective: str) -> Reference:
     from lab.sequencing.methods.cp_sat import cp_sat, fits
 
     unit = "" if objective == "tardy-parts" else " s"
+    if objective not in BUILT_IN:
+        return Reference(0.0, False, "nothing: CP-SAT has no rule for this objective", unit)
     if not fits(cell):
         return Reference(0.0, False, "nothing: too many moves for CP-SAT", unit)
     opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)
@@ -324,16 +325,13 @@ def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
 def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], files: dict[str, Path]) -> None:
     """The pictures that are asked for by name: "plot", the costs of the episodes, "gantt", the best sequence."""
     from lab.view.gantt import gantt
-    from lab.view.plots import sequence_plot
+    from lab.view.sequencing_plots import sequence_plot
 
     if "plot" in files:
         label = "makespan [s]" if document["objective"] == MAKESPAN else document["objective"]
         costs = [result.episode_costs for result in found]
-        sequence_plot(costs, document["optimal_cost"], files["plot"], ylabel=label)
+        stuck = stuck_cost(cell, document["objective"])
+        sequence_plot(costs, document["optimal_cost"], files["plot"], ylabel=label, deadlock=stuck)
     if "gantt" in files:
         gantt(simulate(cell, document["sequence"]), files["gantt"])
     document["files"] = {name: str(path) for name, path in files.items()}
-
-
-def _cost(result: SequenceResult) -> float:
-    return result.cost

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 
 from lab.advice.advisors import AdvisorName
-from lab.production.sequence import (
+from lab.production.sequencing_job import (
     Wanted,
     reference,
     sequence_cell,
@@ -259,7 +259,7 @@ def test_what_cannot_be_beaten_comes_from_whom_it_can() -> None:
 
 def test_an_optimum_that_is_not_proven_is_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     cell = load_cell("oven.toml").cell()
-    monkeypatch.setattr("lab.production.sequence.reference", lambda *_: Reference(20.0, False, "A*"))
+    monkeypatch.setattr("lab.production.sequencing_job.reference", lambda *_: Reference(20.0, False, "A*"))
     document, _ = sequence_cell(cell, load_cell("oven.toml").sequencing, Wanted("fifo"), NO_CHANCE)
     assert (document["optimal_s"], document["optimal_cost"], document["optimum_proven"]) == (None, None, False)
     assert (document["bound_s"], document["gap"]) == (20.0, pytest.approx(0.45))
@@ -337,6 +337,14 @@ def test_pictures_are_in_the_document(lab: Lab) -> None:
     words = "late.toml --method fifo --objective tardy-parts --plot p.svg --gantt g.svg"
     assert asked(lab, words)["files"] == {"plot": "p.svg", "gantt": "g.svg"}
     assert "tardy-parts" in Path("p.svg").read_text(encoding="utf-8")
+
+
+def test_a_deadlock_is_a_mark_in_the_plot(lab: Lab) -> None:
+    """And no cost: it would be the highest of all."""
+    words = "crossing.toml --method random --episodes 8 --plot p.svg"
+    ran = lab("sequence", *words.split())
+    assert ran.code == 0, ran.err
+    assert " of 8 episodes)" in Path("p.svg").read_text(encoding="utf-8")
 
 
 # ---- a task: measured in simulation, then sequenced -----------------------------------------------------------------

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lab.errors import WorkFailed
-from lab.production.sources import source, sources
+from lab.learning.sources import source, sources
 
 FILES = {
     "__init__.py": "",

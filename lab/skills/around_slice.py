@@ -1,0 +1,98 @@
+"""What grasp and place share: the tool's poses around one slice, from anywhere above it down to where fingers close or open."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from lab.errors import BadInput
+from lab.learning.problem import Problem
+from lab.mdp import NoPath, TabularMDP, grid
+from lab.sim.blocked_cells import Survey
+from lab.sim.kinematics import ToolPose
+from lab.skills.skill import Bench, Skill, learned_path, no_way
+from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
+
+if TYPE_CHECKING:
+    from lab.toolbox.policy import Policy
+
+SLOW = 0.6
+_BLEND_M = 0.008
+
+
+class AroundSlice(Skill):
+    """At one station: the table holds the tool's pose relative to the slice (x, y, z, and yaw where it may turn)."""
+
+    near: ClassVar[bool] = True
+    looks_from: ClassVar[tuple[float, float]] = (-60.0, 28.0)
+    actions: ClassVar[tuple[str, ...]]
+    goal: ClassVar[tuple[int, ...]]  # the cell where the fingers close or open
+
+    def __init__(self, station: str) -> None:
+        super().__init__(f"{self.subtask} at {station}")
+        self.station = station
+
+    def setup(self, surveys: Surveys) -> Problem:
+        """The poses around a slice with slices beside it; episodes begin anywhere above it."""
+        self.surveys = surveys
+        survey = surveys.around(self.station, self.carries)
+        rewards = surveys.task.subtask(self.subtask).rewards
+        try:
+            start = free_above(self.name, survey, self.goal)
+            mdp = grid(survey.causes.shape, survey.blocked, start, self.goal, rewards, self.actions)
+        except NoPath as error:
+            raise no_way(self.name, error, survey.names(error.enclosing)) from None
+        self.problem = Problem(self.name, self.subtask, from_above(mdp))
+        return self.problem
+
+    def goal_pose(self) -> ToolPose:
+        """The tool pose of the goal's cell, for a slice that stands, or is to stand, on its spot."""
+        raise NotImplementedError
+
+    def pose(self, state: int, goal: ToolPose | None = None) -> ToolPose:
+        """Around `goal`, by default where the slice is by the task."""
+        return near_pose(goal or self.goal_pose(), self.problem.mdp.state_cell(state))
+
+    def begins_at(self) -> ToolPose:
+        """At the station's approach."""
+        return self.surveys.approach(self.station)
+
+    def down(self, bench: Bench, policy: "Policy", goal: ToolPose) -> Iterator[None]:
+        """Above the slice, and down the learned cells to the tool pose `goal`."""
+        robot, mdp = bench.scene.robot, self.problem.mdp
+        entry = entry_cell(goal, robot.tool())[: len(mdp.shape)]
+        path = learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))
+        poses = [self.pose(state, goal) for state in path]
+        high = max(robot.tool().z, poses[0].z)
+        yield from robot.follow([ToolPose(poses[0].x, poses[0].y, high, poses[0].yaw)], slow=SLOW)
+        yield from robot.follow(poses, blend=_BLEND_M, slow=SLOW)
+
+
+def free_above(what: str, survey: Survey, goal: tuple[int, ...]) -> tuple[int, ...]:
+    """The first free cell of the highest level; BadInput names what blocks them all, or the goal."""
+    top = [cell for cell in np.ndindex(*survey.causes.shape) if cell[2] == NEAR_SHAPE[2] - 1]
+    free = [cell for cell in top if not survey.blocked[cell]]
+    if survey.blocked[goal] or not free:
+        names = survey.names([goal] if survey.blocked[goal] else top)
+        raise BadInput(f"{what}: no room for gripper and slice; in the way: {', '.join(names)}")
+    return free[0]
+
+
+def from_above(mdp: TabularMDP) -> TabularMDP:
+    """The same problem with episodes that begin in any free cell of the highest level."""
+    levels = np.indices(mdp.shape)[2].ravel()
+    starts = np.flatnonzero((levels == NEAR_SHAPE[2] - 1) & ~mdp.terminal)
+    return replace(mdp, starts=tuple(int(s) for s in starts))
+
+
+def entry_cell(goal: ToolPose, tool: ToolPose) -> tuple[int, int, int, int]:
+    """The cell of the highest level that is nearest to where the tool is, seen from the slice."""
+    c, s = np.cos(goal.yaw), np.sin(goal.yaw)
+    dx, dy = tool.x - goal.x, tool.y - goal.y
+    along, across = c * dx + s * dy, -s * dx + c * dy
+    turn = (tool.yaw - goal.yaw + np.pi / 2) % np.pi - np.pi / 2
+    x = int(np.clip(round(along / NEAR_STEP_M[0]) + 2, 0, NEAR_SHAPE[0] - 1))
+    y = int(np.clip(round(across / NEAR_STEP_M[1]) + 2, 0, NEAR_SHAPE[1] - 1))
+    yaw = int(np.clip(round(turn / NEAR_YAW_STEP) + NEAR_YAWS // 2, 0, NEAR_YAWS - 1))
+    return (x, y, NEAR_SHAPE[2] - 1, yaw)
