@@ -15,7 +15,7 @@ from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError
 
 INTERRUPTED = 130
-STOPPED = "stopped by Ctrl-C; what was learned is kept"
+STOPPED = "stopped by Ctrl-C"
 GROUPS = {
     "toolbox": "The policies that were learned.",
     "task": "Task files.",

@@ -51,8 +51,11 @@ def run(
         teacher = teacher_of(toolbox, options, seat)
         if any(name in PEOPLE for name in options.advisors):
             teacher = replace(teacher, keep=kept_by(teacher.toolbox, options))
-        with seat.progress:
-            report = run_task(prepared, teacher, folder, viewer=seat.page)
+        try:
+            with seat.progress:
+                report = run_task(prepared, teacher, folder, viewer=seat.page)
+        except KeyboardInterrupt as stopped:
+            raise KeyboardInterrupt(str(stopped) or "stopped by Ctrl-C; what was learned is kept") from None
     show(report.to_json(), as_json, run_summary)
     if not report.success:
         end(report.outcome.failure or f"{len(report.outcome.delivered)} of {counted(toasts, 'toast')} delivered", 1)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Literal
 
-from lab.errors import BadInput, WorkFailed, unknown
+from lab.errors import BadInput, WorkFailed, counted, unknown
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective
@@ -144,7 +144,7 @@ class Log:
         """The fields of a `SequenceResult`; WorkFailed when no sequence came to its end."""
         if not self.best:
             raise WorkFailed(
-                f"no sequence for {cell.parts} parts came to its end in {len(self.costs)} episodes: deadlocks"
+                f"no sequence for {cell.parts} parts came to its end in {counted(len(self.costs), 'episode')}: deadlocks"
             )
         return self.best, self.best_cost, tuple(self.costs)
 

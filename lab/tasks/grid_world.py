@@ -206,7 +206,9 @@ def from_text(path: Path) -> GridWorld:
             if mark != ".":
                 cells[mark].append((i, j))
         if len(row) != len(rows[0]):
-            raise BadInput(f"{path}: line {i + 1}: {len(row)} cells, line 1 has {len(rows[0])}: wanted the same number")
+            raise BadInput(
+                f"{path}: line {i + 1}: {counted(len(row), 'cell')}, line 1 has {len(rows[0])}: wanted the same number"
+            )
     _check_shape((len(rows), len(rows[0])), str(path))
     for mark, what in (("S", "start"), ("G", "goal")):
         if not cells[mark]:
@@ -246,7 +248,9 @@ def random_world(shape: Sequence[int], density: float, seed: int) -> GridWorld:
     free = prod(shape) - count
     far = max(1, (sum(n - 1 for n in shape) + 1) // 2)
     if free <= far:
-        raise BadInput(f"{where}: density {density} leaves {free} cells free, start and goal far apart need {far + 1}")
+        raise BadInput(
+            f"{where}: density {density} leaves {counted(free, 'cell')} free, start and goal far apart need {far + 1}"
+        )
     rng = np.random.default_rng(seed)
     cells = np.indices(shape).reshape(len(shape), -1).T  # (cells, axes)
     start = cells[rng.integers(len(cells))]

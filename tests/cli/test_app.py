@@ -158,16 +158,21 @@ def test_a_failed_piece_of_work_ends_with_1(lab: Lab, monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
-    [("run", "; what was learned is kept"), ("teach insert", "; what was learned is kept"), ("view toast", "")],
+    ("words", "where", "said"),
+    [
+        ("run", "lab.skills.prepared_scene.prepare", ""),
+        ("run", "lab.production.run.run", "; what was learned is kept"),
+        ("teach insert", "lab.teaching.skill_subject.load", ""),
+        ("view toast", "lab.tasks.task_file.load", ""),
+    ],
 )
-def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: str, said: str) -> None:
-    def stop(*_: object) -> None:
+def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: str, where: str, said: str) -> None:
+    """What was learned is spoken of once there may be something."""
+
+    def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("lab.skills.prepared_scene.prepare", stop)
-    monkeypatch.setattr("lab.teaching.skill_subject.load", stop)
-    monkeypatch.setattr("lab.tasks.task_file.load", stop)
+    monkeypatch.setattr(where, stop)
     ran = lab(*words.split(), "--json")
     why = f"stopped by Ctrl-C{said}"
     assert (ran.code, ran.json, ran.err) == (130, {"error": why, "exit_code": 130}, f"lab: {why}\n")

@@ -124,6 +124,6 @@ def test_a_deadlock_is_work_that_failed(lab: Lab) -> None:
     """The queue puts both products into the machines at once; a search that looks further gets around it."""
     ran = lab("sequence", "crossing.toml", "--method", "fifo", "--json")
     assert (ran.code, ran.gave_nothing) == (1, True)
-    assert ran.err.splitlines()[-1] == "lab: no sequence for 2 parts came to its end in 1 episodes: deadlocks"
+    assert ran.err.splitlines()[-1] == "lab: no sequence for 2 parts came to its end in 1 episode: deadlocks"
     document = lab(*["sequence", "crossing.toml", "--method", "random", "--episodes", "50", "--json"]).json
     assert document["makespan_s"] < max(document["episode_costs"])

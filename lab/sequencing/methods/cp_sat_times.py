@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import from_the_ends, part_of
 from lab.sequencing.cell.ways import Way
@@ -95,7 +95,7 @@ def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]
         run.move(decision)
         moves.append(Timed(part, way, begin, now))
     if not run.done:
-        raise BadInput(f"hint: the sequence ends after {len(moves)} moves, but not all parts are finished")
+        raise BadInput(f"hint: the sequence ends after {counted(len(moves), 'move')}, but not all parts are finished")
     return moves
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.errors import BadInput, WorkFailed
+from lab.errors import BadInput, WorkFailed, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Chance, Episode, drawn_seed
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective, cost
@@ -137,6 +137,6 @@ def replicate(
         times = Episode(cell, chance, drawn_seed(rng))
         run = carry_out(cell, how, times).run if callable(how) else follow(cell, how, times)
         if not run.done and not callable(how) and run.allowed():
-            raise BadInput(f"the sequence ends after {len(how)} moves, but not every part is finished")
+            raise BadInput(f"the sequence ends after {counted(len(how), 'move')}, but not every part is finished")
         costs[number] = cost(run, objective)
     return costs

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.routes import Option, choice_of, entry, part_of
@@ -161,7 +161,9 @@ def simulate(cell: Cell, sequence: Sequence[int], times: Episode | None = None) 
     if not run.done:
         left = run.finished_s.index(None) + 1
         where = cell.names[cell.positions[run.locations[left - 1]].station]
-        raise BadInput(f"the sequence ends after {len(moves)} moves, but {cell.part_name(left)} is still at '{where}'")
+        raise BadInput(
+            f"the sequence ends after {counted(len(moves), 'move')}, but {cell.part_name(left)} is still at '{where}'"
+        )
     return Schedule.from_moves(cell, moves, sequence, came_s)
 
 

@@ -212,7 +212,7 @@ def test_without_chance_every_replication_is_the_same(oven_cell: CellMaker) -> N
         ((1, 1), 0, 0, "makespan", "episodes = 0: allowed are whole numbers from 1"),
         ((1, 1), 1, -1, "makespan", "seed = -1: allowed are whole numbers from 0"),
         ((1, 1), 1, 0, "tardy-parts", "due times"),
-        ((1,), 1, 0, "makespan", "the sequence ends after 1 moves"),
+        ((1,), 1, 0, "makespan", "the sequence ends after 1 move"),
         ((1, 1, 1), 1, 0, "makespan", "already at 'out'"),
     ],
 )
