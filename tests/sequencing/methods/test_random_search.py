@@ -66,7 +66,7 @@ def test_it_says_when_all_it_met_were_deadlocks() -> None:
             ends.add(random_search(cell, Search(1), rng(seed)).sequence)
         except WorkFailed as error:
             ends.add(str(error))
-    assert "no sequence for 2 parts came to its end in 1 episodes: deadlocks" in ends
+    assert "no sequence for 2 parts came to its end in 1 episode: deadlocks" in ends
     assert (1, 1, 1, 2, 2, 2) in ends
 
 
