@@ -1,4 +1,4 @@
-/* The rival "c scalar": whole sessions one after another, compiled by lab/studies/rivals.py and called through ctypes.
+/* The rival "c scalar": whole sessions one after another, compiled by learning_speed_rivals.py and called through ctypes.
    One session walks at a time; the compiler may put its eight exponentials side by side. */
 
 #include <stdint.h>

@@ -3,7 +3,7 @@
 import contextlib
 import socket
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -75,21 +75,6 @@ class Teaching:
         except Undo:
             self.undone.set()
             return self.page.ask(request)
-
-
-@pytest.fixture
-def page() -> Iterator[SeatPage]:
-    with SeatPage() as running:
-        yield running
-
-
-@pytest.fixture
-def tab(browser_page: "Page", page: SeatPage, until: Until) -> "Page":
-    """The page in a browser, at the size of a small screen; rules that it breaks are errors, too."""
-    browser_page.set_viewport_size({"width": 1280, "height": 800})
-    browser_page.goto(page.url)
-    until(browser_page, "document.querySelector('#chair.yours')")
-    return browser_page
 
 
 def says(step: int, episode: int = 1) -> str:

@@ -1,13 +1,12 @@
 """What the teaching seat shows in a real browser: layers, drawings, orders, the receipt, a phone. Skipped without Chromium."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from copy import deepcopy
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pytest
 
 from lab.advice.entries import Entry
 from lab.advice.receipt import receipt
@@ -27,21 +26,6 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 Until = Callable[["Page", str], None]
-
-
-@pytest.fixture
-def page() -> Iterator[SeatPage]:
-    with SeatPage() as running:
-        yield running
-
-
-@pytest.fixture
-def tab(browser_page: "Page", page: SeatPage, until: Until) -> "Page":
-    """The page in a browser, at the size of a small screen."""
-    browser_page.set_viewport_size({"width": 1280, "height": 800})
-    browser_page.goto(page.url)
-    until(browser_page, "document.querySelector('#chair.yours')")
-    return browser_page
 
 
 def ask(page: SeatPage, request: AdviceRequest) -> "Future[Any]":
