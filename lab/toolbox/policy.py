@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from annotated_types import Ge
+from numpy.typing import NDArray
 
 from lab import __version__
 from lab.errors import BadInput
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 MAX_NAME_LENGTH = 100
 Count = Annotated[int, Ge(0)]
+ON, GOAL, OUT = range(3)  # what becomes of an episode in a state
 _SIGNATURE = re.compile(r"[0-9a-f]{16}")
 
 
@@ -42,6 +44,10 @@ class Policy:
     one as max_steps + 1; guided: which of them had advice; helped_steps, requests, optimal_steps, final_steps,
     solved: see `SessionResult`; created: ISO 8601 in UTC; versions by package. Raises BadInput when these do not
     fit together.
+
+    Since lineage is kept, "" or None in older files: parent: the policy that it was warm-started from, as "name@hash";
+    scene: where it was learned, in words; ends (S,) uint8: which states of that problem go on (0), are the goal (1), or
+    end without it (2).
     """
 
     name: str
@@ -66,6 +72,9 @@ class Policy:
     solved: bool
     created: str
     versions: dict[str, str]
+    parent: str = ""
+    scene: str = ""
+    ends: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
         reason = self._what_does_not_fit()
@@ -84,6 +93,8 @@ class Policy:
             return f"visits have shape {self.visits.shape}, q has {self.q.shape}"
         if not np.isfinite(self.q).all():
             return f"{int((~np.isfinite(self.q)).sum())} values of q are not finite"
+        if self.ends is not None and (self.ends.shape != (states,) or self.ends.max() > OUT):
+            return f"ends have shape {self.ends.shape} up to {self.ends.max()}, allowed ({states},) up to {OUT}"
         if self.visits.min() < 0:
             return "a visit count is negative"
         if len(self.action_labels) != actions:
@@ -121,6 +132,7 @@ class Policy:
             final_steps=result.final_steps,
             solved=result.solved,
             created=datetime.now(UTC).isoformat(timespec="microseconds"),
+            ends=np.where(mdp.goal, GOAL, np.where(mdp.terminal, OUT, ON)).astype(np.uint8),
             versions={"teaching-lab": __version__, "python": platform.python_version(), "numpy": np.__version__},
         )
 

@@ -29,7 +29,8 @@ Summaries = list[dict[str, Any]]
 Words = list[str]
 Report = list[tuple[Path, bool, str]]  # path, whether it is sound, what is wrong
 
-_TENSORS = {"q": "F64", "visits": "I64"}
+_TENSORS = {"q": "F64", "visits": "I64", "ends": "U8"}
+_SINCE_LINEAGE = {"ends", "parent", "scene"}  # older files have none of them
 _METADATA = tuple(field.name for field in fields(Policy) if field.name not in _TENSORS)
 _NOT_WRITABLE = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EEXIST, errno.EISDIR, errno.ENAMETOOLONG}
 
@@ -225,7 +226,11 @@ def _date(text: str) -> str:
 @cache
 def _metadata() -> type[BaseModel]:
     """What a policy's file holds beside its tables: the fields of `Policy`."""
-    held: dict[str, Any] = {field.name: (field.type, ...) for field in fields(Policy) if field.name in _METADATA}
+    held: dict[str, Any] = {
+        field.name: (field.type, field.default if field.name in _SINCE_LINEAGE else ...)
+        for field in fields(Policy)
+        if field.name in _METADATA
+    }
     held["created"] = (Annotated[str, AfterValidator(_date)], ...)
     held["learner"] = held["gate"] = (dict[str, str | bool | int | float], ...)
     return create_model("Metadata", __config__=ConfigDict(strict=True, allow_inf_nan=False), **held)
@@ -235,7 +240,8 @@ def _encode(policy: Policy) -> bytes:
     from safetensors.numpy import save
 
     metadata = {name: json.dumps(getattr(policy, name), allow_nan=False) for name in _METADATA}
-    tensors = {name: np.ascontiguousarray(getattr(policy, name)) for name in _TENSORS}
+    found = {name: getattr(policy, name) for name in _TENSORS}
+    tensors = {name: np.ascontiguousarray(table) for name, table in found.items() if table is not None}
     content: bytes = save(tensors, {"format": FORMAT, **metadata})
     return content
 
@@ -249,7 +255,8 @@ def _decode(path: Path) -> Policy:
         if path.stat().st_size > MAX_FILE_BYTES:
             raise ValueError(f"it has {path.stat().st_size} bytes, allowed {MAX_FILE_BYTES}")
         tensors, metadata = _read_tensors(path)
-        return Policy(q=tensors["q"], visits=tensors["visits"], **_read_metadata(metadata))
+        held: dict[str, Any] = tensors | _read_metadata(metadata)
+        return Policy(**held)
     except (BadInput, SafetensorError, OSError, ValueError, TypeError, RecursionError, MemoryError) as error:
         raise BadInput(f"policy file {path}: {' '.join(str(error).split()) or type(error).__name__}") from error
 
@@ -261,12 +268,14 @@ def _read_tensors(path: Path) -> tuple[dict[str, np.ndarray[Any, Any]], dict[str
         metadata = file.metadata() or {}
         if metadata.get("format") != FORMAT:
             raise ValueError(f"format {metadata.get('format')!r}, allowed '{FORMAT}'")
-        if set(file.keys()) != set(_TENSORS):
-            raise ValueError(f"it holds the tensors {sorted(file.keys())}, allowed {sorted(_TENSORS)}")
-        for name, dtype in _TENSORS.items():
+        found = set(file.keys())
+        if not set(_TENSORS) - _SINCE_LINEAGE <= found <= set(_TENSORS):
+            raise ValueError(f"it holds the tensors {sorted(found)}, allowed {sorted(_TENSORS)}")
+        for name in sorted(found):
+            dtype = _TENSORS[name]
             if file.get_slice(name).get_dtype() != dtype:
                 raise ValueError(f"{name} has type {file.get_slice(name).get_dtype()}, allowed {dtype}")
-        return {name: file.get_tensor(name) for name in _TENSORS}, metadata
+        return {name: file.get_tensor(name) for name in found}, metadata
 
 
 def _read_metadata(metadata: dict[str, str]) -> dict[str, Any]:
