@@ -5,9 +5,11 @@ A `TabularMDP` is such an environment by its table; others, such as Gymnasium's,
 
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
-from lab.mdp import FloatArray, TabularMDP, greedy_path, optimal_values, shortest_steps
+from lab.mdp import FloatArray, TabularMDP, fewest_moves, greedy_moves, greedy_path, optimal_values, shortest_steps
 
 
 class Step(NamedTuple):
@@ -80,11 +82,14 @@ class TableEnvironment:
         return optimal_values(self.mdp, discount)
 
     def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
-        """Solved: the greedy path from the start is a shortest one, or, with several starts, each one's reaches the goal."""
-        optimal = shortest_steps(self.mdp) + learner.count_start
-        _, actions, reached = greedy_path(q, self.mdp, learner.max_steps)
+        """Solved: the greedy path from the start, or from each of several ones, is a shortest one."""
+        mdp, optimal = self.mdp, shortest_steps(self.mdp) + learner.count_start
+        _, actions, reached = greedy_path(q, mdp, learner.max_steps)
         final = len(actions) + learner.count_start if reached else None
-        return Judged(final, optimal, not unreached(q, self.mdp) if self.mdp.starts else final == optimal)
+        if not mdp.starts:
+            return Judged(final, optimal, final == optimal)
+        starts = list(mdp.starts)
+        return Judged(final, optimal, np.array_equal(greedy_moves(q, mdp)[starts], fewest_moves(mdp)[starts]))
 
 
 def check_solvable(environment: Environment) -> None:
@@ -92,7 +97,3 @@ def check_solvable(environment: Environment) -> None:
     if isinstance(environment, TableEnvironment):
         shortest_steps(environment.mdp)
 
-
-def unreached(q: FloatArray, mdp: TabularMDP) -> tuple[int, ...]:
-    """The states among the problem's several `starts` from which the greedy path does not reach the goal."""
-    return tuple(start for start in mdp.starts if not greedy_path(q, mdp, mdp.n_states, start)[2])
