@@ -9,7 +9,7 @@ import numpy as np
 
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
-from lab.mdp import FloatArray, TabularMDP, fewest_moves, greedy_moves, greedy_path, optimal_values, shortest_steps
+from lab.mdp import FloatArray, TabularMDP, greedy_moves, greedy_path, optimal_values, shortest_steps
 
 
 class Step(NamedTuple):
@@ -82,18 +82,15 @@ class TableEnvironment:
         return optimal_values(self.mdp, discount)
 
     def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
-        """Solved: the greedy path from the start, or from each of several ones, is a shortest one."""
+        """Solved: the greedy path from the start is a shortest one, or, with several starts, each one's reaches the goal."""
         mdp, optimal = self.mdp, shortest_steps(self.mdp) + learner.count_start
         _, actions, reached = greedy_path(q, mdp, learner.max_steps)
         final = len(actions) + learner.count_start if reached else None
-        if not mdp.starts:
-            return Judged(final, optimal, final == optimal)
-        starts = list(mdp.starts)
-        return Judged(final, optimal, np.array_equal(greedy_moves(q, mdp)[starts], fewest_moves(mdp)[starts]))
+        everywhere = np.isfinite(greedy_moves(q, mdp)[list(mdp.starts)]).all() if mdp.starts else final == optimal
+        return Judged(final, optimal, bool(everywhere))
 
 
 def check_solvable(environment: Environment) -> None:
     """Raises NoPath when no goal of a certain problem can be reached from its start."""
     if isinstance(environment, TableEnvironment):
         shortest_steps(environment.mdp)
-

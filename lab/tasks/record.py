@@ -1,7 +1,7 @@
 """What task files are made of: frozen records of checked fields, names, and how a problem is learned."""
 
 from dataclasses import asdict, replace
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any, Self, cast
 
@@ -67,7 +67,11 @@ class Learned(Record):
         if not isinstance(rewards, dict) or "collision" in rewards or "learner" not in others.data:
             return rewards
         goal, step = (rewards.get(name, getattr(Rewards, name)) for name in ("goal", "step"))
-        if not all(isinstance(value, int | float) for value in (goal, step)):
+        if (
+            not all(isinstance(value, int | float) and isfinite(value) for value in (goal, step))
+            or goal <= 0
+            or step > 0
+        ):
             return rewards  # which is refused
         return rewards | {"collision": round(walking(step, others.data["learner"]) - goal, 6)}
 

@@ -16,7 +16,7 @@ from lab.learning.requests import Advisor, Request, Walked
 from lab.learning.session import Session, SessionResult
 from lab.learning.session_events import AdviceEnded, AdviceRejected
 from lab.learning.settings import LearnerSettings
-from lab.mdp import FloatArray, greedy_moves, greedy_path
+from lab.mdp import FloatArray, fewest_moves, greedy_moves, greedy_path
 from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, Tell
 from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.policy import Policy
@@ -53,6 +53,8 @@ class _Sessions:
         self.rng = np.random.default_rng([seed, crc32(plan.problem.name.encode()), lived])
         self.alone = False  # the advisor left or was rejected: nobody is asked about this skill again
         self.hopeful: FloatArray | None = None  # the table of the sessions alone
+        mdp = plan.problem.mdp  # one session is not followed by another
+        self.fewest = float(fewest_moves(mdp)[list(mdp.starts)].sum()) if mdp.starts and plan.sessions > 1 else inf
 
     def run(self) -> SessionResult:
         """The curves of all sessions, with the best table of these and of the unfinished policy."""
@@ -69,7 +71,7 @@ class _Sessions:
                 if now < moves == inf:
                     left = MORE_SESSIONS if several else 0
                 kept, moves = result, now
-            if result.interrupted or (kept is result and result.solved and now < inf):
+            if result.interrupted or (kept is result and result.solved and now <= self.fewest):
                 break
         assert whole is not None
         assert kept is not None
