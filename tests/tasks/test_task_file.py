@@ -108,7 +108,7 @@ def test_the_toast_task_is_the_cell_of_the_thesis() -> None:
         settings = task.subtask(name)
         assert (settings.rewards.goal, settings.rewards.collision, settings.rewards.step) == (1.5, -11.5, -0.1)
         learner, gate = settings.learner, settings.gate
-        assert (learner.learner, learner.alpha, learner.discount) == ("q", 0.95, 0.99)
+        assert (learner.learner, learner.alpha, learner.discount) == ("dyna-q", 0.95, 0.99)
         assert (learner.beta, gate.gate) == (1.3, "ccrl")
         assert gate.spare_best  # the file says nothing of it, and its own gate table leaves it as it is
     assert task.insert.shape == (12, 12)
@@ -208,9 +208,9 @@ def test_what_is_no_text_is_said(tmp_path: Path) -> None:
         ('name = "cubes B"', 'name = "a/b"', "(got 'a/b')"),
         ('name = "cubes B"', 'name = "a > b"', "(got 'a > b')"),
         (
-            'learner = "q"',
-            'learner = "q-lamda"',
-            "unknown learner 'q-lamda' (subtasks.transfer.learner): did you",
+            'learner = "dyna-q"',
+            'learner = "dyna"',
+            "unknown learner 'dyna' (subtasks.transfer.learner): did you",
         ),
         ('gate = "ccrl"', 'gate = "crcl"', "unknown gate 'crcl' (subtasks.transfer.gate): did you mean 'ccrl'?"),
         ('method = "srl-time"', 'method = "slr"', "unknown method 'slr' (sequencing.method): did you mean 'srl'?"),
