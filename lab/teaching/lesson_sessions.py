@@ -17,7 +17,7 @@ from lab.learning.session import Session, SessionResult
 from lab.learning.session_events import AdviceEnded, AdviceRejected
 from lab.learning.settings import LearnerSettings
 from lab.mdp import FloatArray, fewest_moves, greedy_moves, greedy_path
-from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, Tell
+from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, SessionBegan, Tell
 from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.policy import Policy
 
@@ -85,7 +85,9 @@ class _Sessions:
         hopes = several and advisor is None
         if hopes:
             q0 = self._hopeful(q0, reached)
-        result = Session(self.place, plan.learner, self.gate, advisor, self.rng, q0).run(self._hear)
+        session = Session(self.place, plan.learner, self.gate, advisor, self.rng, q0)
+        self.tell(SessionBegan(session))
+        result = session.run(self._hear)
         self.hopeful = result.q if hopes else None
         return result
 
