@@ -22,7 +22,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.advice", "lab.tasks"),
     ("lab.sim",),
     ("lab.skills", "lab.view"),
-    ("lab.teaching", "lab.studies"),
+    ("lab.teaching",),
+    ("lab.studies",),
     ("lab.production", "lab.seat", "lab.gym"),
     ("lab.cli",),
 )

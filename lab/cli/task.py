@@ -79,8 +79,9 @@ def task_check(
     """
     from lab.skills.prepared_scene import check_task
 
-    errors = check_task(file, toasts, seed)
+    errors, warnings = check_task(file, toasts, seed)
     if as_json or not errors:
-        show({"valid": not errors, "errors": errors}, as_json, lambda _: f"{file} is sound")
+        document = {"valid": not errors, "errors": errors, "warnings": warnings}
+        show(document, as_json, lambda _: "\n".join([f"{file} is sound", *(f"mind: {slip}" for slip in warnings)]))
     if errors:
         end(errors[0], 2)

@@ -5,9 +5,11 @@ A `TabularMDP` is such an environment by its table; others, such as Gymnasium's,
 
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
-from lab.mdp import FloatArray, TabularMDP, greedy_path, optimal_values, shortest_steps
+from lab.mdp import FloatArray, TabularMDP, greedy_moves, greedy_path, optimal_values, shortest_steps
 
 
 class Step(NamedTuple):
@@ -81,18 +83,14 @@ class TableEnvironment:
 
     def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
         """Solved: the greedy path from the start is a shortest one, or, with several starts, each one's reaches the goal."""
-        optimal = shortest_steps(self.mdp) + learner.count_start
-        _, actions, reached = greedy_path(q, self.mdp, learner.max_steps)
+        mdp, optimal = self.mdp, shortest_steps(self.mdp) + learner.count_start
+        _, actions, reached = greedy_path(q, mdp, learner.max_steps)
         final = len(actions) + learner.count_start if reached else None
-        return Judged(final, optimal, not unreached(q, self.mdp) if self.mdp.starts else final == optimal)
+        everywhere = np.isfinite(greedy_moves(q, mdp)[list(mdp.starts)]).all() if mdp.starts else final == optimal
+        return Judged(final, optimal, bool(everywhere))
 
 
 def check_solvable(environment: Environment) -> None:
     """Raises NoPath when no goal of a certain problem can be reached from its start."""
     if isinstance(environment, TableEnvironment):
         shortest_steps(environment.mdp)
-
-
-def unreached(q: FloatArray, mdp: TabularMDP) -> tuple[int, ...]:
-    """The states among the problem's several `starts` from which the greedy path does not reach the goal."""
-    return tuple(start for start in mdp.starts if not greedy_path(q, mdp, mdp.n_states, start)[2])

@@ -43,7 +43,8 @@ class LearnerSettings:
     """How a learner learns; the defaults are those of the thesis (sections 8.3 and 9.8).
 
     learner: a name in UPDATES; alpha: learning rate; discount: gamma; trace: lambda of the learners with traces;
-    replacing: a trace is set to 1 on each visit instead of growing by 1; selection: a name in SELECTIONS; in episode n
+    replacing: a trace is set to 1 on each visit instead of growing by 1; planning: how many earlier moves "dyna-q" learns
+    from again after each one; selection: a name in SELECTIONS; in episode n
     its temperature (or epsilon) is exploration * n**-beta, constant with beta 0; episodes: session length N;
     max_steps: steps after which an episode is broken off; count_start: the start counts as a step, as in the thesis's
     listing, so that a way of 12 moves has 13 steps.
@@ -55,6 +56,7 @@ class LearnerSettings:
     discount: Annotated[float, Gt(0), Le(1)] = 0.99
     trace: Annotated[float, Ge(0), Le(1)] = 0.5
     replacing: bool = False
+    planning: Annotated[int, Ge(0), Le(1000)] = 5
     selection: str = "softmax"
     exploration: Annotated[float, Gt(0), Le(1_000_000)] = 1.0
     beta: Annotated[float, Ge(0), Le(100)] = 1.3

@@ -43,10 +43,11 @@ def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prep
     return Prepared(task, toasts, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
 
 
-def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
-    """What is wrong with a task file, its scene and its problems for so many toasts, or with a cell or a world; or nothing.
+def check_task(file: str, toasts: int | None, seed: int) -> tuple[list[str], list[str]]:
+    """What is wrong with a task file, its scene and its problems for so many toasts, or with a cell or a world; warnings.
 
-    Without a number: a task for 3 toasts, or as many as there is room for; a cell for its own order.
+    Without a number: a task for 3 toasts, or as many as there is room for; a cell for its own order. A warning is of what
+    can be learned, but hardly by a learner that nobody helps.
     Raises BadInput for a file that is not there, and for a number that this kind of file never takes.
     """
     if not file.startswith(RANDOM):
@@ -54,16 +55,21 @@ def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
     try:
         task = load_any(file)
     except LabError as error:
-        return [str(error)]
+        return [str(error)], []
     if toasts is not None and not isinstance(task, GridWorld):
         check_number(toasts) if isinstance(task, Task) else task.ordered(toasts)
+    warnings: list[str] = []
     try:
         if isinstance(task, Task):
-            prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
+            prepared = prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
+            crash = {p.subtask: None for p in prepared.problems.values() if (p.mdp.terminal & ~p.mdp.goal).any()}
+            slips = {name: task.subtask(name).warning() for name in crash}
+            warnings += [f"subtasks.{name}.{slip}" for name, slip in slips.items() if slip]
         elif isinstance(task, GridWorld):
             task.check()
+            warnings += [slip for slip in [task.warning()] if slip]
         else:
             task.cell(toasts)
     except LabError as error:
-        return [str(error)]
-    return []
+        return [str(error)], []
+    return [], warnings

@@ -63,6 +63,12 @@ def _advice_budget(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return advice_budget(job, reading)
 
 
+def _advice_worth(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.advice_worth import advice_worth
+
+    return advice_worth(job, reading)
+
+
 def _advisors(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.several_advisors import advisors
 
@@ -115,6 +121,7 @@ STUDIES: dict[str, Study] = {
         "Readings of chapter 9: what the thesis leaves open, and what comes nearest", _chapter_9("readings")
     ),
     "advice-budget": Study("Success against helped steps: every gate with and without memory", _advice_budget, True),
+    "advice-worth": Study("What an advisor's help is worth over nobody's, for every skill of toast", _advice_worth),
     "advisors": Study("Several advisors at once, beside the best and the worst of them alone", _advisors, True),
     "table-7.4": Study("Table 7.4: sequencing case I by session length", _chapter_7("best_results", "I")),
     "table-7.5": Study("Table 7.5: sequencing case II by session length", _chapter_7("best_results", "II")),

@@ -297,13 +297,10 @@ def _staircase(start: Ints, goal: Ints, rng: np.random.Generator) -> Ints:
 
 
 def _fitted(world: GridWorld) -> GridWorld:
-    """The world with a learner that mostly finds a way alone and, where ways are long, collisions that cost more than they."""
-    moves, rewards, learner = shortest_steps(world.mdp()), world.rewards, world.learner
-    if world.worth(moves, rewards.goal) <= rewards.collision:
-        endless = rewards.step / (1.0 - learner.discount)
-        rewards = replace(rewards, collision=round(endless - 1.0, 6))
+    """The world with a learner that mostly finds a way alone."""
+    moves, learner = shortest_steps(world.mdp()), world.learner
     learner = replace(learner, **_ALONE, max_steps=max(learner.max_steps, _ROOM * moves))
-    return world.model_copy(update={"rewards": rewards, "learner": learner})
+    return world.model_copy(update={"learner": learner})
 
 
 def write_random(shape: str, density: float, seed: int, out: Path) -> dict[str, Any]:

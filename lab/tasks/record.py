@@ -1,14 +1,15 @@
 """What task files are made of: frozen records of checked fields, names, and how a problem is learned."""
 
 from dataclasses import asdict, replace
+from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any, Self, cast
 
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, field_validator
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationInfo, field_validator
 from pydantic_core import CoreSchema
 
 from lab import files
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import Rewards
 
@@ -43,12 +44,36 @@ class _FromTable:
 FROM_TABLE = _FromTable()
 
 
-class Learned(Record):
-    """How something is learned: rewards, learner and gate, which spares the best episodes unless a file says otherwise."""
+def walking(step: float, learner: LearnerSettings) -> float:
+    """What walking as long as can be is worth, for ever or, without discount, through an episode; `step`: a move's reward."""
+    for_ever = inf if learner.discount == 1.0 else 1.0 / (1.0 - learner.discount)
+    return step * min(for_ever, learner.max_steps)
 
-    rewards: Annotated[Rewards, FROM_TABLE] = Rewards()
+
+class Learned(Record):
+    """How something is learned: learner, rewards and gate, which spares the best episodes unless a file says otherwise.
+
+    Where a file names no `rewards.collision`, it costs the goal's worth more than walking as long as can be: however long a
+    learner has strayed, it does better to go on than to crash.
+    """
+
     learner: Annotated[LearnerSettings, FROM_TABLE] = LearnerSettings()
+    rewards: Annotated[Rewards, FROM_TABLE] = Field(default=cast(Rewards, {}), validate_default=True)
     gate: Annotated[GateSettings, FROM_TABLE] = GateSettings(spare_best=True)
+
+    @field_validator("rewards", mode="before")
+    @classmethod
+    def _crash_costs_most(cls, rewards: Any, others: ValidationInfo) -> Any:
+        if not isinstance(rewards, dict) or "collision" in rewards or "learner" not in others.data:
+            return rewards
+        goal, step = (rewards.get(name, getattr(Rewards, name)) for name in ("goal", "step"))
+        if (
+            not all(isinstance(value, int | float) and isfinite(value) for value in (goal, step))
+            or goal <= 0
+            or step > 0
+        ):
+            return rewards  # which is refused
+        return rewards | {"collision": round(walking(step, others.data["learner"]) - goal, 6)}
 
     @field_validator("gate", mode="before")
     @classmethod
@@ -62,6 +87,20 @@ class Learned(Record):
             if abs(value) > MAX_REWARD:
                 raise ValueError(f"{field} = {value}: allowed are -{MAX_REWARD} to {MAX_REWARD}")
         return rewards
+
+    def warning(self) -> str | None:
+        """Why these rewards make crashing the better choice for a learner that has strayed; None where they do not."""
+        collision, learner, moves, walked = self.rewards.collision, self.learner, 0, 0.0
+        if collision < walking(self.rewards.step, learner):
+            return None
+        while walked > collision and moves < learner.max_steps:
+            walked += self.rewards.step * learner.discount**moves
+            moves += 1
+        fitting = walking(self.rewards.step, learner) - self.rewards.goal
+        return (
+            f"rewards.collision = {collision}: {counted(moves, 'move')} cost as much, so a learner that has strayed longer "
+            f"does better to crash: wanted a lower one; left out, it is {fitting:g}"
+        )
 
     def check_members(self, where: str = "") -> None:
         """Raises BadInput for an unknown learner, selection or gate; `where` comes before the names of the tables."""

@@ -8,6 +8,7 @@ from lab.advice.journal import Journal
 from lab.learning import session_events as session
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Request
+from lab.learning.session import Session
 from lab.learning.settings import GateSettings
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
@@ -45,6 +46,13 @@ class AdvisorGathered:
     """Who advises in the session that begins now, several as a `Panel`."""
 
     advisor: Advisor | None
+
+
+@dataclass(frozen=True)
+class SessionBegan:
+    """A session of the lesson begins; its table and counts are those of the learner under way."""
+
+    session: Session
 
 
 @dataclass(frozen=True)
@@ -131,6 +139,7 @@ Event = (
     | LessonContinued
     | LessonBegan
     | AdvisorGathered
+    | SessionBegan
     | LessonEvent
     | QuestionAnswered
     | PhaseBegan

@@ -10,25 +10,29 @@ import numpy as np
 from lab.advice.advising import Advising
 from lab.advice.journal import Again, Journal
 from lab.learning import session_events as session
-from lab.learning.environment import TableEnvironment, unreached
+from lab.learning.environment import TableEnvironment
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Request, Walked
 from lab.learning.session import Session, SessionResult
 from lab.learning.session_events import AdviceEnded, AdviceRejected
 from lab.learning.settings import LearnerSettings
-from lab.mdp import FloatArray, greedy_path
-from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, Tell
+from lab.mdp import FloatArray, fewest_moves, greedy_moves, greedy_path
+from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, SessionBegan, Tell
 from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.policy import Policy
 
-MORE_SESSIONS = 3  # to find a shorter way once the goal is reached
+MORE_SESSIONS = 8  # to find a shorter way once the goal is reached
 
 
 def learn(plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tell: Tell) -> SessionResult:
     """All sessions of a lesson as one, run from the beginning each time an answer is taken back.
 
-    Up to `plan.sessions` are run until the greedy path is as short as can be; once it leads to the goal, at most
-    MORE_SESSIONS further ones look for a shorter one. A table that leads to the goal is never given up for a worse one.
+    Up to `plan.sessions` are run until the greedy paths are as short as can be; once they lead to the goal, at most
+    MORE_SESSIONS further ones look for shorter ones. A table that leads to the goal is never given up for a worse one.
+
+    In a lesson of several sessions nobody is asked in these further ones, and a session alone, there or because nobody is
+    left to ask, does not go on from the best table but from values that no move can beat: then every move that might
+    lead to a shorter way is tried (optimistic initial values, Sutton and Barto 1998, section 2.7).
     """
     while True:
         tell(LessonBegan(plan, journal))
@@ -48,6 +52,9 @@ class _Sessions:
         lived = 0 if plan.unfinished is None else len(plan.unfinished.curve)  # what did not help is not drawn again
         self.rng = np.random.default_rng([seed, crc32(plan.problem.name.encode()), lived])
         self.alone = False  # the advisor left or was rejected: nobody is asked about this skill again
+        self.hopeful: FloatArray | None = None  # the table of the sessions alone
+        mdp = plan.problem.mdp  # one session is not followed by another
+        self.fewest = float(fewest_moves(mdp)[list(mdp.starts)].sum()) if mdp.starts and plan.sessions > 1 else inf
 
     def run(self) -> SessionResult:
         """The curves of all sessions, with the best table of these and of the unfinished policy."""
@@ -58,13 +65,13 @@ class _Sessions:
         whole: SessionResult | None = None
         while left:
             left -= 1
-            result = self._session(None if kept is None else kept.q)
+            result = self._session(None if kept is None else kept.q, reached=moves < inf)
             whole, now = joined(whole, result), moves_to_goal(result.q, plan.problem, plan.learner)
             if now <= moves:
                 if now < moves == inf:
                     left = MORE_SESSIONS if several else 0
                 kept, moves = result, now
-            if result.interrupted or (kept is result and result.solved and now < inf):
+            if result.interrupted or (kept is result and result.solved and now <= self.fewest):
                 break
         assert whole is not None
         assert kept is not None
@@ -72,9 +79,26 @@ class _Sessions:
             kept = unfinished  # no shorter way: with the same table, what was measured with it still holds
         return replace(whole, q=kept.q, final_steps=kept.final_steps, solved=kept.solved)
 
-    def _session(self, q0: FloatArray | None) -> SessionResult:
-        plan, advisor = self.plan, None if self.alone else self._advisor()
-        return Session(self.place, plan.learner, self.gate, advisor, self.rng, q0).run(self._hear)
+    def _session(self, q0: FloatArray | None, reached: bool) -> SessionResult:
+        plan, several = self.plan, self.plan.sessions > 1
+        advisor = None if self.alone or (several and reached) else self._advisor()
+        hopes = several and advisor is None
+        if hopes:
+            q0 = self._hopeful(q0, reached)
+        session = Session(self.place, plan.learner, self.gate, advisor, self.rng, q0)
+        self.tell(SessionBegan(session))
+        result = session.run(self._hear)
+        self.hopeful = result.q if hopes else None
+        return result
+
+    def _hopeful(self, q0: FloatArray | None, reached: bool) -> FloatArray:
+        """The start values of a session alone: those of the one before, or of what was broken off, or the best reward."""
+        mdp, unfinished = self.plan.problem.mdp, self.plan.unfinished
+        if self.hopeful is not None:
+            return self.hopeful
+        if q0 is not None and unfinished is not None and q0 is unfinished.q and not reached:
+            return q0
+        return np.full(mdp.successor.shape, mdp.reward.max())
 
     def _advisor(self) -> Advisor | None:
         made = self.advising.gather(self.place, self.plan.learner, self.rng, journal=self.journal, tell=self._hear)
@@ -107,13 +131,15 @@ def fits(q: FloatArray, problem: Problem, learner: LearnerSettings) -> bool:
 
 
 def moves_to_goal(q: FloatArray, problem: Problem, learner: LearnerSettings) -> float:
-    """The moves of the greedy path from the start; infinite when it, or that from another start, misses the goal."""
+    """The moves of the greedy paths from the problem's starts, together; infinite when one of them misses the goal."""
     if problem.environment is not None:
         steps = problem.environment.judge(q, learner).final_steps
         return inf if steps is None else steps
     mdp = problem.mdp
+    if mdp.starts:
+        return float(greedy_moves(q, mdp)[list(mdp.starts)].sum())
     _, actions, reached = greedy_path(q, mdp, mdp.n_states)
-    return len(actions) if reached and not unreached(q, mdp) else inf
+    return len(actions) if reached else inf
 
 
 def joined(before: SessionResult | Policy | None, now: SessionResult) -> SessionResult:

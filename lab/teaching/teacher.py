@@ -87,8 +87,9 @@ class Teacher:
         length = {"episodes": 0}
         broken_off = len(policy.curve) < policy.learner.get("episodes", 0)
         gate, advisor = asdict(plan.gate), str(self.advising)
-        alike = gate | policy.gate == gate and policy.advisor == advisor  # an older one does not know all settings
-        return policy.learner | length == asdict(plan.learner) | length and (alike or broken_off)
+        learner = asdict(plan.learner) | length  # an older policy does not know all settings
+        alike = gate | policy.gate == gate and policy.advisor == advisor
+        return learner | policy.learner | length == learner and (alike or broken_off)
 
     def teach(self, plan: LessonPlan) -> Lesson:
         """Teach what is planned, and save the policy, solved or not. WorkFailed when several sessions find no way."""

@@ -37,14 +37,18 @@ def test_task_list_show_and_check(lab: Lab, folder: Path, toml: str) -> None:
     (folder / "far" / "mine.toml").write_text(toml)
     ran = lab("task", "check", "far/mine.toml")
     assert (ran.code, ran.out, ran.err) == (0, "far/mine.toml is sound\n", "")
-    assert lab("task", "check", "far/mine.toml", "--toasts", "1", "--json").json == {"valid": True, "errors": []}
+    assert lab("task", "check", "far/mine.toml", "--toasts", "1", "--json").json == {
+        "valid": True,
+        "errors": [],
+        "warnings": [],
+    }
 
 
 def test_a_world_is_shown_checked_and_learned(lab: Lab, folder: Path, root: Path) -> None:
     assert lab("task", "show", "world-1").out == (root / "tasks" / "world-1.toml").read_text(encoding="utf-8")
     shown = lab("task", "show", "world-1", "--json").json
     assert (shown["kind"], shown["shape"], len(shown["obstacles"])) == ("world", [10, 10, 10], 59)
-    assert lab("task", "check", "world-1").out == "world-1 is sound\n"
+    assert lab("task", "check", "world-1").out.startswith("world-1 is sound\nmind: rewards.collision = -1.0: ")
     ran = lab("teach", "world-1", "--sight", "limited", "--json")
     assert (ran.code, ran.err) == (0, "")
     assert (ran.json["subtask"], ran.json["view"], ran.json["optimal_steps"]) == ("world", "limited", 13)
@@ -91,4 +95,7 @@ def test_a_damaged_task_file_is_reported_by_check(lab: Lab, folder: Path) -> Non
     ran = lab("task", "check", "t.toml")
     assert (ran.code, ran.out) == (2, "")
     ran = lab("task", "check", "t.toml", "--json")
-    assert (ran.code, ran.json) == (2, {"valid": False, "errors": [ran.err.removeprefix("lab: ").strip()]})
+    assert (ran.code, ran.json) == (
+        2,
+        {"valid": False, "errors": [ran.err.removeprefix("lab: ").strip()], "warnings": []},
+    )

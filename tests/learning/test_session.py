@@ -28,7 +28,7 @@ from lab.learning.updates import UPDATES
 from lab.mdp import FloatArray, Rewards, TabularMDP, coverage, greedy_path, grid, optimal_values
 
 EARLY = GateSettings(first_episode=5, window=2)
-WHOLE_WAYS = ("q-lambda", "sarsa-lambda", "monte-carlo")  # with lambda 1 they learn a whole way at once
+WHOLE_WAYS = ("q-lambda", "sarsa-lambda", "monte-carlo", "dyna-q")  # with lambda 1 they learn a whole way at once
 SHORT = LearnerSettings(episodes=60, max_steps=30)
 
 

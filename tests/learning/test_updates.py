@@ -1,5 +1,7 @@
 """Update rules on tables of two or three states, redone by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -62,6 +64,20 @@ def test_a_terminal_step_learns_the_reward_alone(name: str) -> None:
 
 
 WALK: list[Step] = [(0, 1, -1.0, 0.5, 1, 1), (1, 1, 2.0, 0.0, 2, 0)]
+
+
+def test_dyna_q_learns_from_earlier_moves_again_the_newest_first() -> None:
+    # step 1: Q(0,1) = -.5, and again: -.75. Step 2: Q(1,1) = 1, again: 1.5, then step 1: -.75 + .5 (-1 + .5*1.5 + .75)
+    assert learned("dyna-q", WALK, [[0.0, 0.0]] * 3) == [[0.0, -0.5], [0.0, 1.5], [0.0, 0.0]]
+    none = replace(HALF, planning=0)
+    assert learned("dyna-q", WALK, [[0.0, 0.0]] * 3, none) == learned("q", WALK, [[0.0, 0.0]] * 3)
+
+
+def test_dyna_q_remembers_what_a_move_led_to_last() -> None:
+    # alpha 1: the move is worth 1, and by the newer outcome 3; a third move learns from it once more
+    settings = LearnerSettings(alpha=1.0, discount=0.5, planning=2)
+    steps: list[Step] = [(0, 1, 1.0, 0.0, 2, 0), (0, 1, 3.0, 0.0, 2, 0), (1, 1, 0.0, 0.5, 0, 0)]
+    assert learned("dyna-q", steps, [[0.0, 0.0]] * 3, settings) == [[0.0, 3.0], [0.0, 1.5], [0.0, 0.0]]
 
 
 def test_q_lambda_carries_the_goal_back() -> None:

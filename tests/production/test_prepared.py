@@ -7,8 +7,31 @@ from typing import Any
 import pytest
 
 from lab.errors import BadInput
-from lab.skills.prepared_scene import check_task
+from lab.skills import prepared_scene
 from lab.tasks.task_file import names_of
+
+
+def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
+    return prepared_scene.check_task(file, toasts, seed)[0]
+
+
+def test_rewards_that_make_crashing_the_better_choice_are_warned_of(tmp_path: Path, root: Path) -> None:
+    """After 11 moves at -0.1 and discount 0.99 walking has cost 1.05; to butter nothing can be run into."""
+    text = (root / "tasks" / "toast.toml").read_text(encoding="utf-8")
+    path = tmp_path / "t.toml"
+    path.write_text(text)
+    assert prepared_scene.check_task(str(path), 1, 0) == ([], [])
+    path.write_text(text.replace("rewards = { goal = 1.5,", "rewards = { goal = 1.5, collision = -1.0,"))
+    errors, warnings = prepared_scene.check_task(str(path), 1, 0)
+    assert errors == []
+    assert [slip.split(" = ")[0] for slip in warnings] == [
+        f"subtasks.{name}.rewards.collision" for name in ("grasp", "transfer", "insert", "place")
+    ]
+    assert warnings[0].endswith(
+        "-1.0: 11 moves cost as much, so a learner that has strayed longer does better to crash: wanted a lower one; "
+        "left out, it is -11.5"
+    )
+    assert len(prepared_scene.check_task("world-1", None, 0)[1]) == 1  # as printed in the thesis
 
 
 def test_check_finds_what_is_wrong(tmp_path: Path, root: Path) -> None:

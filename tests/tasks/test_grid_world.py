@@ -42,7 +42,7 @@ def test_rows_run_down_and_columns_to_the_right() -> None:
     mdp = SMALL.mdp()
     assert mdp.action_labels == ("up", "down", "left", "right")
     assert mdp.successor[0].tolist() == [0, 3, 0, 1]  # from (0, 0): the border, (1, 0), the border, (0, 1)
-    assert mdp.reward[0].tolist() == [-0.1, -0.1, -0.1, -1.0]
+    assert mdp.reward[0].tolist() == [-0.1, -0.1, -0.1, -11.5]
     assert mdp.reward[5, 0] == 1.5  # from (1, 2) up
     assert (mdp.start, np.flatnonzero(mdp.goal).tolist(), shortest_steps(mdp)) == (0, [2], 4)
 
@@ -94,12 +94,12 @@ def test_the_worth_of_a_way(moves: int, discount: float, worth: float) -> None:
 
 def test_a_world_where_no_way_pays_is_refused() -> None:
     """A way of 79 moves costs more than running into the wall at once; what the values say, too."""
-    far = GridWorld(name="far", shape=(2, 80), start=(0, 0), goal=(0, 79), obstacles=((1, 0),))
+    dear = GridWorld(name="far", shape=(2, 80), start=(0, 0), goal=(0, 79), obstacles=((1, 0),))
+    far = dear.model_copy(update={"rewards": Rewards(collision=-1.0)})
     reason = r"rewards.collision = -1.0: .* is worth -1.00 and the way of 79 moves only -4.75: wanted a lower one"
     with pytest.raises(BadInput, match=rf"^world 'far': {reason}"):
         far.check()
     assert not greedy_path(optimal_values(far.mdp(), 0.99), far.mdp(), 100)[2]
-    dear = far.model_copy(update={"rewards": Rewards(collision=-11.0)})
     assert greedy_path(optimal_values(dear.check(), 0.99), dear.mdp(), 100)[2]
 
 
@@ -163,7 +163,7 @@ def test_a_long_way_gets_long_episodes_and_dear_collisions(tmp_path: Path) -> No
     rows = [row if len(row) == 21 else row + ("#" if row[0] == "." else ".") for row in rows]
     rows[0], rows[20] = "S" + rows[0][1:], rows[20][:-1] + "G"
     world = from_text(grid_file(tmp_path, "\n".join(rows)))
-    assert (shortest_steps(world.check()), world.learner.max_steps, world.rewards.collision) == (240, 960, -11.0)
+    assert (shortest_steps(world.check()), world.learner.max_steps, world.rewards.collision) == (240, 960, -11.5)
 
 
 # ---- drawn worlds -------------------------------------------------------------------------------------------------

@@ -106,9 +106,9 @@ def test_the_toast_task_is_the_cell_of_the_thesis() -> None:
     assert len(task.stations) == 6
     for name in SKILLS:
         settings = task.subtask(name)
-        assert (settings.rewards.goal, settings.rewards.collision, settings.rewards.step) == (1.5, -1.0, -0.1)
+        assert (settings.rewards.goal, settings.rewards.collision, settings.rewards.step) == (1.5, -11.5, -0.1)
         learner, gate = settings.learner, settings.gate
-        assert (learner.learner, learner.alpha, learner.discount, learner.trace) == ("q-lambda", 0.95, 0.99, 0.5)
+        assert (learner.learner, learner.alpha, learner.discount) == ("dyna-q", 0.95, 0.99)
         assert (learner.beta, gate.gate) == (1.3, "ccrl")
         assert gate.spare_best  # the file says nothing of it, and its own gate table leaves it as it is
     assert task.insert.shape == (12, 12)
@@ -208,9 +208,9 @@ def test_what_is_no_text_is_said(tmp_path: Path) -> None:
         ('name = "cubes B"', 'name = "a/b"', "(got 'a/b')"),
         ('name = "cubes B"', 'name = "a > b"', "(got 'a > b')"),
         (
-            'learner = "q-lambda"',
-            'learner = "q-lamda"',
-            "unknown learner 'q-lamda' (subtasks.transfer.learner): did you",
+            'learner = "dyna-q"',
+            'learner = "dyna"',
+            "unknown learner 'dyna' (subtasks.transfer.learner): did you",
         ),
         ('gate = "ccrl"', 'gate = "crcl"', "unknown gate 'crcl' (subtasks.transfer.gate): did you mean 'ccrl'?"),
         ('method = "srl-time"', 'method = "slr"', "unknown method 'slr' (sequencing.method): did you mean 'srl'?"),
@@ -231,10 +231,10 @@ def test_what_is_no_text_is_said(tmp_path: Path) -> None:
         ),
         ("alpha = 0.95", "alpha = 1.5", "subtasks.transfer.learner.alpha: Input should be less than or equal to 1"),
         ("omega = 7", "omega = -1", "subtasks.transfer.gate.omega: Input should be greater than or equal to 0"),
-        ("collision = -1.0", "collision = 1.0", "rewards.collision: Input should be less than 0 (got 1.0)"),
+        ("step = -0.1", "collision = 1.0", "rewards.collision: Input should be less than 0 (got 1.0)"),
         ("title =", "titel =", "titel: there is no such key (got 'Toast making with one robot')"),
         ("speed_m_s = 0.5", "sped_m_s = 0.5", "robot.sped_m_s: there is no such key"),
-        ("trace = 0.5", "trce = 0.5", "subtasks.transfer.learner.trce: "),
+        ("beta = 1.3", "bta = 1.3", "subtasks.transfer.learner.bta: "),
         ('kind = "buffer"', 'kind = "bufer"', "stations.1.kind: Input should be 'storage', 'buffer' or 'machine'"),
         ("processing_s = 60.0", "", "machine 'toaster' needs either processing_s or process, a sub-task to learn, not"),
         ("dwell_s = 3.0", "processing_s = 3.0", "machine 'butter_applier' needs either processing_s or process"),
@@ -255,7 +255,7 @@ def test_what_is_no_text_is_said(tmp_path: Path) -> None:
         ("episodes = 200", "episodes = 0", "subtasks.transfer.learner.episodes: Input should be greater than or equal"),
         ("goal = 1.5", "goal = inf", "subtasks.transfer.rewards.goal: Input should be a finite number (got inf)"),
         (
-            "collision = -1.0",
+            "step = -0.1",
             "collision = -inf",
             "subtasks.transfer.rewards.collision: Input should be a finite number",
         ),

@@ -84,7 +84,7 @@ def test_a_policy_of_another_size_or_with_other_actions_is_not_taken(teacher: Te
     sound = teacher.find_or_teach(plan(), {}).policy
     q, visits = np.zeros((7, 4)), np.zeros((7, 4), np.int64)
     for wrong in (
-        replace(sound, q=q, visits=visits, shape=(7,), start=0),
+        replace(sound, q=q, visits=visits, ends=None, shape=(7,), start=0),
         replace(sound, action_labels=("n", "s", "w", "e")),
     ):
         assert teacher.find_or_teach(plan(), known(wrong)).source == "learned"
@@ -145,13 +145,25 @@ def scripted(monkeypatch: pytest.MonkeyPatch, tables: "list[np.ndarray[Any, Any]
 def test_a_worse_table_never_replaces_a_better_one(teacher: Teacher, monkeypatch: pytest.MonkeyPatch) -> None:
     longer = detour(teacher)
     lost = np.zeros_like(longer.q)
-    began = scripted(monkeypatch, [lost, longer.q, lost, lost, lost])
+    scripted(monkeypatch, [lost, longer.q, *[lost] * MORE_SESSIONS])
     policy = teacher.teach(plan()).policy
-    assert [q is longer.q for q in began] == [False, False, True, True, True]  # MORE_SESSIONS after it fits
     assert (policy.final_steps, policy.solved, policy.q is longer.q) == (7, False, True)
     scripted(monkeypatch, [lost])
     policy = teacher.teach(plan(unfinished=longer, sessions=1)).policy
     assert (policy.final_steps, policy.q is longer.q) == (7, True)
+
+
+def test_once_it_fits_shorter_ways_are_looked_for_alone_and_with_hope(
+    teacher: Teacher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Then nobody is asked, and every move begins as good as the goal; the next session goes on from the one before."""
+    longer = detour(teacher)
+    further = [np.full_like(longer.q, -n) for n in range(MORE_SESSIONS)]
+    began = scripted(monkeypatch, [longer.q, *further])
+    teacher.teach(plan())
+    assert began[0] is None
+    assert np.array_equal(began[1], np.full_like(longer.q, 1.5))
+    assert all(began[n + 2] is further[n] for n in range(MORE_SESSIONS - 1))
 
 
 def test_going_on_keeps_the_history(teacher: Teacher) -> None:

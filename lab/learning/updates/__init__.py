@@ -7,6 +7,7 @@ from lab.learning.settings import LearnerSettings
 from lab.learning.updates.afterstate import Afterstate
 from lab.learning.updates.episode_returns import MonteCarlo
 from lab.learning.updates.one_step import QLearning, Sarsa
+from lab.learning.updates.planning import DynaQ
 from lab.learning.updates.traces import SarsaLambda, WatkinsQLambda
 from lab.learning.updates.update import ACTION_VALUES, STATE_VALUES, Row, Table, Update
 from lab.mdp import TabularMDP
@@ -18,6 +19,9 @@ UPDATES: dict[str, Member[Callable[[list[Row], LearnerSettings, TabularMDP], Upd
     "sarsa": Member(Sarsa, "as q, but judged by the move that is really made next"),
     "q-lambda": Member(WatkinsQLambda, "as q, with traces: each step corrects the moves before it, too"),
     "sarsa-lambda": Member(SarsaLambda, "as sarsa, with traces: each step corrects the moves before it, too"),
+    "dyna-q": Member(
+        DynaQ, "as q, and each step is followed by learning from earlier ones again, out of a model of them"
+    ),
     "monte-carlo": Member(MonteCarlo, "moves are judged by the whole rest of the episode"),
     "afterstate": Member(
         Afterstate, "learns what the states are worth that moves lead to, not the moves", STATE_VALUES

@@ -1,0 +1,204 @@
+"""What an advisor's help is worth over nobody's: what a lesson of each skill of the toast task costs until it is solved."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.advice.advising import Advising
+from lab.advice.advisors import SKILL_TAUS
+from lab.advice.journal import Journal
+from lab.learning.session_events import EpisodeEnded
+from lab.mdp import FloatArray, TabularMDP, fewest_moves, greedy_moves
+from lab.skills.prepared_scene import Prepared, prepare
+from lab.studies.charts import bars, legend_below
+from lab.studies.findings import Findings, Row, row, share_row, varying_row
+from lab.studies.runner import Job, seeds_of
+from lab.tasks.task_file import load
+from lab.teaching.events import Event, LessonEvent, SessionBegan
+from lab.teaching.lesson_plan import LessonPlan
+from lab.teaching.lesson_sessions import learn
+from lab.view.canvas import BLUE, GREEN, INK, ORANGE, RED, SKY, picture_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+TASK, TOASTS, SCENE_SEED = "toast", 3, 0
+NOBODY = "none"
+ADVISORS = (NOBODY, *SKILL_TAUS, "wrong")
+COLOURS = dict(zip(ADVISORS, (INK, BLUE, GREEN, SKY, ORANGE, RED), strict=True))
+MOST = 40  # lessons a skill and advisor
+LOOKED = 10  # with several starts, whose ways take longer to look at, the table is looked at in every tenth episode
+
+MEASURES = (
+    "A lesson is what lab run gives: sessions one after the other, with the task file's learner and gate. It is solved when the "
+    "greedy way from every start is a shortest one. Episodes and moves: those of the learner until then, walks with advice "
+    f"counted (looked at after each episode, after every {LOOKED}th where episodes begin in several places). Helped: advised "
+    "steps until then. Saved: by how much fewer moves it takes than with nobody, of the means, with the interval of the "
+    "difference (Welch)."
+)
+SCENE = (
+    f"Task {TASK}, {TOASTS} toasts, the scene of seed {SCENE_SEED}; at most {MOST} lessons a skill and advisor. A simulated "
+    "advisor knows the optimal values, which nobody does in a kitchen; wrong: takes the worst action for the best."
+)
+
+
+@dataclass(frozen=True)
+class Pupil:
+    """Which skill is learned, with whose advice."""
+
+    skill: str
+    advisor: str
+
+
+@dataclass(frozen=True, eq=False)
+class Cost:
+    """What N lessons took until they were solved, (N,) each; one that was never solved counts with all that it took."""
+
+    solved: NDArray[np.bool_]
+    episodes: NDArray[np.int64]
+    moves: NDArray[np.int64]
+    helped: NDArray[np.int64]
+
+
+@dataclass
+class Watch:
+    """Listens to a lesson until its table is as good as can be."""
+
+    mdp: TabularMDP
+    fewest: FloatArray
+    solved: bool = False
+    episodes: int = 0
+    moves: int = 0
+    helped: int = 0
+
+    @classmethod
+    def over(cls, mdp: TabularMDP) -> "Watch":
+        """Of a problem, from every place in which an episode may begin."""
+        return cls(mdp, fewest_moves(mdp))
+
+    def hear(self, event: Event) -> None:
+        """Counts an episode, and looks at what was learned by it."""
+        if isinstance(event, SessionBegan):
+            self.session, self.before = event.session, self.moves
+        if self.solved or not isinstance(event, LessonEvent) or not isinstance(event.event, EpisodeEnded):
+            return
+        self.episodes += 1
+        self.helped += event.event.helped_steps
+        self.moves = self.before + sum(map(sum, self.session.visits))
+        starts = list(self.mdp.starts or (self.mdp.start,))
+        if len(starts) == 1 or self.episodes % LOOKED == 0:
+            ways = greedy_moves(np.array(list(self.session.q)), self.mdp)
+            self.solved = np.array_equal(ways[starts], self.fewest[starts])
+
+
+def advice_worth(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """Every skill of the toast task with every advisor, and nobody."""
+    skills = list(scene().problems)
+    pupils = [Pupil(skill, advisor) for skill in skills for advisor in ADVISORS]
+    found = job.each(partial(taught, lessons=min(job.sessions, MOST), seed=job.seed), pupils)
+    subtasks = dict.fromkeys(problem.subtask for problem in scene().problems.values())
+    costs: dict[str, dict[str, Cost]] = {}
+    rows: list[Row] = []
+    for skill in skills:
+        rows += [one for advisor in ADVISORS for one in rows_of(skill, advisor, found)]
+    for subtask in subtasks:
+        of = [skill for skill in skills if scene().problems[skill].subtask == subtask]
+        costs[subtask] = {name: joined([found[Pupil(skill, name)] for skill in of]) for name in ADVISORS}
+    pictures = {
+        f"{subtask}: lessons that are solved after so many moves": solved_after(of) for subtask, of in costs.items()
+    }
+    return Findings(
+        rows, in_short(costs), {"Moves until a lesson is solved": moves_of(costs)} | pictures, (MEASURES, SCENE)
+    )
+
+
+@cache
+def scene() -> Prepared:
+    """The scene whose skills are learned."""
+    return prepare(load(TASK), TOASTS, SCENE_SEED)
+
+
+def taught(pupil: Pupil, *, lessons: int, seed: int) -> Cost:
+    """So many lessons of a skill with an advisor."""
+    problem = scene().problems[pupil.skill]
+    how, advising = scene().task.subtask(problem.subtask), Advising.of([pupil.advisor])
+    plan = LessonPlan(problem, how.learner, how.gate, TASK)
+    watches = []
+    for own in seeds_of(replace(pupil, advisor=""), lessons, seed):  # every advisor has the same lessons
+        watch = Watch.over(problem.mdp)
+        learn(plan, advising, int(own), Journal(), watch.hear)
+        watches.append(watch)
+    columns = zip(*((one.solved, one.episodes, one.moves, one.helped) for one in watches), strict=True)
+    solved, episodes, moves, helped = (np.array(column) for column in columns)
+    return Cost(solved, episodes, moves, helped)
+
+
+def joined(costs: Sequence[Cost]) -> Cost:
+    """The lessons of several skills as those of one."""
+    return Cost(*(np.concatenate([getattr(one, name) for one in costs]) for name in Cost.__dataclass_fields__))
+
+
+def rows_of(skill: str, advisor: str, found: Mapping[Pupil, Cost]) -> list[Row]:
+    """The measures of a skill and an advisor, and what it saves over nobody."""
+    of, alone = found[Pupil(skill, advisor)], found[Pupil(skill, NOBODY)]
+    named: Row = {
+        "skill": skill,
+        "subtask": scene().problems[skill].subtask,
+        "advisor": advisor,
+        "lessons": len(of.moves),
+    }
+    rows = [
+        share_row(named, "solved_percent", of.solved),
+        varying_row(named, "episodes_to_solve", of.episodes),
+        varying_row(named, "moves_to_solve", of.moves),
+        varying_row(named, "helped_steps", of.helped),
+    ]
+    return rows if advisor == NOBODY else [*rows, saved_row(named, of, alone)]
+
+
+def saved_row(named: Row, of: Cost, alone: Cost) -> Row:
+    """By how much fewer moves a lesson takes than with nobody [%], with the interval of the difference of the means."""
+    from scipy.stats import ttest_ind
+
+    low, high = ttest_ind(alone.moves, of.moves, equal_var=False).confidence_interval(0.95)
+    percent = 100.0 / alone.moves.mean()
+    ends = None if np.isnan(low) else (low * percent, high * percent)
+    return row(named, "saved_percent", (alone.moves.mean() - of.moves.mean()) * percent, ends)
+
+
+def in_short(costs: Mapping[str, Mapping[str, Cost]]) -> Row:
+    """Means over the skills of a sub-task, and whether every lesson was solved."""
+    says: Row = {}
+    for subtask, of in costs.items():
+        for name, cost in of.items():
+            says[f"{subtask}, {name}: moves"] = round(float(cost.moves.mean()))
+            says[f"{subtask}, {name}: helped"] = round(float(cost.helped.mean()))
+            says[f"{subtask}, {name}: solved [%]"] = round(100.0 * float(cost.solved.mean()), 1)
+    return says
+
+
+def moves_of(costs: Mapping[str, Mapping[str, Cost]]) -> bytes:
+    """Bars of the moves until a lesson is solved, by sub-task and advisor."""
+    lines = {name: [varying_row({}, "moves_to_solve", of[name].moves) for of in costs.values()] for name in ADVISORS}
+    named = {("nobody" if name == NOBODY else name): line for name, line in lines.items()}
+    return bars(list(costs), named, "moves until it is solved")
+
+
+def solved_after(of: Mapping[str, Cost]) -> bytes:
+    """The share of lessons that are solved after so many moves, a curve for each advisor."""
+
+    def draw(figure: "Figure") -> None:
+        axes = figure.add_subplot()
+        for name, cost in of.items():
+            moves = np.sort(np.where(cost.solved, cost.moves, np.inf))
+            share = 100.0 * np.arange(1, len(moves) + 1) / len(moves)
+            axes.step(moves, share, where="post", color=COLOURS[name], label="nobody" if name == NOBODY else name)
+        axes.set(xlabel="moves of the learner", ylabel="lessons solved [%]", ylim=(0, 103), xlim=(0, None))
+        axes.grid()
+        legend_below(figure)
+
+    return picture_bytes(draw, 5.6, 3.6)
