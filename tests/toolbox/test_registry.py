@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput, WorkFailed
 from lab.toolbox.policy import Policy
-from lab.toolbox.registry import FORMAT, Toolbox, default_folder, slug
+from lab.toolbox.names import FORMAT, default_folder, slug
+from lab.toolbox.registry import Toolbox
 
 SIGNATURE = "0123456789abcdef"
 
