@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput, WorkFailed, unknown
 from lab.toolbox import records
+from lab.toolbox.folder_place import FolderPlace
 from lab.toolbox.index import Index, Key, KnownPolicies, Row
-from lab.toolbox.names import SUFFIX, default_folder, slug
-from lab.toolbox.place import place_of, read_file
+from lab.toolbox.names import SUFFIX, default_address, is_address, slug
+from lab.toolbox.place import Place, read_file
 from lab.toolbox.versions import TRASH, VERSIONS, Saved, Version, Versions
 
 if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
-
-__all__ = ["Toolbox", "default_folder", "slug"]
 
 Rows = list[Row]
 Words = list[str]
@@ -35,7 +34,7 @@ class Toolbox:
     """
 
     def __init__(self, where: Path | str | None = None):
-        self.place = place_of(where)
+        self.place = _place_of(where)
         self.folder = self.place.folder
         self.address = self.place.address
         self._index = Index(self.place)
@@ -287,6 +286,18 @@ class Toolbox:
         near = get_close_matches(name, named, n=_NEAREST, cutoff=0.5)
         hint = f"did you mean '{near[0]}'? near: {', '.join(near)}; " if near else ""
         raise BadInput(f"unknown policy '{name}' ({where}): {hint}lab toolbox list names all {len(named)} policies")
+
+
+def _place_of(where: Path | str | None) -> Place:
+    """The place that a folder or an address names, by default the user's own."""
+    text = default_address() if where is None else str(where)
+    if text.startswith("file://"):
+        text = text.removeprefix("file://")
+    if is_address(text):
+        from lab.toolbox.remote_place import RemotePlace
+
+        return RemotePlace(text)
+    return FolderPlace(Path(text))
 
 
 def _worth(row: Row) -> tuple[bool, str]:

@@ -71,11 +71,14 @@ class Versions:
         return {version.hash: version for version in found}
 
     def in_use(self) -> InUse | None:
-        """The policy in use; None when there is none, or a damaged one."""
-        with suppress(BadInput):
+        """The policy in use; None when there is none, or a damaged one. Raises BadInput when it may not be read."""
+        try:
             content = self._place.read(self.in_use_file)
             return InUse(content, hash_of(content), decode(content, self._place.where(self.in_use_file)))
-        return None
+        except BadInput as error:
+            if isinstance(error.__cause__, OSError):  # it may be a good one, and must not be replaced
+                raise unreadable(self._place.where(self.in_use_file), error) from error
+            return None
 
     def read(self, version: Version) -> Policy:
         """A kept version. Raises BadInput when its bytes are not those that its name says, or are no sound policy."""
