@@ -5,7 +5,7 @@ import fcntl
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from lab import files
@@ -43,10 +43,12 @@ class FolderPlace:
     def files(self, under: str = "") -> dict[str, FileState]:
         found, fresh = {}, time.time_ns() - _FRESH_NS
         for entry in self._entries(under):
-            with suppress(OSError):  # gone meanwhile, or a link to nothing
+            try:
                 at = entry.stat()
-                stamp = f"{at.st_mtime_ns}-{at.st_ctime_ns}-{at.st_ino}" if at.st_ctime_ns < fresh else ""
-                found[entry.name] = FileState(at.st_size, stamp)
+            except OSError:  # gone meanwhile, or a link to nothing
+                continue
+            stamp = f"{at.st_mtime_ns}-{at.st_ctime_ns}-{at.st_ino}" if at.st_ctime_ns < fresh else ""
+            found[entry.name] = FileState(at.st_size, stamp)
         return found
 
     def exists(self, name: str) -> bool:

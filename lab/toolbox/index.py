@@ -1,7 +1,7 @@
 """The index of a toolbox: what its policies are, so that a list need not read them all. Made again when lost or stale."""
 
-import hashlib
 import json
+import zlib
 from collections.abc import Callable, Iterator, MutableMapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ FORMAT = "teaching-lab-index-1"
 Row = dict[str, Any]
 Key = tuple[str, str]  # sub-task, signature
 _LEFT_OUT = ("learner", "gate", "versions", "curve", "guided", "start")
-_HEAD, _REST = '{"sha256": "', '", "index": '
+_HEAD, _REST = '{"crc32": "', '", "index": '
 _STALE_SHARE = 0.01  # of the rows; with fewer stale ones it is not worth writing again
 
 
@@ -42,6 +42,8 @@ class Index:
         now = {name: state.stamp for name, state in self._place.files().items() if name.endswith(SUFFIX)}
         stale = [name for name, stamp in now.items() if not stamp or self._stamps.get(name) != stamp]
         gone = self._rows.keys() - now.keys()
+        if not stale and not gone:
+            return self._rows
         rows = {name: self._rows[name] for name in now.keys() - set(stale)}
         for name in stale:
             rows[name] = self._read(name)
@@ -73,9 +75,9 @@ class Index:
         """What is kept of it; nothing when that is lost or damaged."""
         with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
             text = (self._place.folder / FILE).read_bytes()
-            end = len(_HEAD) + 64
+            end = len(_HEAD) + 8
             body = text[end + len(_REST) : -1]
-            if text[len(_HEAD) : end].decode() == hashlib.sha256(body).hexdigest():
+            if text[len(_HEAD) : end].decode() == _checksum(body):
                 kept = json.loads(body)
                 if kept["format"] == FORMAT:
                     return kept["rows"], kept["stamps"]
@@ -85,10 +87,13 @@ class Index:
         assert self._rows is not None
         rows = {name: row for name, row in self._rows.items() if name in self._stamps and "damaged" not in row}
         stamps = {name: self._stamps[name] for name in rows}
-        body = json.dumps({"format": FORMAT, "stamps": stamps, "rows": rows})
-        digest = hashlib.sha256(body.encode()).hexdigest()
+        body = json.dumps({"format": FORMAT, "stamps": stamps, "rows": rows}).encode()
         with suppress(OSError):  # a toolbox that may only be read is read all the same
-            write_whole(self._place.folder / FILE, f"{_HEAD}{digest}{_REST}{body}}}".encode())
+            write_whole(self._place.folder / FILE, f"{_HEAD}{_checksum(body)}{_REST}".encode() + body + b"}")
+
+
+def _checksum(body: bytes) -> str:
+    return f"{zlib.crc32(body):08x}"
 
 
 class KnownPolicies(MutableMapping[Key, "Policy"]):

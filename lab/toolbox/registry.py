@@ -9,17 +9,17 @@ from lab.errors import BadInput, WorkFailed, unknown
 from lab.toolbox import records
 from lab.toolbox.folder_place import FolderPlace
 from lab.toolbox.index import Index, Key, KnownPolicies, Row
-from lab.toolbox.names import SUFFIX, default_address, is_address, slug
+from lab.toolbox.names import SUFFIX, TRASH, VERSIONS, default_address, is_address, slug
 from lab.toolbox.place import Place, read_file
-from lab.toolbox.versions import TRASH, VERSIONS, Saved, Version, Versions
 
 if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
+    from lab.toolbox.versions import Saved, Version, Versions
 
 Rows = list[Row]
 Words = list[str]
 Report = list[tuple[Path, bool, str]]  # path, whether it is sound, what is wrong
-_BRIEF = ("action_labels", "shape")  # are in the index, and in no list
+_NOT_LISTED = ("action_labels", "shape")
 _MOST_NAMED = 30  # policies that an error lists; of more, only the nearest
 _NEAREST = 5
 _LONGEST_LINE = 100  # ancestors that are looked up
@@ -47,13 +47,13 @@ class Toolbox:
         """Keeps a policy, and puts it in use unless the one in use does better; returns the file that holds it."""
         return self.folder / self.put(policy).file
 
-    def put(self, policy: "Policy") -> Saved:
+    def put(self, policy: "Policy") -> "Saved":
         """Keeps a policy as `save` does, and says what became of it; at no time is there half a file.
 
         WorkFailed when a remote toolbox cannot be reached; then it is kept in the local folder, and the error says where.
         """
         try:
-            return Versions(self.place, slug(policy.name)).put(policy)
+            return self._of(slug(policy.name)).put(policy)
         except WorkFailed as error:
             if self.place.alone:
                 raise
@@ -113,18 +113,18 @@ class Toolbox:
         """The policies in use, in file order: the metadata of each sound one without curve and settings."""
         wanted = {"subtask": subtask, "task": task, "advisor": advisor, "solved": solved}
         filters = {field: value for field, value in wanted.items() if value is not None}
-        return [
-            {field: value for field, value in row.items() if field not in _BRIEF}
-            for row in self._rows()
-            if all(row[field] == value for field, value in filters.items())
-        ]
+        rows = [row for row in self._rows() if all(row[field] == value for field, value in filters.items())]
+        for row in rows:
+            for field in _NOT_LISTED:
+                del row[field]
+        return rows
 
     def show(self, name: str) -> dict[str, Any]:
         """All that is known of one policy, and of its versions. Raises BadInput for an unknown name or a damaged file."""
         from lab.toolbox.policy_file import described
 
         stem = self._stem(name)
-        versions = Versions(self.place, stem)
+        versions = self._of(stem)
         policy = self.load(self.folder / versions.in_use_file)
         (row,) = [row for row in self._rows() if row["file"] == self.place.where(versions.in_use_file)]
         events, _ = versions.events()
@@ -157,7 +157,7 @@ class Toolbox:
         while parent and parent not in seen and len(found) < _LONGEST_LINE:
             seen.add(parent)
             name, _, digits = parent.rpartition("@")
-            versions, ancestor = Versions(self.place, slug(name)), None
+            versions, ancestor = self._of(slug(name)), None
             with suppress(BadInput):
                 if (version := versions.kept().get(digits)) is not None:
                     ancestor = versions.read(version)
@@ -168,21 +168,21 @@ class Toolbox:
             parent = "" if ancestor is None else ancestor.parent
         return found
 
-    def versions(self, name: str) -> Versions:
+    def versions(self, name: str) -> "Versions":
         """The versions of a name, to read them. Raises BadInput for a name that nothing is kept of."""
-        return Versions(self.place, self._stem(name, also_removed=True))
+        return self._of(self._stem(name, also_removed=True))
 
-    def promote(self, name: str, version: str) -> Version:
+    def promote(self, name: str, version: str) -> "Version":
         """Puts a version in use, by its number or hash, however well it does. Raises BadInput for one that is not there."""
         return self.versions(name).promote(version)
 
-    def rollback(self, name: str) -> Version:
+    def rollback(self, name: str) -> "Version":
         """Puts the version in use that was in use before. Raises BadInput when there was none."""
         return self.versions(name).rollback()
 
     def remove(self, name: str) -> Path:
         """Removes a policy by its name, or a damaged file by its stem, so that `restore` can bring it back; its path."""
-        versions = Versions(self.place, self._stem(name))
+        versions = self._of(self._stem(name))
         versions.remove()
         return self.folder / versions.in_use_file
 
@@ -192,7 +192,7 @@ class Toolbox:
         stem = next((stem for stem in (slug(name), name) if stem in removed), None)
         if stem is None:
             raise unknown("removed policy", name, removed, f"toolbox {self.address}")
-        versions = Versions(self.place, stem)
+        versions = self._of(stem)
         versions.restore()
         return self.folder / versions.in_use_file
 
@@ -217,7 +217,7 @@ class Toolbox:
         report: Report = []
         stems = {file.removesuffix(SUFFIX) for file in self._files()}
         for stem in sorted(stems | set(self.place.folders(VERSIONS))):
-            versions = Versions(self.place, stem)
+            versions = self._of(stem)
             where = self.place.where(versions.in_use_file)
             if stem in stems:
                 reason, kept = "", versions.kept()
@@ -262,9 +262,15 @@ class Toolbox:
                 return str(path).removeprefix(root)
         return None
 
+    def _of(self, stem: str) -> "Versions":
+        from lab.toolbox.versions import Versions
+
+        return Versions(self.place, stem)
+
     def _rows(self) -> Rows:
-        rows = self._index.rows().items()
-        return [{**row, "file": self.place.where(name)} for name, row in rows if "damaged" not in row]
+        """The index's sound rows, each with its file; they are copies."""
+        rows, root = self._index.rows().items(), self.place.where("x")[:-1]
+        return [{**row, "file": root + name} for name, row in rows if "damaged" not in row]
 
     def _files(self) -> set[str]:
         return {name for name in self.place.names() if name.endswith(SUFFIX)}

@@ -6,12 +6,11 @@ from typing import NamedTuple
 
 from lab.errors import BadInput, WorkFailed
 from lab.toolbox.history import ROLLED_BACK, Event, event, in_use_before, line_of, read_events, success_percents
-from lab.toolbox.names import SUFFIX, hash_of
+from lab.toolbox.names import LOG, SUFFIX, TRASH, VERSIONS, hash_of
 from lab.toolbox.place import Place
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import decode, encode, unreadable
 
-VERSIONS, LOG, TRASH = "versions", "log", "trash"  # the folders in a toolbox
 _VERSION = re.compile(rf"(\d{{4,}})-([0-9a-f]{{12}}){re.escape(SUFFIX)}")
 _LEAST_DIGITS = 4  # of a hash that is cut short
 _SHOWN = 5  # versions that an error names
