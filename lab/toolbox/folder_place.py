@@ -93,6 +93,10 @@ class FolderPlace:
         except OSError as error:
             raise _refused("move", path, error) from error
 
+    def sweep(self, under: str) -> None:
+        for left in (self.folder / under).glob(".*.tmp"):
+            left.unlink(missing_ok=True)
+
     def append(self, name: str, line: bytes) -> None:
         path = self.folder / name
         try:

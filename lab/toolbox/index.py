@@ -89,6 +89,7 @@ class Index:
         stamps = {name: self._stamps[name] for name in rows}
         body = json.dumps({"format": FORMAT, "stamps": stamps, "rows": rows}).encode()
         with suppress(OSError):  # a toolbox that may only be read is read all the same
+            self._place.folder.mkdir(parents=True, exist_ok=True)
             write_whole(self._place.folder / FILE, f"{_HEAD}{_checksum(body)}{_REST}".encode() + body + b"}")
 
 

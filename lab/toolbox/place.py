@@ -52,6 +52,9 @@ class Place(Protocol):
     def move(self, name: str, to: str) -> None:
         """Gives a file another name, in place of one that has it."""
 
+    def sweep(self, under: str) -> None:
+        """Deletes what writers that were killed left half written in a folder, for who holds its lock."""
+
     def append(self, name: str, line: bytes) -> None:
         """Adds a line to a log."""
 

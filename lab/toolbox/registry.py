@@ -37,6 +37,7 @@ class Toolbox:
         self.place = _place_of(where)
         self.folder = self.place.folder
         self.address = self.place.address
+        self._root = self.place.where("x")[:-1]
         self._index = Index(self.place)
 
     def check(self) -> None:
@@ -57,7 +58,7 @@ class Toolbox:
         except WorkFailed as error:
             if self.place.alone:
                 raise
-            beside = Toolbox(self.folder / "unsent")
+            beside = Toolbox(self.folder.with_name(f"{self.folder.name}-unsent"))
             raise WorkFailed(f"{error}; it is kept in {beside.save(policy)}") from error
 
     def load(self, path: Path | str) -> "Policy":
@@ -129,7 +130,7 @@ class Toolbox:
         (row,) = [row for row in self._rows() if row["file"] == self.place.where(versions.in_use_file)]
         events, _ = versions.events()
         kept, sizes = versions.kept(), self.place.files(f"{VERSIONS}/{stem}")
-        told = {event["hash"]: event for event in reversed(events) if "hash" in event and "why_not" not in event}
+        saved = {event["hash"]: event["time"] for event in reversed(events) if "hash" in event}
         return {
             **described(policy),
             "file": row["file"],
@@ -141,7 +142,7 @@ class Toolbox:
                     "version": version.number,
                     "hash": version.hash,
                     "in_use": version.hash == row["hash"],
-                    "since": told.get(version.hash, {}).get("time"),
+                    "saved": saved.get(version.hash),
                     "bytes": sizes[Path(version.file).name].size_bytes,
                 }
                 for version in kept.values()
@@ -257,7 +258,7 @@ class Toolbox:
 
     def _inside(self, path: Path | str) -> str | None:
         """The name in the place that a path or an address stands for; None when it is elsewhere."""
-        for root in (f"{self.address}/", f"{self.folder}/"):
+        for root in (self._root, f"{self.folder}/"):
             if str(path).startswith(root):
                 return str(path).removeprefix(root)
         return None
@@ -269,8 +270,8 @@ class Toolbox:
 
     def _rows(self) -> Rows:
         """The index's sound rows, each with its file; they are copies."""
-        rows, root = self._index.rows().items(), self.place.where("x")[:-1]
-        return [{**row, "file": root + name} for name, row in rows if "damaged" not in row]
+        rows = self._index.rows().items()
+        return [{**row, "file": self._root + name} for name, row in rows if "damaged" not in row]
 
     def _files(self) -> set[str]:
         return {name for name in self.place.names() if name.endswith(SUFFIX)}

@@ -159,9 +159,9 @@ class Versions:
     def note(self, what: str, **facts: object) -> None:
         """Something that happened to the version in use, or to the one whose `hash` is given."""
         with self._place.lock(self._log):
-            if "hash" not in facts and (current := self.in_use()) is not None:
-                facts = {"hash": current.hash, **facts}
-            self._place.append(self._log, line_of(event(what, **facts)))
+            current = self.in_use() if "hash" not in facts else None
+            about = facts.get("hash", current and current.hash)
+            self._tell(what, self.kept().get(str(about)), **({"hash": about} if about else {}) | facts)
 
     def events(self) -> tuple[list[Event], list[int]]:
         """What happened, and the numbers of the damaged lines of the log."""
@@ -183,6 +183,7 @@ class Versions:
 
     def _kept_current(self) -> tuple[InUse | None, dict[str, Version]]:
         """The policy in use and the kept versions, of which it is one from now on. For who holds the lock."""
+        self._place.sweep(self._folder)
         current, kept = self.in_use(), self.kept()
         if current is not None and current.hash not in kept:
             kept[current.hash] = version = self._keep(current.content, kept)
@@ -223,7 +224,7 @@ class Versions:
 
     def _tell(self, what: str, version: Version | None, **facts: object) -> None:
         known = {} if version is None else {"version": version.number, "hash": version.hash}
-        self._place.append(self._log, line_of(event(what, **known, **facts)))
+        self._place.append(self._log, line_of(event(what, **(known | facts))))
 
     def _bytes_of(self, version: Version) -> bytes:
         """A version's bytes, exactly those that were kept."""

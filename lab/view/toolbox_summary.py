@@ -67,8 +67,8 @@ def _kept(policy: Mapping[str, Any]) -> list[str]:
     versions, events = policy["kept_versions"], policy["events"]
     lines = [f"{counted(len(versions), 'version')} kept, {policy['kept_bytes'] / 1e6:.2f} MB"] if versions else []
     for row in versions[-_SHOWN_VERSIONS:]:
-        since, mark = _minute(row["since"] or ""), "  in use" if row["in_use"] else ""
-        lines.append(f"  {row['version']:>3}  {row['hash']}  {since}{mark}")
+        saved, mark = _minute(row["saved"] or ""), "  in use" if row["in_use"] else ""
+        lines.append(f"  {row['version']:>3}  {row['hash']}  {saved}{mark}")
     lines += [f"  {_happened(event)}" for event in events[-_SHOWN_EVENTS:]]
     return ["", *lines] if lines else []
 
@@ -83,7 +83,12 @@ def log_summary(log: Mapping[str, Any]) -> RenderableType:
 def _happened(event: Mapping[str, Any]) -> str:
     named = f" version {event['version']} ({event['hash']})" if event.get("version") else ""
     left_out = ("time", "what", "version", "hash", "in_use", "why_not")
-    facts = [f"{name.replace('_', ' ')} {value}" for name, value in event.items() if name not in left_out]
+    words = {True: "yes", False: "no", None: "none"}
+    facts = [
+        f"{name.replace('_', ' ')} {words[value] if isinstance(value, bool | None) else value}"
+        for name, value in event.items()
+        if name not in left_out
+    ]
     why_not = [f"kept beside: {event['why_not']}"] if event.get("why_not") else []
     return f"{_minute(event['time'])}  {event['what']}{named}{': ' if facts or why_not else ''}{', '.join(why_not + facts)}"
 
