@@ -72,7 +72,6 @@ def s3_server() -> Iterator[str]:
 @pytest.fixture
 def bucket(s3_server: str, monkeypatch: pytest.MonkeyPatch) -> str:
     """An address in an empty bucket of that server."""
-    import boto3
     from s3fs import S3FileSystem
 
     for name, value in (
@@ -83,10 +82,8 @@ def bucket(s3_server: str, monkeypatch: pytest.MonkeyPatch) -> str:
     ):
         monkeypatch.setenv(name, value)
     S3FileSystem.clear_instance_cache()
-    client = boto3.client("s3")
-    for held in client.list_buckets()["Buckets"]:
-        for stored in client.list_objects_v2(Bucket=held["Name"]).get("Contents", ()):
-            client.delete_object(Bucket=held["Name"], Key=stored["Key"])
-    client.create_bucket(Bucket="lab")
-    client.close()
+    store = S3FileSystem()
+    if store.exists("lab"):
+        store.rm("lab", recursive=True)
+    store.mkdir("lab")
     return "s3://lab/box"

@@ -131,7 +131,8 @@ def test_a_damaged_version_is_never_put_in_use(box: Toolbox, make: MakePolicy) -
     path = box.folder / f"versions/insert/0001-{first.hash}.safetensors"
     whole = path.read_bytes()
     path.write_bytes(encode(make(5.0)))  # sound, but another one
-    for use in (lambda: box.promote("insert", "1"), lambda: box.rollback("insert")):
+    uses: tuple[Callable[[], object], ...] = (lambda: box.promote("insert", "1"), lambda: box.rollback("insert"))
+    for use in uses:
         with pytest.raises(BadInput, match=r"0001-.*its hash is .*: damaged"):
             use()
     assert in_use(box) == 2.0
