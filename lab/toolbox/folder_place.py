@@ -4,7 +4,7 @@ import errno
 import fcntl
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -25,7 +25,8 @@ class FolderPlace:
     alone = True
 
     def __init__(self, folder: Path) -> None:
-        self.folder, self.address = folder, str(folder)
+        self.folder = self.cache = folder
+        self.address = str(folder)
 
     def check(self) -> None:
         try:
@@ -54,6 +55,9 @@ class FolderPlace:
     def exists(self, name: str) -> bool:
         return os.path.lexists(self.folder / name)
 
+    def tree(self, under: str) -> list[str]:
+        return [f"{under}/{name}/{file}" for name in self.folders(under) for file in self.names(f"{under}/{name}")]
+
     def folders(self, under: str) -> list[str]:
         return sorted(entry.name for entry in self._entries(under) if entry.is_dir(follow_symlinks=False))
 
@@ -74,6 +78,13 @@ class FolderPlace:
         path = self.folder / name
         self._inside(path)
         return read_file(path)
+
+    def read_many(self, states: Mapping[str, FileState]) -> Iterator[tuple[str, bytes | BadInput]]:
+        for name in states:
+            try:
+                yield name, self.read(name)
+            except BadInput as error:
+                yield name, error
 
     def write(self, name: str, content: bytes, drafts: str = "") -> None:
         path, beside = self.folder / name, self.folder / drafts if drafts else None

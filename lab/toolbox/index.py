@@ -2,24 +2,25 @@
 
 import json
 import zlib
-from collections.abc import Callable, Iterator, MutableMapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput
 from lab.files import write_whole
-from lab.toolbox.names import SUFFIX, hash_of
-from lab.toolbox.place import Place
+from lab.toolbox.names import SUFFIX, VERSIONS, hash_of
+from lab.toolbox.place import FileState, Place
 
 if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
 
-FILE = "index.json"  # in the place's local folder
+FILE = "index.json"  # in the place's cache
 FORMAT = "teaching-lab-index-1"
 Row = dict[str, Any]
 Key = tuple[str, str]  # sub-task, signature
 _LEFT_OUT = ("learner", "gate", "versions", "curve", "guided", "start")
 _HEAD, _REST = '{"crc32": "', '", "index": '
+_MANY = 20  # so many files, or one in so many, and their versions are looked up all at once
 _STALE_SHARE = 0.01  # of the rows; with fewer stale ones it is not worth writing again
 
 
@@ -39,42 +40,58 @@ class Index:
         """The rows by file name, in order; a damaged file's row holds "damaged" alone, the reason."""
         if self._rows is None:
             self._rows, self._stamps = self._loaded()
-        now = {name: state.stamp for name, state in self._place.files().items() if name.endswith(SUFFIX)}
-        stale = [name for name, stamp in now.items() if not stamp or self._stamps.get(name) != stamp]
+        now = {name: state for name, state in self._place.files().items() if name.endswith(SUFFIX)}
+        stale = {name: at for name, at in now.items() if not at.stamp or self._stamps.get(name) != at.stamp}
         gone = self._rows.keys() - now.keys()
         if not stale and not gone:
             return self._rows
-        rows = {name: self._rows[name] for name in now.keys() - set(stale)}
-        for name in stale:
-            rows[name] = self._read(name)
-        self._rows, self._stamps = dict(sorted(rows.items())), {name: stamp for name, stamp in now.items() if stamp}
-        changed = sum(bool(now[name]) and "damaged" not in rows[name] for name in stale) + len(gone)
+        rows = {name: self._rows[name] for name in now.keys() - stale.keys()} | self._read(stale)
+        self._rows = dict(sorted(rows.items()))
+        self._stamps = {name: at.stamp for name, at in now.items() if at.stamp}
+        changed = sum(bool(at.stamp) and "damaged" not in rows[name] for name, at in stale.items()) + len(gone)
         if changed > _STALE_SHARE * len(now):
             self._keep()
         return self._rows
 
-    def _read(self, name: str) -> Row:
+    def _read(self, states: Mapping[str, FileState]) -> dict[str, Row]:
+        """The rows of these files."""
         from lab.toolbox.policy_file import decode, described, unreadable
-        from lab.toolbox.versions import Versions
 
-        where = self._place.where(name)
-        try:
-            content = self._place.read(name)
-        except BadInput as error:
-            return {"damaged": str(unreadable(where, error))}
-        try:
-            policy = decode(content, where)
-        except BadInput as error:
-            return {"damaged": str(error)}
-        kept, made = Versions(self._place, name.removesuffix(SUFFIX)).kept(), hash_of(content)
-        number = kept[made].number if made in kept else None if kept else 1
-        found = {fact: value for fact, value in described(policy).items() if fact not in _LEFT_OUT}
-        return {**found, "version": number, "hash": made}
+        rows: dict[str, Row] = {}
+        numbers = self._numbers(states)
+        for name, content in self._place.read_many(states):
+            where = self._place.where(name)
+            try:
+                if isinstance(content, BadInput):
+                    raise unreadable(where, content)
+                facts = described(decode(content, where))
+            except BadInput as error:
+                rows[name] = {"damaged": str(error)}
+                continue
+            found, made = {fact: value for fact, value in facts.items() if fact not in _LEFT_OUT}, hash_of(content)
+            kept = numbers.get(name.removesuffix(SUFFIX), {})
+            rows[name] = {**found, "version": kept.get(made) if kept else 1, "hash": made}
+        return rows
+
+    def _numbers(self, states: Mapping[str, FileState]) -> dict[str, dict[str, int]]:
+        """The numbers of the versions of these files, by stem and hash."""
+        from lab.toolbox.versions import version_of
+
+        found: dict[str, dict[str, int]] = {}
+        folders = [f"{VERSIONS}/{name.removesuffix(SUFFIX)}" for name in states]
+        if len(folders) < max(_MANY, len(self._rows or ()) // _MANY):
+            files = [f"{folder}/{name}" for folder in folders for name in self._place.names(folder)]
+        else:
+            files = self._place.tree(VERSIONS)
+        for file in files:
+            if (version := version_of(file)) is not None:
+                found.setdefault(file.split("/")[1], {})[version.hash] = version.number
+        return found
 
     def _loaded(self) -> tuple[dict[str, Row], dict[str, str]]:
         """What is kept of it; nothing when that is lost or damaged."""
         with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
-            text = (self._place.folder / FILE).read_bytes()
+            text = (self._place.cache / FILE).read_bytes()
             end = len(_HEAD) + 8
             body = text[end + len(_REST) : -1]
             if text[len(_HEAD) : end].decode() == _checksum(body):
@@ -89,8 +106,8 @@ class Index:
         stamps = {name: self._stamps[name] for name in rows}
         body = json.dumps({"format": FORMAT, "stamps": stamps, "rows": rows}).encode()
         with suppress(OSError):  # a toolbox that may only be read is read all the same
-            self._place.folder.mkdir(parents=True, exist_ok=True)
-            write_whole(self._place.folder / FILE, f"{_HEAD}{_checksum(body)}{_REST}".encode() + body + b"}")
+            self._place.cache.mkdir(parents=True, exist_ok=True)
+            write_whole(self._place.cache / FILE, f"{_HEAD}{_checksum(body)}{_REST}".encode() + body + b"}")
 
 
 def _checksum(body: bytes) -> str:

@@ -1,6 +1,7 @@
 """Where a toolbox keeps its bytes: the few calls that a local folder and an address elsewhere both have."""
 
 import stat
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -20,12 +21,14 @@ class FileState(NamedTuple):
 class Place(Protocol):
     """Files by name, such as "insert.safetensors" or "versions/insert/0001-1a2b3c4d5e6f.safetensors".
 
-    address: as --toolbox names it; folder: a local one, for what can only be local; alone: whether nobody else writes
-    while `lock` is held. All methods raise BadInput or WorkFailed, naming the file and the reason.
+    address: as --toolbox names it; folder, cache: local ones, for what can only be local, and for what can be made again;
+    alone: whether nobody else writes while `lock` is held. All methods raise BadInput or WorkFailed, naming the file and
+    the reason.
     """
 
     address: str
     folder: Path
+    cache: Path
     alone: bool
 
     def check(self) -> None:
@@ -40,11 +43,17 @@ class Place(Protocol):
     def exists(self, name: str) -> bool:
         """Whether there is such a file."""
 
+    def tree(self, under: str) -> list[str]:
+        """The names of all files below a folder of the place, as they are in the place."""
+
     def folders(self, under: str) -> list[str]:
         """The names of the folders right in a folder of the place."""
 
     def read(self, name: str) -> bytes:
         """All bytes of a file."""
+
+    def read_many(self, states: Mapping[str, FileState]) -> Iterator[tuple[str, bytes | BadInput]]:
+        """The bytes of several files whose states are known; of one that cannot be read, the error."""
 
     def write(self, name: str, content: bytes, drafts: str = "") -> None:
         """Writes a file whole or not at all; where half-written ones are seen, they are seen in the folder `drafts`."""

@@ -2,7 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,10 +12,11 @@ from typing import Any, TypeVar
 
 from lab.errors import BadInput, WorkFailed
 from lab.files import write_whole
-from lab.toolbox.names import hash_of
+from lab.toolbox.names import hash_of, slug
 from lab.toolbox.place import MAX_FILE_BYTES, FileState
 
 LIMIT_S = 30.0  # for one call
+_AT_ONCE = 64  # files that are read in one call
 NEEDS = "pip install 'teaching-lab[remote]'"
 _BUCKETS = {"s3", "s3a", "gs", "gcs", "az", "abfs", "abfss"}  # whose folders are not made; the first part is a bucket
 _STAMPS = ("ETag", "etag", "LastModified", "last_modified", "updated", "mtime", "modified", "created", "ino")
@@ -27,7 +28,7 @@ Result = TypeVar("Result")
 
 
 class RemotePlace:
-    """Files at an address. `folder` is the local cache, which may be deleted at any time, but for sessions kept in it.
+    """Files at an address. What a person said, such as sessions, is in the local `folder`; `cache` may be deleted at any time.
 
     Nobody can be kept away: of two that put a policy in use at once, `Versions` finds the better one afterwards. A log is a
     folder of small files, an event each.
@@ -36,12 +37,14 @@ class RemotePlace:
     alone = False
 
     def __init__(self, address: str) -> None:
-        from platformdirs import user_cache_dir
+        from platformdirs import user_cache_dir, user_data_dir
 
         self._protocol, _, path = address.partition("://")
         self.address = f"{self._protocol}://{path.rstrip('/')}"
-        known_as = hashlib.sha256(self.address.encode()).hexdigest()[:16]
-        self.folder = Path(user_cache_dir("teaching-lab", appauthor=False)) / "toolboxes" / known_as
+        self.folder, self.cache = (
+            Path(kind("teaching-lab", appauthor=False)) / "toolboxes" / slug(self.address)
+            for kind in (user_data_dir, user_cache_dir)
+        )
         self._fs, self._root = self._connected()
 
     def _connected(self) -> tuple[Any, str]:
@@ -87,6 +90,14 @@ class RemotePlace:
     def folders(self, under: str) -> list[str]:
         return sorted(_last(row["name"]) for row in self._listed(under) if row["type"] == "directory")
 
+    def tree(self, under: str) -> list[str]:
+        try:
+            found: list[str] = self._call("listed", self._fs.find, self._path(under))
+        except FileNotFoundError:
+            return []
+        root = len(self._root.strip("/")) + 1
+        return [path.strip("/")[root:] for path in found]
+
     def _listed(self, under: str) -> list[dict[str, Any]]:
         try:
             rows: list[dict[str, Any]] = self._call("listed", self._fs.ls, self._path(under), detail=True)
@@ -115,6 +126,28 @@ class RemotePlace:
         except FileNotFoundError:
             raise BadInput("there is no such file") from None
         return cached
+
+    def read_many(self, states: Mapping[str, FileState]) -> Iterator[tuple[str, bytes | BadInput]]:
+        missing = []
+        for name, state in states.items():
+            if (cached := self._cached(name, state.stamp)) is not None:
+                yield name, cached
+            elif state.size_bytes > MAX_FILE_BYTES:
+                yield name, BadInput(f"it has {state.size_bytes} bytes, allowed {MAX_FILE_BYTES}")
+            else:
+                missing.append(name)
+        for first in range(0, len(missing), _AT_ONCE):
+            paths = {self._path(name): name for name in missing[first : first + _AT_ONCE]}
+            found = self._call("read", self._fs.cat, list(paths), on_error="return")
+            for path, name in paths.items():
+                content = found.get(path)
+                if isinstance(content, bytes):
+                    self._cache(name, states[name].stamp, content)
+                    yield name, content
+                elif content is None or isinstance(content, FileNotFoundError):
+                    yield name, BadInput("there is no such file")
+                else:
+                    raise WorkFailed(f"toolbox {self.address} cannot be read: {_reason(content)}")
 
     def write(self, name: str, content: bytes, drafts: str = "") -> None:
         path = self._path(name)
@@ -198,7 +231,7 @@ class RemotePlace:
             write_whole(folder / f"{_cache_stem(name, stamp)}-{hash_of(content)}", content)
 
     def _cache_folder(self, name: str) -> Path:
-        return self.folder / "files" / _digest(name)[:2]
+        return self.cache / "files" / _digest(name)[:2]
 
 
 def _digest(text: str) -> str:
@@ -211,8 +244,10 @@ def _cache_stem(name: str, stamp: str = "") -> str:
 
 def _stamp(row: dict[str, Any]) -> str:
     """What tells whether a file is still the same; "" where nothing does."""
-    marks = [str(row[mark]) for mark in _STAMPS if row.get(mark) is not None]
-    return f"{row.get('size')}-{'-'.join(marks)}" if marks else ""
+    mark = next((row[mark] for mark in _STAMPS if row.get(mark) is not None), None)
+    if isinstance(mark, datetime):
+        mark = mark.timestamp()
+    return "" if mark is None else f"{row.get('size')}-{mark}"
 
 
 def _last(path: str) -> str:

@@ -24,6 +24,12 @@ class Version(NamedTuple):
     file: str
 
 
+def version_of(file: str) -> Version | None:
+    """The version that a file in the place is; None when its name is none of a version's."""
+    match = _VERSION.fullmatch(file.rpartition("/")[2])
+    return None if match is None else Version(int(match[1]), match[2], file)
+
+
 class Saved(NamedTuple):
     """What became of a policy that was saved: the file that holds it, and why it was not put in use ("": it was)."""
 
@@ -62,12 +68,8 @@ class Versions:
 
     def kept(self) -> dict[str, Version]:
         """The kept versions by hash, in the order of their numbers."""
-        found = sorted(
-            Version(int(match[1]), match[2], f"{self._folder}/{match[0]}")
-            for match in map(_VERSION.fullmatch, self._place.names(self._folder))
-            if match is not None
-        )
-        return {version.hash: version for version in found}
+        found = (version_of(f"{self._folder}/{name}") for name in self._place.names(self._folder))
+        return {version.hash: version for version in sorted(filter(None, found))}
 
     def in_use(self) -> InUse | None:
         """The policy in use; None when there is none, or a damaged one. Raises BadInput when it may not be read."""

@@ -106,6 +106,7 @@ def test_of_many_only_the_nearest_are_named(lab: Lab, folder: Path, policy: Make
 
 def test_a_toolbox_elsewhere(lab: Lab, folder: Path, policy: MakePolicy, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    monkeypatch.setenv("XDG_DATA_HOME", str(folder / "data"))
     Toolbox("memory://cli/box").save(policy("far"))
     at = ("--toolbox", "memory://cli/box", "--json")
     (row,) = lab("toolbox", "list", *at).json["policies"]

@@ -72,7 +72,7 @@ def test_what_was_read_once_is_not_read_again(
     plain = remote_place.RemotePlace._call
 
     def counted(self: Any, verb: str, function: Any, *args: Any, **named: Any) -> Any:
-        if function.__name__.endswith("cat_file"):
+        if "cat" in function.__name__:
             reads.append(args[0])
         return plain(self, verb, function, *args, **named)
 
@@ -110,10 +110,33 @@ def test_of_two_that_write_at_once_the_better_one_is_in_use(
     assert len(box.versions("insert").kept()) == 2
 
 
-def test_a_session_is_kept_in_the_local_folder(address: str, own_cache: Path) -> None:
+def test_a_session_is_kept_in_a_local_folder_that_is_no_cache(address: str, own_cache: Path, tmp_path: Path) -> None:
     box = Toolbox(address)
-    assert box.folder.is_relative_to(own_cache)
-    assert box.address == address
+    assert box.folder.is_relative_to(tmp_path / "data")
+    assert box.place.cache.is_relative_to(own_cache)
+    assert Toolbox(f"{address}/other").folder != box.folder
+
+
+def test_many_are_read_at_once(address: str, make: MakePolicy, monkeypatch: pytest.MonkeyPatch) -> None:
+    box, names = Toolbox(address), {f"skill-{number:02}" for number in range(25)}
+    for name in names:
+        box.save(make(1.0, name=name))
+    box.place.write("skill-07.safetensors", b"cut off")
+    rmtree(box.place.cache)
+    calls: list[str] = []
+    plain = remote_place.RemotePlace._call
+
+    def noted(self: Any, verb: str, function: Any, *args: Any, **named: Any) -> Any:
+        calls.append(function.__name__.lstrip("_"))
+        return plain(self, verb, function, *args, **named)
+
+    monkeypatch.setattr(remote_place.RemotePlace, "_call", noted)
+    rows = Toolbox(address).list()
+    assert ({row["name"] for row in rows}, {row["version"] for row in rows}) == (names - {"skill-07"}, {1})
+    assert sorted(calls) == ["cat", "find", "ls"]
+    calls.clear()
+    assert Toolbox(address).list() == rows
+    assert set(calls) == {"ls"}
 
 
 def one_line(error: pytest.ExceptionInfo[Exception]) -> str:
