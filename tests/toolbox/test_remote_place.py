@@ -118,7 +118,7 @@ def test_a_session_is_kept_in_a_local_folder_that_is_no_cache(address: str, own_
 
 
 def test_many_are_read_at_once(address: str, make: MakePolicy, monkeypatch: pytest.MonkeyPatch) -> None:
-    box, names = Toolbox(address), {f"skill-{number:02}" for number in range(25)}
+    box, names = Toolbox(address), {f"skill-{number:02}" for number in range(50)}
     for name in names:
         box.save(make(1.0, name=name))
     box.place.write("skill-07.safetensors", b"cut off")
