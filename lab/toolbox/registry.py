@@ -222,11 +222,12 @@ class Toolbox:
             versions = self._of(stem)
             where = self.place.where(versions.in_use_file)
             if stem in stems:
-                reason, kept = "", versions.kept()
+                reason = ""
                 try:
-                    decode(self._content(versions.in_use_file), where)
-                    current = versions.in_use()
-                    if kept and current is not None and current.hash not in kept:
+                    content = self._content(versions.in_use_file)
+                    decode(content, where)
+                    kept = versions.kept()  # looked up last: a version is kept before it is in use
+                    if kept and hash_of(content) not in kept:
                         reason = str(unreadable(where, ValueError("it is none of the kept versions: it was changed")))
                 except BadInput as error:
                     reason = str(error)
@@ -260,7 +261,7 @@ class Toolbox:
     def _inside(self, path: Path | str) -> str | None:
         """The name in the place that a path or an address stands for; None when it is elsewhere."""
         for root in (self._root, f"{self.folder}/"):
-            if str(path).startswith(root):
+            if root and str(path).startswith(root):
                 return str(path).removeprefix(root)
         return None
 
