@@ -95,8 +95,8 @@ class RemotePlace:
             found: list[str] = self._call("listed", self._fs.find, self._path(under))
         except FileNotFoundError:
             return []
-        root = len(self._root.strip("/")) + 1
-        return [path.strip("/")[root:] for path in found]
+        root = f"{self._root.strip('/')}/".lstrip("/")
+        return [path.strip("/").removeprefix(root) for path in found]
 
     def _listed(self, under: str) -> list[dict[str, Any]]:
         try:
