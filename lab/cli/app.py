@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from lab import __version__
-from lab.cli import replay, run, see, sequence, study, task, teach, toolbox, view
+from lab.cli import replay, run, see, sequence, study, task, teach, toolbox, toolbox_archive, toolbox_evaluate, view
 from lab.cli.families import CommandOfFamilies
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError
@@ -44,6 +44,17 @@ COMMANDS = {  # what is typed after `lab` -> the command
     "toolbox show": Command(toolbox.toolbox_show, "lab toolbox show 'insert at toaster 1a2b3c4d'"),
     "toolbox verify": Command(toolbox.toolbox_verify, "lab toolbox verify"),
     "toolbox remove": Command(toolbox.toolbox_remove, "lab toolbox remove 'insert at toaster 1a2b3c4d'"),
+    "toolbox evaluate": Command(
+        toolbox_evaluate.toolbox_evaluate, "lab toolbox evaluate 'insert at toaster 1a2b3c4d' --scenes 50"
+    ),
+    "toolbox card": Command(
+        toolbox_archive.toolbox_card, "lab toolbox card 'insert at toaster 1a2b3c4d' --out insert-card"
+    ),
+    "toolbox export": Command(toolbox_archive.toolbox_export, "lab toolbox export --out my-skills.zip"),
+    "toolbox import": Command(toolbox_archive.toolbox_import, "lab toolbox import my-skills.zip"),
+    "toolbox publish": Command(
+        toolbox_archive.toolbox_publish, "lab toolbox publish 'insert at toaster 1a2b3c4d' --out insert --license mit"
+    ),
     "task list": Command(task.task_list, "lab task list"),
     "task show": Command(task.task_show, "lab task show toast"),
     "task random": Command(task.task_random, "lab task random 10x10x10 --density 0.06 --seed 7 --out my-world.toml"),

@@ -1,0 +1,126 @@
+"""A policy as the bytes of one safetensors file: the same policy gives the same bytes, and no damaged one is read."""
+
+import json
+import struct
+from dataclasses import fields
+from datetime import datetime
+from functools import cache
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, create_model
+
+from lab.errors import BadInput
+from lab.toolbox.names import FORMAT
+from lab.toolbox.policy import Policy
+
+_TENSORS = {"q": "F64", "visits": "I64", "ends": "U8"}
+_SINCE_LINEAGE = {"ends", "parent", "scene"}  # older files have none of them
+_METADATA = tuple(field.name for field in fields(Policy) if field.name not in _TENSORS)
+
+
+def encode(policy: Policy) -> bytes:
+    """The file's bytes: the same policy always gives the same ones."""
+    from safetensors.numpy import save
+
+    metadata = {name: json.dumps(getattr(policy, name), allow_nan=False) for name in _METADATA}
+    found = {name: getattr(policy, name) for name in _TENSORS}
+    tensors = {name: np.ascontiguousarray(table) for name, table in found.items() if table is not None}
+    return _ordered(save(tensors, {"format": FORMAT, **metadata}))
+
+
+def decode(content: bytes, where: str) -> Policy:
+    """The policy that these bytes hold, all of it sound. Raises BadInput naming the file `where`."""
+    from safetensors import SafetensorError
+
+    try:
+        held: dict[str, Any] = _read_tensors(content) | _read_metadata(_header(content).get("__metadata__") or {})
+        return Policy(**held)
+    except (BadInput, SafetensorError, ValueError, TypeError, KeyError, RecursionError, MemoryError) as error:
+        raise unreadable(where, error) from error
+
+
+def unreadable(where: str, error: Exception) -> BadInput:
+    """The error for a policy's file that cannot be read or is damaged."""
+    return BadInput(f"policy file {where}: {' '.join(str(error).split()) or type(error).__name__}")
+
+
+def described(policy: Policy) -> dict[str, Any]:
+    """All metadata of a policy, and its table's size."""
+    states, actions = policy.q.shape
+    values = {name: getattr(policy, name) for name in _METADATA}
+    return {**values, "states": states, "actions": actions, "episodes": len(policy.curve)}
+
+
+def _ordered(content: bytes) -> bytes:
+    """The same file with its header in order; the library writes metadata in any order."""
+    data = content[8 + _header_bytes(content) :]
+    header = json.dumps(_header(content), sort_keys=True, separators=(",", ":")).encode()
+    header += b" " * (-len(header) % 8)  # tables begin at a multiple of 8 bytes
+    return struct.pack("<Q", len(header)) + header + data
+
+
+def _header_bytes(content: bytes) -> int:
+    length: int = struct.unpack_from("<Q", content)[0]
+    return length
+
+
+def _header(content: bytes) -> dict[str, Any]:
+    header = json.loads(content[8 : 8 + _header_bytes(content)])
+    assert isinstance(header, dict)  # the library has read it before
+    return header
+
+
+def _read_tensors(content: bytes) -> dict[str, np.ndarray[Any, Any]]:
+    from safetensors.numpy import load
+
+    tensors: dict[str, np.ndarray[Any, Any]] = load(content)
+    header = _header(content)
+    metadata = header.get("__metadata__") or {}
+    if metadata.get("format") != FORMAT:
+        raise ValueError(f"format {metadata.get('format')!r}, allowed '{FORMAT}'")
+    if not set(_TENSORS) - _SINCE_LINEAGE <= set(tensors) <= set(_TENSORS):
+        raise ValueError(f"it holds the tensors {sorted(tensors)}, allowed {sorted(_TENSORS)}")
+    for name in sorted(tensors):
+        if header[name]["dtype"] != _TENSORS[name]:
+            raise ValueError(f"{name} has type {header[name]['dtype']}, allowed {_TENSORS[name]}")
+    return {name: table if table.flags.writeable else table.copy() for name, table in tensors.items()}
+
+
+def _reject_constant(text: str) -> None:
+    raise ValueError(f"{text} is not allowed")
+
+
+def _date(text: str) -> str:
+    datetime.fromisoformat(text)
+    return text
+
+
+@cache
+def _metadata() -> type[BaseModel]:
+    """What a policy's file holds beside its tables: the fields of `Policy`."""
+    held: dict[str, Any] = {
+        field.name: (field.type, field.default if field.name in _SINCE_LINEAGE else ...)
+        for field in fields(Policy)
+        if field.name in _METADATA
+    }
+    held["created"] = (Annotated[str, AfterValidator(_date)], ...)
+    held["learner"] = held["gate"] = (dict[str, str | bool | int | float], ...)
+    return create_model("Metadata", __config__=ConfigDict(strict=True, allow_inf_nan=False), **held)
+
+
+def _read_metadata(metadata: dict[str, str]) -> dict[str, Any]:
+    values = {
+        name: json.loads(metadata[name], parse_constant=_reject_constant) for name in _METADATA if name in metadata
+    }
+    try:
+        found = _metadata().model_validate_json(json.dumps(values))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field, why = ".".join(map(str, first["loc"][:1])), first["msg"]
+        if first["type"] == "missing":
+            raise ValueError(f"its field '{field}' is missing") from None
+        raise ValueError(
+            f"its field '{field}' is {str(metadata.get(field))[:60]!r}, which is not allowed: {why}"
+        ) from None
+    return dict(found)
