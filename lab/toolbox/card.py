@@ -165,9 +165,16 @@ def _happened(event: Event) -> str:
             f"(95 % interval {low:.0f} to {high:.0f})"
         )
     else:
-        facts = [f"{name.replace('_', ' ')} {value}" for name, value in event.items() if name not in _PLUMBING]
+        facts = [_fact(name.replace("_", " "), value) for name, value in event.items() if name not in _PLUMBING]
         text = f"{event['what']}{': ' if facts else ''}{', '.join(facts)}"
     return f"{when}: {plain(text)}"
+
+
+def _fact(name: str, value: object) -> str:
+    """A fact in words: what is true is named."""
+    if isinstance(value, bool):
+        return name if value else f"not {name}"
+    return f"{name} {value}"
 
 
 def _use(policy: Policy, telling: Telling) -> str:

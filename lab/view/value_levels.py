@@ -1,5 +1,6 @@
 """What a policy has learned in every cell of a grid of any dimension, as one picture: a small map for each of its levels."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,13 +23,9 @@ MAX_LEVELS = 40  # of more, those with the start and the goal and the most visit
 MAX_CELLS = 10_000  # of a level
 _IN_A_ROW = 5  # levels, unless a fourth axis says how many
 _LEAST_SIDE = 6.0  # [pt] of a cell with a sign: in a smaller one it would be a speck
-_BESIDE = ((-1, 0), (1, 0), (0, -1), (0, 1))  # actions 0 to 3, along axes 0 and 1
-_SIGNS = (
-    r"$\otimes$",
-    r"$\odot$",
-    "$↻$",
-    "$↺$",
-)  # actions 4 to 7, along axes 2 and 3: away from who looks, towards, turns
+# where moves lead in the picture, by what they are called: x to the right, y downwards
+_ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1), "forward": (0, -1), "backward": (0, 1)}
+_SIGNS = {"down": r"$\otimes$", "up": r"$\odot$", "turn right": "$↻$", "turn left": "$↺$"}  # where forward is up
 
 
 class Learned(NamedTuple):
@@ -48,8 +45,8 @@ def can_be_drawn(policy: Policy) -> bool:
 def value_levels(policy: Policy, path: Path) -> None:
     """The values and the best moves of a policy's cells, a map a level, written as PNG.
 
-    Actions 2k and 2k + 1 lead along axis k, as in `lab.mdp.grid`; those beyond the fourth axis have no sign. Raises
-    BadInput when the states are no grid or a too large one, and for a path that is no PNG file.
+    Moves have a sign by what they are called; others have none. Raises BadInput when the states are no grid or a too large
+    one, and for a path that is no PNG file.
     """
     check_png(path)
     if not can_be_drawn(policy):
@@ -61,7 +58,7 @@ def value_levels(policy: Policy, path: Path) -> None:
     levels = _chosen(planes, learned, planes.layer(start))
     columns = policy.shape[3] if len(policy.shape) == 4 else -(-len(levels) // -(-len(levels) // _IN_A_ROW))
     rows = -(-len(levels) // columns)
-    wide_inch = min(4.6 if len(levels) == 1 else 3.0, max(1.25, 0.26 * planes.columns))
+    wide_inch = 4.4 if len(levels) == 1 else min(3.0, max(1.25, 0.26 * planes.columns))
     tall_inch = wide_inch * planes.rows / planes.columns
     with picture_file(path, max(5.2, wide_inch * columns + 1.3), (tall_inch + 0.3) * rows + 0.8) as figure:
         grid = figure.subplots(rows, columns, squeeze=False).ravel()
@@ -69,7 +66,7 @@ def value_levels(policy: Policy, path: Path) -> None:
             axes.remove()
         shown = learned.values[learned.visited & (ends == ON)]
         scale = (float(shown.min()), float(shown.max())) if shown.size else (0.0, 1.0)
-        pen = Pen(72 * wide_inch / planes.columns, planes, scale)
+        pen = Pen(72 * wide_inch / planes.columns, planes, policy.action_labels, scale)
         for axes, level in zip(grid, levels, strict=False):
             tint = pen.draw_level(axes, learned, level)
             axes.set_title(_level_name(policy.shape, level), fontsize=8)
@@ -97,10 +94,11 @@ def _level_name(shape: tuple[int, ...], level: int) -> str:
 
 
 class Pen(NamedTuple):
-    """How levels are drawn: a cell's side in points, where cells stand, and the least and the largest value."""
+    """How levels are drawn: a cell's side in points, where cells stand, the names of moves, the least and largest value."""
 
     side: float
     planes: Planes
+    labels: tuple[str, ...]
     scale: tuple[float, float]
 
     def draw_level(self, axes: "Axes", learned: Learned, level: int) -> "QuadMesh":
@@ -124,22 +122,24 @@ class Pen(NamedTuple):
         self._mark(axes, at, "o", 0.8, "none", RED)
 
     def _draw_moves(self, axes: "Axes", best: NDArray[np.int64]) -> None:
-        """Arrows along axes 0 and 1, signs for the moves along axes 2 and 3."""
-        for action, beside in enumerate(_BESIDE):
-            along, across = (beside[0], -beside[1]) if self.planes.flips else (beside[1], beside[0])
-            rows, columns = np.nonzero(best == action)
-            x, y = columns + 0.5 - 0.3 * along, rows + 0.5 - 0.3 * across
-            length: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
-            look: dict[str, Any] = {
-                "width": 0.09 * self.side,
-                "units": "dots",
-                "color": INK,
-                "headwidth": 4,
-                "headlength": 4,
-            }
-            axes.quiver(x, y, np.full(len(x), 0.6 * along), np.full(len(x), 0.6 * across), **length, **look)
-        for action, sign in enumerate(_SIGNS, start=len(_BESIDE)):
-            self._mark(axes, best == action, sign, 0.6, INK)
+        """An arrow for what leads to a cell beside it, a sign for other moves."""
+        signs = _signs(self.labels)
+        length: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
+        look: dict[str, Any] = {
+            "width": 0.09 * self.side,
+            "units": "dots",
+            "color": INK,
+            "headwidth": 4,
+            "headlength": 4,
+        }
+        for action, name in enumerate(self.labels):
+            if name in signs:
+                self._mark(axes, best == action, signs[name], 0.6, INK)
+            elif name in _ARROWS:
+                x, y = _ARROWS[name]
+                rows, columns = np.nonzero(best == action)
+                tails = columns + 0.5 - 0.3 * x, rows + 0.5 - 0.3 * y
+                axes.quiver(*tails, np.full(len(rows), 0.6 * x), np.full(len(rows), 0.6 * y), **length, **look)
 
     def _mark(
         self, axes: "Axes", where: NDArray[np.bool_], marker: str, size: float, face: str, edge: str = INK
@@ -169,5 +169,9 @@ def _legend(policy: Policy, learned: Learned) -> list["Line2D"]:
     signs = [sign("start", "o", "none", RED), sign("goal", "*", ORANGE)]
     signs += [sign("never visited", "s", PALE_GREY, GREY)] * bool((~learned.visited & (learned.ends == ON)).any())
     signs += [sign("ends without the goal", "s", GREY, GREY)] * bool((learned.ends == OUT).any())
-    names = policy.action_labels[len(_BESIDE) :]
-    return signs + [sign(name, marker, INK) for name, marker in zip(names, _SIGNS, strict=False)]
+    return signs + [sign(name, marker, INK) for name, marker in _signs(policy.action_labels).items()]
+
+
+def _signs(labels: Sequence[str]) -> dict[str, str]:
+    """The signs of the moves that lead out of the plane: up and down only do where forward is what is up in the picture."""
+    return {name: _SIGNS[name] for name in labels if name in _SIGNS and "forward" in labels}
