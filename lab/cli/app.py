@@ -43,7 +43,6 @@ COMMANDS = {  # what is typed after `lab` -> the command
     "toolbox list": Command(toolbox.toolbox_list, "lab toolbox list"),
     "toolbox show": Command(toolbox.toolbox_show, "lab toolbox show 'insert at toaster 1a2b3c4d'"),
     "toolbox verify": Command(toolbox.toolbox_verify, "lab toolbox verify"),
-    "toolbox remove": Command(toolbox.toolbox_remove, "lab toolbox remove 'insert at toaster 1a2b3c4d'"),
     "toolbox evaluate": Command(
         toolbox_evaluate.toolbox_evaluate, "lab toolbox evaluate 'insert at toaster 1a2b3c4d' --scenes 50"
     ),
@@ -55,6 +54,7 @@ COMMANDS = {  # what is typed after `lab` -> the command
     "toolbox publish": Command(
         toolbox_archive.toolbox_publish, "lab toolbox publish 'insert at toaster 1a2b3c4d' --out insert --license mit"
     ),
+    "toolbox remove": Command(toolbox.toolbox_remove, "lab toolbox remove 'insert at toaster 1a2b3c4d'"),
     "task list": Command(task.task_list, "lab task list"),
     "task show": Command(task.task_show, "lab task show toast"),
     "task random": Command(task.task_random, "lab task random 10x10x10 --density 0.06 --seed 7 --out my-world.toml"),

@@ -34,7 +34,8 @@ def decode(content: bytes, where: str) -> Policy:
     from safetensors import SafetensorError
 
     try:
-        held: dict[str, Any] = _read_tensors(content) | _read_metadata(_header(content).get("__metadata__") or {})
+        tensors, metadata = _read(content)
+        held: dict[str, Any] = tensors | _read_metadata(metadata)
         return Policy(**held)
     except (BadInput, SafetensorError, ValueError, TypeError, KeyError, RecursionError, MemoryError) as error:
         raise unreadable(where, error) from error
@@ -71,7 +72,7 @@ def _header(content: bytes) -> dict[str, Any]:
     return header
 
 
-def _read_tensors(content: bytes) -> dict[str, np.ndarray[Any, Any]]:
+def _read(content: bytes) -> tuple[dict[str, np.ndarray[Any, Any]], dict[str, str]]:
     from safetensors.numpy import load
 
     tensors: dict[str, np.ndarray[Any, Any]] = load(content)
@@ -84,7 +85,7 @@ def _read_tensors(content: bytes) -> dict[str, np.ndarray[Any, Any]]:
     for name in sorted(tensors):
         if header[name]["dtype"] != _TENSORS[name]:
             raise ValueError(f"{name} has type {header[name]['dtype']}, allowed {_TENSORS[name]}")
-    return {name: table if table.flags.writeable else table.copy() for name, table in tensors.items()}
+    return {name: table if table.flags.writeable else table.copy() for name, table in tensors.items()}, metadata
 
 
 def _reject_constant(text: str) -> None:
