@@ -44,12 +44,12 @@ def find(name: str, package: Path) -> Path:
 _DRAFT = ".run-"  # and eight characters: the folder of a draft
 
 
-def write_whole(path: Path, content: bytes) -> None:
-    """Writes beside the target, then renames: readers see the old file or the new one, never half of one.
+def write_whole(path: Path, content: bytes, drafts: Path | None = None) -> None:
+    """Writes beside the target, or in the folder `drafts` next to it, then renames: readers never see half a file.
 
-    The folder must be there. Raises OSError when it cannot be written; then nothing is left behind.
+    The folders must be there. Raises OSError when it cannot be written; then nothing is left behind.
     """
-    beside = path.with_name(f".{path.name}.{token_hex(4)}.tmp")
+    beside = (drafts or path.parent) / f".{path.name}.{token_hex(4)}.tmp"
     try:
         with beside.open("xb") as file:
             file.write(content)

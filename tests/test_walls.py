@@ -40,6 +40,8 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "uvicorn": {"lab.view.server"},
     "websockets": set(),  # uvicorn's
     "jinja2": {"lab.studies.report"},
+    "fsspec": {"lab.toolbox.remote_place"},
+    "s3fs": set(),  # fsspec's
     "joblib": {"lab.studies.runner"},  # to work in several processes; its files are pickles, and nobody reads those
 } | {library: set() for library in ("random", "pickle", "dill", "cloudpickle", "shelve", "marshal")}
 NEVER = {  # room -> rooms that it never imports, whatever the layers say
@@ -50,7 +52,7 @@ NEVER = {  # room -> rooms that it never imports, whatever the layers say
 }
 HEAVY = (
     *("numpy", "pydantic", "scipy", "trimesh", "matplotlib", "numba", "meshcat", "cv2", "pybullet", "safetensors"),
-    *("ortools", "pymoo", "starlette", "uvicorn", "gymnasium", "jinja2"),
+    *("ortools", "pymoo", "starlette", "uvicorn", "gymnasium", "jinja2", "fsspec"),
 )
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 

@@ -40,8 +40,11 @@ COMMANDS = {  # what is typed after `lab` -> the command
     ),
     "see": Command(see.see, "lab see overhead.png --task toast"),
     "view": Command(view.view, "lab view toast"),
-    "toolbox list": Command(toolbox.toolbox_list, "lab toolbox list"),
+    "toolbox list": Command(toolbox.toolbox_list, "lab toolbox list --subtask insert --solved"),
     "toolbox show": Command(toolbox.toolbox_show, "lab toolbox show 'insert at toaster 1a2b3c4d'"),
+    "toolbox log": Command(toolbox.toolbox_log, "lab toolbox log 'insert at toaster 1a2b3c4d'"),
+    "toolbox promote": Command(toolbox.toolbox_promote, "lab toolbox promote 'insert at toaster 1a2b3c4d' 2"),
+    "toolbox rollback": Command(toolbox.toolbox_rollback, "lab toolbox rollback 'insert at toaster 1a2b3c4d'"),
     "toolbox verify": Command(toolbox.toolbox_verify, "lab toolbox verify"),
     "toolbox evaluate": Command(
         toolbox_evaluate.toolbox_evaluate, "lab toolbox evaluate 'insert at toaster 1a2b3c4d' --scenes 50"
@@ -55,6 +58,7 @@ COMMANDS = {  # what is typed after `lab` -> the command
         toolbox_archive.toolbox_publish, "lab toolbox publish 'insert at toaster 1a2b3c4d' --out insert --license mit"
     ),
     "toolbox remove": Command(toolbox.toolbox_remove, "lab toolbox remove 'insert at toaster 1a2b3c4d'"),
+    "toolbox restore": Command(toolbox.toolbox_restore, "lab toolbox restore 'insert at toaster 1a2b3c4d'"),
     "task list": Command(task.task_list, "lab task list"),
     "task show": Command(task.task_show, "lab task show toast"),
     "task random": Command(task.task_random, "lab task random 10x10x10 --density 0.06 --seed 7 --out my-world.toml"),

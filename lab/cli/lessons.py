@@ -52,7 +52,7 @@ def lesson_seat(
             raise
 
 
-def teacher_of(toolbox: Path | None, options: "LessonOptions", seat: "LessonSeat") -> "Teacher":
+def teacher_of(toolbox: str | None, options: "LessonOptions", seat: "LessonSeat") -> "Teacher":
     """The teacher that the options describe; raises BadInput for options and folders that cannot be."""
     from lab.teaching.teacher import Teacher
     from lab.toolbox.registry import Toolbox
@@ -94,7 +94,7 @@ def subject_of(options: "LessonOptions", kept: "KeptSession | None" = None) -> "
 
 
 def sequenced(
-    kept: "OrderSession", people: "Mapping[str, Ask]", seat: "LessonSeat", toolbox: Path | None, files: dict[str, Path]
+    kept: "OrderSession", people: "Mapping[str, Ask]", seat: "LessonSeat", toolbox: str | None, files: dict[str, Path]
 ) -> dict[str, Any]:
     """The document of a session of `lab sequence`, whom it may ask behind such names as "terminal", its pictures in files."""
     from lab.production.sequencing_job import Wanted, sequence_named

@@ -1,6 +1,5 @@
 """The options that several commands have."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -12,9 +11,13 @@ MAX_SESSIONS = 10_000
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Where all chance comes from.")]
-ToolboxFolder = Annotated[
-    Path | None,
-    typer.Option("--toolbox", envvar="LAB_TOOLBOX", help="Where policies are kept; default: your data folder."),
+ToolboxPlace = Annotated[
+    str | None,
+    typer.Option(
+        "--toolbox",
+        envvar="LAB_TOOLBOX",
+        help="Where policies are kept: a folder, or an address such as s3://bucket/lab; default: your data folder.",
+    ),
 ]
 AdvisorNames = Annotated[
     list[str] | None,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lab.cli.lessons import lesson_seat, say_read, sequenced, subject_of
-from lab.cli.options import Json, Plain, Port, ToolboxFolder, TrustModule
+from lab.cli.options import Json, Plain, Port, ToolboxPlace, TrustModule
 from lab.cli.output import end, show
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def replay(
     page: Annotated[bool, typer.Option("--page", help="Show it on a page on 127.0.0.1, too.")] = False,
     port: Port = 0,
     plain: Plain = False,
-    toolbox: ToolboxFolder = None,
+    toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
     """Show a kept teaching session again: each question, what was answered, what came of it, and what it was worth."""
@@ -63,7 +63,7 @@ def replay(
         end("stopped by Ctrl-C", 130)
 
 
-def _replayed(kept: "OrderSession", seat: "LessonSeat", toolbox: Path | None) -> dict[str, Any]:
+def _replayed(kept: "OrderSession", seat: "LessonSeat", toolbox: str | None) -> dict[str, Any]:
     """Advice on an order again: the session is run once more, and the journal answers for the people."""
     from lab.advice.advisors import PEOPLE
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from lab.cli.lessons import lesson_seat, teacher_of
-from lab.cli.options import AdvisorNames, Asked, Decide, Json, Port, Seed, ShowPage, Toasts, ToolboxFolder, Wait
+from lab.cli.options import AdvisorNames, Asked, Decide, Json, Port, Seed, ShowPage, Toasts, ToolboxPlace, Wait
 from lab.cli.output import end, show
 from lab.errors import counted
 
@@ -22,7 +22,7 @@ def run(
     port: Port = 0,
     wait: Wait = None,
     seed: Seed = 0,
-    toolbox: ToolboxFolder = None,
+    toolbox: ToolboxPlace = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures, replay and JSON; default: TASK-run.")
     ] = None,

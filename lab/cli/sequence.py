@@ -7,7 +7,7 @@ import typer
 
 from lab.cli.families import offers
 from lab.cli.lessons import lesson_seat, say_read, sequenced
-from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Plain, Port, Seed, ShowPage, ToolboxFolder, Wait
+from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Plain, Port, Seed, ShowPage, ToolboxPlace, Wait
 from lab.cli.output import end, show
 
 
@@ -58,7 +58,7 @@ def sequence(
     wait: Wait = None,
     plain: Plain = False,
     seed: Seed = 0,
-    toolbox: ToolboxFolder = None,
+    toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
     """The high level alone: the order of the robot's transfers, beside the proven optimum.

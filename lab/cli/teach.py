@@ -17,7 +17,7 @@ from lab.cli.options import (
     Port,
     Seed,
     ShowPage,
-    ToolboxFolder,
+    ToolboxPlace,
     TrustModule,
     Wait,
 )
@@ -73,7 +73,7 @@ def teach(
     wait: Wait = None,
     plain: Plain = False,
     seed: Seed = 0,
-    toolbox: ToolboxFolder = None,
+    toolbox: ToolboxPlace = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", help="Folder for the session's journal, receipt, learning curve (and value map)."),

@@ -148,7 +148,7 @@ def kept_durations(toolbox: Toolbox, key: str, task: Task, moves: NeededMoves) -
     try:
         return Durations.from_json(record, moves, [s.name for s in task.stations if s.process is not None])
     except BadInput as error:
-        raise BadInput(f"record '{key}' in toolbox {toolbox.folder}: {error}") from None
+        raise BadInput(f"record '{key}' in toolbox {toolbox.address}: {error}") from None
 
 
 def durations_key(

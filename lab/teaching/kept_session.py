@@ -20,8 +20,9 @@ from lab.mdp import FloatArray
 from lab.tasks.record import write_whole
 from lab.teaching.lesson_options import LessonOptions, SessionOptions
 from lab.teaching.lesson_plan import MAX_SESSIONS, Keep, LessonPlan
+from lab.toolbox.names import default_address, slug
 from lab.toolbox.policy import Policy
-from lab.toolbox.registry import Toolbox, default_folder, slug
+from lab.toolbox.registry import Toolbox
 
 SESSIONS = "sessions"  # the folder in the toolbox
 _BEGUN = "begun"  # the folder in a session's folder for the policy that it went on from
@@ -61,7 +62,7 @@ class SessionInFolder:
         """What goes on with it; "" when there is nothing to go on with."""
         if self.folder is None or self.journal is None:
             return ""
-        box = "" if toolbox.folder == default_folder() else f" --toolbox {quote(str(toolbox.folder))}"
+        box = "" if toolbox.address == default_address() else f" --toolbox {quote(toolbox.address)}"
         return f"; go on with: lab {self.options.command} --resume {quote(str(self.folder))}{box}"
 
     def replayed(self) -> dict[str, Any]:

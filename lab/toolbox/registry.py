@@ -1,301 +1,311 @@
-"""The toolbox: learned policies and measured records in a folder, written whole or not at all, never loaded damaged."""
+"""The toolbox: learned policies in versions and measured records, written whole or not at all, never loaded damaged."""
 
-import errno
-import hashlib
-import json
-import os
-import re
-from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import fields
-from datetime import datetime
-from functools import cache
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, create_model
-
-from lab import files
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.toolbox.policy import Policy
+from lab.toolbox import records
+from lab.toolbox.folder_place import FolderPlace
+from lab.toolbox.index import Index, Key, KnownPolicies, Row
+from lab.toolbox.names import SUFFIX, TRASH, VERSIONS, default_address, is_address, slug
+from lab.toolbox.place import Place, read_file
 
-FORMAT = "teaching-lab-policy-1"
-SUFFIX = ".safetensors"
-MAX_FILE_BYTES = 1 << 30
-MAX_SLUG_LENGTH = 60
-Paths = list[Path]
-Summaries = list[dict[str, Any]]
+if TYPE_CHECKING:
+    from lab.toolbox.policy import Policy
+    from lab.toolbox.versions import Saved, Version, Versions
+
+Rows = list[Row]
 Words = list[str]
 Report = list[tuple[Path, bool, str]]  # path, whether it is sound, what is wrong
-
-_TENSORS = {"q": "F64", "visits": "I64", "ends": "U8"}
-_SINCE_LINEAGE = {"ends", "parent", "scene"}  # older files have none of them
-_METADATA = tuple(field.name for field in fields(Policy) if field.name not in _TENSORS)
-_NOT_WRITABLE = {errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EEXIST, errno.EISDIR, errno.ENAMETOOLONG}
-
-
-def default_folder() -> Path:
-    """LAB_TOOLBOX if it is set, else the folder "toolbox" in the user's data folder."""
-    named = os.environ.get("LAB_TOOLBOX")
-    if named:
-        return Path(named)
-    from platformdirs import user_data_dir
-
-    return Path(user_data_dir("teaching-lab", appauthor=False)) / "toolbox"
-
-
-def slug(name: str) -> str:
-    """A file stem for any name: plain lower-case ones stay, others are cleaned and get a hash that keeps them apart."""
-    plain = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:MAX_SLUG_LENGTH]
-    if plain and plain == name:
-        return plain
-    return f"{plain or 'policy'}-{hashlib.sha256(name.encode('utf-8', 'replace')).hexdigest()[:10]}"
+_NOT_LISTED = ("action_labels", "shape")
+_MOST_NAMED = 30  # policies that an error lists; of more, only the nearest
+_NEAREST = 5
+_LONGEST_LINE = 100  # ancestors that are looked up
 
 
 class Toolbox:
-    """Policies and records in one folder; the folder is made when something is first saved.
+    """Policies and records in a folder or at an address that fsspec knows; a folder is made when something is first saved.
 
-    All methods raise BadInput when the folder is no folder, cannot be read or cannot be written.
+    A policy's name leads to the version that is in use. A `Path` in `folder` names a file of the toolbox, wherever that is
+    kept. All methods raise BadInput when the place is no folder, cannot be read or cannot be written, and WorkFailed when it
+    cannot be reached.
     """
 
-    def __init__(self, folder: Path | str | None = None):
-        self.folder = Path(folder) if folder is not None else default_folder()
+    def __init__(self, where: Path | str | None = None):
+        self.place = _place_of(where)
+        self.folder = self.place.folder
+        self.address = self.place.address
+        self._root = self.place.where("x")[:-1]
+        self._index = Index(self.place)
 
     def check(self) -> None:
-        """Raises BadInput unless policies can be saved here; makes nothing."""
+        """Raises unless policies can be saved here; makes nothing."""
+        self.place.check()
+
+    def save(self, policy: "Policy") -> Path:
+        """Keeps a policy, and puts it in use unless the one in use does better; returns the file that holds it."""
+        return self.folder / self.put(policy).file
+
+    def put(self, policy: "Policy") -> "Saved":
+        """Keeps a policy as `save` does, and says what became of it; at no time is there half a file.
+
+        WorkFailed when a remote toolbox cannot be reached; then it is kept in the local folder, and the error says where.
+        """
         try:
-            place = files.nearest(self.folder)
-        except OSError as error:
-            raise BadInput(f"toolbox {self.folder}: {error.strerror}") from error
-        if not place.is_dir():
-            raise BadInput(f"toolbox {self.folder}: '{place}' is a file, a folder is needed")
-        if not os.access(place, os.R_OK | os.W_OK | os.X_OK):
-            raise BadInput(f"toolbox {self.folder}: '{place}' cannot be written")
+            return self._of(slug(policy.name)).put(policy)
+        except WorkFailed as error:
+            if self.place.alone:
+                raise
+            beside = Toolbox(self.folder.with_name(f"{self.folder.name}-unsent"))
+            raise WorkFailed(f"{error}; it is kept in {beside.save(policy)}") from error
 
-    def save(self, policy: Policy) -> Path:
-        """Writes a policy, replacing one of the same name; at no time is there half a file."""
-        return _write_whole(self._path(policy.name), _encode(policy))
+    def load(self, path: Path | str) -> "Policy":
+        """Reads one file, of the toolbox or a local one. Raises BadInput, naming it, unless it is a sound policy."""
+        from lab.toolbox.policy_file import decode, unreadable
 
-    def load(self, path: Path | str) -> Policy:
-        """Reads one file. Raises BadInput, naming it, for anything but a whole and sound policy."""
-        return _decode(Path(path))
+        inside = self._inside(path)
+        try:
+            content = read_file(Path(path)) if inside is None else self.place.read(inside)
+        except BadInput as error:
+            raise unreadable(str(path), error) from error
+        return decode(content, str(path))
 
-    def find(self, subtask: str, signature: str, name: str | None = None) -> Policy | None:
+    def find(self, subtask: str, signature: str, name: str | None = None) -> "Policy | None":
         """The policy of a sub-task for exactly this problem, None if there is none.
 
         Solved ones come before unsolved ones, then the newest. Damaged files are skipped; `verify` reports them.
         """
-        fitting = [
-            policy
-            for _, policy in self._sound()
-            if policy.subtask == subtask and policy.signature == signature and name in (None, policy.name)
+        rows = [
+            row
+            for row in self._rows()
+            if (row["subtask"], row["signature"]) == (subtask, signature) and name in (None, row["name"])
         ]
-        return max(fitting, key=_worth, default=None)
+        for row in sorted(rows, key=_worth, reverse=True):
+            with suppress(BadInput):  # damaged or gone meanwhile
+                return self.load(row["file"])
+        return None
 
-    def index(self) -> tuple[dict[tuple[str, str], Policy], Words]:
-        """What `find` would give, for every (sub-task, signature) at once; and what is wrong with each damaged file."""
-        found: dict[tuple[str, str], Policy] = {}
-        damaged = []
-        for path in self._files(SUFFIX):
-            try:
-                policy = _decode(path)
-            except BadInput as error:
-                damaged.append(str(error))
-                continue
-            key = (policy.subtask, policy.signature)
-            found[key] = max(found.get(key, policy), policy, key=_worth)
-        return found, damaged
+    def index(self) -> tuple[KnownPolicies, Words]:
+        """What `find` would give, for every (sub-task, signature); and what is wrong with each damaged file."""
+        best: dict[Key, Row] = {}
+        for row in self._rows():
+            key = (row["subtask"], row["signature"])
+            best[key] = max(best.get(key, row), row, key=_worth)
+        damaged = [row["damaged"] for row in self._index.rows().values() if "damaged" in row]
+        return KnownPolicies({key: row["file"] for key, row in best.items()}, self.load), damaged
 
-    def list(self) -> Summaries:
-        """What is stored, in file order: the metadata of each sound policy without curve and settings."""
-        brief = ("learner", "gate", "versions", "curve", "guided", "action_labels", "shape", "start")
-        return [{k: v for k, v in _describe(path, policy).items() if k not in brief} for path, policy in self._sound()]
+    def candidates(self, subtask: str, states: int, actions: int) -> Rows:
+        """The policies in use of a sub-task whose tables have this size, the newest first, with shape and action labels."""
+        rows = [
+            row for row in self._rows() if (row["subtask"], row["states"], row["actions"]) == (subtask, states, actions)
+        ]
+        return sorted(rows, key=lambda row: str(row["created"]), reverse=True)
+
+    def list(
+        self,
+        *,
+        subtask: str | None = None,
+        task: str | None = None,
+        advisor: str | None = None,
+        solved: bool | None = None,
+    ) -> Rows:
+        """The policies in use, in file order: the metadata of each sound one without curve and settings."""
+        wanted = {"subtask": subtask, "task": task, "advisor": advisor, "solved": solved}
+        filters = {field: value for field, value in wanted.items() if value is not None}
+        rows = [row for row in self._rows() if all(row[field] == value for field, value in filters.items())]
+        for row in rows:
+            for field in _NOT_LISTED:
+                del row[field]
+        return rows
 
     def show(self, name: str) -> dict[str, Any]:
-        """All metadata of one policy. Raises BadInput for an unknown name or a damaged file."""
-        path = self._locate(name)
-        return _describe(path, self.load(path))
+        """All that is known of one policy, and of its versions. Raises BadInput for an unknown name or a damaged file."""
+        from lab.toolbox.policy_file import described
+
+        stem = self._stem(name)
+        versions = self._of(stem)
+        policy = self.load(self.folder / versions.in_use_file)
+        (row,) = [row for row in self._rows() if row["file"] == self.place.where(versions.in_use_file)]
+        events, _ = versions.events()
+        kept, sizes = versions.kept(), self.place.files(f"{VERSIONS}/{stem}")
+        saved = {event["hash"]: event["time"] for event in reversed(events) if "hash" in event}
+        return {
+            **described(policy),
+            "file": row["file"],
+            "version": row["version"],
+            "hash": row["hash"],
+            "lineage": self._lineage(policy),
+            "kept_versions": [
+                {
+                    "version": version.number,
+                    "hash": version.hash,
+                    "in_use": version.hash == row["hash"],
+                    "saved": saved.get(version.hash),
+                    "bytes": sizes[Path(version.file).name].size_bytes,
+                }
+                for version in kept.values()
+            ],
+            "kept_bytes": sum(state.size_bytes for state in sizes.values()),
+            "events": events,
+        }
+
+    def _lineage(self, policy: "Policy") -> Rows:
+        """The policies that it came from by warm starts, the nearest first: name, hash, scene, and whether it is kept here."""
+        found: Rows = []
+        seen, parent = set(), policy.parent
+        while parent and parent not in seen and len(found) < _LONGEST_LINE:
+            seen.add(parent)
+            name, _, digits = parent.rpartition("@")
+            versions, ancestor = self._of(slug(name)), None
+            with suppress(BadInput):
+                if (version := versions.kept().get(digits)) is not None:
+                    ancestor = versions.read(version)
+                elif (current := versions.in_use()) is not None and current.hash == digits:
+                    ancestor = current.policy
+            scene = "" if ancestor is None else ancestor.scene
+            found.append({"name": name, "hash": digits, "scene": scene, "kept": ancestor is not None})
+            parent = "" if ancestor is None else ancestor.parent
+        return found
+
+    def versions(self, name: str) -> "Versions":
+        """The versions of a name, to read them. Raises BadInput for a name that nothing is kept of."""
+        return self._of(self._stem(name, also_removed=True))
+
+    def promote(self, name: str, version: str) -> "Version":
+        """Puts a version in use, by its number or hash, however well it does. Raises BadInput for one that is not there."""
+        return self.versions(name).promote(version)
+
+    def rollback(self, name: str) -> "Version":
+        """Puts the version in use that was in use before. Raises BadInput when there was none."""
+        return self.versions(name).rollback()
 
     def remove(self, name: str) -> Path:
-        """Deletes a policy by its name, or a damaged file by its stem; returns the path. Raises BadInput if unknown."""
-        path = self._locate(name)
-        try:
-            path.unlink()
-        except OSError as error:
-            raise _refused("remove", path, error) from error
-        return path
+        """Removes a policy by its name, or a damaged file by its stem, so that `restore` can bring it back; its path."""
+        versions = self._of(self._stem(name))
+        versions.remove()
+        return self.folder / versions.in_use_file
+
+    def restore(self, name: str) -> Path:
+        """Brings back the policy that was removed last under a name; returns its path. Raises BadInput if none was."""
+        removed = {file.removesuffix(SUFFIX) for file in self.place.names(TRASH)}
+        stem = next((stem for stem in (slug(name), name) if stem in removed), None)
+        if stem is None:
+            raise unknown("removed policy", name, removed, f"toolbox {self.address}")
+        versions = self._of(stem)
+        versions.restore()
+        return self.folder / versions.in_use_file
+
+    def log(self, name: str) -> Rows:
+        """What happened to the policies of a name, the first first: time, what, version, hash and more."""
+        return self.versions(name).events()[0]
+
+    def note(self, name: str, what: str, **facts: object) -> None:
+        """Something that happened to the policy in use, or to the version whose `hash` is given, for its log.
+
+        "evaluated" with `success_percent` counts when versions are compared.
+        """
+        self.versions(name).note(what, **facts)
 
     def verify(self) -> Report:
-        """Checks every file: (path, whether it is sound, "" or what is wrong)."""
-        report = []
-        for path in [*self._files(SUFFIX), *self._files(".json", "records/*/")]:
-            try:
-                _decode(path) if path.suffix == SUFFIX else _read_record(path)
-                report.append((path, True, ""))
-            except BadInput as error:
-                report.append((path, False, str(error)))
-        return report
+        """Checks every file: (path, whether it is sound, "" or what is wrong).
+
+        A row for each policy in use and each record; of versions and logs only those that are not sound.
+        """
+        from lab.toolbox.policy_file import decode, unreadable
+
+        report: Report = []
+        stems = {file.removesuffix(SUFFIX) for file in self._files()}
+        for stem in sorted(stems | set(self.place.folders(VERSIONS))):
+            versions = self._of(stem)
+            where = self.place.where(versions.in_use_file)
+            if stem in stems:
+                reason, kept = "", versions.kept()
+                try:
+                    decode(self._content(versions.in_use_file), where)
+                    current = versions.in_use()
+                    if kept and current is not None and current.hash not in kept:
+                        reason = str(unreadable(where, ValueError("it is none of the kept versions: it was changed")))
+                except BadInput as error:
+                    reason = str(error)
+                report.append((self.folder / versions.in_use_file, not reason, reason))
+            report += [(self.folder / file, False, reason) for file, reason in versions.faults()]
+        checked = records.faults(self.place).items()
+        return report + [(self.folder / file, not reason, reason) for file, reason in checked]
 
     def save_record(self, kind: str, key: str, record: dict[str, Any]) -> Path:
         """Keeps a JSON record, such as the measured duration of a transfer, under its kind and key."""
-        try:
-            text = json.dumps({"kind": kind, "key": key, "record": record}, indent=1, allow_nan=False)
-        except (TypeError, ValueError) as error:
-            raise BadInput(f"record '{key}' ({kind}): {error}") from error
-        return _write_whole(self._record_path(kind, key), text.encode())
+        records.save(self.place, kind, key, record)
+        return self.folder / records.file_of(kind, key)
 
     def load_record(self, kind: str, key: str) -> dict[str, Any] | None:
         """The record of that kind and key; None when there is none or its file is damaged (see `verify`)."""
+        return records.load(self.place, kind, key)
+
+    def _content(self, file: str) -> bytes:
+        from lab.toolbox.policy_file import unreadable
+
         try:
-            whole = _read_record(self._record_path(kind, key))
-        except BadInput:
-            return None
-        record: dict[str, Any] = whole["record"]
-        return record if (whole["kind"], whole["key"]) == (kind, key) else None
+            return self.place.read(file)
+        except BadInput as error:
+            raise unreadable(self.place.where(file), error) from error
 
-    def _path(self, name: str) -> Path:
-        return self.folder / f"{slug(name)}{SUFFIX}"
+    def where(self, path: Path) -> str:
+        """The whole address of a path in the toolbox."""
+        inside = self._inside(path)
+        return str(path) if inside is None else self.place.where(inside)
 
-    def _record_path(self, kind: str, key: str) -> Path:
-        return self.folder / "records" / slug(kind) / f"{slug(key)}.json"
+    def _inside(self, path: Path | str) -> str | None:
+        """The name in the place that a path or an address stands for; None when it is elsewhere."""
+        for root in (self._root, f"{self.folder}/"):
+            if str(path).startswith(root):
+                return str(path).removeprefix(root)
+        return None
 
-    def _files(self, suffix: str, below: str = "") -> Paths:
-        try:
-            if self.folder.exists() and not self.folder.is_dir():
-                raise BadInput(f"toolbox {self.folder}: it is a file, a folder is needed")
-            if self.folder.exists():
-                os.scandir(self.folder).close()  # glob would hide a folder that may not be read
-            return sorted(self.folder.glob(f"{below}*{suffix}"))
-        except OSError as error:
-            raise _refused("read", self.folder, error) from error
+    def _of(self, stem: str) -> "Versions":
+        from lab.toolbox.versions import Versions
 
-    def _sound(self) -> Iterator[tuple[Path, Policy]]:
-        for path in self._files(SUFFIX):
-            with suppress(BadInput):
-                yield path, _decode(path)
+        return Versions(self.place, stem)
 
-    def _locate(self, name: str) -> Path:
-        files = self._files(SUFFIX)
-        for path in (self._path(name), self.folder / f"{name}{SUFFIX}"):
-            if path in files:
-                return path
-        named = {policy.name: path for path, policy in self._sound()}
-        if name not in named:
-            raise unknown("policy", name, named, f"toolbox {self.folder}")
-        return named[name]
+    def _rows(self) -> Rows:
+        """The index's sound rows, each with its file; they are copies."""
+        rows = self._index.rows().items()
+        return [{**row, "file": self._root + name} for name, row in rows if "damaged" not in row]
 
+    def _files(self) -> set[str]:
+        return {name for name in self.place.names() if name.endswith(SUFFIX)}
 
-def _worth(policy: Policy) -> tuple[bool, str]:
-    return policy.solved, policy.created
-
-
-def _refused(verb: str, path: Path, error: OSError) -> BadInput | WorkFailed:
-    reason = f"cannot {verb} {path}: {error.strerror or error}"
-    return BadInput(reason) if error.errno in _NOT_WRITABLE or verb == "read" else WorkFailed(reason)
-
-
-def _write_whole(path: Path, content: bytes) -> Path:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        files.write_whole(path, content)
-    except OSError as error:
-        raise _refused("write", path, error) from error
-    return path
+    def _stem(self, name: str, also_removed: bool = False) -> str:
+        """The file stem of a policy in use, or, `also_removed`, of one that a log is kept of. BadInput for no such name."""
+        files = self._files()
+        for stem in (slug(name), name):
+            if f"{stem}{SUFFIX}" in files:
+                return stem
+        if also_removed and self.place.folders(f"{VERSIONS}") and slug(name) in self.place.folders(VERSIONS):
+            return slug(name)
+        named = {row["name"]: file for file, row in self._index.rows().items() if "damaged" not in row}
+        if name in named:
+            return str(named[name]).removesuffix(SUFFIX)
+        where = f"toolbox {self.address}"
+        if len(named) <= _MOST_NAMED:
+            raise unknown("policy", name, named, where)
+        near = get_close_matches(name, named, n=_NEAREST, cutoff=0.5)
+        hint = f"did you mean '{near[0]}'? near: {', '.join(near)}; " if near else ""
+        raise BadInput(f"unknown policy '{name}' ({where}): {hint}lab toolbox list names all {len(named)} policies")
 
 
-def _read_record(path: Path) -> dict[str, Any]:
-    try:
-        whole = json.loads(path.read_bytes(), parse_constant=_reject_constant)
-    except (OSError, ValueError, RecursionError) as error:
-        raise BadInput(f"record file {path}: {error}") from error
-    if not isinstance(whole, dict) or not isinstance(whole.get("record"), dict) or not {"kind", "key"} <= whole.keys():
-        raise BadInput(f"record file {path}: it must hold kind, key and record")
-    return whole
+def _place_of(where: Path | str | None) -> Place:
+    """The place that a folder or an address names, by default the user's own."""
+    text = default_address() if where is None else str(where)
+    if text.startswith("file://"):
+        text = text.removeprefix("file://")
+    if is_address(text):
+        from lab.toolbox.remote_place import RemotePlace
+
+        return RemotePlace(text)
+    return FolderPlace(Path(text))
 
 
-def _reject_constant(text: str) -> None:
-    raise ValueError(f"{text} is not allowed")
-
-
-def _date(text: str) -> str:
-    datetime.fromisoformat(text)
-    return text
-
-
-@cache
-def _metadata() -> type[BaseModel]:
-    """What a policy's file holds beside its tables: the fields of `Policy`."""
-    held: dict[str, Any] = {
-        field.name: (field.type, field.default if field.name in _SINCE_LINEAGE else ...)
-        for field in fields(Policy)
-        if field.name in _METADATA
-    }
-    held["created"] = (Annotated[str, AfterValidator(_date)], ...)
-    held["learner"] = held["gate"] = (dict[str, str | bool | int | float], ...)
-    return create_model("Metadata", __config__=ConfigDict(strict=True, allow_inf_nan=False), **held)
-
-
-def _encode(policy: Policy) -> bytes:
-    from safetensors.numpy import save
-
-    metadata = {name: json.dumps(getattr(policy, name), allow_nan=False) for name in _METADATA}
-    found = {name: getattr(policy, name) for name in _TENSORS}
-    tensors = {name: np.ascontiguousarray(table) for name, table in found.items() if table is not None}
-    content: bytes = save(tensors, {"format": FORMAT, **metadata})
-    return content
-
-
-def _decode(path: Path) -> Policy:
-    from safetensors import SafetensorError
-
-    try:
-        if not path.is_file():
-            raise ValueError("it is not a file" if path.exists() else "there is no such file")
-        if path.stat().st_size > MAX_FILE_BYTES:
-            raise ValueError(f"it has {path.stat().st_size} bytes, allowed {MAX_FILE_BYTES}")
-        tensors, metadata = _read_tensors(path)
-        held: dict[str, Any] = tensors | _read_metadata(metadata)
-        return Policy(**held)
-    except (BadInput, SafetensorError, OSError, ValueError, TypeError, RecursionError, MemoryError) as error:
-        raise BadInput(f"policy file {path}: {' '.join(str(error).split()) or type(error).__name__}") from error
-
-
-def _read_tensors(path: Path) -> tuple[dict[str, np.ndarray[Any, Any]], dict[str, str]]:
-    from safetensors import safe_open
-
-    with safe_open(path, framework="np") as file:
-        metadata = file.metadata() or {}
-        if metadata.get("format") != FORMAT:
-            raise ValueError(f"format {metadata.get('format')!r}, allowed '{FORMAT}'")
-        found = set(file.keys())
-        if not set(_TENSORS) - _SINCE_LINEAGE <= found <= set(_TENSORS):
-            raise ValueError(f"it holds the tensors {sorted(found)}, allowed {sorted(_TENSORS)}")
-        for name in sorted(found):
-            dtype = _TENSORS[name]
-            if file.get_slice(name).get_dtype() != dtype:
-                raise ValueError(f"{name} has type {file.get_slice(name).get_dtype()}, allowed {dtype}")
-        return {name: file.get_tensor(name) for name in found}, metadata
-
-
-def _read_metadata(metadata: dict[str, str]) -> dict[str, Any]:
-    values = {
-        name: json.loads(metadata[name], parse_constant=_reject_constant) for name in _METADATA if name in metadata
-    }
-    try:
-        found = _metadata().model_validate_json(json.dumps(values))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        field, why = ".".join(map(str, first["loc"][:1])), first["msg"]
-        if first["type"] == "missing":
-            raise ValueError(f"its field '{field}' is missing") from None
-        raise ValueError(
-            f"its field '{field}' is {str(metadata.get(field))[:60]!r}, which is not allowed: {why}"
-        ) from None
-    return dict(found)
-
-
-def _describe(path: Path, policy: Policy) -> dict[str, Any]:
-    states, actions = policy.q.shape
-    values = {field.name: getattr(policy, field.name) for field in fields(policy) if field.name not in _TENSORS}
-    return {**values, "states": states, "actions": actions, "episodes": len(policy.curve), "file": str(path)}
+def _worth(row: Row) -> tuple[bool, str]:
+    return row["solved"], row["created"]

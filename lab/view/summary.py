@@ -206,49 +206,6 @@ def study_summary(study: Mapping[str, Any]) -> RenderableType:
     return Group(table_of(rows, columns), *(Text(line) for line in (*lines, "", *study["notes"])))
 
 
-def toolbox_summary(box: Mapping[str, Any]) -> RenderableType:
-    """What `lab toolbox list` shows, from its JSON document."""
-    if not box["policies"]:
-        return Text(f"nothing in {box['folder']}")
-    columns = ("name", "subtask", "task", "solved", "signature", "created")
-    rows = [
-        {**row, "created": row["created"][:16].replace("T", " "), "solved": "yes" if row["solved"] else "no"}
-        for row in box["policies"]
-    ]
-    return table_of(rows, columns)
-
-
-def policy_summary(policy: Mapping[str, Any]) -> RenderableType:
-    """What `lab toolbox show` shows, from its JSON document."""
-    from lab.view.progress import sparkline
-
-    curve = policy["curve"] or [0]
-    guided = [str(n) for n, was_guided in enumerate(policy["guided"], start=1) if was_guided]
-    shown = {
-        **policy,
-        "curve": f"{sparkline(curve, 40)}  {min(curve)} to {max(curve)} steps",
-        "guided": counted(len(guided), "episode")
-        + (f", the first {guided[0]}, the last {guided[-1]}" if guided else ""),
-        "created": policy["created"].replace("T", " "),
-        "solved": "yes" if policy["solved"] else "no",
-        **{name: ", ".join(f"{k} {v}" for k, v in policy[name].items()) for name in ("learner", "gate", "versions")},
-        **{name: ", ".join(map(str, policy[name])) for name in ("action_labels", "shape")},
-    }
-    return table_of(
-        [{"field": name.replace("_", " "), "value": value} for name, value in shown.items()], ("field", "value")
-    )
-
-
-def verify_summary(report: Mapping[str, Any]) -> RenderableType:
-    """What `lab toolbox verify` shows, from its JSON document: the damaged files, and how many are sound."""
-    files, damaged = report["files"], [row for row in report["files"] if not row["ok"]]
-    if not files:
-        return Text(f"nothing in {report['folder']}")
-    are = "is" if len(files) == 1 else "are"
-    lines = [Text(f"{len(files) - len(damaged)} of {counted(len(files), 'file')} in {report['folder']} {are} sound")]
-    return Group(*lines, *(Text(row["reason"], "red") for row in damaged))
-
-
 def grid_summary(seen: Mapping[str, Any]) -> RenderableType:
     """The end of `lab see`: the grid seen from above, y upwards, as the overhead camera shows it."""
     marks = {".": "·", "S": "S", "G": "G", "#": "█"}

@@ -9,12 +9,9 @@ from rich.console import Console, RenderableType
 from lab.view.summary import (
     grid_summary,
     lesson_summary,
-    policy_summary,
     run_summary,
     sequence_summary,
     table_of,
-    toolbox_summary,
-    verify_summary,
 )
 
 
@@ -254,51 +251,6 @@ def test_a_sequence_in_drawn_times() -> None:
 
 def test_a_table_takes_what_looks_like_markup_as_it_is() -> None:
     assert shown(table_of([{"a_b": "[red]x", "c": 1}], ("a_b", "c"))) == ["a b     c", "[red]x  1"]
-
-
-POLICY: dict[str, Any] = {
-    "name": "insert 1a2b",
-    "subtask": "insert",
-    "task": "toast",
-    "solved": True,
-    "signature": "1a2b",
-    "created": "2026-01-02T03:04:05.678+00:00",
-    "curve": [9, 5, 4],
-    "guided": [False, True, True],
-    "learner": {"learner": "q", "alpha": 0.5},
-    "gate": {"gate": "never"},
-    "versions": {"numpy": "2"},
-    "action_labels": ("up", "down"),
-    "shape": (2, 3),
-}
-
-
-def test_a_toolbox() -> None:
-    assert shown(toolbox_summary({"folder": "/box", "policies": []})) == ["nothing in /box"]
-    assert shown(toolbox_summary({"folder": "/box", "policies": [POLICY, POLICY | {"solved": False}]})) == [
-        "name         subtask  task   solved  signature  created",
-        "insert 1a2b  insert   toast  yes     1a2b       2026-01-02 03:04",
-        "insert 1a2b  insert   toast  no      1a2b       2026-01-02 03:04",
-    ]
-
-
-def test_a_policy() -> None:
-    lines = [" ".join(line.split()) for line in shown(policy_summary(POLICY))]
-    assert "learner learner q, alpha 0.5" in lines
-    assert "guided 2 episodes, the first 2, the last 3" in lines
-    assert "action labels up, down" in lines
-    assert "shape 2, 3" in lines
-    assert any(line.startswith("curve █") and line.endswith("4 to 9 steps") for line in lines)
-    fresh = [" ".join(line.split()) for line in shown(policy_summary(POLICY | {"curve": [], "guided": []}))]
-    assert "guided 0 episodes" in fresh
-
-
-def test_a_verified_toolbox() -> None:
-    rows = [{"file": "/box/a", "ok": True, "reason": ""}, {"file": "/box/b", "ok": False, "reason": "/box/b: cut off"}]
-    assert shown(verify_summary({"folder": "/box", "files": rows, "damaged": 1})) == [
-        "1 of 2 files in /box are sound",
-        "/box/b: cut off",
-    ]
 
 
 def test_a_grid_is_seen_from_above() -> None:

@@ -1,0 +1,160 @@
+"""A toolbox in a local folder."""
+
+import errno
+import fcntl
+import os
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from lab import files
+from lab.errors import BadInput, WorkFailed
+from lab.toolbox.place import FileState, read_file
+
+_NOT_WRITABLE = {
+    *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP),
+    *(errno.ENOTDIR, errno.EEXIST, errno.EISDIR, errno.ENAMETOOLONG),
+}
+_FRESH_NS = 50_000_000  # a file changed so lately may change again without its times telling
+
+
+class FolderPlace:
+    """A local folder, made when something is first written. Symbolic links in it are not followed out of it."""
+
+    alone = True
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = self.cache = folder
+        self.address = str(folder)
+
+    def check(self) -> None:
+        try:
+            place = files.nearest(self.folder)
+        except OSError as error:
+            raise BadInput(f"toolbox {self.folder}: {error.strerror}") from error
+        if not place.is_dir():
+            raise BadInput(f"toolbox {self.folder}: '{place}' is a file, a folder is needed")
+        if not os.access(place, os.R_OK | os.W_OK | os.X_OK):
+            raise BadInput(f"toolbox {self.folder}: '{place}' cannot be written")
+
+    def names(self, under: str = "") -> list[str]:
+        return [entry.name for entry in self._entries(under)]
+
+    def files(self, under: str = "") -> dict[str, FileState]:
+        found, fresh = {}, time.time_ns() - _FRESH_NS
+        for entry in self._entries(under):
+            try:
+                at = entry.stat()
+            except OSError:  # gone meanwhile, or a link to nothing
+                continue
+            stamp = f"{at.st_mtime_ns}-{at.st_ctime_ns}-{at.st_ino}" if at.st_ctime_ns < fresh else ""
+            found[entry.name] = FileState(at.st_size, stamp)
+        return found
+
+    def exists(self, name: str) -> bool:
+        return os.path.lexists(self.folder / name)
+
+    def tree(self, under: str) -> list[str]:
+        return [f"{under}/{name}/{file}" for name in self.folders(under) for file in self.names(f"{under}/{name}")]
+
+    def folders(self, under: str) -> list[str]:
+        return sorted(entry.name for entry in self._entries(under) if entry.is_dir(follow_symlinks=False))
+
+    def _entries(self, under: str) -> list["os.DirEntry[str]"]:
+        folder = self.folder / under
+        try:
+            if self.folder.exists() and not self.folder.is_dir():
+                raise BadInput(f"toolbox {self.folder}: it is a file, a folder is needed")
+            self._inside(folder)
+            with os.scandir(folder) as entries:
+                return [entry for entry in entries if not entry.name.startswith(".")]
+        except FileNotFoundError:
+            return []
+        except OSError as error:
+            raise _refused("read", folder, error) from error
+
+    def read(self, name: str) -> bytes:
+        path = self.folder / name
+        self._inside(path)
+        return read_file(path)
+
+    def read_many(self, states: Mapping[str, FileState]) -> Iterator[tuple[str, bytes | BadInput]]:
+        for name in states:
+            try:
+                yield name, self.read(name)
+            except BadInput as error:
+                yield name, error
+
+    def write(self, name: str, content: bytes, drafts: str = "") -> None:
+        path, beside = self.folder / name, self.folder / drafts if drafts else None
+        try:
+            for folder in {path.parent, beside or path.parent}:
+                self._made(folder)
+            files.write_whole(path, content, beside)
+        except OSError as error:
+            raise _refused("write", path, error) from error
+
+    def move(self, name: str, to: str) -> None:
+        path, target = self.folder / name, self.folder / to
+        try:
+            self._inside(path.parent)
+            self._made(target.parent)
+            os.replace(path, target)
+        except OSError as error:
+            raise _refused("move", path, error) from error
+
+    def sweep(self, under: str) -> None:
+        for left in (self.folder / under).glob(".*.tmp"):
+            left.unlink(missing_ok=True)
+
+    def append(self, name: str, line: bytes) -> None:
+        path = self.folder / name
+        try:
+            self._made(path.parent)
+            handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+            try:
+                size = os.fstat(handle).st_size
+                cut = size > 0 and os.pread(handle, 1, size - 1) != b"\n"  # by a crash: begin a new line
+                os.write(handle, b"\n" * cut + line + b"\n")
+            finally:
+                os.close(handle)
+        except OSError as error:
+            raise _refused("write", path, error) from error
+
+    def lines(self, name: str) -> list[bytes]:
+        path = self.folder / name
+        self._inside(path)
+        return read_file(path).splitlines() if path.exists() else []
+
+    @contextmanager
+    def lock(self, name: str) -> Iterator[None]:
+        path = self.folder / name
+        try:
+            self._made(path.parent)
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+        except OSError as error:
+            raise _refused("write", path, error) from error
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX)
+            yield
+        finally:
+            os.close(handle)
+
+    def where(self, name: str) -> str:
+        return str(self.folder / name)
+
+    def _made(self, folder: Path) -> None:
+        """Makes a folder in the place; what is written into it stays in the place."""
+        folder.mkdir(parents=True, exist_ok=True)
+        self._inside(folder)
+
+    def _inside(self, path: Path) -> None:
+        """Raises BadInput when a name or a symbolic link leads out of the place."""
+        if not path.resolve().is_relative_to(self.folder.resolve()):
+            raise BadInput(f"{path}: it leads out of the toolbox {self.folder}")
+
+
+def _refused(verb: str, path: Path, error: OSError) -> BadInput | WorkFailed:
+    reason = f"cannot {verb} {path}: {error.strerror or error}"
+    return BadInput(reason) if error.errno in _NOT_WRITABLE or verb == "read" else WorkFailed(reason)

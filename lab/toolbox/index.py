@@ -1,0 +1,145 @@
+"""The index of a toolbox: what its policies are, so that a list need not read them all. Made again when lost or stale."""
+
+import json
+import zlib
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from lab.errors import BadInput
+from lab.files import write_whole
+from lab.toolbox.names import SUFFIX, VERSIONS, hash_of
+from lab.toolbox.place import FileState, Place
+
+if TYPE_CHECKING:
+    from lab.toolbox.policy import Policy
+
+FILE = "index.json"  # in the place's cache
+FORMAT = "teaching-lab-index-1"
+Row = dict[str, Any]
+Key = tuple[str, str]  # sub-task, signature
+_LEFT_OUT = ("learner", "gate", "versions", "curve", "guided", "start")
+_HEAD, _REST = '{"crc32": "', '", "index": '
+_MANY = 20  # so many files, or one in so many, and their versions are looked up all at once
+_STALE_SHARE = 0.01  # of the rows; with fewer stale ones it is not worth writing again
+
+
+class Index:
+    """A row for each policy in use: its metadata without curve and settings, or why it is damaged.
+
+    Only files that changed since they were read are read. Any number of processes may use it at once: it is written whole,
+    and what it says of a file counts only while the file's stamp is the same.
+    """
+
+    def __init__(self, place: Place) -> None:
+        self._place = place
+        self._rows: dict[str, Row] | None = None
+        self._stamps: dict[str, str] = {}
+
+    def rows(self) -> dict[str, Row]:
+        """The rows by file name, in order; a damaged file's row holds "damaged" alone, the reason."""
+        if self._rows is None:
+            self._rows, self._stamps = self._loaded()
+        now = {name: state for name, state in self._place.files().items() if name.endswith(SUFFIX)}
+        stale = {name: at for name, at in now.items() if not at.stamp or self._stamps.get(name) != at.stamp}
+        gone = self._rows.keys() - now.keys()
+        if not stale and not gone:
+            return self._rows
+        rows = {name: self._rows[name] for name in now.keys() - stale.keys()} | self._read(stale)
+        self._rows = dict(sorted(rows.items()))
+        self._stamps = {name: at.stamp for name, at in now.items() if at.stamp}
+        changed = sum(bool(at.stamp) and "damaged" not in rows[name] for name, at in stale.items()) + len(gone)
+        if changed > _STALE_SHARE * len(now):
+            self._keep()
+        return self._rows
+
+    def _read(self, states: Mapping[str, FileState]) -> dict[str, Row]:
+        """The rows of these files."""
+        from lab.toolbox.policy_file import decode, described, unreadable
+
+        rows: dict[str, Row] = {}
+        numbers = self._numbers(states)
+        for name, content in self._place.read_many(states):
+            where = self._place.where(name)
+            try:
+                if isinstance(content, BadInput):
+                    raise unreadable(where, content)
+                facts = described(decode(content, where))
+            except BadInput as error:
+                rows[name] = {"damaged": str(error)}
+                continue
+            found, made = {fact: value for fact, value in facts.items() if fact not in _LEFT_OUT}, hash_of(content)
+            kept = numbers.get(name.removesuffix(SUFFIX), {})
+            rows[name] = {**found, "version": kept.get(made) if kept else 1, "hash": made}
+        return rows
+
+    def _numbers(self, states: Mapping[str, FileState]) -> dict[str, dict[str, int]]:
+        """The numbers of the versions of these files, by stem and hash."""
+        from lab.toolbox.versions import version_of
+
+        found: dict[str, dict[str, int]] = {}
+        folders = [f"{VERSIONS}/{name.removesuffix(SUFFIX)}" for name in states]
+        if len(folders) < max(_MANY, len(self._rows or ()) // _MANY):
+            files = [f"{folder}/{name}" for folder in folders for name in self._place.names(folder)]
+        else:
+            files = self._place.tree(VERSIONS)
+        for file in files:
+            if (version := version_of(file)) is not None:
+                found.setdefault(file.split("/")[1], {})[version.hash] = version.number
+        return found
+
+    def _loaded(self) -> tuple[dict[str, Row], dict[str, str]]:
+        """What is kept of it; nothing when that is lost or damaged."""
+        with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
+            text = (self._place.cache / FILE).read_bytes()
+            end = len(_HEAD) + 8
+            body = text[end + len(_REST) : -1]
+            if text[len(_HEAD) : end].decode() == _checksum(body):
+                kept = json.loads(body)
+                if kept["format"] == FORMAT:
+                    return kept["rows"], kept["stamps"]
+        return {}, {}
+
+    def _keep(self) -> None:
+        assert self._rows is not None
+        rows = {name: row for name, row in self._rows.items() if name in self._stamps and "damaged" not in row}
+        stamps = {name: self._stamps[name] for name in rows}
+        body = json.dumps({"format": FORMAT, "stamps": stamps, "rows": rows}).encode()
+        with suppress(OSError):  # a toolbox that may only be read is read all the same
+            self._place.cache.mkdir(parents=True, exist_ok=True)
+            write_whole(self._place.cache / FILE, f"{_HEAD}{_checksum(body)}{_REST}".encode() + body + b"}")
+
+
+def _checksum(body: bytes) -> str:
+    return f"{zlib.crc32(body):08x}"
+
+
+class KnownPolicies(MutableMapping[Key, "Policy"]):
+    """Policies by sub-task and signature, each read when it is first asked for; one that is gone by then is not there."""
+
+    def __init__(self, files: dict[Key, str], load: Callable[[str], "Policy"]) -> None:
+        self._files, self._load = files, load
+        self._read: dict[Key, Policy] = {}
+
+    def __getitem__(self, key: Key) -> "Policy":
+        if key not in self._read:
+            try:
+                self._read[key] = self._load(self._files[key])
+            except BadInput:
+                raise KeyError(key) from None
+        return self._read[key]
+
+    def __setitem__(self, key: Key, policy: "Policy") -> None:
+        self._read[key] = policy
+
+    def __delitem__(self, key: Key) -> None:
+        if key not in self:
+            raise KeyError(key)
+        self._read.pop(key, None)
+        self._files.pop(key, None)
+
+    def __iter__(self) -> Iterator[Key]:
+        return iter(self._files | dict.fromkeys(self._read, ""))
+
+    def __len__(self) -> int:
+        return len(self._files.keys() | self._read.keys())

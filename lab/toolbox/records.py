@@ -1,0 +1,64 @@
+"""Measured records in a toolbox, such as how long moves take: JSON files, by kind and key."""
+
+import json
+from typing import Any
+
+from lab.errors import BadInput
+from lab.toolbox.names import slug
+from lab.toolbox.place import Place
+
+FOLDER = "records"
+_SUFFIX = ".json"
+
+
+def file_of(kind: str, key: str) -> str:
+    """The file of a record in the toolbox."""
+    return f"{FOLDER}/{slug(kind)}/{slug(key)}{_SUFFIX}"
+
+
+def save(place: Place, kind: str, key: str, record: dict[str, Any]) -> None:
+    """Writes a record. Raises BadInput for what JSON cannot hold."""
+    try:
+        text = json.dumps({"kind": kind, "key": key, "record": record}, indent=1, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise BadInput(f"record '{key}' ({kind}): {error}") from error
+    place.write(file_of(kind, key), text.encode())
+
+
+def load(place: Place, kind: str, key: str) -> dict[str, Any] | None:
+    """The record of that kind and key; None when there is none or its file is damaged."""
+    try:
+        whole = _read(place, file_of(kind, key))
+    except BadInput:
+        return None
+    record: dict[str, Any] = whole["record"]
+    return record if (whole["kind"], whole["key"]) == (kind, key) else None
+
+
+def faults(place: Place) -> dict[str, str]:
+    """What is wrong with each record's file, by file; "" where nothing is."""
+    found = {}
+    for folder in place.folders(FOLDER):
+        for name in sorted(place.names(f"{FOLDER}/{folder}")):
+            file = f"{FOLDER}/{folder}/{name}"
+            if name.endswith(_SUFFIX):
+                try:
+                    _read(place, file)
+                    found[file] = ""
+                except BadInput as error:
+                    found[file] = str(error)
+    return found
+
+
+def _read(place: Place, file: str) -> dict[str, Any]:
+    try:
+        whole = json.loads(place.read(file), parse_constant=_reject_constant)
+    except (BadInput, ValueError, RecursionError) as error:
+        raise BadInput(f"record file {place.where(file)}: {error}") from error
+    if not isinstance(whole, dict) or not isinstance(whole.get("record"), dict) or not {"kind", "key"} <= whole.keys():
+        raise BadInput(f"record file {place.where(file)}: it must hold kind, key and record")
+    return whole
+
+
+def _reject_constant(text: str) -> None:
+    raise ValueError(f"{text} is not allowed")

@@ -1,0 +1,295 @@
+"""The versions of one policy's name: kept for good, one of them in use, and never replaced by one that does worse."""
+
+import re
+from contextlib import suppress
+from typing import NamedTuple
+
+from lab.errors import BadInput, WorkFailed
+from lab.toolbox.history import ROLLED_BACK, Event, event, in_use_before, line_of, read_events, success_percents
+from lab.toolbox.names import LOG, SUFFIX, TRASH, VERSIONS, hash_of
+from lab.toolbox.place import Place
+from lab.toolbox.policy import Policy
+from lab.toolbox.policy_file import decode, encode, unreadable
+
+_VERSION = re.compile(rf"(\d{{4,}})-([0-9a-f]{{12}}){re.escape(SUFFIX)}")
+_LEAST_DIGITS = 4  # of a hash that is cut short
+_SHOWN = 5  # versions that an error names
+
+
+class Version(NamedTuple):
+    """One kept version: its number, the hash of its bytes, and its file's name in the place."""
+
+    number: int
+    hash: str
+    file: str
+
+
+def version_of(file: str) -> Version | None:
+    """The version that a file in the place is; None when its name is none of a version's."""
+    match = _VERSION.fullmatch(file.rpartition("/")[2])
+    return None if match is None else Version(int(match[1]), match[2], file)
+
+
+class Saved(NamedTuple):
+    """What became of a policy that was saved: the file that holds it, and why it was not put in use ("": it was)."""
+
+    file: str
+    version: int
+    hash: str
+    why_not: str
+
+    @property
+    def in_use(self) -> bool:
+        """Whether it is the version in use now."""
+        return not self.why_not
+
+
+class InUse(NamedTuple):
+    """The sound policy that is in use."""
+
+    content: bytes
+    hash: str
+    policy: Policy
+
+
+class Versions:
+    """All that a place holds of one name, which is given as its file stem.
+
+    "STEM.safetensors" is the version in use, "versions/STEM/NUMBER-HASH.safetensors" are all, "log/STEM.jsonl" tells what
+    happened, "trash/STEM.safetensors" is what was removed. A policy from before there were versions is kept as one as
+    soon as anything takes its place.
+    """
+
+    def __init__(self, place: Place, stem: str) -> None:
+        self._place, self._stem = place, stem
+        self.in_use_file = f"{stem}{SUFFIX}"
+        self.trash_file = f"{TRASH}/{stem}{SUFFIX}"
+        self._folder, self._log = f"{VERSIONS}/{stem}", f"{LOG}/{stem}.jsonl"
+
+    def kept(self) -> dict[str, Version]:
+        """The kept versions by hash, in the order of their numbers."""
+        found = (version_of(f"{self._folder}/{name}") for name in self._place.names(self._folder))
+        return {version.hash: version for version in sorted(filter(None, found))}
+
+    def in_use(self) -> InUse | None:
+        """The policy in use; None when there is none, or a damaged one. Raises BadInput when it may not be read."""
+        try:
+            content = self._place.read(self.in_use_file)
+            return InUse(content, hash_of(content), decode(content, self._place.where(self.in_use_file)))
+        except BadInput as error:
+            if isinstance(error.__cause__, OSError):  # it may be a good one, and must not be replaced
+                raise unreadable(self._place.where(self.in_use_file), error) from error
+            return None
+
+    def read(self, version: Version) -> Policy:
+        """A kept version. Raises BadInput when its bytes are not those that its name says, or are no sound policy."""
+        return decode(self._bytes_of(version), self._place.where(version.file))
+
+    def put(self, policy: Policy) -> Saved:
+        """Keeps a policy as a version, and puts it in use unless the one in use does better."""
+        content = encode(policy)
+        name = hash_of(content)
+        with self._place.lock(self._log):
+            current, kept = self._kept_current()
+            version = self._keep(content, kept)
+            rates = success_percents(self._place.lines(self._log)) if current is not None else {}
+            why_not = ""
+            if current is None:
+                self._use(content)
+            elif current.hash != name:
+                why_not = does_worse(policy, current.policy, rates.get(name), rates.get(current.hash))
+                if not why_not:
+                    self._use(content)
+            if name not in kept or current is None or current.hash != name:
+                self._tell(
+                    _how_learned(policy, current),
+                    version,
+                    in_use=not why_not,
+                    **({"why_not": why_not} if why_not else {}),
+                    solved=policy.solved,
+                    episodes=len(policy.curve),
+                    final_steps=policy.final_steps,
+                    **{fact: text for fact in ("parent", "scene") if (text := getattr(policy, fact))},
+                )
+            if not self._place.alone:
+                self._settle(kept)
+        return Saved(version.file if why_not else self.in_use_file, version.number, name, why_not)
+
+    def promote(self, wanted: str) -> Version:
+        """Puts a version in use, by number or hash, however well it does. Raises BadInput for one that is not there."""
+        with self._place.lock(self._log):
+            current, kept = self._kept_current()
+            version = self._chosen(wanted, kept)
+            if current is None or current.hash != version.hash:
+                self._use(self._sound_bytes(version))
+                self._tell("promoted", version, in_use=True, **_instead_of(current))
+        return version
+
+    def rollback(self) -> Version:
+        """Puts the version in use that was in use before. Raises BadInput when there was none."""
+        with self._place.lock(self._log):
+            current, kept = self._kept_current()
+            events, _ = self.events()
+            before = [name for name in in_use_before(events, current and current.hash) if name in kept]
+            if not before:
+                raise BadInput(
+                    f"policy {self._place.where(self.in_use_file)}: nothing was in use before, to go back to"
+                )
+            version = kept[before[0]]
+            self._use(self._sound_bytes(version))
+            self._tell(ROLLED_BACK, version, in_use=True, **_instead_of(current))
+        return version
+
+    def remove(self) -> None:
+        """Takes the policy in use away; `restore` brings it back, and its versions stay."""
+        with self._place.lock(self._log):
+            current, kept = self._kept_current()
+            self._place.move(self.in_use_file, self.trash_file)
+            self._tell("removed", kept.get(current.hash) if current else None)
+
+    def restore(self) -> None:
+        """Brings back what was removed. Raises BadInput when nothing was, or another has taken its place."""
+        with self._place.lock(self._log):
+            if self._place.exists(self.in_use_file):
+                raise BadInput(
+                    f"policy {self._place.where(self.in_use_file)}: one is in use; promote chooses among its versions"
+                )
+            self._place.move(self.trash_file, self.in_use_file)
+            current = self.in_use()
+            self._tell("restored", self.kept().get(current.hash) if current else None, in_use=True)
+
+    def note(self, what: str, **facts: object) -> None:
+        """Something that happened to the version in use, or to the one whose `hash` is given."""
+        with self._place.lock(self._log):
+            current = self.in_use() if "hash" not in facts else None
+            about = facts.get("hash", current and current.hash)
+            self._tell(what, self.kept().get(str(about)), **({"hash": about} if about else {}) | facts)
+
+    def events(self) -> tuple[list[Event], list[int]]:
+        """What happened, and the numbers of the damaged lines of the log."""
+        return read_events(self._place.lines(self._log))
+
+    def faults(self) -> list[tuple[str, str]]:
+        """Files that are not sound, with the reason: a damaged log, versions whose bytes are not those that were kept."""
+        found = []
+        for version in self.kept().values():
+            try:
+                self.read(version)
+            except BadInput as error:
+                found.append((version.file, str(error)))
+        if damaged := self.events()[1]:
+            where = self._place.where(self._log)
+            lines = ", ".join(map(str, damaged[:_SHOWN])) + (", ..." if len(damaged) > _SHOWN else "")
+            found.append((self._log, f"log {where}: damaged lines: {lines}"))
+        return found
+
+    def _kept_current(self) -> tuple[InUse | None, dict[str, Version]]:
+        """The policy in use and the kept versions, of which it is one from now on. For who holds the lock."""
+        self._place.sweep(self._folder)
+        current, kept = self.in_use(), self.kept()
+        if current is not None and current.hash not in kept:
+            kept[current.hash] = version = self._keep(current.content, kept)
+            self._tell("found", version, in_use=True)
+        return current, kept
+
+    def _keep(self, content: bytes, kept: dict[str, Version]) -> Version:
+        """Writes a version unless it is kept already. Raises WorkFailed for other bytes of the same hash."""
+        name = hash_of(content)
+        version = kept.get(name)
+        if version is None:
+            number = 1 + max((version.number for version in kept.values()), default=0)
+            version = Version(number, name, f"{self._folder}/{number:04}-{name}{SUFFIX}")
+        else:
+            with suppress(BadInput):  # a damaged one is written again
+                if self._bytes_of(version) == content:
+                    return version
+                raise WorkFailed(f"policy file {self._place.where(version.file)}: it has the same hash and other bytes")
+        self._place.write(version.file, content)
+        return version
+
+    def _use(self, content: bytes) -> None:
+        self._place.write(self.in_use_file, content, drafts=self._folder)
+
+    def _settle(self, known: dict[str, Version]) -> None:
+        """Where no lock keeps others away: what was kept meanwhile, and does better, is put in use."""
+        for version in self.kept().values():
+            current = self.in_use()
+            if version.hash in known or (current is not None and current.hash == version.hash):
+                continue
+            with suppress(BadInput):
+                policy = self.read(version)
+                rates = success_percents(self._place.lines(self._log))
+                if current is None or does_worse(
+                    current.policy, policy, rates.get(current.hash), rates.get(version.hash)
+                ):
+                    self._use(self._bytes_of(version))
+
+    def _tell(self, what: str, version: Version | None, **facts: object) -> None:
+        known = {} if version is None else {"version": version.number, "hash": version.hash}
+        self._place.append(self._log, line_of(event(what, **(known | facts))))
+
+    def _bytes_of(self, version: Version) -> bytes:
+        """A version's bytes, exactly those that were kept."""
+        try:
+            content = self._place.read(version.file)
+        except BadInput as error:
+            raise unreadable(self._place.where(version.file), error) from error
+        if hash_of(content) != version.hash:
+            raise unreadable(self._place.where(version.file), ValueError(f"its hash is {hash_of(content)}: damaged"))
+        return content
+
+    def _sound_bytes(self, version: Version) -> bytes:
+        content = self._bytes_of(version)
+        decode(content, self._place.where(version.file))
+        return content
+
+    def _chosen(self, wanted: str, kept: dict[str, Version]) -> Version:
+        found = [version for version in kept.values() if str(version.number) == wanted]
+        if not found and len(wanted) >= _LEAST_DIGITS:
+            found = [version for version in kept.values() if version.hash.startswith(wanted.lower())]
+        if len(found) == 1:
+            return found[0]
+        choices = found or [*kept.values()][-_SHOWN:]
+        shown = ", ".join(f"{version.number} ({version.hash})" for version in choices)
+        what = "several versions" if found else "no version"
+        raise BadInput(f"policy {self._place.where(self.in_use_file)}: {what} '{wanted}'; there are: {shown or 'none'}")
+
+
+def does_worse(new: Policy, old: Policy, new_percent: float | None, old_percent: float | None) -> str:
+    """Why a policy does worse than the one in use; "" when it does not.
+
+    Solved is better than unsolved. In the same problem the greater success counts where both were evaluated, else the
+    fewer steps, as a multiple of the fewest that are possible.
+    """
+    if new.solved != old.solved:
+        return "the one in use is solved" if old.solved else ""
+    if (new.subtask, new.signature) != (old.subtask, old.signature):
+        return ""
+    if new_percent is not None and old_percent is not None and new_percent != old_percent:
+        return (
+            f"the one in use succeeds in {old_percent:g} %, it in {new_percent:g} %"
+            if new_percent < old_percent
+            else ""
+        )
+    if _length(new) > _length(old):
+        steps = "does not reach the goal" if new.final_steps is None else f"takes {new.final_steps} steps"
+        return f"the one in use takes {old.final_steps} steps, it {steps}"
+    return ""
+
+
+def _length(policy: Policy) -> float:
+    if policy.final_steps is None:
+        return float("inf")
+    return policy.final_steps / (policy.optimal_steps or 1)
+
+
+def _how_learned(policy: Policy, current: InUse | None) -> str:
+    if policy.parent:
+        return "warm-started"
+    before = current.policy.curve if current is not None else []
+    on = 0 < len(before) < len(policy.curve) and policy.curve[: len(before)] == before
+    return "continued" if on else "learned"
+
+
+def _instead_of(current: InUse | None) -> dict[str, str]:
+    return {} if current is None else {"instead_of": current.hash}
