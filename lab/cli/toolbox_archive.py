@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lab.cli.options import Json, ToolboxFolder
+from lab.cli.options import Json, ToolboxPlace
 from lab.cli.output import complain, show
 from lab.errors import BadInput, counted
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 OutFolder = Annotated[Path, typer.Option("--out", help="The folder for its files.")]
 
 
-def toolbox_card(name: str, out: OutFolder, toolbox: ToolboxFolder = None, as_json: Json = False) -> None:
+def toolbox_card(name: str, out: OutFolder, toolbox: ToolboxPlace = None, as_json: Json = False) -> None:
     """A policy's card: what it does, where and with whose advice it was learned, its curve and its values as pictures."""
     from lab.production.publication import CARD, write_card
     from lab.toolbox.registry import Toolbox
@@ -34,7 +34,7 @@ def toolbox_publish(
     license_name: Annotated[
         str, typer.Option("--license", help="Under which others may use it, as the Hub names it, such as mit.")
     ] = "unknown",
-    toolbox: ToolboxFolder = None,
+    toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
     """A folder as the Hugging Face Hub has it: model card, safetensors, metadata, pictures. Nothing is sent anywhere."""
@@ -51,7 +51,7 @@ def toolbox_publish(
 def toolbox_export(
     out: Annotated[Path, typer.Option("--out", help="The .zip file to write.")],
     names: Annotated[list[str] | None, typer.Argument(help="Which policies; none: all of them.")] = None,
-    toolbox: ToolboxFolder = None,
+    toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
     """Policies as one archive; the same policies give the same bytes."""
@@ -62,7 +62,7 @@ def toolbox_export(
     box = Toolbox(toolbox)
     wanted = list(dict.fromkeys(names or [row["name"] for row in box.list()]))
     if not wanted:
-        raise BadInput(f"toolbox {box.folder}: there is nothing to export")
+        raise BadInput(f"toolbox {box.address}: there is nothing to export")
     content, manifest = pack(_told(box, name)[0] for name in wanted)
     damaged = [] if names else box.index()[1]
     try:
@@ -82,7 +82,7 @@ def toolbox_import(
     replace: Annotated[
         bool, typer.Option("--replace", help="Also where another policy of that name is there already.")
     ] = False,
-    toolbox: ToolboxFolder = None,
+    toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
     """Bring in policies that somebody gave you: every one is checked before the first is kept, and all are kept or none."""
@@ -93,7 +93,7 @@ def toolbox_import(
     box = Toolbox(toolbox)
     policies = [read_folder(file)] if file.is_dir() else unpack(file)
     taken = take_in(box, policies, replace)
-    document = {"file": str(file), "toolbox": str(box.folder), **taken._asdict()}
+    document = {"file": str(file), "toolbox": box.address, **taken._asdict()}
 
     def told(d: dict[str, Any]) -> str:
         words = {"imported": "imported", "replaced": "in place of another", "unchanged": "there already"}
@@ -105,4 +105,4 @@ def toolbox_import(
 def _told(box: "Toolbox", name: str) -> "tuple[Policy, list[dict[str, Any]]]":
     """A policy and its log."""
     shown = box.show(name)
-    return box.load(shown["file"]), shown.get("events", [])
+    return box.load(shown["file"]), shown["events"]

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lab.cli.options import Json, Seed, ToolboxFolder
+from lab.cli.options import Json, Seed, ToolboxPlace
 from lab.cli.output import console, end, show
 from lab.errors import counted
 
@@ -25,11 +25,12 @@ def toolbox_evaluate(
         str | None, typer.Option("--skill", help="The skill that it is for, where its name does not tell.")
     ] = None,
     seed: Seed = 0,
-    toolbox: ToolboxFolder = None,
+    toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
-    """Carry a policy out in physics, in scenes drawn from the seed on: how often it does what it is for."""
+    """Carry a policy out in physics, in scenes drawn from the seed on: how often it does what it is for, for its log."""
     from lab.production.evaluation import evaluate, skill_of, task_of
+    from lab.toolbox.history import EVALUATED
     from lab.toolbox.registry import Toolbox
     from lab.view.progress import counting
 
@@ -40,6 +41,8 @@ def toolbox_evaluate(
     with counting(console(), "scenes") as told:
         evaluation = evaluate(policy, found, wanted, scenes, seed, told)
     document = evaluation.to_json()
+    if document["scenes"]:
+        box.note(policy.name, EVALUATED, **evaluation.facts())
     show(document, as_json, evaluation_summary)
     if evaluation.interrupted:
         end(f"stopped by Ctrl-C after {counted(len(evaluation.scenes), 'scene')} of {scenes}", 130)

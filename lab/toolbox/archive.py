@@ -16,7 +16,7 @@ from annotated_types import Ge
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from lab.errors import BadInput, counted
-from lab.toolbox.names import SUFFIX, slug
+from lab.toolbox.names import SUFFIX, hash_of, slug
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import decode, encode
 from lab.toolbox.registry import Toolbox
@@ -120,22 +120,22 @@ def take_in(toolbox: Toolbox, policies: Policies, replace: bool) -> TakenIn:
     written, the toolbox is as before.
     """
     toolbox.check()
-    files = {row["name"]: row["file"] for row in toolbox.list()}
-    before = {policy.name: toolbox.load(files[policy.name]) for policy in policies if policy.name in files}
-    unchanged = [policy.name for policy in policies if _same(policy, before.get(policy.name))]
+    hashes = {row["name"]: row["hash"] for row in toolbox.list()}
+    before = {policy.name: hashes[policy.name] for policy in policies if policy.name in hashes}
+    unchanged = [policy.name for policy in policies if hash_of(encode(policy)) == before.get(policy.name)]
     coming = [policy for policy in policies if policy.name not in unchanged]
     taken = [policy.name for policy in coming if policy.name in before]
     if taken and not replace:
         more = f" and {len(taken) - 1} more" if len(taken) > 1 else ""
         raise BadInput(
-            f"toolbox {toolbox.folder}: '{taken[0]}'{more} is there already with other content: "
+            f"toolbox {toolbox.address}: '{taken[0]}'{more} is there already with other content: "
             "--replace keeps what is imported in its place"
         )
     done: list[str] = []
     try:
         for policy in coming:
             done.append(policy.name)
-            toolbox.save(policy)
+            toolbox.promote(policy.name, toolbox.put(policy).hash)
     except BaseException:
         for name in done:
             _put_back(toolbox, name, before.get(name))
@@ -143,16 +143,12 @@ def take_in(toolbox: Toolbox, policies: Policies, replace: bool) -> TakenIn:
     return TakenIn([policy.name for policy in coming if policy.name not in before], taken, unchanged)
 
 
-def _put_back(toolbox: Toolbox, name: str, before: Policy | None) -> None:
-    """What was kept under a name is kept again; nothing, if nothing was."""
+def _put_back(toolbox: Toolbox, name: str, before: str | None) -> None:
+    """The version that was in use under a name is in use again; nothing, if nothing was."""
     if before is not None:
-        toolbox.save(before)
+        toolbox.promote(name, before)
     elif any(row["name"] == name for row in toolbox.list()):
         toolbox.remove(name)
-
-
-def _same(policy: Policy, other: Policy | None) -> bool:
-    return other is not None and encode(policy) == encode(other)
 
 
 def _entry(name: str) -> ZipInfo:

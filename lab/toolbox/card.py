@@ -8,10 +8,10 @@ from statistics import mean
 from typing import Any
 
 from lab.errors import counted, printable
+from lab.toolbox.history import EVALUATED
 from lab.toolbox.policy import Policy
 
 Event = Mapping[str, Any]  # "time", "what", and facts; see the toolbox's log
-EVALUATED = "evaluated"
 _PLUMBING = ("time", "what", "hash", "version")  # of an event, beside its facts
 _SHOWN = 20  # events that a card lists; of more, the last
 _ENDS = 5  # episodes at each end of the curve whose mean is told

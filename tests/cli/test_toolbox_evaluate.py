@@ -39,6 +39,12 @@ def test_it_counts(lab: Lab, place: Policy) -> None:
     }.items()  # fmt: skip
     assert [row["seed"] for row in found["rows"]] == [3, 4]
     assert found["ci95"] == pytest.approx([34.24, 100.0], abs=0.01)
+    noted = lab("toolbox", "log", place.name, "--json").json["events"][-1]
+    assert (noted["what"], noted["successes"], noted["success_percent"]) == ("evaluated", 2, 100.0)
+    lab("toolbox", "publish", place.name, "--out", "hub")
+    text = Path("hub/README.md").read_text()
+    assert "2 drawn scenes of toast from seed 3: 2 succeeded, 100 % (95 % interval 34 to 100)" in text
+    assert "      value: 1.0000\n      name: share of 2 scenes that succeed" in text
 
 
 def test_it_says_what_is_wrong(lab: Lab, place: Policy, toml: str) -> None:

@@ -21,6 +21,7 @@ from lab.toolbox.archive import MANIFEST, pack, take_in, unpack
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import encode
 from lab.toolbox.registry import Toolbox
+from lab.toolbox.versions import Saved
 
 Make = Callable[..., Policy]
 Entries = list[tuple[ZipInfo, bytes]]
@@ -287,20 +288,26 @@ def test_another_policy_of_that_name_is_replaced_only_when_asked(toolbox: Toolbo
     assert names_in(toolbox) == {"a": 5, "b": 5, "c": 5}
 
 
+def test_what_is_replaced_is_in_use_even_if_it_does_worse_and_the_other_is_kept(toolbox: Toolbox, make: Make) -> None:
+    take_in(toolbox, [make(name="a")], replace=False)
+    take_in(toolbox, [make(name="a", seed=5, solved=False)], replace=True)
+    assert names_in(toolbox) == {"a": 5}
+    toolbox.rollback("a")
+    assert names_in(toolbox) == {"a": 0}
+
+
 def test_all_or_none_are_kept(toolbox: Toolbox, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     take_in(toolbox, [make(name="b")], replace=False)
-    saves = []
 
-    def save(self: Toolbox, policy: Policy, whole: Callable[..., Path] = Toolbox.save) -> Path:
-        saves.append(policy.name)
+    def put(self: Toolbox, policy: Policy, whole: Callable[..., Saved] = Toolbox.put) -> Saved:
         if policy.name == "c":
+            assert names_in(self) == {"a": 0, "b": 5}
             raise KeyboardInterrupt
         return whole(self, policy)
 
-    monkeypatch.setattr(Toolbox, "save", save)
+    monkeypatch.setattr(Toolbox, "put", put)
     with pytest.raises(KeyboardInterrupt):
         take_in(toolbox, [make(name="a"), make(name="b", seed=5), make(name="c")], replace=True)
-    assert saves == ["a", "b", "c", "b"]
     assert names_in(toolbox) == {"b": 0}
     found = toolbox.find("insert", "0123456789abcdef")
     assert found is not None
