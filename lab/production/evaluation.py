@@ -20,7 +20,7 @@ Told = Callable[[int, int], None]  # hears how many scenes are done, of how many
 Why = Literal["scene", "table", "physics"]
 
 
-class Scene(NamedTuple):
+class SceneResult(NamedTuple):
     """What came of one scene.
 
     failed_in: None where the skill succeeded; "scene": nobody can reach the goal there; "table": what was learned does not
@@ -42,7 +42,7 @@ class Evaluation:
     task: str
     seed: int
     wanted: int
-    scenes: Sequence[Scene] = field(default_factory=list)
+    scenes: Sequence[SceneResult] = field(default_factory=list)
     wall_s: float = 0.0
 
     @property
@@ -84,7 +84,7 @@ def evaluate(policy: Policy, task: Task, skill: str, scenes: int, seed: int, tol
     Ctrl-C ends it with the scenes until then. Raises KeyboardInterrupt when there is none yet, and BadInput when the
     policy's table is not of the skill's size and actions.
     """
-    began, done = time.perf_counter(), list[Scene]()
+    began, done = time.perf_counter(), list[SceneResult]()
     try:
         for number in range(scenes):
             told(number, scenes)
@@ -96,24 +96,24 @@ def evaluate(policy: Policy, task: Task, skill: str, scenes: int, seed: int, tol
     return Evaluation(policy.name, skill, task.name, seed, scenes, done, time.perf_counter() - began)
 
 
-def in_scene(policy: Policy, task: Task, name: str, seed: int) -> Scene:
+def in_scene(policy: Policy, task: Task, name: str, seed: int) -> SceneResult:
     """One scene, drawn with this seed; where slices are taken up first, the slice stands off its spot as drawn."""
     try:
         prepared = prepare(task, fitting(task, TOASTS), seed, name)
     except BadInput as error:
-        return Scene(seed, "scene", str(error), 0.0)
+        return SceneResult(seed, "scene", str(error), 0.0)
     skill, mdp = prepared.skillset.skills[name], prepared.problems[name].mdp
     check_table(policy, name, mdp)
     lost = _starts_without_a_way(policy, mdp)
     if lost and lost == _starts(mdp):
-        return Scene(seed, "table", _astray(policy, mdp, lost[0]), 0.0)
+        return SceneResult(seed, "table", _astray(policy, mdp, lost[0]), 0.0)
     try:
         failure, sim_s = carry_out(prepared, skill, policy, _off(prepared, skill))
     except LabError as error:
         failure, sim_s = str(error), 0.0
     if failure is None:
-        return Scene(seed, None, None, sim_s)
-    return Scene(seed, "table" if lost else "physics", failure, sim_s)
+        return SceneResult(seed, None, None, sim_s)
+    return SceneResult(seed, "table" if lost else "physics", failure, sim_s)
 
 
 def check_table(policy: Policy, skill: str, mdp: TabularMDP) -> None:

@@ -126,9 +126,9 @@ def take_in(toolbox: Toolbox, policies: Policies, replace: bool) -> TakenIn:
     coming = [policy for policy in policies if policy.name not in unchanged]
     taken = [policy.name for policy in coming if policy.name in before]
     if taken and not replace:
-        more = f" and {len(taken) - 1} more" if len(taken) > 1 else ""
+        are = f" and {len(taken) - 1} more are" if len(taken) > 1 else " is"
         raise BadInput(
-            f"toolbox {toolbox.address}: '{taken[0]}'{more} is there already with other content: "
+            f"toolbox {toolbox.address}: '{taken[0]}'{are} there already with other content: "
             "--replace keeps what is imported in its place"
         )
     done: list[str] = []

@@ -10,7 +10,7 @@ import pytest
 
 from lab.cli.toolbox_evaluate import evaluation_summary
 from lab.mdp import optimal_values
-from lab.production.evaluation import Evaluation, Scene
+from lab.production.evaluation import Evaluation, SceneResult
 from lab.skills.prepared_scene import prepare
 from lab.tasks.task_file import load
 from lab.toolbox.policy import Policy
@@ -73,7 +73,7 @@ def test_ctrl_c_shows_what_was_done(lab: Lab, place: Policy, monkeypatch: pytest
 
     whole = evaluation.in_scene
 
-    def stop(policy: Policy, task: Any, name: str, seed: int) -> Scene:
+    def stop(policy: Policy, task: Any, name: str, seed: int) -> SceneResult:
         if seed == 1:
             raise KeyboardInterrupt
         return whole(policy, task, name, seed)
@@ -85,7 +85,11 @@ def test_ctrl_c_shows_what_was_done(lab: Lab, place: Policy, monkeypatch: pytest
 
 
 def test_a_line_for_each_scene_that_failed() -> None:
-    scenes = [Scene(0, None, None, 2.0), Scene(1, "physics", "it fell", 1.0), Scene(2, "table", "it goes round", 0.0)]
+    scenes = [
+        SceneResult(0, None, None, 2.0),
+        SceneResult(1, "physics", "it fell", 1.0),
+        SceneResult(2, "table", "it goes round", 0.0),
+    ]
     document = Evaluation("mine", "grasp at plate", "toast", 0, 3, scenes, 1.5).to_json()
     lines = [str(line) for line in evaluation_summary(document).renderables]  # type: ignore[union-attr]
     assert lines == [

@@ -9,7 +9,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.mdp import optimal_values
-from lab.production.evaluation import TOASTS, Evaluation, Scene, evaluate, in_scene, skill_of, task_of
+from lab.production.evaluation import TOASTS, Evaluation, SceneResult, evaluate, in_scene, skill_of, task_of
 from lab.skills.prepared_scene import prepare
 from lab.tasks.task_file import Task, load
 from lab.toolbox.policy import Policy
@@ -119,8 +119,8 @@ def test_a_scene_without_a_way_is_not_counted(task: Task, known: Known) -> None:
 
 def test_what_is_counted() -> None:
     """Three of four: Wilson's interval is 30.1 to 95.4 %."""
-    scenes = [Scene(n, None, None, 2.0 + n) for n in range(3)]
-    scenes += [Scene(3, "physics", "it fell", 1.0), Scene(4, "scene", "no way", 0.0)]
+    scenes = [SceneResult(n, None, None, 2.0 + n) for n in range(3)]
+    scenes += [SceneResult(3, "physics", "it fell", 1.0), SceneResult(4, "scene", "no way", 0.0)]
     found = Evaluation("mine", GRASP, "toast", 0, 6, scenes, 1.5).to_json()
     assert {name: found[name] for name in ("scenes", "successes", "success_percent", "mean_sim_s", "unsolvable")} == {
         "scenes": 4, "successes": 3, "success_percent": 75.0, "mean_sim_s": 3.0, "unsolvable": 1,

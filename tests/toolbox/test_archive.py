@@ -281,7 +281,7 @@ def test_new_ones_are_kept_and_the_same_ones_stay(toolbox: Toolbox, make: Make) 
 def test_another_policy_of_that_name_is_replaced_only_when_asked(toolbox: Toolbox, make: Make) -> None:
     take_in(toolbox, [make(name="a"), make(name="b")], replace=False)
     new = [replace(make(name=name, seed=5), created="2025-01-01T00:00:00+00:00") for name in ("c", "b", "a")]
-    with pytest.raises(BadInput, match=r"'b' and 1 more is there already with other content: --replace"):
+    with pytest.raises(BadInput, match=r"'b' and 1 more are there already with other content: --replace"):
         take_in(toolbox, new, replace=False)
     assert names_in(toolbox) == {"a": 0, "b": 0}
     assert take_in(toolbox, new, replace=True) == (["c"], ["b", "a"], [])
