@@ -20,8 +20,10 @@ from lab.mdp import FloatArray
 from lab.tasks.record import write_whole
 from lab.teaching.lesson_options import LessonOptions, SessionOptions
 from lab.teaching.lesson_plan import MAX_SESSIONS, Keep, LessonPlan
-from lab.toolbox.names import default_address, slug
+from lab.toolbox.folder_place import FolderPlace
+from lab.toolbox.names import SUFFIX, default_address, slug
 from lab.toolbox.policy import Policy
+from lab.toolbox.policy_file import encode
 from lab.toolbox.registry import Toolbox
 
 SESSIONS = "sessions"  # the folder in the toolbox
@@ -125,7 +127,8 @@ class NewSession(SessionInFolder):
         self.plan, problem = plan, plan.problem
         self.folder = claimed(self._toolbox, problem.name, Path.mkdir) if self._wanted is None else self._wanted
         if plan.unfinished is not None:
-            Toolbox(self.folder / _BEGUN).save(plan.unfinished)
+            begun = FolderPlace(self.folder / _BEGUN)
+            begun.write(f"{slug(plan.unfinished.name)}{SUFFIX}", encode(plan.unfinished))
         head = Session(
             self.options.to_json(),
             problem.name,

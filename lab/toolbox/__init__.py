@@ -1,1 +1,1 @@
-"""What was learned, kept: policies and measured records in a folder, never loaded damaged."""
+"""What was learned, kept: policies in versions and measured records, in a folder or elsewhere, never loaded damaged."""

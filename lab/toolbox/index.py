@@ -22,13 +22,15 @@ _LEFT_OUT = ("learner", "gate", "versions", "curve", "guided", "start")
 _HEAD, _REST = '{"crc32": "', '", "index": '
 _MANY = 20  # so many files, or one in so many, and their versions are looked up all at once
 _STALE_SHARE = 0.01  # of the rows; with fewer stale ones it is not worth writing again
+_LEAST = 50  # policies; fewer are read in an instant
 
 
 class Index:
     """A row for each policy in use: its metadata without curve and settings, or why it is damaged.
 
-    Only files that changed since they were read are read. Any number of processes may use it at once: it is written whole,
-    and what it says of a file counts only while the file's stamp is the same.
+    Only files that changed since they were read are read. It is written when there are 50 policies or more. Any number of
+    processes may use it at once: it is written whole, and what it says of a file counts only while the file's stamp is the
+    same.
     """
 
     def __init__(self, place: Place) -> None:
@@ -49,7 +51,7 @@ class Index:
         self._rows = dict(sorted(rows.items()))
         self._stamps = {name: at.stamp for name, at in now.items() if at.stamp}
         changed = sum(bool(at.stamp) and "damaged" not in rows[name] for name, at in stale.items()) + len(gone)
-        if changed > _STALE_SHARE * len(now):
+        if len(now) >= _LEAST and changed > _STALE_SHARE * len(now):
             self._keep()
         return self._rows
 

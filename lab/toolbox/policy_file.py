@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, create_model
 
 from lab.errors import BadInput
+from lab.toolbox import strict_json
 from lab.toolbox.names import FORMAT
 from lab.toolbox.policy import Policy
 
@@ -88,10 +89,6 @@ def _read(content: bytes) -> tuple[dict[str, np.ndarray[Any, Any]], dict[str, st
     return {name: table if table.flags.writeable else table.copy() for name, table in tensors.items()}, metadata
 
 
-def _reject_constant(text: str) -> None:
-    raise ValueError(f"{text} is not allowed")
-
-
 def _date(text: str) -> str:
     datetime.fromisoformat(text)
     return text
@@ -111,9 +108,7 @@ def _metadata() -> type[BaseModel]:
 
 
 def _read_metadata(metadata: dict[str, str]) -> dict[str, Any]:
-    values = {
-        name: json.loads(metadata[name], parse_constant=_reject_constant) for name in _METADATA if name in metadata
-    }
+    values = {name: strict_json.loads(metadata[name]) for name in _METADATA if name in metadata}
     try:
         found = _metadata().model_validate_json(json.dumps(values))
     except ValidationError as error:

@@ -4,6 +4,7 @@ import json
 from typing import Any
 
 from lab.errors import BadInput
+from lab.toolbox import strict_json
 from lab.toolbox.names import slug
 from lab.toolbox.place import Place
 
@@ -52,13 +53,9 @@ def faults(place: Place) -> dict[str, str]:
 
 def _read(place: Place, file: str) -> dict[str, Any]:
     try:
-        whole = json.loads(place.read(file), parse_constant=_reject_constant)
+        whole = strict_json.loads(place.read(file))
     except (BadInput, ValueError, RecursionError) as error:
         raise BadInput(f"record file {place.where(file)}: {error}") from error
     if not isinstance(whole, dict) or not isinstance(whole.get("record"), dict) or not {"kind", "key"} <= whole.keys():
         raise BadInput(f"record file {place.where(file)}: it must hold kind, key and record")
     return whole
-
-
-def _reject_constant(text: str) -> None:
-    raise ValueError(f"{text} is not allowed")

@@ -9,7 +9,7 @@ from lab.errors import BadInput, WorkFailed, unknown
 from lab.toolbox import records
 from lab.toolbox.folder_place import FolderPlace
 from lab.toolbox.index import Index, Key, KnownPolicies, Row
-from lab.toolbox.names import SUFFIX, TRASH, VERSIONS, default_address, is_address, slug
+from lab.toolbox.names import SUFFIX, TRASH, VERSIONS, default_address, hash_of, is_address, slug
 from lab.toolbox.place import Place, read_file
 
 if TYPE_CHECKING:
@@ -122,26 +122,27 @@ class Toolbox:
 
     def show(self, name: str) -> dict[str, Any]:
         """All that is known of one policy, and of its versions. Raises BadInput for an unknown name or a damaged file."""
-        from lab.toolbox.policy_file import described
+        from lab.toolbox.policy_file import decode, described
 
         stem = self._stem(name)
         versions = self._of(stem)
-        policy = self.load(self.folder / versions.in_use_file)
-        (row,) = [row for row in self._rows() if row["file"] == self.place.where(versions.in_use_file)]
+        file = self.place.where(versions.in_use_file)
+        content = self._content(versions.in_use_file)
+        policy, made = decode(content, file), hash_of(content)
         events, _ = versions.events()
         kept, sizes = versions.kept(), self.place.files(f"{VERSIONS}/{stem}")
-        saved = {event["hash"]: event["time"] for event in reversed(events) if "hash" in event}
+        saved = {str(event.get("hash")): event["time"] for event in reversed(events)}
         return {
             **described(policy),
-            "file": row["file"],
-            "version": row["version"],
-            "hash": row["hash"],
+            "file": file,
+            "version": kept[made].number if made in kept else None if kept else 1,
+            "hash": made,
             "lineage": self._lineage(policy),
             "kept_versions": [
                 {
                     "version": version.number,
                     "hash": version.hash,
-                    "in_use": version.hash == row["hash"],
+                    "in_use": version.hash == made,
                     "saved": saved.get(version.hash),
                     "bytes": sizes[Path(version.file).name].size_bytes,
                 }
@@ -221,11 +222,12 @@ class Toolbox:
             versions = self._of(stem)
             where = self.place.where(versions.in_use_file)
             if stem in stems:
-                reason, kept = "", versions.kept()
+                reason = ""
                 try:
-                    decode(self._content(versions.in_use_file), where)
-                    current = versions.in_use()
-                    if kept and current is not None and current.hash not in kept:
+                    content = self._content(versions.in_use_file)
+                    decode(content, where)
+                    kept = versions.kept()  # looked up last: a version is kept before it is in use
+                    if kept and hash_of(content) not in kept:
                         reason = str(unreadable(where, ValueError("it is none of the kept versions: it was changed")))
                 except BadInput as error:
                     reason = str(error)
@@ -259,7 +261,7 @@ class Toolbox:
     def _inside(self, path: Path | str) -> str | None:
         """The name in the place that a path or an address stands for; None when it is elsewhere."""
         for root in (self._root, f"{self.folder}/"):
-            if str(path).startswith(root):
+            if root and str(path).startswith(root):
                 return str(path).removeprefix(root)
         return None
 
@@ -282,7 +284,7 @@ class Toolbox:
         for stem in (slug(name), name):
             if f"{stem}{SUFFIX}" in files:
                 return stem
-        if also_removed and self.place.folders(f"{VERSIONS}") and slug(name) in self.place.folders(VERSIONS):
+        if also_removed and slug(name) in self.place.folders(VERSIONS):
             return slug(name)
         named = {row["name"]: file for file, row in self._index.rows().items() if "damaged" not in row}
         if name in named:

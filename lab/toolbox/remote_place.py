@@ -95,8 +95,8 @@ class RemotePlace:
             found: list[str] = self._call("listed", self._fs.find, self._path(under))
         except FileNotFoundError:
             return []
-        root = len(self._root.strip("/")) + 1
-        return [path.strip("/")[root:] for path in found]
+        root = f"{self._root.strip('/')}/".lstrip("/")
+        return [path.strip("/").removeprefix(root) for path in found]
 
     def _listed(self, under: str) -> list[dict[str, Any]]:
         try:
@@ -171,7 +171,8 @@ class RemotePlace:
         self.write(f"{name}/{now}-{token_hex(4)}.json", line)
 
     def lines(self, name: str) -> list[bytes]:
-        return [self.read(f"{name}/{event}") for event in sorted(self.names(name))]
+        events = dict(self.read_many({f"{name}/{event}": state for event, state in self.files(name).items()}))
+        return [content for _, content in sorted(events.items()) if isinstance(content, bytes)]
 
     def lock(self, name: str) -> AbstractContextManager[None]:
         return nullcontext()

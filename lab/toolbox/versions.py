@@ -61,7 +61,7 @@ class Versions:
     """
 
     def __init__(self, place: Place, stem: str) -> None:
-        self._place, self._stem = place, stem
+        self._place = place
         self.in_use_file = f"{stem}{SUFFIX}"
         self.trash_file = f"{TRASH}/{stem}{SUFFIX}"
         self._folder, self._log = f"{VERSIONS}/{stem}", f"{LOG}/{stem}.jsonl"
@@ -92,15 +92,10 @@ class Versions:
         with self._place.lock(self._log):
             current, kept = self._kept_current()
             version = self._keep(content, kept)
-            rates = success_percents(self._place.lines(self._log)) if current is not None else {}
-            why_not = ""
-            if current is None:
-                self._use(content)
-            elif current.hash != name:
-                why_not = does_worse(policy, current.policy, rates.get(name), rates.get(current.hash))
+            why_not = "" if current is None else self._does_worse(policy, name, current)
+            if current is None or current.hash != name:
                 if not why_not:
                     self._use(content)
-            if name not in kept or current is None or current.hash != name:
                 self._tell(
                     _how_learned(policy, current),
                     version,
@@ -210,19 +205,21 @@ class Versions:
     def _use(self, content: bytes) -> None:
         self._place.write(self.in_use_file, content, drafts=self._folder)
 
+    def _does_worse(self, policy: Policy, name: str, current: InUse) -> str:
+        rates = success_percents(self._place.lines(self._log))
+        return does_worse(policy, current.policy, rates.get(name), rates.get(current.hash))
+
     def _settle(self, known: dict[str, Version]) -> None:
         """Where no lock keeps others away: what was kept meanwhile, and does better, is put in use."""
         for version in self.kept().values():
             current = self.in_use()
-            if version.hash in known or (current is not None and current.hash == version.hash):
+            if current is None or version.hash in known or current.hash == version.hash:
                 continue
             with suppress(BadInput):
-                policy = self.read(version)
-                rates = success_percents(self._place.lines(self._log))
-                if current is None or does_worse(
-                    current.policy, policy, rates.get(current.hash), rates.get(version.hash)
-                ):
-                    self._use(self._bytes_of(version))
+                content = self._bytes_of(version)
+                other = InUse(content, version.hash, decode(content, version.file))
+                if self._does_worse(current.policy, current.hash, other):
+                    self._use(content)
 
     def _tell(self, what: str, version: Version | None, **facts: object) -> None:
         known = {} if version is None else {"version": version.number, "hash": version.hash}

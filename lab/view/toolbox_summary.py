@@ -6,7 +6,7 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from lab.errors import counted
+from lab.errors import counted, printable
 from lab.view.summary import table_of
 
 _SHOWN_VERSIONS = 10
@@ -56,9 +56,8 @@ def _lineage(policy: Mapping[str, Any]) -> list[str]:
     lines = []
     for ancestor in policy["lineage"]:
         where = f", learned in {ancestor['scene']}" if ancestor["scene"] else ""
-        lines.append(
-            f"warm-started from {ancestor['name']}@{ancestor['hash']}{where if ancestor['kept'] else ', not kept here'}"
-        )
+        known = where if ancestor["kept"] else ", not kept here"
+        lines.append(printable(f"warm-started from {ancestor['name']}@{ancestor['hash']}{known}"))
     return ["", *lines] if lines else []
 
 
@@ -81,7 +80,7 @@ def log_summary(log: Mapping[str, Any]) -> RenderableType:
 
 
 def _happened(event: Mapping[str, Any]) -> str:
-    named = f" version {event['version']} ({event['hash']})" if event.get("version") else ""
+    named = f" version {event['version']} ({event.get('hash')})" if event.get("version") else ""
     left_out = ("time", "what", "version", "hash", "in_use", "why_not")
     words = {True: "yes", False: "no", None: "none"}
     facts = [
@@ -90,7 +89,8 @@ def _happened(event: Mapping[str, Any]) -> str:
         if name not in left_out
     ]
     why_not = [f"kept beside: {event['why_not']}"] if event.get("why_not") else []
-    return f"{_minute(event['time'])}  {event['what']}{named}{': ' if facts or why_not else ''}{', '.join(why_not + facts)}"
+    more = ": " if facts or why_not else ""
+    return printable(f"{_minute(event['time'])}  {event['what']}{named}{more}{', '.join(why_not + facts)}")
 
 
 def _minute(time: str) -> str:

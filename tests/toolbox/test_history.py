@@ -22,10 +22,11 @@ def test_what_is_written_is_read_and_damaged_lines_are_numbered() -> None:
         b'{"time": 1, "what": "x"}',
         b"\xff",
         b"[" * 9999,
+        b'{"time": "", "what": "", "x": NaN}',
     ]
     events, damaged = read_events(lines)
     assert [(read["what"], read["runs"]) for read in events] == [("used", 2)]
-    assert damaged == [3, 4, 5, 6, 7]
+    assert damaged == [3, 4, 5, 6, 7, 8]
     for fact in (float("nan"), object()):
         with pytest.raises(BadInput, match="log entry 'used'"):
             line_of(event("used", fact=fact))

@@ -12,19 +12,24 @@ import pytest
 from lab.toolbox.folder_place import FolderPlace
 from lab.toolbox.index import FILE, KnownPolicies
 from lab.toolbox.policy import Policy
+from lab.toolbox.policy_file import encode
 from lab.toolbox.registry import Toolbox
 
 MakePolicy = Callable[..., Policy]
 SIGNATURE = "0123456789abcdef"
+COUNT = 50
+EVEN = sorted(range(0, COUNT, 2), key=lambda number: f"skill-{number}.safetensors")  # as files are listed
 SETTLED_S = 0.06  # after which a file's times tell whether it changed
 
 
 @pytest.fixture
 def box(tmp_path: Path, make: MakePolicy) -> Toolbox:
-    """Ten policies, and their index."""
+    """Fifty policies of a toolbox from before versions, and their index."""
     made = Toolbox(tmp_path / "box")
-    for number in range(10):
-        made.save(make(number, name=f"skill-{number}", subtask=("insert", "grasp")[number % 2]))
+    made.folder.mkdir()
+    for number in range(COUNT):
+        held = make(number, name=f"skill-{number}", subtask=("insert", "grasp")[number % 2])
+        (made.folder / f"skill-{number}.safetensors").write_bytes(encode(held))
     time.sleep(SETTLED_S)
     made.list()
     assert (made.folder / FILE).is_file()
@@ -47,7 +52,7 @@ def reads(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def test_only_what_changed_is_read(box: Toolbox, reads: list[str], make: MakePolicy) -> None:
     again = Toolbox(box.folder)
-    assert len(again.list()) == 10
+    assert len(again.list()) == COUNT
     assert reads == []
     box.save(make(77.0, name="skill-3"))
     reads.clear()
@@ -55,7 +60,7 @@ def test_only_what_changed_is_read(box: Toolbox, reads: list[str], make: MakePol
     assert reads == ["skill-3.safetensors"]
     reads.clear()
     box.remove("skill-4")
-    assert len(Toolbox(box.folder).list()) == 9
+    assert len(Toolbox(box.folder).list()) == COUNT - 1
 
 
 @pytest.mark.parametrize(
@@ -64,7 +69,7 @@ def test_only_what_changed_is_read(box: Toolbox, reads: list[str], make: MakePol
 def test_a_lost_or_damaged_index_is_made_again(box: Toolbox, damage: bytes | str | None, reads: list[str]) -> None:
     rows, path = box.list(), box.folder / FILE
     whole = path.read_bytes()
-    assert json.loads(whole)["index"]["rows"].keys() == {f"skill-{n}.safetensors" for n in range(10)}
+    assert json.loads(whole)["index"]["rows"].keys() == {f"skill-{n}.safetensors" for n in range(COUNT)}
     if damage is None:
         path.unlink()
     elif isinstance(damage, bytes):
@@ -72,7 +77,7 @@ def test_a_lost_or_damaged_index_is_made_again(box: Toolbox, damage: bytes | str
     else:
         path.write_bytes(whole[:-30] if damage == "cut" else whole.replace(b'"solved": true', b'"solved": fals', 1))
     assert Toolbox(box.folder).list() == rows
-    assert len(reads) == 10
+    assert len(reads) == COUNT
     assert path.read_bytes() == whole
 
 
@@ -93,7 +98,17 @@ def test_a_toolbox_that_may_only_be_read_is_listed(box: Toolbox, monkeypatch: py
 
     (box.folder / FILE).unlink()
     monkeypatch.setattr("lab.toolbox.index.write_whole", refuse)
-    assert len(Toolbox(box.folder).list()) == 10
+    assert len(Toolbox(box.folder).list()) == COUNT
+
+
+def test_few_policies_need_none(tmp_path: Path, make: MakePolicy) -> None:
+    """Nothing is written into a folder that was only looked at."""
+    few = Toolbox(tmp_path / "few")
+    few.save(make())
+    before = sorted(few.folder.rglob("*"))
+    time.sleep(SETTLED_S)
+    assert len(few.list()) == 1
+    assert sorted(few.folder.rglob("*")) == before
 
 
 def test_listing_loads_no_numerical_library(box: Toolbox, root: Path) -> None:
@@ -102,7 +117,7 @@ def test_listing_loads_no_numerical_library(box: Toolbox, root: Path) -> None:
 
     code = (
         "import sys; from lab.toolbox.registry import Toolbox; rows = Toolbox(sys.argv[1]).list(); "
-        "sys.exit(len(rows) != 10 or any(name in sys.modules for name in ('numpy', 'pydantic', 'safetensors')))"
+        "sys.exit(len(rows) != 50 or any(name in sys.modules for name in ('numpy', 'pydantic', 'safetensors')))"
     )
     ran = subprocess.run([sys.executable, "-c", code, str(box.folder)], cwd=root, check=False)
     assert ran.returncode == 0
@@ -112,7 +127,7 @@ def test_candidates_have_the_tables_size_the_newest_first(box: Toolbox, make: Ma
     box.save(make(1.0, name="newer", created="2026-07-01T00:00:00+00:00"))
     box.save(make(name="larger", q=np.zeros((6, 2)), visits=np.zeros((6, 2), np.int64), shape=(6,)))
     rows = box.candidates("insert", 4, 2)
-    assert [row["name"] for row in rows] == ["newer", *(f"skill-{n}" for n in (0, 2, 4, 6, 8))]
+    assert [row["name"] for row in rows] == ["newer", *(f"skill-{n}" for n in EVEN)]
     assert {"shape", "action_labels", "signature", "solved", "created", "file"} <= rows[0].keys()
     assert box.load(rows[0]["file"]).q[0, 0] == 1.0
     assert [row["name"] for row in box.candidates("insert", 6, 2)] == ["larger"]

@@ -252,6 +252,17 @@ def test_things_that_are_no_files(toolbox: Toolbox, tmp_path: Path) -> None:
         toolbox.load(tmp_path / "missing.safetensors")
 
 
+def test_a_folder_may_be_named_in_any_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    other = Toolbox(tmp_path / "other").save(policy(name="other"))
+    for where in (".", "box", tmp_path / "box", f"file://{tmp_path}/box", "./box/"):
+        box = Toolbox(where)
+        assert_same(box.load(box.save(policy())), policy())
+        assert_same(box.load(box.list()[0]["file"]), policy())
+        assert box.load(other).name == "other"
+        assert box.where(box.remove("insert")) == str(box.folder / "insert.safetensors")
+
+
 @pytest.mark.parametrize("fault", [KeyboardInterrupt(), OSError(errno.ENOSPC, "No space left on device")])
 @pytest.mark.parametrize("where", ["fsync", "replace"])
 def test_an_interrupted_write_leaves_the_old_file_and_no_other(

@@ -117,8 +117,16 @@ def test_a_session_is_kept_in_a_local_folder_that_is_no_cache(address: str, own_
     assert Toolbox(f"{address}/other").folder != box.folder
 
 
+def test_the_root_of_a_place_will_do(memory: str, make: MakePolicy) -> None:
+    box = Toolbox("memory://")
+    names = {box.load(box.save(make(1.0, name=f"skill-{number}"))).name for number in range(50)}
+    rows = Toolbox("memory://").list()
+    assert {row["name"]: row["version"] for row in rows} == dict.fromkeys(names, 1)
+    assert rows[0]["file"] == "memory://skill-0.safetensors"
+
+
 def test_many_are_read_at_once(address: str, make: MakePolicy, monkeypatch: pytest.MonkeyPatch) -> None:
-    box, names = Toolbox(address), {f"skill-{number:02}" for number in range(25)}
+    box, names = Toolbox(address), {f"skill-{number:02}" for number in range(50)}
     for name in names:
         box.save(make(1.0, name=name))
     box.place.write("skill-07.safetensors", b"cut off")
