@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from lab import __version__
-from lab.cli import replay, run, see, sequence, study, task, teach, toolbox, view
+from lab.cli import replay, run, see, sequence, study, task, teach, toolbox, toolbox_archive, toolbox_evaluate, view
 from lab.cli.families import CommandOfFamilies
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError
@@ -46,6 +46,17 @@ COMMANDS = {  # what is typed after `lab` -> the command
     "toolbox promote": Command(toolbox.toolbox_promote, "lab toolbox promote 'insert at toaster 1a2b3c4d' 2"),
     "toolbox rollback": Command(toolbox.toolbox_rollback, "lab toolbox rollback 'insert at toaster 1a2b3c4d'"),
     "toolbox verify": Command(toolbox.toolbox_verify, "lab toolbox verify"),
+    "toolbox evaluate": Command(
+        toolbox_evaluate.toolbox_evaluate, "lab toolbox evaluate 'insert at toaster 1a2b3c4d' --scenes 50"
+    ),
+    "toolbox card": Command(
+        toolbox_archive.toolbox_card, "lab toolbox card 'insert at toaster 1a2b3c4d' --out insert-card"
+    ),
+    "toolbox export": Command(toolbox_archive.toolbox_export, "lab toolbox export --out my-skills.zip"),
+    "toolbox import": Command(toolbox_archive.toolbox_import, "lab toolbox import my-skills.zip"),
+    "toolbox publish": Command(
+        toolbox_archive.toolbox_publish, "lab toolbox publish 'insert at toaster 1a2b3c4d' --out insert --license mit"
+    ),
     "toolbox remove": Command(toolbox.toolbox_remove, "lab toolbox remove 'insert at toaster 1a2b3c4d'"),
     "toolbox restore": Command(toolbox.toolbox_restore, "lab toolbox restore 'insert at toaster 1a2b3c4d'"),
     "task list": Command(task.task_list, "lab task list"),

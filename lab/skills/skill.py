@@ -195,12 +195,15 @@ class Skill:
         """Where the tool is when the skill begins; None: anywhere."""
         return None
 
-    def begin(self, bench: Bench) -> None:
-        """Put all at once to where the set-up skill begins, to try it: the arm, and a slice on its spot or in the gripper."""
+    def begin(self, bench: Bench, off: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+        """Put all at once to where the set-up skill begins, to try it: the arm, and a slice on its spot or in the gripper.
+
+        off: how far off its spot the slice stands, x, y [m] and yaw [rad].
+        """
         scene, pose = bench.scene, self.begins_at()
         self.aim(TRIED_WITH)
         if self.near and not self.carries:
-            scene.add_slice(TRIED_WITH, spots(self.surveys.task.station(self.station))[0])
+            scene.add_slice(TRIED_WITH, spots(self.surveys.task.station(self.station))[0], off)
         if pose is not None:
             scene.robot.stand(pose)
             if self.carries:

@@ -1,10 +1,11 @@
 """A learned skill is tried in physics before it is kept."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from lab.learning.problem import Problem
 from lab.sim.scene import Scene
-from lab.sim.world import World
+from lab.sim.world import TIME_STEP, World
 from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import SETTLE_STEPS, Bench, Skill, Status
 from lab.toolbox.policy import Policy
@@ -20,14 +21,27 @@ def trial_of(prepared: Prepared) -> Callable[[Problem, Policy], str | None]:
     return trial
 
 
+class Trial(NamedTuple):
+    """What came of a skill that was carried out once: why it failed, None when it did not; how long it took in physics [s]."""
+
+    failure: str | None
+    sim_s: float
+
+
 def try_out(prepared: Prepared, skill: Skill, policy: Policy) -> str | None:
     """Carry a skill out once in physics; None when it did what it is for, else why it did not."""
+    return carry_out(prepared, skill, policy).failure
+
+
+def carry_out(prepared: Prepared, skill: Skill, policy: Policy, off: Sequence[float] = (0.0, 0.0, 0.0)) -> Trial:
+    """Carry a skill out once in physics; `off`: as `Skill.begin` has it."""
     with World() as world:
         bench = Bench(Scene(world, prepared.task, 0, prepared.surveys.layout))
         for _ in range(SETTLE_STEPS):
             world.step()
-        skill.begin(bench)
+        skill.begin(bench, off)
         skill.start(bench, policy)
+        began = world.steps
         while skill.step() is Status.RUNNING:
             world.step()
-        return None if skill.status is Status.SUCCESS else skill.reason
+        return Trial(None if skill.status is Status.SUCCESS else skill.reason, (world.steps - began) * TIME_STEP)

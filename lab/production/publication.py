@@ -1,0 +1,76 @@
+"""A policy shown to others: its card with pictures in a folder, or the whole folder that the Hugging Face Hub takes."""
+
+import os
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from lab.errors import WorkFailed
+from lab.files import check_out, draft
+from lab.skills import SKILLS
+from lab.toolbox.card import Event, Telling, card
+from lab.toolbox.hub_folder import MODEL, README, check_license, header, hub_files, sha256
+from lab.toolbox.names import SUFFIX, slug
+from lab.toolbox.policy import Policy
+from lab.toolbox.policy_file import encode
+
+CARD = "card.md"
+PICTURES = {"learning curve": "learning-curve.png", "value map": "value-map.png"}
+Files = dict[str, str]  # what was written, by what it is
+
+
+def write_card(policy: Policy, events: Sequence[Event], out: Path) -> Files:
+    """The policy's file and its card with pictures, in the folder `out`. Raises BadInput and WorkFailed."""
+    file, content = f"{slug(policy.name)}{SUFFIX}", encode(policy)
+    bring_in = f"lab toolbox export {shlex.quote(policy.name)} --out skill.zip\nlab toolbox import skill.zip"
+    telling = Telling(_what(policy), sha256(content), file, bring_in, _pictures(policy), events)
+    return _write(policy, {CARD: card(policy, telling).encode(), file: content}, out)
+
+
+def publish(policy: Policy, events: Sequence[Event], license_name: str, out: Path) -> Files:
+    """A folder that can be pushed to the Hub as it is, and imported again. Raises BadInput and WorkFailed."""
+    check_license(license_name)
+    files = hub_files(policy)
+    bring_in = "lab toolbox import ."
+    telling = Telling(_what(policy), sha256(files[MODEL]), MODEL, bring_in, _pictures(policy), events)
+    text = header(policy, license_name, events) + "\n" + card(policy, telling)
+    return _write(policy, {README: text.encode(), **files}, out)
+
+
+def _what(policy: Policy) -> str:
+    """What the policy does, in words."""
+    skill = SKILLS.get(policy.subtask)
+    return f"a way to the goal in '{policy.task}'" if skill is None else skill.help
+
+
+def _pictures(policy: Policy) -> Files:
+    """The pictures that there can be of a policy."""
+    from lab.view.value_levels import can_be_drawn
+
+    there = {"learning curve": bool(policy.curve), "value map": can_be_drawn(policy)}
+    return {name: file for name, file in PICTURES.items() if there[name]}
+
+
+def _write(policy: Policy, contents: dict[str, bytes], out: Path) -> Files:
+    """Files and pictures, all drawn before any of them stands in `out`; pictures of another policy go."""
+    from lab.view.plots import learning_curves
+    from lab.view.value_levels import value_levels
+
+    check_out(out)
+    pictures = _pictures(policy)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with draft(out) as beside:
+            for name, content in contents.items():
+                (beside / name).write_bytes(content)
+            if "learning curve" in pictures:
+                learning_curves({policy.name: policy}, beside / pictures["learning curve"])
+            if "value map" in pictures:
+                value_levels(policy, beside / pictures["value map"])
+            for name in (*contents, *pictures.values()):
+                os.replace(beside / name, out / name)
+        for file in set(PICTURES.values()) - set(pictures.values()):
+            (out / file).unlink(missing_ok=True)
+    except OSError as error:
+        raise WorkFailed(f"output folder '{out}' (--out) cannot be written: {error.strerror or error}") from error
+    return {name: str(out / name) for name in (*contents, *pictures.values())}

@@ -1,0 +1,120 @@
+"""Maps of what a policy has learned: on rows and boards that a reader can draw by hand."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lab.errors import BadInput
+from lab.toolbox.policy import GOAL, ON, OUT, Policy
+from lab.view import value_levels as levels
+from lab.view.canvas import ORANGE, RED
+from lab.view.grid_planes import Planes
+from lab.view.value_levels import Learned, can_be_drawn, value_levels
+
+SPACE = ("left", "right", "backward", "forward", "down", "up")
+
+
+def policy(shape: tuple[int, ...], labels: tuple[str, ...] = SPACE, ends: Any = None, **changed: Any) -> Policy:
+    """A policy of a grid whose goal is its last cell, and which has seen every cell."""
+    states = int(np.prod(shape)) if shape else 6
+    closed = np.full(states, ON, np.uint8)
+    closed[-1] = GOAL
+    fields: dict[str, Any] = {
+        "name": "made",
+        "subtask": "made",
+        "task": "made",
+        "q": np.arange(float(states * len(labels))).reshape(states, -1),
+        "visits": np.ones((states, len(labels)), np.int64),
+        "action_labels": labels,
+        "shape": shape,
+        "start": 0,
+        "signature": "0" * 16,
+        "learner": {},
+        "gate": {},
+        "advisor": "none",
+        "seed": 0,
+        "curve": [],
+        "guided": [],
+        "helped_steps": 0,
+        "requests": 0,
+        "optimal_steps": None,
+        "final_steps": None,
+        "solved": False,
+        "created": "2026-05-01T12:00:00+00:00",
+        "versions": {},
+        "ends": closed if ends is None else ends,
+    }
+    return Policy(**(fields | changed))
+
+
+def colours(path: Path) -> set[str]:
+    """Every colour of a PNG file, as #RRGGBB."""
+    from matplotlib.image import imread
+
+    pixels = np.unique((imread(path)[..., :3] * 255).round().astype(int).reshape(-1, 3), axis=0)
+    return {"#{:02X}{:02X}{:02X}".format(*pixel) for pixel in pixels}
+
+
+@pytest.mark.parametrize(
+    ("shape", "labels"),
+    [((5,), ("left", "right")), ((3, 4), ("up", "down", "left", "right")), ((3, 2, 7), SPACE), ((2, 2, 2, 3), SPACE)],
+)
+def test_grids_of_any_dimension_are_drawn_alike_each_time(
+    tmp_path: Path, shape: tuple[int, ...], labels: tuple[str, ...]
+) -> None:
+    for file in ("one.png", "two.png"):
+        value_levels(policy(shape, labels), tmp_path / file)
+    assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
+    assert colours(tmp_path / "one.png") >= {ORANGE, RED}
+
+
+def test_another_best_move_and_another_end_are_another_picture(tmp_path: Path) -> None:
+    shape, drawn = (3, 2, 2), []
+    turned = np.full((12, 6), 0.0)
+    turned[:, 2] = 71.0
+    blocked = np.full(12, ON, np.uint8)
+    blocked[[4, 11]] = OUT, GOAL
+    unseen = np.ones((12, 6), np.int64)
+    unseen[5] = 0
+    for changed in ({}, {"q": turned}, {"ends": blocked}, {"visits": unseen}, {"start": 3}):
+        value_levels(policy(shape, **changed), tmp_path / "map.png")
+        drawn.append((tmp_path / "map.png").read_bytes())
+    assert len(set(drawn)) == 5
+
+
+def test_one_that_nothing_was_learned_of_and_an_older_one_are_drawn(tmp_path: Path) -> None:
+    value_levels(policy((3, 4), visits=np.zeros((12, 6), np.int64)), tmp_path / "new.png")
+    older = policy((3, 4))
+    object.__setattr__(older, "ends", None)
+    value_levels(older, tmp_path / "old.png")
+    assert ORANGE in colours(tmp_path / "new.png")
+
+
+def test_of_too_many_levels_those_with_the_ends_and_the_most_visited_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A column of six levels of one cell: the start is in level 1, the goal in 4; visited is 3, too."""
+    monkeypatch.setattr(levels, "MAX_LEVELS", 3)
+    ends = np.array([0, 0, 0, 0, GOAL, 0], np.uint8)
+    learned = Learned(np.zeros(6), np.zeros(6, np.int64), np.array([0, 0, 0, 1, 0, 0], bool), ends)
+    assert levels._chosen(Planes((1, 1, 6), False), learned, 1) == [1, 3, 4]
+
+
+def test_levels_are_named_by_their_axes() -> None:
+    assert [levels._level_name((2, 2), 0), levels._level_name((2, 2, 3), 2)] == ["", "level 2"]
+    assert levels._level_name((2, 2, 3, 5), 7) == "level 1, turn 2"
+    assert levels._level_name((2, 2, 2, 2, 2), 5) == "axis 2 1, axis 3 0, axis 4 1"
+
+
+def test_up_is_out_of_the_plane_where_there_is_forward() -> None:
+    assert levels._signs(SPACE).keys() == {"down", "up"}
+    assert levels._signs(("left", "down", "right", "up")) == {}
+
+
+def test_what_is_no_grid_is_refused(tmp_path: Path) -> None:
+    assert not can_be_drawn(policy(()))
+    with pytest.raises(BadInput, match="a grid with up to 10000 cells a level is needed"):
+        value_levels(policy(()), tmp_path / "map.png")
+    with pytest.raises(BadInput, match=r"plots are written as \.png"):
+        value_levels(policy((2, 2)), tmp_path / "map.svg")
+    assert not list(tmp_path.iterdir())
