@@ -83,12 +83,11 @@ class Memory(NamedTuple):
 
 
 class Move(NamedTuple):
-    """A move: the state left, its place in `led` (state * A + action), OWN, ASKED or PRACTISED, the state entered.
+    """A move: its place in `led` (state * A + action), OWN, ASKED or PRACTISED, the state entered.
 
     over: no step goes on from there; reached: it is the goal.
     """
 
-    state: int
     number: int
     source: int
     entered: int
@@ -182,7 +181,7 @@ def plan(memory: Memory, start: int) -> None:
 def moved(memory: Memory, move: Move) -> None:
     """Takes in a move (rules 2 and 3)."""
     now, at, led = memory.now, memory.now.at, memory.led
-    state, number, source, entered, over, reached = move
+    number, source, entered, over, reached = move
     leads = entered if not over else GOAL if reached else NOWHERE
     if led[number] != leads:
         led[number] = leads if led[number] == NOTHING else NOWHERE
@@ -265,7 +264,7 @@ class Recall:
 
     def moved(self, state: int, action: int, entered: int, over: bool, reached: bool) -> None:
         """`moved`, of the move that was chosen last: the learner's own, unless `chosen` or `asked` said otherwise."""
-        moved(self.memory, Move(state, state * self._actions + action, self._source, entered, over, reached))
+        moved(self.memory, Move(state * self._actions + action, self._source, entered, over, reached))
         self._source = OWN
 
     def ended(self, moves: int | None, helped: int) -> Iterator[Event]:

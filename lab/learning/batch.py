@@ -71,7 +71,7 @@ def run_sessions(
         said = advice.thresholds, advice.region
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, found.kept.shape[1], ensemble)
-    memories = _memories(*mdp.successor.shape, learning.max_moves) if gate.memory else None
+    memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
     run(records.Work(problem, learning, asking, *said, found, lanes), memories)
     return _batch(found.steps, found.guided, found.counts, _action_values(mdp, learning, found.kept))
 

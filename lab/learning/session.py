@@ -122,7 +122,7 @@ class Session:
         self.gate = make(gate, learner.episodes, learner.max_steps, around)
         self.max_moves = learner.max_steps - learner.count_start
         self.recall = (
-            Recall(*mdp.successor.shape, self.max_moves, learner.episodes, gate.window) if gate.memory else None
+            Recall(mdp.n_states, mdp.n_actions, self.max_moves, learner.episodes, gate.window) if gate.memory else None
         )
         self.judge_unhelped = gate.judge_unhelped and not gate.memory
         self.steps: list[int] = []

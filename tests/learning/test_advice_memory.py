@@ -1,5 +1,6 @@
 """What is remembered, by hand: where moves led, the way, trust, showings, practice."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ def fresh() -> Memory:
 def goes(kept: Memory, state: int, entered: int, source: int, action: int | None = None) -> None:
     """A move by the action of the entered state's number, or by another."""
     number = state * STATES + (entered if action is None else action)
-    memory.moved(kept, memory.Move(state, number, source, entered, entered >= GOAL, entered == GOAL))
+    memory.moved(kept, memory.Move(number, source, entered, entered >= GOAL, entered == GOAL))
 
 
 def walk(kept: Memory, episode: int, moves: list[tuple[int, int]], gate: bool = True) -> bool:
@@ -242,7 +243,7 @@ def test_whatever_happens_a_walk_has_no_repeats_and_the_way_is_the_shortest_know
         over = next((n for n, (entered, _) in enumerate(moves) if entered >= GOAL), len(moves))
         walk(kept, number, moves[: over + 1])
         states = [0, *(entered for entered, _ in moves[: over + 1])]
-        for left, entered in zip(states, states[1:], strict=False):
+        for left, entered in pairwise(states):
             successor[left, entered] = entered
         on_walk = list(kept.walk[: kept.now.at + 1])
         assert len(set(on_walk)) == len(on_walk)

@@ -103,7 +103,8 @@ def decided(work: Any, memories: Any, j: int) -> Any:
     lanes, state = work.lanes, work.lanes.states[j]
     action, source = np.uint64(lanes.chosen[j]), np.int64(memory.OWN)
     if memories is not None:
-        if memories.now[j].practices > 0 and memories.way[j, state] != memory.NOTHING:
+        now = memories.now[j]
+        if now.practices > 0 and memories.way[j, state] != memory.NOTHING:
             action, source = np.uint64(memories.way[j, state]), np.int64(memory.PRACTISED)
     if lanes.is_open[j]:
         lane = lanes.lane[j]

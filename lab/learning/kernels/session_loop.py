@@ -107,7 +107,7 @@ def _step(work: Any, memories: Any, j: int) -> bool:
             learn(work, lanes.others[j, k], state, action)
     if memories is not None and lanes.lane[j].session >= 0:
         mine = _of_lane(memories, j)
-        _moved(mine, _Move(np.int64(state), np.int64(number), source, np.int64(entered), ends != 0, ends == 1))
+        _moved(mine, _Move(np.int64(number), source, np.int64(entered), ends != 0, ends == 1))
         if mine.now.trust < 0:
             lanes.is_open[j] = False
     lanes.states[j] = entered
