@@ -219,7 +219,7 @@ def ended(memory: Memory, moves: int, reached: bool, helped: int) -> None:
     else:
         now.last_alone = moves
         if now.late == 1:
-            now.practices = -1 if moves > now.best else 0
+            now.practices = 0 if moves == now.best else -1
 
 
 class Recall:

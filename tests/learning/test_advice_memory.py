@@ -221,7 +221,17 @@ def test_a_learner_that_does_as_well_as_the_way_does_not_practise() -> None:
 def test_nothing_is_practised_before_a_way_is_known() -> None:
     kept = fresh()
     walk(kept, 17, [(1, OWN), (2, OWN)])
-    assert (kept.now.practices, kept.now.best) == (0, UNKNOWN)
+    assert (kept.now.practices, kept.now.best) == (-1, UNKNOWN)  # planned anew in the next one
+
+
+def test_a_way_that_is_found_late_counts_at_once() -> None:
+    kept = fresh()
+    walk(kept, 17, [(1, OWN), (2, OWN)])  # no way is known yet
+    walk(kept, 18, straight([1, 2, 3, GOAL], OWN))
+    memory.opens(kept, 19, EPISODES, WINDOW, False)
+    assert memory.starts(kept, 0)
+    assert way(kept) == [0, 1, 2, 3, GOAL]
+    assert kept.now.practices == 0  # its last result was as short
 
 
 def test_another_session_begins_with_nothing() -> None:
