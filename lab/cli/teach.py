@@ -47,7 +47,9 @@ def teach(
     ] = None,
     memory: Annotated[
         bool | None,
-        typer.Option("--memory/--no-memory", help="Remember advice and use it again unasked; default: the task's."),
+        typer.Option(
+            "--memory/--no-memory", help="Remember what was shown and practise it unasked; default: the task's."
+        ),
     ] = None,
     advisor: AdvisorNames = None,
     asked: Asked = "together",

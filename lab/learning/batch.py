@@ -71,7 +71,7 @@ def run_sessions(
         said = advice.thresholds, advice.region
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, found.kept.shape[1], ensemble)
-    memories = _memories(mdp.n_states, learning.max_moves) if gate.memory else None
+    memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
     run(records.Work(problem, learning, asking, *said, found, lanes), memories)
     return _batch(found.steps, found.guided, found.counts, _action_values(mdp, learning, found.kept))
 
@@ -146,9 +146,10 @@ def _lanes(actions: int, episodes: int, size: int, ensemble: int) -> records.Lan
     )
 
 
-def _memories(states: int, moves: int) -> Memory:
+def _memories(states: int, actions: int, moves: int) -> Memory:
     walk = places(states, moves)
-    cells = (np.zeros((LANES, n), np.int32) for n in (states, states, states, states, walk, walk, walk))
+    sizes = (states * actions, states, states, states, states, states, walk, walk)  # as the fields of Memory
+    cells = (np.zeros((LANES, size), np.int32) for size in sizes)
     return Memory._make((*cells, np.zeros(LANES, records.NOW)))
 
 

@@ -11,7 +11,7 @@ from lab.learning.advice_memory import Recall
 from lab.learning.environment import Environment, TableEnvironment, check_solvable
 from lab.learning.gates import GATES, Surroundings, improvement
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked, allowed_words
-from lab.learning.selection import SELECTIONS, Draw, temperature, uniforms
+from lab.learning.selection import COLDEST, SELECTIONS, Draw, temperature, uniforms
 from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
@@ -121,7 +121,9 @@ class Session:
         make = GATES[gate.gate if self.advised else "never"].make
         self.gate = make(gate, learner.episodes, learner.max_steps, around)
         self.max_moves = learner.max_steps - learner.count_start
-        self.recall = Recall(mdp.n_states, self.max_moves, learner.episodes, gate.window) if gate.memory else None
+        self.recall = (
+            Recall(mdp.n_states, mdp.n_actions, self.max_moves, learner.episodes, gate.window) if gate.memory else None
+        )
         self.judge_unhelped = gate.judge_unhelped and not gate.memory
         self.steps: list[int] = []
         self.guided: list[bool] = []
@@ -163,8 +165,9 @@ class Session:
             self.tell(AdviceEnded(episode, "converged"))
         followed = getattr(self.advisor, "followed", None)
         self.trail = [] if is_open and followed is not None else None
-        practises = self.recall is not None and self.recall.practises
-        closed = self._practised_choice if practises else self._own_choice
+        closed = self._own_choice
+        if self.recall is not None and self.recall.late:
+            self.tau, closed = COLDEST, self._practised_choice
         moves = self._walk(self._advised_choice if is_open else closed)
         self.update.end()
         steps = self.settings.max_steps + 1 if moves is None else moves + self.settings.count_start
@@ -188,10 +191,8 @@ class Session:
 
     def _opens(self, episode: int) -> bool:
         """Whether the gate opens for somebody, and memory does not close it again."""
-        is_open = self.gate.opens(episode, self.steps)
-        if self.recall is None:
-            return is_open and self.advisor is not None
-        return self.recall.opens(episode, is_open and self.advised)  # what somebody said who has left is kept
+        is_open = self.gate.opens(episode, self.steps) and self.advisor is not None
+        return is_open if self.recall is None else self.recall.opens(episode, is_open)
 
     def _mean_before(self) -> float:
         """The mean of the K step counts before the last one, of fewer at the beginning; the step limit before the first."""
@@ -240,23 +241,17 @@ class Session:
         return own if self.recall is None else self.recall.chosen(state, own)
 
     def _advised_choice(self, state: int, step: int) -> int:
-        """What was said there before or what the advisor says now, where the gate asks, else the learner's own."""
+        """What the advisor says, where the gate asks, else the learner's own."""
         own, recall = self._own_choice(state, step), self.recall
-        said = None if recall is None else recall.said(state)
         advisor = self.advisor if self.helped_steps + self.helped_now < self.gate_settings.budget else None
-        if (advisor is None and said is None) or (recall is not None and not recall.trusts):
+        if advisor is None or (recall is not None and not recall.trusts):
             return own
-        if not self.gate.asks(state, self.update.gauge(state)):
-            return own
-        if recall is not None and said is not None:
-            recall.does()
-            return said
-        action = None if advisor is None else self._asks(advisor, state, step, own)
+        action = self._asks(advisor, state, step, own) if self.gate.asks(state, self.update.gauge(state)) else None
         if action is None:
             return own
         self.helped_now += 1
         if recall is not None:
-            recall.keeps(state, action)
+            recall.asked()
         return action
 
     def _asks(self, advisor: Advisor, state: int, step: int, own: int) -> int | None:

@@ -80,7 +80,7 @@ class AdviceGiven:
 
 @dataclass(frozen=True)
 class AdviceRemembered:
-    """In the episode that is over so many steps were made from memory, without asking, practice of a known way included."""
+    """In the episode that is over so many steps were made from memory, without asking: practice of a known way."""
 
     episode: int
     steps: int

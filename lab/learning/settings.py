@@ -80,8 +80,8 @@ class GateSettings:
     helped steps that any gate may use in a session; judge_unhelped: an episode that was open for advice and got none,
     as in a limited view, is judged too (the listing), or not (the text's words); spare_best: an episode that is as good
     as the best so far is no mislead, though it is not better than those before; the default is as printed, lessons and
-    runs set it (see lab/tasks/record.py); memory: advice is remembered and used
-    again without asking (see lab/learning/advice_memory.py).
+    runs set it (see lab/tasks/record.py); memory: what was shown, or found alone, is remembered and practised without
+    asking again (see lab/learning/advice_memory.py).
     Raises BadInput for a value outside its range, or for X < 2K with a gate that compares moving averages.
     """
 

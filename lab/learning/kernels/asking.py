@@ -99,23 +99,18 @@ def advised(work: Any, j: int, state: Any) -> Any:
 
 @inlined
 def decided(work: Any, memories: Any, j: int) -> Any:
-    """The action of lane j's next step and where it comes from: its own, or what memory or the advisor says."""
+    """The action of lane j's next step and where it comes from: its own, of the way that it practises, or advised."""
     lanes, state = work.lanes, work.lanes.states[j]
-    action, source, said = np.uint64(lanes.chosen[j]), np.int64(memory.OWN), np.int64(memory.NOTHING)
+    action, source = np.uint64(lanes.chosen[j]), np.int64(memory.OWN)
     if memories is not None:
-        if lanes.is_open[j]:
-            said = np.int64(memories.said[j, state])
-        elif memories.now[j].practises == 1 and memories.way[j, state] != memory.NOTHING:
+        now = memories.now[j]
+        if now.practices > 0 and memories.way[j, state] != memory.NOTHING:
             action, source = np.uint64(memories.way[j, state]), np.int64(memory.PRACTISED)
     if lanes.is_open[j]:
         lane = lanes.lane[j]
-        if (said != memory.NOTHING or lane.helped < lane.left) and asks(work, j, state):
-            if said != memory.NOTHING:
-                return np.uint64(said), np.int64(memory.REMEMBERED)
+        if lane.helped < lane.left and asks(work, j, state):
             lane.asked = 1
             if work.region[state]:
                 lane.helped += 1
                 action, source = advised(work, j, state), np.int64(memory.ASKED)
-                if memories is not None:
-                    memories.said[j, state] = action
     return action, source

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lab.learning import advice_memory as memory
+from lab.learning import selection
 from lab.learning.compiled import inlined, inner, lean
 from lab.learning.kernels.asking import decided, judge, opens
 from lab.learning.kernels.learners import choose, draw, learn
@@ -21,6 +22,7 @@ _Move: Any = memory.Move
 _clear: Any = inner(memory.clear)
 _remembers: Any = inner(memory.opens)
 _starts: Any = inlined(memory.starts)
+_plan: Any = inner(memory.plan)
 _moved: Any = inlined(memory.moved)
 _ended: Any = inner(memory.ended)
 
@@ -28,7 +30,8 @@ _ended: Any = inner(memory.ended)
 @partial(lean, inline="always")  # as source: a compiled function may not return arrays that it was not handed
 def _of_lane(m: Any, j: int) -> Any:
     """The memory of one lane."""
-    return _Memory(m.said[j], m.way[j], m.on_walk[j], m.place[j], m.walk[j], m.did[j], m.own[j], m.now[j])
+    known = m.led[j], m.way[j], m.came[j], m.queue[j]
+    return _Memory(*known, m.on_walk[j], m.place[j], m.walk[j], m.advised[j], m.now[j])
 
 
 @inlined
@@ -54,14 +57,19 @@ def _begin_episode(work: Any, memories: Any, j: int) -> None:
     lane.episode, lane.asked, lane.helped = lane.episode + 1, 0, 0
     lane.left = asking.budget - count.helped_steps
     lane.is_open = opens(asking, lane, steps, work.learning.max_steps, count.rejected_at_episode > 0)
+    lanes.per_tau[j] = sessions.per_tau[lane.episode - 1]
     if memories is not None:
         mine, may = _of_lane(memories, j), lane.is_open == 1
         lane.is_open = _remembers(mine, lane.episode, len(steps), asking.window, may)
-    lanes.per_tau[j], lanes.is_open[j] = sessions.per_tau[lane.episode - 1], lane.is_open
+        if mine.now.late == 1:
+            lanes.per_tau[j] = 1.0 / selection.COLDEST
+    lanes.is_open[j] = lane.is_open
     if len(starts) > 1:
         lanes.states[j] = starts[int(draw(lanes.rng, j) * len(starts))]
     if memories is not None:
-        _starts(_of_lane(memories, j), np.int64(lanes.states[j]))
+        mine, state = _of_lane(memories, j), np.int64(lanes.states[j])
+        if _starts(mine, state):
+            _plan(mine, state)
 
 
 @inlined
@@ -90,7 +98,8 @@ def _step(work: Any, memories: Any, j: int) -> bool:
     lanes, problem, learning = work.lanes, work.problem, work.learning
     state = lanes.states[j]
     action, source = decided(work, memories, j)
-    entered = np.uint64(problem.successor[state * np.uint64(len(learning.actions)) + action])
+    number = state * np.uint64(len(learning.actions)) + action
+    entered = np.uint64(problem.successor[number])
     ends = problem.ends[entered]
     learn(work, lanes.tables[j], state, action)
     for k in range(lanes.others.shape[1]):
@@ -98,7 +107,7 @@ def _step(work: Any, memories: Any, j: int) -> bool:
             learn(work, lanes.others[j, k], state, action)
     if memories is not None and lanes.lane[j].session >= 0:
         mine = _of_lane(memories, j)
-        _moved(mine, _Move(np.int64(state), np.int64(action), source, np.int64(entered), ends != 0, ends == 1))
+        _moved(mine, _Move(np.int64(number), source, np.int64(entered), ends != 0, ends == 1))
         if mine.now.trust < 0:
             lanes.is_open[j] = False
     lanes.states[j] = entered
@@ -124,7 +133,7 @@ def _end(work: Any, memories: Any, j: int) -> int:
         judge(work.asking, lane, sessions.steps[n], count)
     if memories is not None:
         went = moves if won else learning.max_moves + 1
-        _ended(_of_lane(memories, j), len(sessions.per_tau), went, won, lane.helped)
+        _ended(_of_lane(memories, j), went, won, lane.helped)
     if episode < len(sessions.per_tau):
         return 0
     lanes.is_open[j] = False

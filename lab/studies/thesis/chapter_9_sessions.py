@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import BoolArray, FloatArray, TabularMDP, optimal_values, shortest_steps
 from lab.studies.runner import Job, said, seeds_of
-from lab.tasks.grid_world import GridWorld
+from lab.tasks.grid_world import AdvisorView, GridWorld
 
 if TYPE_CHECKING:
     from lab.learning.batch import Batch
@@ -130,7 +130,7 @@ def succeeded(setting: AdviceSetting, steps: NDArray[np.integer[Any]]) -> BoolAr
     return np.asarray(shown == shortest_steps(problem(setting.world)) + world(setting.world).learner.count_start)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=128)
 def world(name: str) -> GridWorld:
     """The world of that name or file, read once."""
     from lab.tasks.task_file import load_world
@@ -138,13 +138,13 @@ def world(name: str) -> GridWorld:
     return load_world(name)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=128)
 def problem(name: str) -> TabularMDP:
     """The world of that name or file as a decision problem."""
     return world(name).mdp()
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=128)
 def known_values(name: str, seed: int | None) -> FloatArray:
     """What an advisor in the world of that name knows, (S, A): the table learned with a seed, or None: the exact values."""
     return (
@@ -152,6 +152,15 @@ def known_values(name: str, seed: int | None) -> FloatArray:
         if seed is None
         else learned_table(world(name), seed)
     )
+
+
+def limited_view(place: GridWorld) -> BoolArray:
+    """The states (S,) bool in which an advisor with a limited view sees the robot; without a view the middle half of each axis.
+
+    That is 6 x 6 x 6 of 10 x 10 x 10 cells; the views of the thesis's worlds have 5 x 7 x 6 and 5 x 5 x 7.
+    """
+    middle = AdvisorView(lower=tuple(n // 4 for n in place.shape), upper=tuple(n - n // 4 - 1 for n in place.shape))
+    return place.model_copy(update={"view": place.view or middle}).region()
 
 
 def learned_table(place: GridWorld, seed: int = LEARNED_SEED) -> FloatArray:
@@ -209,6 +218,8 @@ def _learned(setting: AdviceSetting, seeds: NDArray[np.uint64]) -> "Batch":
     place, advice = world(setting.world), None
     if setting.tau is not None:
         table = -table_of(setting) if setting.wrong else table_of(setting)
-        advice = Advice.of(advice_chances(table, setting.tau), place.region() if setting.view == "limited" else None)
+        advice = Advice.of(
+            advice_chances(table, setting.tau), limited_view(place) if setting.view == "limited" else None
+        )
     gate = gate_of(setting, place.gate)
     return run_sessions(problem(setting.world), learner_of(setting), gate, advice, seeds)

@@ -13,7 +13,11 @@ from lab.studies.ours.advice_budget import (
     ADVISORS,
     ASKING,
     NOBODY,
+    PLACES,
+    RANDOM,
+    RANDOM_WORLDS,
     TARGETS,
+    VIEWS,
     WORLDS,
     Asked,
     difference,
@@ -22,9 +26,18 @@ from lab.studies.ours.advice_budget import (
     worst,
 )
 from lab.studies.runner import Job, seeds_of
-from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, gate_of, sessions_of, world
+from lab.studies.thesis.chapter_9_sessions import (
+    AdviceOutcome,
+    AdviceSetting,
+    gate_of,
+    limited_view,
+    sessions_of,
+    world,
+)
 
-CELLS = len(WORLDS) * 2 * (1 + len(ASKING) * len(ADVISORS))
+ASKED = len(ASKING) * len(ADVISORS)
+CELLS = len(PLACES) * 2 + len(WORLDS) * ASKED + len(PLACES) * len(VIEWS) * ASKED  # nobody; without memory; with it
+FEW = Asked("world-1", "full", "ccrl", "limited", True)
 TARGETS_IN_ROWS = {name: list(pair) for name, pair in TARGETS.items()}
 
 
@@ -37,30 +50,35 @@ def outcome(successes: int, sessions: int, helped: int = 0) -> AdviceOutcome:
 
 @pytest.fixture(scope="module")
 def found() -> Findings:
-    """The study with three sessions a cell."""
-    return STUDIES["advice-budget"].run(Job(sessions=3), {})
+    """The study with three sessions a cell, in two random worlds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(advice_budget, "RANDOM_WORLDS", RANDOM_WORLDS[:2])
+        return STUDIES["advice-budget"].run(Job(sessions=3), {})
 
 
 @pytest.fixture(scope="module")
 def outcomes() -> Mapping[Asked, AdviceOutcome]:
     """Sixty of a hundred succeed everywhere but in a few cells."""
     made = dict.fromkeys(settings(), outcome(60, 100, 20))
-    made["world-1", "ccrl", "limited", True] = outcome(50, 100, 9)
-    made["world-1", "ccrl", "limited", False] = outcome(1, 100, 1000)
-    made["world-1", "never", NOBODY, True] = outcome(90, 100)
-    made["world-2", "importance", "wrong", True] = outcome(20, 100, 3)
+    made[FEW] = outcome(50, 100, 9)
+    made[FEW._replace(memory=False)] = outcome(1, 100, 1000)
+    made[Asked("world-1", "full", "never", NOBODY, True)] = outcome(90, 100)
+    made[Asked("world-2", "limited", "importance", "wrong", True)] = outcome(20, 100, 3)
     return made
 
 
 def test_every_gate_and_advisor_is_measured_with_and_without_memory() -> None:
     cells = settings()
-    assert len(cells) == CELLS == len(set(cells.values()))
-    assert {setting.advisor_table for setting in cells.values()} == {"exact"}
-    for (place, gate, name, memory), setting in cells.items():
-        assert (setting.world, setting.gate, setting.memory) == (place, gate, memory)
-        assert (gate == "never") == (name == NOBODY) == (setting.tau is None)
-        assert setting.wrong == (name == "wrong")
-    assert {cell[1] for cell in cells} == {
+    assert len(cells) == CELLS
+    single = [ones for cell, ones in cells.items() if cell.world != RANDOM]
+    assert len({one for ones in cells.values() for one in ones}) == len(single) + 100 * (CELLS - len(single))
+    for (place, view, gate, name, memory), ones in cells.items():
+        assert [one.world for one in ones] == (list(RANDOM_WORLDS) if place == RANDOM else [place])
+        for one in ones:
+            assert (one.view, one.gate, one.memory, one.advisor_table) == (view, gate, memory, "exact")
+            assert (gate == "never") == (name == NOBODY) == (one.tau is None)
+            assert one.wrong == (name == "wrong")
+    assert {cell.gate for cell in cells} == {
         *("ccrl", "ia", "combined", "cq", "always", "never", "random", "importance", "uncertainty")
     }
 
@@ -71,14 +89,15 @@ def test_each_cell_has_its_measures_with_intervals(found: Findings) -> None:
     for one in cells:
         low, high = one["ci95"]
         assert low <= one["value"] <= high
-        assert (one["thesis"], one["view"]) == (None, "full")
+        assert one["thesis"] is None
+        assert one["view"] in VIEWS
         assert ("tau" in one) == ("advisor_table" in one) == (one["advisor"] != NOBODY)
     helped = {(one["advisor"], one["memory"]) for one in cells if one["measure"] == "HS_steps" and one["value"] > 0}
     assert helped == {(name, memory) for name in ADVISORS for memory in (False, True)}
     targets: dict[str, list[float]] = {}
     for one in cells:
         if "target" in one:
-            assert (one["world"], one["gate"], one["memory"]) == ("world-1", "ccrl", True)
+            assert (one["world"], one["view"], one["gate"], one["memory"]) == ("world-1", "full", "ccrl", True)
             targets.setdefault(one["advisor"], []).append(one["target"])
     assert targets == TARGETS_IN_ROWS
 
@@ -102,7 +121,7 @@ def test_the_pictures_are_drawn(found: Findings) -> None:
 
 def test_advisors_may_know_a_learned_table(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(advice_budget, "ASKING", ("ccrl",))
-    monkeypatch.setattr(advice_budget, "WORLDS", ("world-1", "world-2"))
+    monkeypatch.setattr(advice_budget, "RANDOM_WORLDS", RANDOM_WORLDS[:1])
     learned = STUDIES["advice-budget"].run(Job(sessions=2), {"advisor_table": "learned"})
     tables = {one["advisor_table"] for one in learned.rows if "advisor_table" in one}
     assert tables == {"learned"}
@@ -118,18 +137,18 @@ def test_the_difference_of_two_shares_has_newcombes_interval() -> None:
 
 
 def test_the_worst_advisor_is_held_against_nobody(outcomes: Mapping[Asked, AdviceOutcome]) -> None:
-    alone, kept = worst(outcomes, "world-1")
+    alone, kept = worst(outcomes, "world-1", "full")
     assert (alone["advisor"], kept["advisor"]) == ("limited", "limited")
     assert (alone["against"], kept["against"]) == ("alone", "alone, with memory")
     np.testing.assert_allclose([alone["value"], kept["value"]], [-10.0, -40.0])
     assert kept["ci95"][1] < 0 < alone["ci95"][1]
-    any_gate = worst(outcomes, "world-2", ASKING)[0]
+    any_gate = worst(outcomes, "world-2", "limited", ASKING)[0]
     assert (any_gate["gate"], any_gate["advisor"], any_gate["over"]) == ("importance", "wrong", "any gate")
 
 
 def test_targets_are_met_or_missed(outcomes: Mapping[Asked, AdviceOutcome]) -> None:
     rows = [one for cell, made in outcomes.items() for one in advice_budget.rows_of(cell, made, "exact")]
-    below = [one for place in WORLDS for one in worst(outcomes, place)]
+    below = [one for gates in (("ccrl",), ASKING) for one in worst(outcomes, "world-1", "full", gates)]
     says = in_short(rows, below)
     assert (
         says["limited, target 85 % / 150 steps"]
@@ -138,7 +157,9 @@ def test_targets_are_met_or_missed(outcomes: Mapping[Asked, AdviceOutcome]) -> N
     assert says["world-1: alone"] == "60.0 %"
     assert says["worst_below_alone"] == -10.0
     assert says["worst_below_alone target"] == "at least -2 points: open: the interval holds it"
-    better = dict(outcomes) | {("world-1", "ccrl", "limited", True): outcome(85, 100, 149)}
+    assert says["worst_below_alone_with_memory"] == -40.0
+    assert says["worst_below_alone_with_memory target"] == "at least -2 points: missed"
+    better = dict(outcomes) | {FEW: outcome(85, 100, 149)}
     rows = [one for cell, made in better.items() for one in advice_budget.rows_of(cell, made, "exact")]
     assert ": met (" in in_short(rows, below)["limited, target 85 % / 150 steps"]
 
@@ -169,6 +190,18 @@ def test_a_setting_says_whether_advice_is_remembered() -> None:
     gate = world("world-1").gate
     assert gate_of(AdviceSetting("world-1", gate="ccrl", memory=True), gate).memory
     assert not gate_of(AdviceSetting("world-1", gate="ccrl"), gate).memory
+
+
+def test_the_random_worlds_share_the_sessions_and_have_a_limited_view() -> None:
+    ones = settings()[Asked(RANDOM, "limited", "always", "expert", True)][:3]
+    joined = advice_budget._joined(ones, 2, 0)
+    parts = [sessions_of(one, 2, 0) for one in ones]
+    assert joined.success.tolist() == [one for part in parts for one in part.success.tolist()]
+    assert joined.helped_steps.tolist() == [one for part in parts for one in part.helped_steps.tolist()]
+    seen = limited_view(world(RANDOM_WORLDS[0])).reshape(10, 10, 10)
+    assert seen[2:8, 2:8, 2:8].all()
+    assert seen.sum() == 6**3
+    np.testing.assert_array_equal(limited_view(world("world-1")), world("world-1").region())
 
 
 def test_a_wrong_advisor_never_leads_to_the_goal() -> None:
