@@ -21,6 +21,10 @@ def run(
     view: Annotated[bool, typer.Option("--view/--no-view", hidden=True)] = False,  # the old word for --page
     port: Port = 0,
     wait: Wait = None,
+    override: Annotated[
+        int,
+        typer.Option("--override", min=10, max=100, help="The arm's speed override [%]; the next plan knows of it."),
+    ] = 100,
     seed: Seed = 0,
     toolbox: ToolboxPlace = None,
     out: Annotated[
@@ -53,7 +57,7 @@ def run(
             teacher = replace(teacher, keep=kept_by(teacher.toolbox, options))
         try:
             with seat.progress:
-                report = run_task(prepared, teacher, folder, viewer=seat.page)
+                report = run_task(prepared, teacher, folder, override=override / 100, viewer=seat.page)
         except KeyboardInterrupt as stopped:
             raise KeyboardInterrupt(str(stopped) or "stopped by Ctrl-C; what was learned is kept") from None
     show(report.to_json(), as_json, run_summary)

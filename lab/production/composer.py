@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import hypot
 
+from lab.production.durations import TimedMove
 from lab.production.floor import Floor
 from lab.production.recorder import Viewer
 from lab.sequencing.cell.cell import Cell
@@ -24,7 +25,10 @@ DELIVERED_M = 0.02  # a slice this near to its spot has been delivered
 
 @dataclass(frozen=True)
 class Outcome:
-    """A run in physics: the measured schedule, which toasts were delivered, retries, and why it stopped (None: it did not)."""
+    """A run in physics: the measured schedule, which toasts were delivered, retries, and why it stopped (None: it did not).
+
+    timed: how long each move took in which nothing had to be tried again.
+    """
 
     schedule: Schedule
     delivered: tuple[int, ...]
@@ -33,6 +37,7 @@ class Outcome:
     failure: str | None
     sim_s: float
     camera_deviations_m: tuple[float, ...]
+    timed: tuple[TimedMove, ...] = ()
 
 
 class _Stopped(Exception):
@@ -47,6 +52,7 @@ class Production:
     cell: Cell
     tell: Tell = unheard
     moves: list[Move] = field(default_factory=list)
+    timed: list[TimedMove] = field(default_factory=list)
     retries: list[str] = field(default_factory=list)
     deviations_m: list[float] = field(default_factory=list)
     ready_s: dict[str, float] = field(default_factory=dict)
@@ -79,13 +85,18 @@ class Production:
         if option is None:
             raise _Stopped(self.plan.refusal(toast))
         origin, target, start, leave_s = names[option.origin], names[option.target], self.place, floor.now_s
+        tried = len(self.retries)
         for skill in () if start == origin else floor.skillset.travels[start, origin]:
             self._try(toast, origin, skill)
         reach_s = floor.now_s
+        if start != origin and len(self.retries) == tried:
+            self.timed.append(TimedMove((start, origin), False, reach_s - leave_s))
         self._await(toast, origin)
-        pick_s = floor.now_s
+        pick_s, tried = floor.now_s, len(self.retries)
         spot = self._free_spot(target)
         self._carry(toast, origin, target, spot)
+        if len(self.retries) == tried:
+            self.timed.append(TimedMove((origin, target), True, floor.now_s - pick_s))
         self.place, self.spot_of[toast] = target, spot
         process_s = self.plan.move(toast).process_s
         self.moves.append(Move(toast, start, origin, target, leave_s, reach_s, pick_s, floor.now_s, process_s))
@@ -191,14 +202,22 @@ def _slice(toast: int) -> str:
 
 
 def carry_out(
-    prepared: Prepared, cell: Cell, sequence: Sequence[int], *, viewer: Viewer | None = None, tell: Tell = unheard
+    prepared: Prepared,
+    cell: Cell,
+    sequence: Sequence[int],
+    *,
+    override: float = 1.0,
+    viewer: Viewer | None = None,
+    tell: Tell = unheard,
 ) -> tuple[Outcome, Recording]:
     """Carry `sequence` (toasts from 1, one entry a move) out in physics, from slices on the first station to the end.
 
-    A toast is delivered when its slice stands on the last station at the end; dropped when it is nowhere upright.
+    override: the share of the task's speed and acceleration with which the arm moves. A toast is delivered when its slice
+    stands on the last station at the end; dropped when it is nowhere upright.
     """
     with World() as world:
         floor = Floor(world, prepared.skillset, prepared.layout, cell.parts, film=True, viewer=viewer)
+        floor.scene.robot.override(override)
         floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
         work = Production(floor, cell, tell)
@@ -210,6 +229,13 @@ def carry_out(
         dropped = tuple(t for t in fallen if floor.bench.upright(_slice(t)) < UPRIGHT)
         schedule = Schedule.from_moves(cell, work.moves)
         outcome = Outcome(
-            schedule, delivered, dropped, tuple(work.retries), failure, floor.now_s, tuple(work.deviations_m)
+            schedule,
+            delivered,
+            dropped,
+            tuple(work.retries),
+            failure,
+            floor.now_s,
+            tuple(work.deviations_m),
+            tuple(work.timed),
         )
         return outcome, floor.recorder.recording  # type: ignore[union-attr]

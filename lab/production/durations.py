@@ -3,10 +3,10 @@
 import hashlib
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import packages_distributions, version
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,6 +34,14 @@ DECIDED_BY_RESULT = ("lab.sequencing", "lab.learning", "lab.advice", "lab.view")
 Pair = tuple[str, str]
 
 
+class TimedMove(NamedTuple):
+    """How long the robot took in a run [s] from one station to another, with a part or without."""
+
+    pair: Pair
+    loaded: bool
+    seconds: float
+
+
 @dataclass(frozen=True)
 class Durations:
     """Measured times [s]: the robot's moves by (origin, target), empty and loaded; what each machine takes."""
@@ -50,6 +58,21 @@ class Durations:
             "loaded_s": {_word(pair): seconds for pair, seconds in self.loaded_s.items()},
             "process_s": dict(self.process_s),
         }
+
+    def after(self, timed: Sequence[TimedMove]) -> "Durations":
+        """What is believed after a run: each move that it carried out takes what it took there, in the mean.
+
+        Source: thesis, section 10.2.1 (i).
+        """
+        times: dict[tuple[Pair, bool], list[float]] = {}
+        for pair, loaded, seconds in timed:
+            times.setdefault((pair, loaded), []).append(seconds)
+        means = {move: sum(all_s) / len(all_s) for move, all_s in times.items()}
+        return replace(
+            self,
+            empty_s={pair: means.get((pair, False), seconds) for pair, seconds in self.empty_s.items()},
+            loaded_s={pair: means.get((pair, True), seconds) for pair, seconds in self.loaded_s.items()},
+        )
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any], moves: NeededMoves, processes: Sequence[str]) -> "Durations":

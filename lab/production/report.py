@@ -40,6 +40,7 @@ class Taught:
     lessons: dict[str, Lesson]
     durations: Durations
     cell: Cell
+    durations_key: str = ""  # under which they are kept; "": they are not
 
 
 @dataclass

@@ -36,12 +36,15 @@ def teach_all(prepared: Prepared, teacher: Teacher) -> Taught:
         skillset.policies[name] = lesson.policy
         lessons[name] = lesson
         teacher.tell(SkillReady(name, lesson))
-    durations = _durations(prepared, teacher)
-    return Taught(lessons, durations, cell_of(task, durations, prepared.toasts))
+    durations, key = _durations(prepared, teacher)
+    return Taught(lessons, durations, cell_of(task, durations, prepared.toasts), key)
 
 
-def _durations(prepared: Prepared, teacher: Teacher) -> Durations:
-    """The durations measured earlier for exactly these policies in exactly this scene, or measured now and kept."""
+def _durations(prepared: Prepared, teacher: Teacher) -> tuple[Durations, str]:
+    """The durations measured earlier for exactly these policies in exactly this scene, or measured now and kept; their key.
+
+    The key is "" where they cannot be kept.
+    """
     skillset, key, kept = prepared.skillset, "", None
     try:
         key = durations_key(prepared.task, prepared.layout, skillset.moves, skillset.policies)
@@ -49,17 +52,22 @@ def _durations(prepared: Prepared, teacher: Teacher) -> Durations:
     except LabError as error:  # then they are measured: nothing is lost but time
         teacher.tell(RecordSkipped(f"durations measured earlier: {error}"))
     if kept is not None:
-        return kept
+        return kept, key
     processes = sum(station.process is not None for station in prepared.task.stations)
     teacher.tell(PhaseBegan("measure", len(skillset.moves.loaded) + len(skillset.moves.empty) + processes))
     durations = measure(prepared, lambda name, seconds: teacher.tell(MoveTimed(name, seconds)))
     if key:
         teacher.toolbox.save_record(RECORDS, key, durations.to_json())
-    return durations
+    return durations, key
 
 
-def run(prepared: Prepared, teacher: Teacher, out: Path, *, viewer: Viewer | None = None) -> Report:
-    """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.files.check_out`)."""
+def run(
+    prepared: Prepared, teacher: Teacher, out: Path, *, override: float = 1.0, viewer: Viewer | None = None
+) -> Report:
+    """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.files.check_out`).
+
+    override: the arm's share of its speed (see `carry_out`). How long moves took is kept, and the next run plans with it.
+    """
     began = time.perf_counter() - prepared.wall_s
     if viewer is not None:
         show_scene(prepared.task, prepared.toasts, prepared.layout, viewer)
@@ -70,7 +78,11 @@ def run(prepared: Prepared, teacher: Teacher, out: Path, *, viewer: Viewer | Non
     proven = optimum(taught.cell)
     teacher.tell(SequenceFound(found, Reference(proven.bound_s, proven.proven, "A*")))
     teacher.tell(PhaseBegan("carry out", len(found.sequence)))
-    outcome, recording = carry_out(prepared, taught.cell, found.sequence, viewer=viewer, tell=teacher.tell)
+    outcome, recording = carry_out(
+        prepared, taught.cell, found.sequence, override=override, viewer=viewer, tell=teacher.tell
+    )
+    if taught.durations_key:
+        teacher.toolbox.save_record(RECORDS, taught.durations_key, taught.durations.after(outcome.timed).to_json())
     report = Report(prepared, taught, found, proven, outcome, recording, began)
     teacher.tell(PhaseBegan("draw", 1))
     write_files(report, out)

@@ -162,6 +162,10 @@ class Robot:
         tip = position + kinematics.TOOL * forward
         return ToolPose(float(tip[0]), float(tip[1]), float(tip[2]), atan2(-float(across[0]), float(across[1])))
 
+    def override(self, share: float) -> None:
+        """Move from now on with a share of speed and acceleration, as an operator's speed override."""
+        self.speed, self.acceleration = share * self.speed, share * self.acceleration
+
     def follow(self, poses: Sequence[ToolPose], *, blend: float = 0.0, slow: float = 1.0) -> Iterator[None]:
         """Move the tool from where it is along `poses`; `slow` < 1 lowers speed and acceleration."""
         before = self.world.joints(NAME, kinematics.JOINTS)

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from shutil import copytree
 from typing import Any
 
 import numpy as np
@@ -52,10 +53,10 @@ class Ran:
     folder: Path
 
 
-def run_toast(folder: Path, root: Path) -> Ran:
+def run_toast(folder: Path, root: Path, *options: str) -> Ran:
     code = "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()"
     ran = subprocess.run(
-        [sys.executable, "-c", code, "run", "toast", "--toasts", "1", "--json"],
+        [sys.executable, "-c", code, "run", "toast", "--toasts", "1", "--json", *options],
         cwd=folder,
         env={**os.environ, "LAB_TOOLBOX": str(folder / "toolbox"), "PYTHONPATH": str(root)},
         capture_output=True,
@@ -74,6 +75,15 @@ def cold(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Ran:
 @pytest.fixture(scope="module")
 def warm(cold: Ran, root: Path) -> Ran:
     return run_toast(cold.folder, root)
+
+
+def test_a_robot_that_is_slower_than_believed_is_known_by_its_second_run(warm: Ran, root: Path, tmp_path: Path) -> None:
+    """Timed at full speed, carried out at 60 % of it, as set on an operator's pendant."""
+    copytree(warm.folder / "toolbox", tmp_path / "toolbox")
+    first, second = (run_toast(tmp_path, root, "--override", "60").document for _ in range(2))
+    wrong = [abs(one["predicted_makespan_s"] - one["measured_makespan_s"]) for one in (first, second)]
+    assert first["measured_makespan_s"] > 1.05 * warm.document["measured_makespan_s"]
+    assert wrong[1] < 0.1 * wrong[0]
 
 
 # ---- the document -------------------------------------------------------------------------------------------------
@@ -145,8 +155,11 @@ def test_a_second_run_learns_nothing_and_does_the_same(cold: Ran, warm: Ran) -> 
     assert {row["source"] for row in warm.document["skills"]} == {"reused"}
     assert sum(row["episodes"] + row["helped_steps"] for row in warm.document["skills"]) == 0
     assert [row["policy"] for row in warm.document["skills"]] == [row["policy"] for row in cold.document["skills"]]
-    same = set(RUN_FIELDS) - {"skills", "sim_s", "wall_s"}
+    planned = {"predicted_makespan_s", "optimal_makespan_s", "bound_s"}  # with the times of the first run
+    same = set(RUN_FIELDS) - {"skills", "sim_s", "wall_s", *planned}
     assert {name: warm.document[name] for name in same} == {name: cold.document[name] for name in same}
+    wrong = [abs(ran.document["predicted_makespan_s"] - ran.document["measured_makespan_s"]) for ran in (cold, warm)]
+    assert wrong[1] < 0.1 * wrong[0]
     assert "Time every move" not in warm.stderr
     assert f"  reused    {len(warm.document['skills'])} skills: " in warm.stderr
 
