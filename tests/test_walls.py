@@ -22,8 +22,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.advice", "lab.tasks"),
     ("lab.sim",),
     ("lab.skills", "lab.view"),
-    ("lab.teaching", "lab.studies"),
-    ("lab.production", "lab.seat", "lab.gym"),
+    ("lab.teaching",),
+    ("lab.production", "lab.seat", "lab.gym", "lab.studies"),
     ("lab.cli",),
 )
 ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it

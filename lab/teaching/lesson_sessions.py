@@ -19,9 +19,11 @@ from lab.learning.settings import LearnerSettings
 from lab.mdp import FloatArray, greedy_path
 from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, Tell
 from lab.teaching.lesson_plan import LessonPlan
+from lab.toolbox.fitness import warm_start
 from lab.toolbox.policy import Policy
 
 MORE_SESSIONS = 3  # to find a shorter way once the goal is reached
+WARM_EXPLORATION = 0.1  # of what a beginner explores: what was learned elsewhere is to be tried, not forgotten
 
 
 def learn(plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tell: Tell) -> SessionResult:
@@ -29,6 +31,7 @@ def learn(plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tel
 
     Up to `plan.sessions` are run until the greedy path is as short as can be; once it leads to the goal, at most
     MORE_SESSIONS further ones look for a shorter one. A table that leads to the goal is never given up for a worse one.
+    With a policy to begin from, a short session alone comes before them, as long as a beginner's until it may first ask.
     """
     while True:
         tell(LessonBegan(plan, journal))
@@ -52,10 +55,12 @@ class _Sessions:
     def run(self) -> SessionResult:
         """The curves of all sessions, with the best table of these and of the unfinished policy."""
         plan, several, unfinished = self.plan, self.plan.sessions > 1, self.plan.unfinished
-        kept: SessionResult | Policy | None = unfinished
-        moves = before = inf if unfinished is None else moves_to_goal(unfinished.q, plan.problem, plan.learner)
+        whole = None if plan.warm is None else self._alone(plan.warm)
+        kept: SessionResult | Policy | None = unfinished or whole
+        moves = before = inf if kept is None else moves_to_goal(kept.q, plan.problem, plan.learner)
+        if whole is not None and (whole.interrupted or whole.solved):
+            return whole
         left = plan.sessions if moves == inf else min(plan.sessions, MORE_SESSIONS)
-        whole: SessionResult | None = None
         while left:
             left -= 1
             result = self._session(None if kept is None else kept.q)
@@ -75,6 +80,19 @@ class _Sessions:
     def _session(self, q0: FloatArray | None) -> SessionResult:
         plan, advisor = self.plan, None if self.alone else self._advisor()
         return Session(self.place, plan.learner, self.gate, advisor, self.rng, q0).run(self._hear)
+
+    def _alone(self, warm: Policy) -> SessionResult:
+        """A short session without advice that begins from a policy of another problem; the better of both tables."""
+        plan, mdp = self.plan, self.place.mdp
+        q0 = warm_start(warm, mdp, plan.learner.discount)
+        episodes = min(plan.learner.episodes, max(1, plan.gate.first_episode - 1))
+        short = replace(plan.learner, episodes=episodes, exploration=WARM_EXPLORATION * plan.learner.exploration)
+        self.tell(AdvisorGathered(None))
+        result = Session(self.place, short, self.gate, None, self.rng, q0).run(self._hear)
+        if moves_to_goal(q0, plan.problem, plan.learner) >= moves_to_goal(result.q, plan.problem, plan.learner):
+            return result
+        final, _, solved = self.place.judge(q0, plan.learner)
+        return replace(result, q=q0, final_steps=final, solved=solved)
 
     def _advisor(self) -> Advisor | None:
         made = self.advising.gather(self.place, self.plan.learner, self.rng, journal=self.journal, tell=self._hear)
