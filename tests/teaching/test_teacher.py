@@ -84,7 +84,7 @@ def test_a_policy_of_another_size_or_with_other_actions_is_not_taken(teacher: Te
     sound = teacher.find_or_teach(plan(), {}).policy
     q, visits = np.zeros((7, 4)), np.zeros((7, 4), np.int64)
     for wrong in (
-        replace(sound, q=q, visits=visits, shape=(7,), start=0),
+        replace(sound, q=q, visits=visits, shape=(7,), start=0, ends=None),
         replace(sound, action_labels=("n", "s", "w", "e")),
     ):
         assert teacher.find_or_teach(plan(), known(wrong)).source == "learned"

@@ -91,11 +91,25 @@ def reuse(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 
 @lru_cache(maxsize=1)
-def learned_here() -> tuple[Prepared, Known]:
-    """The scene that is changed, and what is learned in it, by (sub-task, signature): the same in each process."""
+def learned_here() -> tuple[Prepared, Known, Known]:
+    """The scene that is changed, what a run learns in it, and what each problem of it gives when it is learned from nothing.
+
+    Both by (sub-task, signature), and the same in each process.
+    """
     prepared = prepare(load(TASK), TOASTS, 0)
-    lessons = taught(prepared, {}, prepared.problems.values())
-    return prepared, {(one.policy.subtask, one.policy.signature): one.policy for one, _ in lessons}
+    problems = _distinct(prepared)
+    lessons = taught(prepared, {}, problems)
+    anew = {_key(problem): _from_nothing(prepared, problem) for problem in problems}
+    return prepared, {(one.policy.subtask, one.policy.signature): one.policy for one, _ in lessons}, anew
+
+
+def _key(problem: Problem) -> tuple[str, str]:
+    return problem.subtask, problem.mdp.signature
+
+
+def _distinct(prepared: Prepared) -> list[Problem]:
+    """The problems of a scene, each once, under the skill that meets it first."""
+    return [*reversed({_key(problem): problem for problem in reversed(prepared.problems.values())}.values())]
 
 
 def taught(prepared: Prepared, known: Known, problems: Iterable[Problem]) -> list[tuple[Lesson, float]]:
@@ -113,24 +127,22 @@ def taught(prepared: Prepared, known: Known, problems: Iterable[Problem]) -> lis
 
 def tried(scene: Scene) -> Outcome:
     """One changed scene, with what was learned before and from nothing."""
-    base, known = learned_here()
+    base, known, learned = learned_here()
     prepared, words, refused = surveyed(scene, base.task, base.layout, base.seed, TOASTS)
-    distinct = {(p.subtask, p.mdp.signature): p for p in reversed(prepared.problems.values())}
-    problems = [*reversed(distinct.values())]
+    problems = _distinct(prepared)
     here = taught(prepared, known, problems)
-    anew = _from_nothing(prepared, known, problems)
+    anew = [learned.get(_key(problem)) or _from_nothing(prepared, problem) for problem in problems]
     ways = [_way(lesson) for lesson, _ in here]
     tallies = {}
     for way in WAYS:
         own = [n for n, one in enumerate(ways) if one == way]
         spent = [_spent(here[n][0]) for n in own]
-        from_nothing = [anew[n][1:] for n in own]
         tallies[way] = Tally(
             len(own),
             sum(episodes for episodes, _ in spent),
             sum(helped for _, helped in spent),
             sum(here[n][1] for n in own),
-            (sum(episodes for episodes, _ in from_nothing), sum(helped for _, helped in from_nothing)),
+            (sum(len(anew[n].curve) for n in own), sum(anew[n].helped_steps for n in own)),
         )
     lessons = [lesson for lesson, _ in here]
     failing = [_fails(prepared, problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)]
@@ -145,28 +157,19 @@ def tried(scene: Scene) -> Outcome:
         ),
         longer=sum(
             _moves(problem, lesson.policy) > _moves(problem, policy)
-            for problem, lesson, (policy, *_) in zip(problems, lessons, anew, strict=True)
+            for problem, lesson, policy in zip(problems, lessons, anew, strict=True)
         ),
         unsolved=(
             sum(not works(problem, one.policy) for problem, one in zip(problems, lessons, strict=True)),
-            sum(not works(problem, policy) for problem, (policy, *_) in zip(problems, anew, strict=True)),
+            sum(not works(problem, policy) for problem, policy in zip(problems, anew, strict=True)),
         ),
     )
 
 
-def _from_nothing(prepared: Prepared, known: Known, problems: Sequence[Problem]) -> list[tuple[Policy, int, int]]:
-    """What learning each problem from nothing gives, in how many episodes and helped steps.
-
-    Of a problem that the skills were learned in this is known: the same seed, the same lesson.
-    """
-    found = []
-    for problem in problems:
-        policy = known.get((problem.subtask, problem.mdp.signature))
-        if policy is None:
-            (lesson, _), *_ = taught(prepared, {}, [problem])
-            policy = lesson.policy
-        found.append((policy, len(policy.curve), policy.helped_steps))
-    return found
+def _from_nothing(prepared: Prepared, problem: Problem) -> Policy:
+    """What a problem gives to who knows nothing else."""
+    ((lesson, _),) = taught(prepared, {}, [problem])
+    return lesson.policy
 
 
 def _way(lesson: Lesson) -> str:
