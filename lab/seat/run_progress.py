@@ -115,7 +115,7 @@ class RunProgress:
         reused, self._reused = self._reused, []
         elsewhere = [one for one in reused if one[1].fitness is not None]
         self._tell_found([one for one in reused if one[1].fitness is None])
-        self._tell_found(elsewhere, f" (learned in another scene; {ALL_FREE})")
+        self._tell_found(elsewhere, f" (learned in another scene: {ALL_FREE})")
         saved = (sum(lesson.saved[n] for _, lesson in reused) for n in (0, 1))
         if text := saved_text(*saved):
             self._say(f"{'':{_INDENT}}{text}")

@@ -14,6 +14,7 @@ import pytest
 
 import lab.production.run
 from lab.errors import WorkFailed
+from lab.mdp import shortest_steps
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
 from lab.production.report import FILES, Report, Taught, write_files
@@ -26,6 +27,7 @@ from lab.skills.prepared_scene import Prepared, prepare
 from lab.tasks.sequencing import search_for
 from lab.tasks.task_file import Task, load
 from lab.teaching.events import Event, PhaseBegan, RecordSkipped
+from lab.teaching.lesson_sessions import fits
 from lab.teaching.teacher import Teacher
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
@@ -39,7 +41,9 @@ RUN_FIELDS = (
     *("optimality_gap", "optimum_proven"),
     *("camera_deviation_m", "sim_s", "wall_s", "files"),
 )
-SKILL_FIELDS = {"name", "subtask", "source", "policy", "episodes", "requests", "helped_steps", "solved"}
+SKILL_FIELDS = {"name", "subtask", "source", "policy", "episodes", "requests", "helped_steps", "solved"} | {
+    *("reason", "parent", "saved_episodes", "saved_helped_steps", "fitness")
+}
 
 
 @dataclass(frozen=True)
@@ -234,10 +238,27 @@ def test_a_moved_obstacle_is_learned_around_and_nothing_else(
     assert must in {prepared.problems[name].subtask for name in affected}
     assert not {prepared.problems[name].subtask for name in affected} & {"grasp", "butter", "place"}
     assert len(affected) < len(prepared.problems)
-    found = sources(teach_all(changed, Teacher(toolbox)))
-    assert {name for name, source in found.items() if source == "learned"} == affected
-    assert set(found.values()) == {"learned", "reused"}
+    taught = teach_all(changed, Teacher(toolbox))
+    judged = {name for name, lesson in taught.lessons.items() if lesson.fitness is not None}
+    assert judged == affected
+    assert {source for name, source in sources(taught).items() if name not in affected} == {"reused"}
+    for name in affected:
+        lesson, problem = taught.lessons[name], changed.problems[name]
+        assert fits(lesson.policy.q, problem, changed.task.subtask(problem.subtask).learner)
+        assert lesson.reason.startswith("'")  # it names the policy that it speaks of
+        if lesson.source == "reused":
+            assert lesson.policy.final_steps == shortest_steps(problem.mdp)
+    before = sum(prepared.task.subtask(changed.problems[name].subtask).learner.episodes for name in affected)
+    spent = [lesson.result for lesson in taught.lessons.values() if lesson.result is not None]
+    assert sum(len(result.steps) for result in spent) < 0.8 * before
     assert len(measured) == 1
+
+
+def test_skills_with_one_problem_save_its_lesson_once(prepared: Prepared, toolbox: Toolbox) -> None:
+    lessons = teach_all(prepared, Teacher(toolbox)).lessons
+    grasps = [name for name in lessons if name.startswith("grasp")]
+    assert [lessons[name].saved[0] > 0 for name in grasps] == [True] + [False] * (len(grasps) - 1)
+    assert {lessons[name].reason for name in grasps[1:]} == {f"it is the same problem as '{grasps[0]}'"}
 
 
 def test_damaged_policies_are_named_and_learned_again(
