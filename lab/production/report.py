@@ -109,8 +109,8 @@ def _skill_row(name: str, lesson: Lesson) -> dict[str, Any]:
         "requests": 0 if result is None else result.requests,
         "helped_steps": 0 if result is None else result.helped_steps,
         "rejected_at_episode": None if result is None else result.rejected_at_episode,
-        "optimal_steps": policy.optimal_steps,
-        "final_steps": policy.final_steps,
+        "optimal_steps": lesson.steps[1],
+        "final_steps": lesson.steps[0],
         "solved": policy.solved,
     }
 

@@ -45,7 +45,7 @@ ENDED = {
     "misled by what was remembered": "what was said led round in circles or into obstacles; the learner asks no more",
 }
 PARTS_DONE = (SkillReady, MoveTimed, SequenceFound, MoveMade)  # each tells that one part of a phase is done
-_FOUND = {"reused": "by", "adapted": "from"}  # the policy of another scene
+_FOUND = {"reused": "by", "adapted": "from"}  # the policy of another problem
 _SHOWN_MOVES = 24
 _LEAST_WAIT_S = 0.05  # that is worth a word
 
@@ -129,8 +129,8 @@ class SessionText:
 
 def lesson_parts(lesson: Lesson, first_asked: int | None = None, rejected: AdviceRejected | None = None) -> list[str]:
     """What came of a lesson, beginning with the steps of the learned way and the fewest; where known, when it asked."""
-    policy, result = lesson.policy, lesson.result
-    reached, fewest = policy.final_steps, policy.optimal_steps
+    result = lesson.result
+    reached, fewest = lesson.steps
     parts = [f"{'?' if reached is None else reached}/{fewest or '?'} steps"]
     if reached is not None and reached > (fewest or reached):
         parts.append("not the shortest way")

@@ -111,11 +111,11 @@ class RunProgress:
         self._pack([head, *map(Text, [f"{curve} {steps:>11}", *rest])])
 
     def _tell_reused(self) -> None:
-        """In few lines, all skills that were there already, those learned in another scene apart."""
+        """In few lines, all skills that were there already, those of another problem apart."""
         reused, self._reused = self._reused, []
         elsewhere = [one for one in reused if one[1].fitness is not None]
         self._tell_found([one for one in reused if one[1].fitness is None])
-        self._tell_found(elsewhere, f" (learned in another scene: {ALL_FREE})")
+        self._tell_found(elsewhere, f" (of another problem: {ALL_FREE})")
         saved = (sum(lesson.saved[n] for _, lesson in reused) for n in (0, 1))
         if text := saved_text(*saved):
             self._say(f"{'':{_INDENT}}{text}")

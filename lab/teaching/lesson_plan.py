@@ -44,8 +44,9 @@ class Lesson:
 
     failure: why it failed when it was tried in physics, None when it did not, or was not tried. Of a lesson of a run also
     reason: why it is reused, adapted or learned; parent: the policy that an adapted one was begun from; fitness: what was
-    judged of that, of the one that is reused in another scene, or of the best one that was refused; saved: how many episodes and
-    helped steps fewer than the policy took that was found, or one session from nothing, if that is more.
+    judged of that, of the one that is reused though it was learned for another problem, or of the best one that was
+    refused; saved: how many episodes and helped steps fewer than the policy took that was found, or one session from
+    nothing, if that is more.
     """
 
     policy: Policy
@@ -56,6 +57,13 @@ class Lesson:
     parent: Policy | None = None
     fitness: Fitness | None = None
     saved: tuple[int, int] = (0, 0)
+
+    @property
+    def steps(self) -> tuple[int | None, int | None]:
+        """Those of the greedy way in this problem, and the fewest."""
+        if self.source == "reused" and self.fitness is not None:
+            return self.fitness.moves, self.fitness.fewest
+        return self.policy.final_steps, self.policy.optimal_steps
 
 
 class Interrupted(KeyboardInterrupt):

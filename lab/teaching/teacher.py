@@ -19,6 +19,7 @@ from lab.toolbox.policy import MAX_NAME_LENGTH, Origin, Policy, is_name
 from lab.toolbox.registry import Toolbox
 
 _UNFINISHED = " unfinished"
+_REUSED = "reused"  # the toolbox's records of which policy was used for a problem that it was not learned in
 _LONGEST_PROBLEM = MAX_NAME_LENGTH - 20  # characters of a policy's name; the rest is for its signature and state
 
 
@@ -55,11 +56,12 @@ class Teacher:
             return _reused(plan, found, "it was learned in exactly this problem")
         fitting = None
         if problem.environment is None:
-            fitting = best_fit(candidates(known, problem), problem.mdp, plan.learner.discount)
+            fitting = best_fit(self._candidates(known, problem), problem.mdp, plan.learner.discount)
         if fitting is not None and fitting[1].verdict == "use":
             policy, fitness = fitting
             failure = None if self.trial is None else self.trial(problem, policy)
             if failure is None:
+                self.toolbox.save_record(_REUSED, _record_key(problem), {"policy": reference(policy)})
                 return _reused(plan, policy, f"'{policy.name}': {fitness.reason}", fitness)
             fitting = policy, replace(fitness, verdict="refuse", reason=f"in physics, {failure}")
         if found is not None:
@@ -71,6 +73,14 @@ class Teacher:
         lesson = self.teach(replace(plan, warm=parent))
         saved = (0, 0) if parent is None else _saved(plan, parent, lesson.result)
         return replace(lesson, reason=f"'{policy.name}': {fitness.reason}", parent=parent, fitness=fitness, saved=saved)
+
+    def _candidates(self, known: Mapping[tuple[str, str], Policy], problem: Problem) -> list[Policy]:
+        """As `candidates`, but the one that was used for this problem before comes first: the next run does the same."""
+        record = self.toolbox.load_record(_REUSED, _record_key(problem)) or {}
+        before = str(record.get("policy"))
+        found = candidates(known, problem)
+        found.sort(key=lambda policy: not before.startswith(f"{policy.name}@") or reference(policy) != before)
+        return found
 
     def unfinished(self, problem: Problem, name: str | None = None) -> Policy | None:
         """The unsolved policy to go on from: the one it would replace, the best one, or the one beside a solved one."""
@@ -176,6 +186,10 @@ def candidates(known: Mapping[tuple[str, str], Policy], problem: Problem) -> lis
     found = [policy for (subtask, _), policy in known.items() if subtask == problem.subtask and policy.solved]
     found.sort(key=lambda policy: policy.created, reverse=True)
     return sorted(found, key=lambda policy: not policy.name.startswith(f"{problem.name[:_LONGEST_PROBLEM]} "))
+
+
+def _record_key(problem: Problem) -> str:
+    return f"{problem.subtask} {problem.mdp.signature}"
 
 
 def _reused(plan: LessonPlan, policy: Policy, reason: str, fitness: Fitness | None = None) -> Lesson:

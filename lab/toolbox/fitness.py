@@ -39,7 +39,8 @@ class Fitness:
     the starts from which its greedy steps reach the goal; worst, mean: how many moves above the shortest these ways take,
     None where none reaches it; value: its highest action value in the start, the feasibility score; changed: how many states
     go on or end otherwise than where it was learned, None where its file does not say; warm: `reached` of its warm start,
-    None where that was not looked at.
+    None where that was not looked at; moves: of its way from the problem's start, None where it misses the goal, fewest: of the
+    shortest way.
     """
 
     verdict: Verdict
@@ -51,6 +52,8 @@ class Fitness:
     value: float = 0.0
     changed: int | None = None
     warm: float | None = None
+    moves: int | None = None
+    fewest: int | None = None
 
     @property
     def rank(self) -> tuple[float, ...]:
@@ -163,6 +166,8 @@ def behaviour(policy: Policy, mdp: TabularMDP) -> Fitness:
         mean=float(above.mean()) if len(above) else None,
         value=float(policy.q[mdp.start].max()),
         changed=changed,
+        moves=int(moves[mdp.start]) if known.kinds[end[mdp.start]] == GOAL else None,
+        fewest=int(known.moves[mdp.start]),
     )
 
 

@@ -34,7 +34,7 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     learned = sources.count("learned") + sources.count("continued")
     found = [f"{learned} learned", *([f"{n} adapted"] if (n := sources.count("adapted")) else [])]
     elsewhere = sum(row["source"] == "reused" and row["fitness"] is not None for row in skills)
-    found += [f"{sources.count('reused')} reused{f' ({elsewhere} from another scene)' if elsewhere else ''}"]
+    found += [f"{sources.count('reused')} reused{f' ({elsewhere} of another problem)' if elsewhere else ''}"]
     table.add_row("skills", ", ".join([*found, counted(helped, "helped step")]))
     saved = [sum(row[f"saved_{what}"] for row in skills) for what in ("episodes", "helped_steps")]
     if any(saved):

@@ -101,8 +101,8 @@ def test_the_toast_is_delivered_as_predicted(cold: Ran) -> None:
     assert document["wall_s"] > 0
 
 
-def test_every_skill_was_learned_or_is_the_same_table_as_one_that_was(cold: Ran) -> None:
-    learned = {row["policy"] for row in cold.document["skills"] if row["source"] == "learned"}
+def test_every_skill_was_learned_or_adapted_or_has_the_table_of_one_that_was(cold: Ran) -> None:
+    learned = {row["policy"] for row in cold.document["skills"] if row["source"] in ("learned", "adapted")}
     assert {row["subtask"] for row in cold.document["skills"]} == {"transfer", "grasp", "insert", "butter", "place"}
     assert {row["policy"] for row in cold.document["skills"]} == learned
     assert sum(row["helped_steps"] for row in cold.document["skills"]) > 100
@@ -152,7 +152,9 @@ def test_a_second_run_learns_nothing_and_does_the_same(cold: Ran, warm: Ran) -> 
     same = set(RUN_FIELDS) - {"skills", "sim_s", "wall_s"}
     assert {name: warm.document[name] for name in same} == {name: cold.document[name] for name in same}
     assert "Time every move" not in warm.stderr
-    assert f"  reused    {len(warm.document['skills'])} skills: " in warm.stderr
+    reused = [line for line in warm.stderr.splitlines() if line.startswith("  reused    ")]
+    assert len(reused) == 2  # of this very problem, and of another one
+    assert "of another problem: their ways are free here" in reused[1]
 
 
 # ---- what is reused, and what is not -------------------------------------------------------------------------------
@@ -240,14 +242,14 @@ def test_a_moved_obstacle_is_learned_around_and_nothing_else(
     assert len(affected) < len(prepared.problems)
     taught = teach_all(changed, Teacher(toolbox))
     judged = {name for name, lesson in taught.lessons.items() if lesson.fitness is not None}
-    assert judged == affected
+    assert affected <= judged
     assert {source for name, source in sources(taught).items() if name not in affected} == {"reused"}
     for name in affected:
         lesson, problem = taught.lessons[name], changed.problems[name]
         assert fits(lesson.policy.q, problem, changed.task.subtask(problem.subtask).learner)
         assert lesson.reason.startswith("'")  # it names the policy that it speaks of
         if lesson.source == "reused":
-            assert lesson.policy.final_steps == shortest_steps(problem.mdp)
+            assert lesson.steps == (shortest_steps(problem.mdp),) * 2
     before = sum(prepared.task.subtask(changed.problems[name].subtask).learner.episodes for name in affected)
     spent = [lesson.result for lesson in taught.lessons.values() if lesson.result is not None]
     assert sum(len(result.steps) for result in spent) < 0.8 * before

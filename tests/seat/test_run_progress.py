@@ -139,7 +139,7 @@ def test_many_reused_skills_are_counted(board: TabularMDP) -> None:
     assert lines(shown) == ["  reused    20 skills: 20 x transfer"]
 
 
-def test_a_skill_of_another_scene_says_why_and_what_it_saved(board: TabularMDP) -> None:
+def test_a_skill_of_another_problem_says_why_and_what_it_saved(board: TabularMDP) -> None:
     shown = console(200, terminal=False)
     fitness = Fitness("adapt", "its way meets what is in the way at (1, 1)")
     adapted = replace(lesson(board, "adapted"), reason=f"'p 1': {fitness.reason}", fitness=fitness, saved=(171, 80))
@@ -151,7 +151,7 @@ def test_a_skill_of_another_scene_says_why_and_what_it_saved(board: TabularMDP) 
     first, same, other, saved = lines(shown)
     assert first.endswith(f"never asked  from 'p 1': {fitness.reason}  saved 171 episodes, 80 helped steps")
     assert same == "  reused    grasp at plate"
-    assert other == f"  reused    grasp at toaster (learned in another scene: {ALL_FREE})"
+    assert other == f"  reused    grasp at toaster (of another problem: {ALL_FREE})"
     assert saved == "            saved 800 episodes, 1 helped step"
     refused = replace(lesson(board), reason="'p 3': the goal is not where it was", fitness=fitness)
     assert run_text(SkillReady("insert", refused)).endswith("refused 'p 3': the goal is not where it was")

@@ -92,6 +92,7 @@ def test_what_stands_in_its_way_is_named_and_gone_around() -> None:
     assert fitness.verdict == "adapt"
     assert fitness.reason == "its way meets what is in the way at (0, 1); 1 of 12 states changed"
     assert (fitness.reached, fitness.worst, fitness.mean, fitness.warm) == (0.0, None, None, 1.0)
+    assert (fitness.moves, fitness.fewest) == (None, 5)
     states, _, reached = greedy_path(warm_start(old, mdp), mdp, 12)
     assert reached
     assert states == [state(cell) for cell in ((0, 0), (1, 0), (1, 1), (1, 2), (0, 2), (0, 3))]
@@ -101,7 +102,7 @@ def test_a_shorter_way_that_was_blocked_is_to_be_found() -> None:
     old = only(board((0, 1)), *(((0, 0), DOWN), ((1, 0), RIGHT), ((1, 1), RIGHT), ((1, 2), UP), ((0, 2), RIGHT)))
     fitness = judged(old, board())
     assert fitness.reason == "its way is free, but 2 moves longer than the shortest; 1 of 12 states changed"
-    assert (fitness.verdict, fitness.worst) == ("adapt", 2)
+    assert (fitness.verdict, fitness.worst, fitness.moves, fitness.fewest) == ("adapt", 2, 5, 3)
     assert warm_start(old, board())[state((0, 0)), RIGHT] == 0.0  # it knows nothing of that, and may try it
 
 

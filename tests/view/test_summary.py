@@ -62,7 +62,7 @@ RUN: dict[str, Any] = {
 def test_a_run_says_what_was_found_and_saved() -> None:
     skills = [skill("learned", 3), skill("adapted", saved=171), skill("reused", saved=200)]
     found = shown(run_summary(RUN | {"skills": [*skills, skill("reused", elsewhere=True, saved=200)]}))
-    assert found[1] == "         skills  1 learned, 1 adapted, 2 reused (1 from another scene), 3 helped steps"
+    assert found[1] == "         skills  1 learned, 1 adapted, 2 reused (1 of another problem), 3 helped steps"
     assert found[2] == "          saved  571 episodes, 571 helped steps"
 
 
