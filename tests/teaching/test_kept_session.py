@@ -155,6 +155,7 @@ def test_what_a_lesson_was_warm_started_from_is_kept_with_it(tmp_path: Path, maz
     plan = LessonPlan(problem, how.learner, how.gate, subject.name, sessions=MAX_SESSIONS)
     lesson = replace(here, keep=NewSession(folder, box, wanted).keep).find_or_teach(plan, box.index()[0])
     assert (lesson.source, lesson.policy.parent.partition("@")[0]) == ("adapted", before["saved_as"])
+    assert lesson.parent is not None
     assert not fits(lesson.parent.q, problem, how.learner)
     box.remove(lesson.policy.name)
     lines = (folder / FILE).read_bytes().splitlines(keepends=True)
@@ -162,6 +163,7 @@ def test_what_a_lesson_was_warm_started_from_is_kept_with_it(tmp_path: Path, maz
     kept = KeptSession(folder, "--resume")
     document = taught(kept.options, here, folder, kept)
     again = box.find("world", problem.mdp.signature)
+    assert again is not None
     assert (document["source"], again.parent) == ("adapted", lesson.policy.parent)
     assert (again.q.tobytes(), again.curve) == (lesson.policy.q.tobytes(), lesson.policy.curve)
 

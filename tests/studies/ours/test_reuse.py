@@ -1,13 +1,14 @@
 """Skills in changed scenes: one scene from end to end, and how many become rows."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.studies.findings import those
 from lab.studies.ours import reuse as study
-from lab.studies.ours.changed_scenes import KINDS, Scene
+from lab.studies.ours.changed_scenes import KINDS, Scene, surveyed
 from lab.studies.ours.reuse import WAYS, Outcome, Tally, in_short, reuse, rows_of, rows_of_scene, tried
 from lab.studies.runner import Job
 from lab.tasks.task_file import load
@@ -73,9 +74,12 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
         prepared.problems = {name: prepared.problems[name] for name in names}
         return prepared
 
-    surveyed = study.surveyed
+    def scene(*given: Any) -> tuple[Prepared, str, int]:
+        prepared, words, refused = surveyed(*given)
+        return some(prepared), words, refused
+
     monkeypatch.setattr(study, "prepare", lambda *given: some(prepare(*given)))
-    monkeypatch.setattr(study, "surveyed", lambda *given: (some((found := surveyed(*given))[0]), *found[1:]))
+    monkeypatch.setattr(study, "surveyed", scene)
     study.learned_here.cache_clear()
 
 
