@@ -23,7 +23,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.sim",),
     ("lab.skills", "lab.view"),
     ("lab.teaching",),
-    ("lab.production", "lab.seat", "lab.gym", "lab.studies"),
+    ("lab.studies",),
+    ("lab.production", "lab.seat", "lab.gym"),
     ("lab.cli",),
 )
 ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
