@@ -61,7 +61,7 @@ class Teacher:
             policy, fitness = fitting
             failure = None if self.trial is None else self.trial(problem, policy)
             if failure is None:
-                self.toolbox.save_record(_REUSED, _record_key(problem), {"policy": reference(policy)})
+                self._remember(problem, {"policy": reference(policy)})
                 return _reused(plan, policy, f"'{policy.name}': {fitness.reason}", fitness)
             fitting = policy, replace(fitness, verdict="refuse", reason=f"in physics, {failure}")
         if found is not None:
@@ -81,6 +81,11 @@ class Teacher:
         found = candidates(known, problem)
         found.sort(key=lambda policy: not before.startswith(f"{policy.name}@") or reference(policy) != before)
         return found
+
+    def _remember(self, problem: Problem, record: dict[str, str]) -> None:
+        """Note what is used for a problem, where that is news."""
+        if self.toolbox.load_record(_REUSED, _record_key(problem)) != record:
+            self.toolbox.save_record(_REUSED, _record_key(problem), record)
 
     def unfinished(self, problem: Problem, name: str | None = None) -> Policy | None:
         """The unsolved policy to go on from: the one it would replace, the best one, or the one beside a solved one."""

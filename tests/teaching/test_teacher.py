@@ -118,6 +118,19 @@ def test_a_way_that_is_free_in_another_scene_is_used_as_it_is(teacher: Teacher) 
     assert len(teacher.toolbox.list()) == 1  # it is not kept twice
 
 
+def test_what_was_used_for_a_problem_is_used_for_it_again(teacher: Teacher) -> None:
+    first = teacher.find_or_teach(plan(), {}).policy
+    beside = next((r, c) for r in range(3) for c in range(4) if (r, c) not in {*way(first), (1, 1)})
+    newer = replace(first, name="insert at toaster newer", created="2099-01-01T00:00:00+00:00", signature="0" * 16)
+    about = plan(HOPELESS, about=elsewhere(beside))
+    assert teacher.find_or_teach(about, known(first)).policy is first
+    assert teacher.find_or_teach(about, known(newer) | known(first)).policy is first
+    assert (
+        Teacher(Toolbox(teacher.toolbox.folder / "other")).find_or_teach(about, known(newer) | known(first)).policy
+        is newer
+    )
+
+
 def test_what_is_in_the_way_is_learned_around(teacher: Teacher) -> None:
     first = teacher.find_or_teach(plan(), {}).policy
     about = elsewhere(way(first)[3])
