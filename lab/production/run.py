@@ -28,11 +28,14 @@ def teach_all(prepared: Prepared, teacher: Teacher) -> Taught:
     for what in damaged:
         teacher.tell(RecordSkipped(what))
     teacher.tell(PhaseBegan("learn", len(prepared.problems)))
-    lessons = {}
+    lessons, first = {}, dict[str, str]()  # by signature, the skill that it was first found or learned for
     for name, problem in prepared.problems.items():
         settings = task.subtask(problem.subtask)
         lesson = teacher.find_or_teach(LessonPlan(problem, settings.learner, settings.gate, task.name), known)
-        known[problem.subtask, problem.mdp.signature] = lesson.policy
+        same = first.setdefault(f"{problem.subtask} {problem.mdp.signature}", name)
+        if same != name and lesson.source == "reused":  # it would have been learned only once
+            lesson = replace(lesson, reason=f"it is the same problem as '{same}'", saved=(0, 0))
+        known[problem.subtask, lesson.policy.signature] = lesson.policy
         skillset.policies[name] = lesson.policy
         lessons[name] = lesson
         teacher.tell(SkillReady(name, lesson))

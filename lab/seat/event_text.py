@@ -45,6 +45,7 @@ ENDED = {
     "misled by what was remembered": "what was said led round in circles or into obstacles; the learner asks no more",
 }
 PARTS_DONE = (SkillReady, MoveTimed, SequenceFound, MoveMade)  # each tells that one part of a phase is done
+_FOUND = {"reused": "by", "adapted": "from"}  # the policy of another problem
 _SHOWN_MOVES = 24
 _LEAST_WAIT_S = 0.05  # that is worth a word
 
@@ -128,8 +129,8 @@ class SessionText:
 
 def lesson_parts(lesson: Lesson, first_asked: int | None = None, rejected: AdviceRejected | None = None) -> list[str]:
     """What came of a lesson, beginning with the steps of the learned way and the fewest; where known, when it asked."""
-    policy, result = lesson.policy, lesson.result
-    reached, fewest = policy.final_steps, policy.optimal_steps
+    result = lesson.result
+    reached, fewest = lesson.steps
     parts = [f"{'?' if reached is None else reached}/{fewest or '?'} steps"]
     if reached is not None and reached > (fewest or reached):
         parts.append("not the shortest way")
@@ -141,7 +142,17 @@ def lesson_parts(lesson: Lesson, first_asked: int | None = None, rejected: Advic
         if rejected is not None:
             misleads = counted(rejected.misleads, "mislead")
             parts.append(f"rejected its advisor in episode {rejected.episode} after {misleads}")
-    return parts
+    if lesson.fitness is not None:
+        parts.append(f"{_FOUND.get(lesson.source, 'refused')} {lesson.reason}")
+    saved = saved_text(*lesson.saved)
+    return [*parts, saved] if saved else parts
+
+
+def saved_text(episodes: int, helped_steps: int) -> str:
+    """What a skill that was found has saved, "" for nothing."""
+    counts = ((episodes, "episode"), (helped_steps, "helped step"))
+    saved = [counted(number, what) for number, what in counts if number > 0]
+    return f"saved {', '.join(saved)}" if saved else ""
 
 
 def sequence_parts(event: SequenceFound) -> tuple[str, str]:

@@ -9,7 +9,7 @@ from rich.progress import TaskID
 from rich.text import Text
 
 from lab.learning.session_events import AdviceRejected, AdviceRequested
-from lab.seat.event_text import PARTS_DONE, lesson_parts, move_text, run_text, sequence_parts
+from lab.seat.event_text import PARTS_DONE, lesson_parts, move_text, run_text, saved_text, sequence_parts
 from lab.teaching.events import (
     Event,
     LessonContinued,
@@ -29,6 +29,7 @@ _NAME = 52
 _INDENT = 12
 _LONGEST_LIST = 8
 _UNLIMITED = 1000
+ALL_FREE = "their ways are free here, and none is longer than one learned anew"
 
 
 class RunProgress:
@@ -44,7 +45,7 @@ class RunProgress:
         self._task: TaskID | None = None
         self._first_asked: dict[str, int] = {}  # skill -> episode
         self._rejected: dict[str, AdviceRejected] = {}
-        self._reused: list[tuple[str, str]] = []  # skill, sub-task
+        self._reused: list[tuple[str, Lesson]] = []  # by skill
 
     def __enter__(self) -> "RunProgress":
         self._running = True
@@ -102,7 +103,7 @@ class RunProgress:
 
     def _lesson(self, name: str, lesson: Lesson) -> None:
         if lesson.result is None:
-            self._reused.append((name, lesson.policy.subtask))
+            self._reused.append((name, lesson))
             return
         steps, *rest = lesson_parts(lesson, self._first_asked.get(name), self._rejected.get(name))
         curve = sparkline(lesson.result.steps.tolist(), bars=self._bars)
@@ -110,15 +111,23 @@ class RunProgress:
         self._pack([head, *map(Text, [f"{curve} {steps:>11}", *rest])])
 
     def _tell_reused(self) -> None:
-        """In few lines, all skills that were there already."""
+        """In few lines, all skills that were there already, those of another problem apart."""
         reused, self._reused = self._reused, []
+        elsewhere = [one for one in reused if one[1].fitness is not None]
+        self._tell_found([one for one in reused if one[1].fitness is None])
+        self._tell_found(elsewhere, f" (of another problem: {ALL_FREE})")
+        saved = (sum(lesson.saved[n] for _, lesson in reused) for n in (0, 1))
+        if text := saved_text(*saved):
+            self._say(f"{'':{_INDENT}}{text}")
+
+    def _tell_found(self, reused: Sequence[tuple[str, Lesson]], where: str = "") -> None:
         if not reused:
             return
         names = [name for name, _ in reused]
         if len(names) > _LONGEST_LIST:
-            counts = Counter(subtask for _, subtask in reused)
+            counts = Counter(lesson.policy.subtask for _, lesson in reused)
             names = [f"{len(reused)} skills: " + ", ".join(f"{count} x {name}" for name, count in counts.items())]
-        parts = [Text(name + ",") for name in names[:-1]] + [Text(names[-1])]
+        parts = [Text(name + ",") for name in names[:-1]] + [Text(names[-1] + where)]
         self._pack([Text.assemble("  ", (f"{'reused':9}", "green"), " ") + parts[0], *parts[1:]], gap=" ")
 
     def _say(self, *parts: str | tuple[str, str]) -> None:

@@ -87,6 +87,12 @@ def _flat(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return flat(job, reading)
 
 
+def _reuse(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.reuse import reuse
+
+    return reuse(job, reading)
+
+
 def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.sequencing_speed import sequencing_speed
 
@@ -135,6 +141,7 @@ STUDIES: dict[str, Study] = {
     "appendix-iii": Study("Appendix III: a flexible manufacturing system", _appendix_iii),
     "srl-time": Study("SRL improved, beside every rival", _srl_time),
     "flat": Study("One flat problem, or two levels: the toast task on a small grid", _flat),
+    "reuse": Study("Skills in changed scenes: used as they are, adapted or learned, beside learning all anew", _reuse),
     "sequencing-speed": Study("Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }

@@ -126,9 +126,9 @@ class NewSession(SessionInFolder):
         """The journal of a lesson. Raises BadInput when the folder holds a session already."""
         self.plan, problem = plan, plan.problem
         self.folder = claimed(self._toolbox, problem.name, Path.mkdir) if self._wanted is None else self._wanted
-        if plan.unfinished is not None:
+        if plan.begins_from is not None:
             begun = FolderPlace(self.folder / _BEGUN)
-            begun.write(f"{slug(plan.unfinished.name)}{SUFFIX}", encode(plan.unfinished))
+            begun.write(f"{slug(plan.begins_from.name)}{SUFFIX}", encode(plan.begins_from))
         head = Session(
             self.options.to_json(),
             problem.name,
@@ -136,7 +136,7 @@ class NewSession(SessionInFolder):
             __version__,
             asdict(plan.learner),
             asdict(plan.gate),
-            "" if plan.unfinished is None else plan.unfinished.name,
+            "" if plan.begins_from is None else plan.begins_from.name,
         )
         self.journal = Journal.begin(self.folder, head)
         if self._wanted is not None:
@@ -215,14 +215,18 @@ class KeptSession(SessionInFolder):
         return self.options
 
     def begun(self, problem: Problem) -> Policy | None:
-        """The policy that the session went on from when it began. Raises BadInput when it is not there any more."""
+        """The policy that the session went on from when it began, or of another problem, was warm-started from.
+
+        Raises BadInput when it is not there any more.
+        """
         name = self.read.session.continues
         if not name:
             return None
-        found = Toolbox(self.folder / _BEGUN).find(problem.subtask, problem.mdp.signature, name)
-        if found is None:
-            raise BadInput(f"session '{self.folder}': the policy that it went on from is not in '{_BEGUN}' any more")
-        return found
+        kept, _ = Toolbox(self.folder / _BEGUN).index()
+        for policy in kept.values():
+            if (policy.name, policy.subtask) == (name, problem.subtask):
+                return policy
+        raise BadInput(f"session '{self.folder}': the policy that it went on from is not in '{_BEGUN}' any more")
 
 
 def check_same(given: Any, read: Read) -> None:

@@ -19,9 +19,11 @@ from lab.learning.settings import LearnerSettings
 from lab.mdp import FloatArray, fewest_moves, greedy_moves, greedy_path
 from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, SessionBegan, Tell
 from lab.teaching.lesson_plan import LessonPlan
+from lab.toolbox.fitness import warm_start
 from lab.toolbox.policy import Policy
 
 MORE_SESSIONS = 8  # to find a shorter way once the goal is reached
+WARM_EXPLORATION = 0.1  # of what a beginner explores: what was learned elsewhere is to be tried, not forgotten
 
 
 def learn(plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tell: Tell) -> SessionResult:
@@ -33,6 +35,8 @@ def learn(plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tel
     In a lesson of several sessions nobody is asked in these further ones, and a session alone, there or because nobody is
     left to ask, does not go on from the best table but from values that no move can beat: then every move that might
     lead to a shorter way is tried (optimistic initial values, Sutton and Barto 1998, section 2.7).
+
+    With a policy to begin from, a short session alone comes before them, as long as a beginner's until it may first ask.
     """
     while True:
         tell(LessonBegan(plan, journal))
@@ -59,10 +63,12 @@ class _Sessions:
     def run(self) -> SessionResult:
         """The curves of all sessions, with the best table of these and of the unfinished policy."""
         plan, several, unfinished = self.plan, self.plan.sessions > 1, self.plan.unfinished
-        kept: SessionResult | Policy | None = unfinished
-        moves = before = inf if unfinished is None else moves_to_goal(unfinished.q, plan.problem, plan.learner)
+        whole = None if plan.warm is None else self._alone(plan.warm)
+        kept: SessionResult | Policy | None = unfinished or whole
+        moves = before = inf if kept is None else moves_to_goal(kept.q, plan.problem, plan.learner)
+        if whole is not None and (whole.interrupted or (whole.solved and moves <= self.fewest)):
+            return whole
         left = plan.sessions if moves == inf else min(plan.sessions, MORE_SESSIONS)
-        whole: SessionResult | None = None
         while left:
             left -= 1
             result = self._session(None if kept is None else kept.q, reached=moves < inf)
@@ -85,11 +91,14 @@ class _Sessions:
         hopes = several and advisor is None
         if hopes:
             q0 = self._hopeful(q0, reached)
-        session = Session(self.place, plan.learner, self.gate, advisor, self.rng, q0)
-        self.tell(SessionBegan(session))
-        result = session.run(self._hear)
+        result = self._run(plan.learner, advisor, q0)
         self.hopeful = result.q if hopes else None
         return result
+
+    def _run(self, learner: LearnerSettings, advisor: Advisor | None, q0: FloatArray | None) -> SessionResult:
+        session = Session(self.place, learner, self.gate, advisor, self.rng, q0)
+        self.tell(SessionBegan(session))
+        return session.run(self._hear)
 
     def _hopeful(self, q0: FloatArray | None, reached: bool) -> FloatArray:
         """The start values of a session alone: those of the one before, or of what was broken off, or the best reward."""
@@ -99,6 +108,19 @@ class _Sessions:
         if q0 is not None and unfinished is not None and q0 is unfinished.q and not reached:
             return q0
         return np.full(mdp.successor.shape, mdp.reward.max())
+
+    def _alone(self, warm: Policy) -> SessionResult:
+        """A short session without advice that begins from a policy of another problem; the better of both tables."""
+        plan, mdp = self.plan, self.place.mdp
+        q0 = warm_start(warm, mdp, plan.learner.discount)
+        episodes = min(plan.learner.episodes, max(1, plan.gate.first_episode - 1))
+        short = replace(plan.learner, episodes=episodes, exploration=WARM_EXPLORATION * plan.learner.exploration)
+        self.tell(AdvisorGathered(None))
+        result = self._run(short, None, q0)
+        if moves_to_goal(q0, plan.problem, plan.learner) >= moves_to_goal(result.q, plan.problem, plan.learner):
+            return result
+        final, _, solved = self.place.judge(q0, plan.learner)
+        return replace(result, q=q0, final_steps=final, solved=solved)
 
     def _advisor(self) -> Advisor | None:
         made = self.advising.gather(self.place, self.plan.learner, self.rng, journal=self.journal, tell=self._hear)

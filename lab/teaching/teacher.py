@@ -1,6 +1,6 @@
 """Find a policy that fits, or teach a new one and keep it, whatever happens."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 
@@ -9,14 +9,18 @@ from lab.advice.entries import Closed
 from lab.advice.journal import Journal
 from lab.errors import BadInput, WorkFailed, counted
 from lab.learning.problem import Problem
+from lab.learning.session import SessionResult
 from lab.mdp import TabularMDP
 from lab.teaching.events import LessonContinued, Tell, unheard
-from lab.teaching.lesson_plan import Interrupted, Keep, Lesson, LessonPlan, Trial
+from lab.teaching.lesson_plan import Interrupted, Keep, Lesson, LessonPlan, Source, Trial
 from lab.teaching.lesson_sessions import fits, joined, learn
+from lab.toolbox.fitness import Fitness, best_fit, reference
+from lab.toolbox.index import KnownPolicies
 from lab.toolbox.policy import MAX_NAME_LENGTH, Origin, Policy, is_name
 from lab.toolbox.registry import Toolbox
 
 _UNFINISHED = " unfinished"
+_REUSED = "reused"  # the toolbox's records of which policy was used for a problem that it was not learned in
 _LONGEST_PROBLEM = MAX_NAME_LENGTH - 20  # characters of a policy's name; the rest is for its signature and state
 
 
@@ -25,7 +29,8 @@ class Teacher:
     """How to teach: who advises, with which seed, whom to tell, and where policies and journals are kept.
 
     keep: gives the journal of a lesson, by default one that is not written; begun: in a lesson that is resumed, the
-    policy that it once went on from; trial: tries in physics what was learned, before it is kept.
+    policy that it once went on from, or was warm-started from; trial: tries in physics what was learned, before it is kept,
+    and what was learned elsewhere, before it is used.
     """
 
     toolbox: Toolbox
@@ -36,19 +41,49 @@ class Teacher:
     begun: Callable[[Problem], Policy | None] | None = None
     trial: Trial | None = None
 
-    def find_or_teach(self, plan: LessonPlan, known: Mapping[tuple[str, str], Policy]) -> Lesson:
-        """A policy that reaches the goal in exactly this problem: from `known`, by (sub-task, signature), or learned now.
+    def find_or_teach(self, plan: LessonPlan, known: KnownPolicies) -> Lesson:
+        """A policy that reaches the goal of this problem: from `known`, by (sub-task, signature), or learned now.
 
-        Only a solved policy is reused; any other is learned on from where it stands, and followed when it fits though
-        no shorter way was found. WorkFailed when no session finds a way; Interrupted on Ctrl-C.
+        A solved policy of exactly this problem is reused; then one of any other problem that would give nothing less (see
+        `lab.toolbox.fitness`), which is not kept twice. An unsolved one of this problem is learned on from where it stands, and
+        followed when it fits though no shorter way was found; then one of another problem is adapted. WorkFailed when no
+        session finds a way; Interrupted on Ctrl-C.
         """
         problem = plan.problem
         found = known.get((problem.subtask, problem.mdp.signature))
         if found is not None and not _belongs(found, problem.mdp):
             found = None
         if found is not None and found.solved and fits(found.q, problem, plan.learner):
-            return Lesson(found, "reused")
-        return self.teach(replace(plan, unfinished=found))
+            return _reused(plan, found, "it was learned in exactly this problem")
+        fitting = None
+        if problem.environment is None:
+            fitting = best_fit(self._candidates(known, problem), problem.mdp, plan.learner.discount)
+        if fitting is not None and fitting[1].verdict == "use":
+            policy, fitness = fitting
+            failure = None if self.trial is None else self.trial(problem, policy)
+            if failure is None:
+                self._remember(problem, {"policy": reference(policy)})
+                return _reused(plan, policy, f"'{policy.name}': {fitness.reason}", fitness)
+            fitting = policy, replace(fitness, verdict="refuse", reason=f"in physics, {failure}")
+        if found is not None:
+            return replace(self.teach(replace(plan, unfinished=found)), reason=f"'{found.name}' was left unfinished")
+        if fitting is None:
+            return replace(self.teach(plan), reason="nothing in the toolbox has its states and moves")
+        policy, fitness = fitting
+        parent = policy if fitness.verdict == "adapt" else None
+        lesson = self.teach(replace(plan, warm=parent))
+        saved = (0, 0) if parent is None else _saved(plan, parent, lesson.result)
+        return replace(lesson, reason=f"'{policy.name}': {fitness.reason}", parent=parent, fitness=fitness, saved=saved)
+
+    def _candidates(self, known: KnownPolicies, problem: Problem) -> Iterator[Policy]:
+        """As `candidates`, but the one that was used for this problem before comes first: the next run does the same."""
+        record = self.toolbox.load_record(_REUSED, _record_key(problem)) or {}
+        return candidates(known, problem, first=str(record.get("policy")).rpartition("@")[0])
+
+    def _remember(self, problem: Problem, record: dict[str, str]) -> None:
+        """Note what is used for a problem, where that is news."""
+        if self.toolbox.load_record(_REUSED, _record_key(problem)) != record:
+            self.toolbox.save_record(_REUSED, _record_key(problem), record)
 
     def unfinished(self, problem: Problem, name: str | None = None) -> Policy | None:
         """The unsolved policy to go on from: the one it would replace, the best one, or the one beside a solved one."""
@@ -74,6 +109,8 @@ class Teacher:
                 )
         if self.begun is not None:
             found = self.begun(problem)
+            if found is not None and found.signature != problem.mdp.signature:
+                return self.teach(replace(plan, warm=found))
         else:
             found = self.unfinished(problem, name)
             if found is not None and (self.advising.records or not self._same(found, plan)):
@@ -101,6 +138,7 @@ class Teacher:
             name = plan.name or self._free_name(problem, result.solved)
             origin = Origin(name, problem.subtask, plan.task, str(self.advising), self.seed)
             policy = Policy.of(joined(unfinished, result), problem.mdp, plan.learner, plan.gate, origin)
+            policy = replace(policy, parent=_parent(plan))
             failure = None
             if not (result.interrupted or journal.read_only):
                 policy, failure = self._tried(problem, policy)
@@ -122,7 +160,8 @@ class Teacher:
                 f"'{problem.name}' was not learned in {length} with the advisor '{self.advising}'; "
                 "what was learned is kept: try a better advisor, or more episodes in the task file"
             )
-        return Lesson(policy, "learned" if unfinished is None else "continued", result, failure)
+        source: Source = "learned" if unfinished is None else "continued"
+        return Lesson(policy, source if plan.warm is None else "adapted", result, failure)
 
     def _tried(self, problem: Problem, policy: Policy) -> tuple[Policy, str | None]:
         """The policy as it is to be kept, and why it failed in physics; then it is unsolved, and replaces no solved one."""
@@ -144,6 +183,36 @@ class Teacher:
         name = plain_name(problem)
         kept = None if solved else self.toolbox.find(problem.subtask, problem.mdp.signature, name)
         return f"{name}{_UNFINISHED}" if kept is not None and kept.solved else name
+
+
+def candidates(known: KnownPolicies, problem: Problem, first: str = "") -> Iterator[Policy]:
+    """The solved policies of a problem's sub-task and table size: the one called `first`, those of the same skill, the newest."""
+    own = f"{problem.name[:_LONGEST_PROBLEM]} "
+    found = known.alike(problem.subtask, problem.mdp.n_states, problem.mdp.n_actions)
+    for key, _ in sorted(found, key=lambda one: (one[1] != first, not one[1].startswith(own))):
+        with suppress(KeyError):  # damaged, or gone meanwhile
+            yield known[key]
+
+
+def _record_key(problem: Problem) -> str:
+    return f"{problem.subtask} {problem.mdp.signature}"
+
+
+def _reused(plan: LessonPlan, policy: Policy, reason: str, fitness: Fitness | None = None) -> Lesson:
+    return Lesson(policy, "reused", reason=reason, fitness=fitness, saved=_saved(plan, policy))
+
+
+def _saved(plan: LessonPlan, found: Policy, now: SessionResult | None = None) -> tuple[int, int]:
+    """Episodes and helped steps that a found policy saves: see `Lesson`."""
+    episodes, helped = (0, 0) if now is None else (len(now.steps), now.helped_steps)
+    return max(len(found.curve), plan.learner.episodes) - episodes, found.helped_steps - helped
+
+
+def _parent(plan: LessonPlan) -> str:
+    """What a policy's `parent` says: the one that it was warm-started from, be it in this lesson or before it."""
+    if plan.warm is not None:
+        return reference(plan.warm)
+    return "" if plan.unfinished is None else plan.unfinished.parent
 
 
 def check_name(name: str | None) -> None:

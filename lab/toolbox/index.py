@@ -2,7 +2,7 @@
 
 import json
 import zlib
-from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -117,31 +117,50 @@ def _checksum(body: bytes) -> str:
 
 
 class KnownPolicies(MutableMapping[Key, "Policy"]):
-    """Policies by sub-task and signature, each read when it is first asked for; one that is gone by then is not there."""
+    """Policies by sub-task and signature, each read when it is first asked for; one that is gone by then is not there.
 
-    def __init__(self, files: dict[Key, str], load: Callable[[str], "Policy"]) -> None:
-        self._files, self._load = files, load
+    rows: what the index says of each: at least its name, whether it is solved, when it was made, its table's size, its file.
+    """
+
+    def __init__(self, rows: Mapping[Key, Row], load: Callable[[str], "Policy"]) -> None:
+        self._rows, self._load = dict(rows), load
         self._read: dict[Key, Policy] = {}
+
+    @classmethod
+    def of(cls, policies: Iterable["Policy"]) -> "KnownPolicies":
+        """These, which need not be read."""
+        known = cls({}, lambda file: NotImplemented)
+        known.update({(policy.subtask, policy.signature): policy for policy in policies})
+        return known
+
+    def alike(self, subtask: str, states: int, actions: int) -> list[tuple[Key, str]]:
+        """The solved ones of a sub-task whose tables have this size, by key and name, the newest first; none is read."""
+        wanted = {"solved": True, "states": states, "actions": actions}
+        found = [key for key, row in self._rows.items() if key[0] == subtask and row | wanted == row]
+        found.sort(key=lambda key: str(self._rows[key]["created"]), reverse=True)
+        return [(key, self._rows[key]["name"]) for key in found]
 
     def __getitem__(self, key: Key) -> "Policy":
         if key not in self._read:
             try:
-                self._read[key] = self._load(self._files[key])
+                self._read[key] = self._load(self._rows[key]["file"])
             except BadInput:
                 raise KeyError(key) from None
         return self._read[key]
 
     def __setitem__(self, key: Key, policy: "Policy") -> None:
-        self._read[key] = policy
+        states, actions = policy.q.shape
+        about = {"name": policy.name, "solved": policy.solved, "created": policy.created}
+        self._read[key], self._rows[key] = policy, about | {"states": states, "actions": actions}
 
     def __delitem__(self, key: Key) -> None:
         if key not in self:
             raise KeyError(key)
         self._read.pop(key, None)
-        self._files.pop(key, None)
+        self._rows.pop(key, None)
 
     def __iter__(self) -> Iterator[Key]:
-        return iter(self._files | dict.fromkeys(self._read, ""))
+        return iter(self._rows)
 
     def __len__(self) -> int:
-        return len(self._files.keys() | self._read.keys())
+        return len(self._rows)

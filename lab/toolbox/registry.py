@@ -94,14 +94,7 @@ class Toolbox:
             key = (row["subtask"], row["signature"])
             best[key] = max(best.get(key, row), row, key=_worth)
         damaged = [row["damaged"] for row in self._index.rows().values() if "damaged" in row]
-        return KnownPolicies({key: row["file"] for key, row in best.items()}, self.load), damaged
-
-    def candidates(self, subtask: str, states: int, actions: int) -> Rows:
-        """The policies in use of a sub-task whose tables have this size, the newest first, with shape and action labels."""
-        rows = [
-            row for row in self._rows() if (row["subtask"], row["states"], row["actions"]) == (subtask, states, actions)
-        ]
-        return sorted(rows, key=lambda row: str(row["created"]), reverse=True)
+        return KnownPolicies(best, self.load), damaged
 
     def list(
         self,

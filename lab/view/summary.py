@@ -32,7 +32,13 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     if report["retries"]:
         table.add_row("retries", Text("\n".join(report["retries"])))
     learned = sources.count("learned") + sources.count("continued")
-    table.add_row("skills", f"{learned} learned, {sources.count('reused')} reused, {counted(helped, 'helped step')}")
+    found = [f"{learned} learned", *([f"{n} adapted"] if (n := sources.count("adapted")) else [])]
+    elsewhere = sum(row["source"] == "reused" and row["fitness"] is not None for row in skills)
+    found += [f"{sources.count('reused')} reused{f' ({elsewhere} of another problem)' if elsewhere else ''}"]
+    table.add_row("skills", ", ".join([*found, counted(helped, "helped step")]))
+    saved = [sum(row[f"saved_{what}"] for row in skills) for what in ("episodes", "helped_steps")]
+    if any(saved):
+        table.add_row("saved", f"{counted(saved[0], 'episode')}, {counted(saved[1], 'helped step')}")
     table.add_row("sequence", " ".join(map(str, report["sequence"])))
     measured = report["measured_makespan_s"]
     predicted, bound = beside(report["predicted_makespan_s"], report["bound_s"], " s", 1)

@@ -25,6 +25,7 @@ from lab.tasks.task_file import Stage, Task, load
 from lab.teaching.events import Event, MoveMade, MoveRetried
 from lab.teaching.lesson_plan import LessonPlan
 from lab.teaching.teacher import Teacher
+from lab.toolbox.index import KnownPolicies
 from lab.toolbox.registry import Toolbox
 
 
@@ -62,7 +63,7 @@ def taught(
         for name, problem in problems.items():
             settings = task.subtask(problem.subtask)
             lesson = LessonPlan(problem, settings.learner, settings.gate, task.name)
-            skillset.policies[name] = teacher.find_or_teach(lesson, {}).policy
+            skillset.policies[name] = teacher.find_or_teach(lesson, KnownPolicies.of([])).policy
         return Prepared(task, toasts, 0, layout, surveys, skillset, problems)
 
     return teach

@@ -12,7 +12,8 @@ from lab.learning.session import SessionResult, run_session
 from lab.learning.session_events import AdviceRejected, AdviceRequested
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
-from lab.seat.run_progress import RunProgress
+from lab.seat.event_text import run_text
+from lab.seat.run_progress import ALL_FREE, RunProgress
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.search import Reference, SequenceResult
 from lab.teaching.events import (
@@ -26,6 +27,7 @@ from lab.teaching.events import (
     SkillReady,
 )
 from lab.teaching.lesson_plan import Lesson
+from lab.toolbox.fitness import Fitness
 from lab.toolbox.policy import Origin, Policy
 
 LONG = "transfer butter_applier to finished_plate with slice"
@@ -135,6 +137,25 @@ def test_many_reused_skills_are_counted(board: TabularMDP) -> None:
         for n in range(20):
             progress.hear(SkillReady(f"skill {n}", lesson(board, "reused")))
     assert lines(shown) == ["  reused    20 skills: 20 x transfer"]
+
+
+def test_a_skill_of_another_problem_says_why_and_what_it_saved(board: TabularMDP) -> None:
+    shown = console(200, terminal=False)
+    fitness = Fitness("adapt", "its way meets what is in the way at (1, 1)")
+    adapted = replace(lesson(board, "adapted"), reason=f"'p 1': {fitness.reason}", fitness=fitness, saved=(171, 80))
+    used = replace(lesson(board, "reused"), reason="'p 2': its way is free", fitness=fitness, saved=(200, 1))
+    with RunProgress(shown) as progress:
+        progress.hear(SkillReady("insert at toaster", adapted))
+        progress.hear(SkillReady("grasp at plate", replace(lesson(board, "reused"), saved=(600, 0))))
+        progress.hear(SkillReady("grasp at toaster", used))
+    first, same, other, saved = lines(shown)
+    assert first.endswith(f"never asked  from 'p 1': {fitness.reason}  saved 171 episodes, 80 helped steps")
+    assert same == "  reused    grasp at plate"
+    assert other == f"  reused    grasp at toaster (of another problem: {ALL_FREE})"
+    assert saved == "            saved 800 episodes, 1 helped step"
+    refused = replace(lesson(board), reason="'p 3': the goal is not where it was", fitness=fitness)
+    assert run_text(SkillReady("insert", refused)).endswith("refused 'p 3': the goal is not where it was")
+    assert run_text(SkillReady("insert", used)).endswith("by 'p 2': its way is free, saved 200 episodes, 1 helped step")
 
 
 def test_the_rest_of_a_run() -> None:

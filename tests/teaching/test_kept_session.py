@@ -19,10 +19,11 @@ from lab.learning.requests import AdviceRequest, Ask
 from lab.learning.session_events import AdviceGiven
 from lab.tasks.task_file import load_world
 from lab.teaching.events import Event, LessonEvent, QuestionAnswered, unheard
-from lab.teaching.kept_session import SESSIONS, KeptSession, check_new, session_rows
+from lab.teaching.kept_session import SESSIONS, KeptSession, NewSession, check_new, session_rows
 from lab.teaching.lesson import replay, teach
 from lab.teaching.lesson_options import LessonOptions
-from lab.teaching.lesson_plan import Interrupted
+from lab.teaching.lesson_plan import MAX_SESSIONS, Interrupted, LessonPlan
+from lab.teaching.lesson_sessions import fits
 from lab.teaching.teacher import Teacher
 from lab.teaching.world_subject import WorldSubject
 from lab.toolbox.registry import Toolbox
@@ -142,6 +143,31 @@ def test_what_a_session_went_on_from_is_kept_with_it(tmp_path: Path, maze: Path)
         taught(kept.options, teacher(tmp_path / "cut", person, "none"), folder, kept)
 
 
+def test_what_a_lesson_was_warm_started_from_is_kept_with_it(tmp_path: Path, maze: Path) -> None:
+    """In a run: a way learned before a wall was moved; broken off and gone on with, it begins from the same table."""
+    wanted, box = options(maze, "none", gate="never", sessions=MAX_SESSIONS), Toolbox(tmp_path / "toolbox")
+    here = teacher(tmp_path, person, "none")
+    before = taught(wanted, here, None)
+    assert before["solved"]
+    maze.write_text(MAZE.strip().replace("...##.", "..###."))  # on its way
+    subject, folder = WorldSubject.of(wanted), tmp_path / "lesson"
+    problem, how = subject.prepare(3), subject.settings
+    plan = LessonPlan(problem, how.learner, how.gate, subject.name, sessions=MAX_SESSIONS)
+    lesson = replace(here, keep=NewSession(folder, box, wanted).keep).find_or_teach(plan, box.index()[0])
+    assert (lesson.source, lesson.policy.parent.partition("@")[0]) == ("adapted", before["saved_as"])
+    assert lesson.parent is not None
+    assert not fits(lesson.parent.q, problem, how.learner)
+    box.remove(lesson.policy.name)
+    lines = (folder / FILE).read_bytes().splitlines(keepends=True)
+    (folder / FILE).write_bytes(b"".join(lines[:9]))
+    kept = KeptSession(folder, "--resume")
+    document = taught(kept.options, here, folder, kept)
+    again = box.find("world", problem.mdp.signature)
+    assert again is not None
+    assert (document["source"], again.parent) == ("adapted", lesson.policy.parent)
+    assert (again.q.tobytes(), again.curve) == (lesson.policy.q.tobytes(), lesson.policy.curve)
+
+
 def test_a_session_without_a_folder_is_kept_in_the_toolbox(tmp_path: Path, maze: Path) -> None:
     for number in (1, 2):
         document = taught(options(maze, "novice", episodes=12), teacher(tmp_path, person, "novice"), None)
@@ -190,7 +216,7 @@ def test_another_world_in_the_file_is_noticed(tmp_path: Path, maze: Path) -> Non
     held(tmp_path, maze)
     journal = tmp_path / "lesson" / FILE
     journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:-1]))
-    maze.write_text(MAZE.strip().replace("###", "#.#").replace("S.....", "S....#"))
+    maze.write_text(MAZE.strip().replace("...##.", "..###."))  # on its way
     with pytest.raises(BadInput, match=r"is about 'maze' .* its file or the lab has changed"):
         gone_on(tmp_path, maze)
 

@@ -19,7 +19,9 @@ from lab.teaching.events import Event as LessonsEvent
 from lab.teaching.events import LessonEvent
 from lab.teaching.lesson_plan import MAX_SESSIONS, Interrupted, LessonPlan
 from lab.teaching.lesson_sessions import MORE_SESSIONS, fits
-from lab.teaching.teacher import Teacher
+from lab.teaching.teacher import Teacher, candidates
+from lab.toolbox.fitness import reference
+from lab.toolbox.index import KnownPolicies
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
 
@@ -46,12 +48,12 @@ def plan(
     return LessonPlan(about or problem(), learner, gate, "toast", **more)
 
 
-def known(policy: Policy) -> dict[tuple[str, str], Policy]:
-    return {(policy.subtask, policy.signature): policy}
+def known(*policies: Policy) -> KnownPolicies:
+    return KnownPolicies.of(policies)
 
 
 def test_a_new_problem_is_learned_kept_and_then_found(teacher: Teacher) -> None:
-    lesson = teacher.find_or_teach(plan(), {})
+    lesson = teacher.find_or_teach(plan(), known())
     assert (lesson.source, lesson.policy.solved, lesson.policy.final_steps) == ("learned", True, 5)
     assert lesson.policy.name == f"insert at toaster {problem().mdp.signature[:8]}"
     index, damaged = teacher.toolbox.index()
@@ -62,7 +64,7 @@ def test_a_new_problem_is_learned_kept_and_then_found(teacher: Teacher) -> None:
 
 
 def test_another_scene_is_learned_anew(teacher: Teacher) -> None:
-    first = teacher.find_or_teach(plan(), {})
+    first = teacher.find_or_teach(plan(), known())
     other = teacher.find_or_teach(plan(about=problem(columns=5)), known(first.policy))
     assert other.source == "learned"
     assert len(teacher.toolbox.index()[0]) == 2
@@ -71,7 +73,7 @@ def test_another_scene_is_learned_anew(teacher: Teacher) -> None:
 def test_an_unfinished_policy_is_learned_on(teacher: Teacher) -> None:
     why = f"'insert at toaster' was not learned in {MAX_SESSIONS} episodes.*what was learned is kept"
     with pytest.raises(WorkFailed, match=why):
-        teacher.find_or_teach(plan(HOPELESS), {})
+        teacher.find_or_teach(plan(HOPELESS), known())
     index, _ = teacher.toolbox.index()
     (unfinished,) = index.values()
     assert (unfinished.solved, len(unfinished.curve), unfinished.visits.sum()) == (False, MAX_SESSIONS, MAX_SESSIONS)
@@ -81,13 +83,116 @@ def test_an_unfinished_policy_is_learned_on(teacher: Teacher) -> None:
 
 
 def test_a_policy_of_another_size_or_with_other_actions_is_not_taken(teacher: Teacher) -> None:
-    sound = teacher.find_or_teach(plan(), {}).policy
+    sound = teacher.find_or_teach(plan(), known()).policy
     q, visits = np.zeros((7, 4)), np.zeros((7, 4), np.int64)
     for wrong in (
         replace(sound, q=q, visits=visits, ends=None, shape=(7,), start=0),
         replace(sound, action_labels=("n", "s", "w", "e")),
     ):
         assert teacher.find_or_teach(plan(), known(wrong)).source == "learned"
+
+
+# ---- in another scene: the board has an obstacle at (1, 1), others are added ---------------------------------------
+
+
+def elsewhere(*more: tuple[int, int], name: str = "insert at toaster") -> Problem:
+    """The same board with more obstacles."""
+    blocked = np.zeros((3, 4), bool)
+    for cell in ((1, 1), *more):
+        blocked[cell] = True
+    return Problem(name, "insert", grid(blocked.shape, blocked, (0, 0), (2, 3)))
+
+
+def way(policy: Policy) -> list[tuple[int, int]]:
+    """The cells of its greedy way."""
+    return [divmod(state, 4) for state in greedy_path(policy.q, problem().mdp, 12)[0]]
+
+
+def test_a_way_that_is_free_in_another_scene_is_used_as_it_is(teacher: Teacher) -> None:
+    first = teacher.find_or_teach(plan(), known()).policy
+    beside = next((r, c) for r in range(3) for c in range(4) if (r, c) not in {*way(first), (1, 1)})
+    about = elsewhere(beside, name="insert elsewhere")
+    lesson = teacher.find_or_teach(plan(HOPELESS, about=about), known(first))
+    assert (lesson.source, lesson.result, lesson.policy) == ("reused", None, first)
+    assert lesson.reason == f"'{first.name}': its way is free and as short as any"
+    assert (lesson.saved, lesson.parent) == ((60, first.helped_steps), None)
+    assert len(teacher.toolbox.list()) == 1  # it is not kept twice
+
+
+def test_what_was_used_for_a_problem_is_used_for_it_again(teacher: Teacher) -> None:
+    first = teacher.find_or_teach(plan(), known()).policy
+    beside = next((r, c) for r in range(3) for c in range(4) if (r, c) not in {*way(first), (1, 1)})
+    newer = replace(first, name="insert at toaster newer", created="2099-01-01T00:00:00+00:00", signature="0" * 16)
+    about = plan(HOPELESS, about=elsewhere(beside))
+    assert teacher.find_or_teach(about, known(first)).policy is first
+    assert teacher.find_or_teach(about, known(newer, first)).policy is first
+    assert Teacher(Toolbox(teacher.toolbox.folder / "other")).find_or_teach(about, known(newer, first)).policy is newer
+
+
+def test_what_is_in_the_way_is_learned_around(teacher: Teacher) -> None:
+    first = teacher.find_or_teach(plan(), known()).policy
+    about = elsewhere(way(first)[3])
+    lesson = teacher.find_or_teach(plan(about=about), known(first))
+    assert (lesson.source, lesson.policy.solved, lesson.policy.final_steps) == ("adapted", True, 5)
+    assert lesson.reason.startswith(f"'{first.name}': its way meets what is in the way at {way(first)[3]}; 1 of 12")
+    assert lesson.result is not None
+    assert (len(lesson.result.steps), lesson.result.helped_steps) == (GATE.first_episode - 1, 0)  # alone, and no longer
+    assert lesson.saved == (60 - 11, first.helped_steps)
+    kept = teacher.toolbox.find("insert", about.mdp.signature)
+    assert kept is not None
+    assert (kept.parent, len(kept.curve), kept.helped_steps) == (reference(first), 11, 0)  # its history is its own
+    assert not fits(first.q, about, QUICK)
+    assert fits(kept.q, about, QUICK)
+
+
+def test_who_does_not_get_there_alone_goes_on_as_any_learner(teacher: Teacher, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = teacher.find_or_teach(plan(), known()).policy
+    about = elsewhere(way(first)[3])
+    monkeypatch.setattr("lab.teaching.lesson_sessions.warm_start", lambda *_: np.zeros((12, 4)))
+    short = LearnerSettings(episodes=3, max_steps=6)
+    lesson = teacher.find_or_teach(plan(short, about=about), known(first))
+    assert lesson.result is not None
+    assert (lesson.source, len(lesson.result.steps) > 3) == ("adapted", True)
+    assert fits(lesson.policy.q, about, QUICK)
+
+
+def test_a_warm_table_is_never_given_up_for_a_worse_one(teacher: Teacher, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = teacher.find_or_teach(plan(), known()).policy
+    about = elsewhere(way(first)[3])
+    scripted(monkeypatch, [np.zeros((12, 4))])
+    policy = teacher.find_or_teach(plan(about=about), known(first)).policy
+    assert (policy.solved, policy.final_steps) == (True, 5)
+    assert fits(policy.q, about, QUICK)
+
+
+def test_what_fails_in_physics_is_refused_and_learned(teacher: Teacher) -> None:
+    first = teacher.find_or_teach(plan(), known()).policy
+    beside = next((r, c) for r in range(3) for c in range(4) if (r, c) not in {*way(first), (1, 1)})
+    tried: list[str] = []
+
+    def trial(problem: Problem, policy: Policy) -> str | None:
+        tried.append(policy.name)
+        return "it slipped" if policy is first else None
+
+    lesson = replace(teacher, trial=trial).find_or_teach(plan(about=elsewhere(beside)), known(first))
+    assert tried == [first.name, lesson.policy.name]
+    assert (lesson.source, lesson.failure) == ("learned", None)
+    assert lesson.reason == f"'{first.name}': in physics, it slipped"
+
+
+def test_candidates_are_solved_and_those_of_the_same_skill_come_first(teacher: Teacher) -> None:
+    first = teacher.find_or_teach(plan(), known()).policy
+    stamp = "2026-01-0{}T00:00:00+00:00".format
+    made = [
+        replace(first, name=name, created=stamp(day), solved=solved, signature=f"{day}" * 16)
+        for day, (name, solved) in enumerate(
+            [("insert at toaster old", True), ("other old", True), ("other new", True), ("insert at toaster", False)], 1
+        )
+    ]
+    found = known(*made, replace(first, subtask="grasp", signature="f" * 16))
+    names = [one.name for one in candidates(found, problem())]
+    assert names == ["insert at toaster old", "other new", "other old"]
+    assert next(candidates(found, problem(), first="other old")).name == "other old"
 
 
 def detour(teacher: Teacher) -> Policy:
@@ -206,7 +311,7 @@ def test_who_left_or_was_rejected_is_not_asked_in_further_sessions(tmp_path: Pat
     teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": leave}))
     for times in (1, 2):  # each skill asks once
         with pytest.raises(WorkFailed):
-            teacher.find_or_teach(plan(HOPELESS, GateSettings("always"), problem(columns=3 + times)), {})
+            teacher.find_or_teach(plan(HOPELESS, GateSettings("always"), problem(columns=3 + times)), known())
         assert len(asked) == times
 
     def stay(request: AdviceRequest) -> int:
@@ -219,7 +324,7 @@ def test_who_left_or_was_rejected_is_not_asked_in_further_sessions(tmp_path: Pat
     asked.clear()
     teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": stay}), tell=heard.append)
     with pytest.raises(WorkFailed):
-        teacher.find_or_teach(plan(short, wary, problem(columns=6)), {})
+        teacher.find_or_teach(plan(short, wary, problem(columns=6)), known())
     assert sum(isinstance(event, AdviceRejected) for _, event in told(heard)) == 1
     assert {request.episode for request in asked} == {5}
 

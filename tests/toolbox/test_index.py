@@ -123,15 +123,21 @@ def test_listing_loads_no_numerical_library(box: Toolbox, root: Path) -> None:
     assert ran.returncode == 0
 
 
-def test_candidates_have_the_tables_size_the_newest_first(box: Toolbox, make: MakePolicy) -> None:
-    box.save(make(1.0, name="newer", created="2026-07-01T00:00:00+00:00"))
-    box.save(make(name="larger", q=np.zeros((6, 2)), visits=np.zeros((6, 2), np.int64), shape=(6,)))
-    rows = box.candidates("insert", 4, 2)
-    assert [row["name"] for row in rows] == ["newer", *(f"skill-{n}" for n in EVEN)]
-    assert {"shape", "action_labels", "signature", "solved", "created", "file"} <= rows[0].keys()
-    assert box.load(rows[0]["file"]).q[0, 0] == 1.0
-    assert [row["name"] for row in box.candidates("insert", 6, 2)] == ["larger"]
-    assert box.candidates("butter", 4, 2) == []
+def test_those_alike_are_solved_have_the_tables_size_and_come_newest_first(
+    box: Toolbox, reads: list[str], make: MakePolicy
+) -> None:
+    six = {"q": np.zeros((6, 2)), "visits": np.zeros((6, 2), np.int64), "shape": (6,)}
+    box.save(make(name="newer", created="2026-07-01T00:00:00+00:00", signature="1" * 16))
+    box.save(make(name="unsolved", solved=False, signature="2" * 16))
+    box.save(make(name="larger", signature="3" * 16, **six))
+    known, _ = box.index()
+    reads.clear()
+    names = [name for _, name in known.alike("insert", 4, 2)]
+    assert (names[0], len(names), reads) == ("newer", 2, [])
+    assert known.alike("insert", 6, 2) == [(("insert", "3" * 16), "larger")]
+    assert known.alike("butter", 4, 2) == []
+    known["butter", SIGNATURE] = make(name="mine", subtask="butter")
+    assert known.alike("butter", 4, 2) == [(("butter", SIGNATURE), "mine")]
 
 
 def test_what_is_known_is_read_when_it_is_asked_for(box: Toolbox, reads: list[str], make: MakePolicy) -> None:

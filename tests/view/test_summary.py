@@ -22,8 +22,16 @@ def shown(what: RenderableType, width: int = 100) -> list[str]:
     return [line.rstrip() for line in console.file.getvalue().splitlines()]
 
 
-def skill(source: str, helped_steps: int = 0) -> dict[str, Any]:
-    return {"source": source, "helped_steps": helped_steps}
+def skill(source: str, helped_steps: int = 0, *, elsewhere: bool = False, saved: int = 0) -> dict[str, Any]:
+    """A skill's row; saved: episodes, and as many helped steps."""
+    fitness = {"verdict": "use"} if elsewhere else None
+    return {
+        "source": source,
+        "helped_steps": helped_steps,
+        "fitness": fitness,
+        "saved_episodes": saved,
+        "saved_helped_steps": saved,
+    }
 
 
 RUN: dict[str, Any] = {
@@ -46,6 +54,13 @@ RUN: dict[str, Any] = {
     "wall_s": 10.0,
     "files": {"gantt": "out/gantt.png", "learning_curves": "[out]/learning-curves.png"},
 }
+
+
+def test_a_run_says_what_was_found_and_saved() -> None:
+    skills = [skill("learned", 3), skill("adapted", saved=171), skill("reused", saved=200)]
+    found = shown(run_summary(RUN | {"skills": [*skills, skill("reused", elsewhere=True, saved=200)]}))
+    assert found[1] == "         skills  1 learned, 1 adapted, 2 reused (1 of another problem), 3 helped steps"
+    assert found[2] == "          saved  571 episodes, 571 helped steps"
 
 
 def test_a_run_that_went_well() -> None:

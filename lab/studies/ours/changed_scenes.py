@@ -1,0 +1,120 @@
+"""Scenes that differ from a task's own by one change: cubes or stations moved, cubes added or taken away, another seed."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import cos, pi, sin
+from zlib import crc32
+
+import numpy as np
+
+from lab.errors import BadInput
+from lab.sim.scene import Layout, in_camera_grid
+from lab.skills.prepared_scene import Prepared, prepare
+from lab.tasks.task_file import Obstacle, Task
+
+NEAREST_M, FARTHEST_M = 0.01, 0.10  # how far a thing is moved
+TURN_RAD = 0.15  # how far every other station that is moved is turned, too
+HIGHEST = 7  # cubes of a stack that is added
+SEEN = 3  # cubes of each stack in the camera's grid, which must be equally high
+MAX_DRAWS = 50  # of a scene that cannot be surveyed
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One changed scene: its kind, its number among those of the kind, and the study's seed."""
+
+    kind: str
+    number: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Changed:
+    """What was drawn: the task, the seed that lays it out, and the change in words."""
+
+    task: Task
+    seed: int
+    words: str
+
+
+def still(task: Task, layout: Layout) -> Task:
+    """The task with its obstacles where they were laid out, whatever else is drawn."""
+    stand = zip(task.obstacles, layout.obstacles, strict=True)
+    return _with(task, obstacles=tuple(o.model_copy(update={"position_m": p, "area": (0.0, 0.0)}) for o, p in stand))
+
+
+def surveyed(scene: Scene, task: Task, layout: Layout, seed: int, toasts: int) -> tuple[Prepared, str, int]:
+    """A changed scene, surveyed; the change in words; how many draws before it could not be surveyed.
+
+    task, layout, seed: those of the scene that is changed. BadInput when no draw can be surveyed.
+    """
+    rng = np.random.default_rng([scene.seed, crc32(scene.kind.encode()), scene.number])
+    for refused in range(MAX_DRAWS):
+        try:
+            changed = KINDS[scene.kind](task, layout, seed, rng)
+            return prepare(changed.task, toasts, changed.seed), changed.words, refused
+        except (BadInput, ValueError) as error:
+            last = error
+    raise BadInput(f"{scene.kind}, scene {scene.number}: none of {MAX_DRAWS} draws can be surveyed; the last: {last}")
+
+
+def _with(task: Task, **changed: object) -> Task:
+    """A copy of a task, checked again."""
+    return Task.model_validate({**dict(task), **changed})
+
+
+def _shift(rng: np.random.Generator) -> tuple[float, float, float]:
+    """A way in the plane and its length [m]."""
+    far, angle = rng.uniform(NEAREST_M, FARTHEST_M), rng.uniform(0, 2 * pi)
+    return far * cos(angle), far * sin(angle), far
+
+
+def _cubes_moved(task: Task, layout: Layout, seed: int, rng: np.random.Generator) -> Changed:
+    obstacles, which = [*still(task, layout).obstacles], int(rng.integers(len(task.obstacles)))
+    moved, (dx, dy, far) = obstacles[which], _shift(rng)
+    x, y = moved.position_m
+    obstacles[which] = moved.model_copy(update={"position_m": (x + dx, y + dy)})
+    return Changed(_with(task, obstacles=tuple(obstacles)), seed, f"'{moved.name}' moved {100 * far:.1f} cm")
+
+
+def _station_moved(task: Task, layout: Layout, seed: int, rng: np.random.Generator) -> Changed:
+    stations, which = [*task.stations], int(rng.integers(len(task.stations)))
+    moved, (dx, dy, far) = stations[which], _shift(rng)
+    turn = rng.uniform(-TURN_RAD, TURN_RAD) if rng.random() < 0.5 else 0.0
+    x, y, yaw = moved.pose
+    stations[which] = moved.model_copy(update={"pose": (x + dx, y + dy, yaw + turn)})
+    words = f"'{moved.name}' moved {100 * far:.1f} cm" + (f", turned {np.degrees(turn):.0f} degrees" if turn else "")
+    return Changed(_with(still(task, layout), stations=tuple(stations)), seed, words)
+
+
+def _cubes_added(task: Task, layout: Layout, seed: int, rng: np.random.Generator) -> Changed:
+    xs, ys = zip(*(station.pose[:2] for station in task.stations), strict=True)
+    x, y = float(rng.uniform(min(xs), max(xs))), float(rng.uniform(min(ys), max(ys)))
+    cubes = SEEN if in_camera_grid(task, (x, y)) else int(rng.integers(1, HIGHEST + 1))
+    added = Obstacle(name="cubes added", position_m=(x, y), cubes=cubes)
+    obstacles = (*still(task, layout).obstacles, added)
+    return Changed(_with(task, obstacles=obstacles), seed, f"{cubes} cubes added at ({x:.2f}, {y:.2f}) m")
+
+
+def _cubes_taken(task: Task, layout: Layout, seed: int, rng: np.random.Generator) -> Changed:
+    obstacles, which = [*still(task, layout).obstacles], int(rng.integers(len(task.obstacles)))
+    lower = obstacles[which]
+    seen = in_camera_grid(task, lower.position_m)
+    taken = lower.cubes if seen else int(rng.integers(1, lower.cubes + 1))
+    left = [lower.model_copy(update={"cubes": lower.cubes - taken})] if taken < lower.cubes else []
+    obstacles[which : which + 1] = left
+    return Changed(_with(task, obstacles=tuple(obstacles)), seed, f"{taken} cubes of '{lower.name}' taken away")
+
+
+def _another_seed(task: Task, layout: Layout, seed: int, rng: np.random.Generator) -> Changed:
+    other = int(rng.integers(1, 1_000_000))
+    return Changed(task, other, f"seed {other}")
+
+
+KINDS: dict[str, Callable[[Task, Layout, int, np.random.Generator], Changed]] = {
+    "cubes moved": _cubes_moved,
+    "station moved": _station_moved,
+    "cubes added": _cubes_added,
+    "cubes taken away": _cubes_taken,
+    "another seed": _another_seed,
+}
