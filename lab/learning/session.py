@@ -136,13 +136,18 @@ class Session:
         self.asked_now = False  # in the episode under way; booked when it has ended
         self.helped_now = 0
 
-    def run(self, on_event: OnEvent | None = None) -> SessionResult:
-        """All episodes, told to `on_event`; a KeyboardInterrupt ends them at once, and what was learned so far counts."""
+    def run(self, on_event: OnEvent | None = None, enough: Callable[[], bool] = lambda: False) -> SessionResult:
+        """All episodes, told to `on_event`, or fewer: until after one it is `enough`.
+
+        A KeyboardInterrupt ends them at once, and what was learned so far counts.
+        """
         self.tell = on_event or self.tell
         interrupted = False
         try:
             for episode in range(1, self.settings.episodes + 1):
                 self.play(episode)
+                if enough():
+                    break
         except KeyboardInterrupt:
             interrupted = True
         return self.result(interrupted)

@@ -16,13 +16,14 @@ from lab.learning.requests import Advisor, Request, Walked
 from lab.learning.session import Session, SessionResult
 from lab.learning.session_events import AdviceEnded, AdviceRejected
 from lab.learning.settings import LearnerSettings
-from lab.mdp import FloatArray, fewest_moves, greedy_moves, greedy_path
+from lab.mdp import BoolArray, FloatArray, TabularMDP, fewest_moves, greedy_moves, greedy_path
 from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, SessionBegan, Tell
 from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.fitness import warm_start
 from lab.toolbox.policy import Policy
 
 MORE_SESSIONS = 8  # to find a shorter way once the goal is reached
+_MOST_SWEEPS, _SETTLED = 1000, 1e-6
 WARM_EXPLORATION = 0.1  # of what a beginner explores: what was learned elsewhere is to be tried, not forgotten
 
 
@@ -33,8 +34,8 @@ def learn(plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tel
     MORE_SESSIONS further ones look for shorter ones. A table that leads to the goal is never given up for a worse one.
 
     In a lesson of several sessions nobody is asked in these further ones, and a session alone, there or because nobody is
-    left to ask, does not go on from the best table but from values that no move can beat: then every move that might
-    lead to a shorter way is tried (optimistic initial values, Sutton and Barto 1998, section 2.7).
+    left to ask, does not go on from the best table but with hope (see `hopeful`): then every move that might lead to a
+    shorter way is tried. A session whose advisor has left, or was rejected, ends at once, and one alone follows.
 
     With a policy to begin from, a short session alone comes before them, as long as a beginner's until it may first ask.
     """
@@ -56,7 +57,6 @@ class _Sessions:
         lived = 0 if plan.unfinished is None else len(plan.unfinished.curve)  # what did not help is not drawn again
         self.rng = np.random.default_rng([seed, crc32(plan.problem.name.encode()), lived])
         self.alone = False  # the advisor left or was rejected: nobody is asked about this skill again
-        self.hopeful: FloatArray | None = None  # the table of the sessions alone
         mdp = plan.problem.mdp  # one session is not followed by another
         self.fewest = float(fewest_moves(mdp)[list(mdp.starts)].sum()) if mdp.starts and plan.sessions > 1 else inf
 
@@ -71,7 +71,8 @@ class _Sessions:
         left = plan.sessions if moves == inf else min(plan.sessions, MORE_SESSIONS)
         while left:
             left -= 1
-            result = self._session(None if kept is None else kept.q, reached=moves < inf)
+            lived = unfinished if whole is None else joined(unfinished, whole)
+            result = self._session(None if kept is None else kept.q, moves < inf, lived)
             whole, now = joined(whole, result), moves_to_goal(result.q, plan.problem, plan.learner)
             if now <= moves:
                 if now < moves == inf:
@@ -85,29 +86,26 @@ class _Sessions:
             kept = unfinished  # no shorter way: with the same table, what was measured with it still holds
         return replace(whole, q=kept.q, final_steps=kept.final_steps, solved=kept.solved)
 
-    def _session(self, q0: FloatArray | None, reached: bool) -> SessionResult:
+    def _session(self, q0: FloatArray | None, reached: bool, lived: SessionResult | Policy | None) -> SessionResult:
+        """A session that begins from a table; lived: all that was tried before it, None: nothing."""
         plan, several = self.plan, self.plan.sessions > 1
         advisor = None if self.alone or (several and reached) else self._advisor()
-        hopes = several and advisor is None
-        if hopes:
-            q0 = self._hopeful(q0, reached)
-        result = self._run(plan.learner, advisor, q0)
-        self.hopeful = result.q if hopes else None
-        return result
+        if several and advisor is None and plan.problem.environment is None:
+            mdp = plan.problem.mdp
+            tried = np.zeros(mdp.successor.shape, bool) if lived is None else lived.visits > 0
+            q0 = hopeful(mdp, tried, plan.learner.discount)
+        return self._run(plan.learner, advisor, q0, enough=lambda: several and advisor is not None and self.alone)
 
-    def _run(self, learner: LearnerSettings, advisor: Advisor | None, q0: FloatArray | None) -> SessionResult:
+    def _run(
+        self,
+        learner: LearnerSettings,
+        advisor: Advisor | None,
+        q0: FloatArray | None,
+        enough: Callable[[], bool] = lambda: False,
+    ) -> SessionResult:
         session = Session(self.place, learner, self.gate, advisor, self.rng, q0)
         self.tell(SessionBegan(session))
-        return session.run(self._hear)
-
-    def _hopeful(self, q0: FloatArray | None, reached: bool) -> FloatArray:
-        """The start values of a session alone: those of the one before, or of what was broken off, or the best reward."""
-        mdp, unfinished = self.plan.problem.mdp, self.plan.unfinished
-        if self.hopeful is not None:
-            return self.hopeful
-        if q0 is not None and unfinished is not None and q0 is unfinished.q and not reached:
-            return q0
-        return np.full(mdp.successor.shape, mdp.reward.max())
+        return session.run(self._hear, enough)
 
     def _alone(self, warm: Policy) -> SessionResult:
         """A short session without advice that begins from a policy of another problem; the better of both tables."""
@@ -131,6 +129,24 @@ class _Sessions:
         left_for_good = isinstance(event, AdviceEnded) and event.reason != "converged"
         self.alone = self.alone or left_for_good or isinstance(event, AdviceRejected)
         self.tell(LessonEvent(self.plan.problem.name, event, self.journal.tell(event)))
+
+
+def hopeful(mdp: TabularMDP, tried: BoolArray, discount: float) -> FloatArray:
+    """Start values (S, A) for one who goes on alone: a move that was not tried yet is as good as the best reward.
+
+    tried (S, A): what tried moves led to is known, so they are worth what comes after them (value iteration over them).
+    Source: Brafman and Tennenholtz 2002 (R-max), here in certain problems.
+    """
+    best = np.full(mdp.successor.shape, mdp.reward.max())
+    q = best
+    onward = discount * ~mdp.terminal[mdp.successor]
+    for _ in range(_MOST_SWEEPS):
+        found = np.where(tried, mdp.reward + onward * q.max(axis=1)[mdp.successor], best)
+        settled = np.abs(found - q).max() < _SETTLED
+        q = found
+        if settled:
+            break
+    return q
 
 
 class TellingAdvisor:
