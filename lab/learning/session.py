@@ -187,6 +187,8 @@ class Session:
         if self.trail is not None and followed is not None:
             followed(Walked(episode, self.trail, moves is not None, steps, self._mean_before()))
         self.tell(EpisodeEnded(episode, steps, helped > 0, helped, rate, moves is not None, self.gate.verdict))
+        if helped and self.helped_steps >= self.gate_settings.budget:
+            self.tell(AdviceEnded(episode, "budget spent"))
         if self.gate.rejected and self.rejected_at is None:
             self.rejected_at = episode
             mean_before = self._mean_before()

@@ -4,7 +4,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Verdict = Literal["", "better", "best", "misled"]  # of a gate on an episode that was open for advice; "": none
-Ending = Literal["converged", "advisor left", "misled by what was remembered"]  # why there is no more advice
+# why there is no more advice
+Ending = Literal["converged", "advisor left", "budget spent", "misled by what was remembered"]
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ PHASES = {
 ENDED = {
     "converged": "the same result again and again; the learner asks no more",
     "advisor left": "advice has ended; the learner goes on alone",
+    "budget spent": "all the help that may be asked for has been given; the learner goes on alone",
     "misled by what was remembered": "what was said led round in circles or into obstacles; the learner asks no more",
 }
 PARTS_DONE = (SkillReady, MoveTimed, SequenceFound, MoveMade)  # each tells that one part of a phase is done

@@ -149,7 +149,7 @@ TOASTER = '[[route]]\nstation = "toaster"'
             TOASTER.replace("toaster", "toster"),
             "t.toml: unknown station 'toster' (route): did you mean 'toaster'?",
         ),
-        ('learner = "q-lambda"', 'learner = "qq"', "t.toml: unknown learner 'qq' (subtasks.transfer.learner): "),
+        ('learner = "dyna-q"', 'learner = "qq"', "t.toml: unknown learner 'qq' (subtasks.transfer.learner): "),
         ('gate = "ccrl"', 'gate = "cc"', "t.toml: unknown gate 'cc' (subtasks.transfer.gate): "),
         (
             'process = "butter" ',

@@ -122,7 +122,7 @@ def test_a_small_world_by_hand() -> None:
     assert env.render() == ". # G\n. . R\n"
     assert env.step(0) == (2, 1.5, True, False, {"is_success": True})
     env.reset()
-    assert env.step(3) == (1, -1.0, True, False, {"is_success": False})
+    assert env.step(3) == (1, -11.5, True, False, {"is_success": False})
 
 
 def test_too_long_an_episode_is_truncated_not_terminated() -> None:
@@ -143,7 +143,7 @@ def test_the_whole_problem_stands_in_its_table() -> None:
         0: [(1.0, 0, -0.1, False)],
         1: [(1.0, 3, -0.1, False)],
         2: [(1.0, 0, -0.1, False)],
-        3: [(1.0, 1, -1.0, True)],
+        3: [(1.0, 1, -11.5, True)],
     }
     assert env.P[2][0] == [(1.0, 2, 0.0, True)]
     assert env.initial_state_distrib.tolist() == [1.0, 0, 0, 0, 0, 0]

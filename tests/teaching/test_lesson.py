@@ -58,7 +58,7 @@ def test_one_session_with_pictures(task: Task, teacher: Teacher, tmp_path: Path)
         200,
     )
     assert (document["solved"], document["final_steps"]) == (True, document["optimal_steps"])
-    assert document["guided_episodes"][0] == 44
+    assert document["guided_episodes"][0] == 11
     assert document["helped_steps"] > 0
     assert document["files"].keys() == {"learning_curve", "value_map"}
     assert all(min(read_picture(Path(path)).shape[:2]) > 200 for path in document["files"].values())
@@ -95,10 +95,10 @@ def test_ctrl_c_keeps_the_session(task: Task, tmp_path: Path) -> None:
         raise KeyboardInterrupt
 
     teacher = Teacher(Toolbox(tmp_path), Advising.of(("terminal",), {"terminal": ask}))
-    with pytest.raises(Interrupted, match="stopped by Ctrl-C after 32 episodes of 'insert at toaster'"):
-        teach_skill(task, "insert", teacher, out=tmp_path / "out", learner="q-lambda")
+    with pytest.raises(Interrupted, match="stopped by Ctrl-C after 10 episodes of 'insert at toaster'"):
+        teach_skill(task, "insert", teacher, out=tmp_path / "out")
     (row,) = teacher.toolbox.list()
-    assert (row["episodes"], row["solved"]) == (32, False)
+    assert (row["episodes"], row["solved"]) == (10, False)
     assert not (tmp_path / "out").exists()
 
 
@@ -108,11 +108,11 @@ def test_an_interrupted_session_is_gone_on_with(task: Task, tmp_path: Path) -> N
 
     toolbox = Toolbox(tmp_path)
     with pytest.raises(Interrupted):
-        teach_skill(task, "insert", Teacher(toolbox, Advising.of(("terminal",), {"terminal": ask})), learner="q-lambda")
-    again = teach_skill(task, "insert", Teacher(toolbox), learner="q-lambda")
+        teach_skill(task, "insert", Teacher(toolbox, Advising.of(("terminal",), {"terminal": ask})))
+    again = teach_skill(task, "insert", Teacher(toolbox))
     assert again["episodes"] == 200
     (row,) = toolbox.list()
-    assert (row["name"], row["episodes"], row["solved"]) == (again["saved_as"], 32 + 200, again["solved"])
+    assert (row["name"], row["episodes"], row["solved"]) == (again["saved_as"], 10 + 200, again["solved"])
 
 
 def test_a_name_of_another_problem_is_refused(task: Task, teacher: Teacher) -> None:

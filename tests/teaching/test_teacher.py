@@ -15,10 +15,10 @@ from lab.learning.session import Session, SessionResult
 from lab.learning.session_events import AdviceRejected, EpisodeEnded, Event
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, greedy_path, grid
+from lab.teaching.events import AdvisorGathered, LessonEvent
 from lab.teaching.events import Event as LessonsEvent
-from lab.teaching.events import LessonEvent
 from lab.teaching.lesson_plan import MAX_SESSIONS, Interrupted, LessonPlan
-from lab.teaching.lesson_sessions import MORE_SESSIONS, fits
+from lab.teaching.lesson_sessions import MORE_SESSIONS, fits, hopeful
 from lab.teaching.teacher import Teacher, candidates
 from lab.toolbox.fitness import reference
 from lab.toolbox.index import KnownPolicies
@@ -238,7 +238,7 @@ def scripted(monkeypatch: pytest.MonkeyPatch, tables: "list[np.ndarray[Any, Any]
             super().__init__(mdp, HOPELESS, GATE, None, np.random.default_rng(0))
             began.append(args[-1])
 
-        def run(self, on_event: Any = None) -> SessionResult:
+        def run(self, on_event: Any = None, enough: Any = None) -> SessionResult:
             q = tables[len(began) - 1]
             moves = greedy_path(q, self.mdp, 40)
             return replace(super().run(), q=q, final_steps=len(moves[1]) if moves[2] else None, solved=solved)
@@ -261,14 +261,33 @@ def test_a_worse_table_never_replaces_a_better_one(teacher: Teacher, monkeypatch
 def test_once_it_fits_shorter_ways_are_looked_for_alone_and_with_hope(
     teacher: Teacher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Then nobody is asked, and every move begins as good as the goal; the next session goes on from the one before."""
+    """The one move that each scripted session makes is known by then; any other may be as good as the goal."""
     longer = detour(teacher)
-    further = [np.full_like(longer.q, -n) for n in range(MORE_SESSIONS)]
-    began = scripted(monkeypatch, [longer.q, *further])
-    teacher.teach(plan())
-    assert began[0] is None
-    assert np.array_equal(began[1], np.full_like(longer.q, 1.5))
-    assert all(began[n + 2] is further[n] for n in range(MORE_SESSIONS - 1))
+    began = scripted(monkeypatch, [longer.q] * (1 + MORE_SESSIONS))
+    heard: list[Any] = []
+    result = replace(teacher, tell=heard.append).teach(plan()).result
+    assert result is not None
+    assert sum(isinstance(event, AdvisorGathered) for event in heard) == 1  # nobody is asked again
+    assert (began[0], len(began)) == (None, 1 + MORE_SESSIONS)
+    tried = result.visits > 0
+    assert (began[-1][~tried & ~problem().mdp.terminal[:, None]] == 1.5).all()
+    assert (began[-1][tried] < 1.5).all()
+
+
+def test_hope_by_hand() -> None:
+    """In a corridor of 4 cells the first move was made: it is worth a step and then, discounted, the best that can be."""
+    corridor = grid((1, 4), np.zeros((1, 4), bool), (0, 0), (0, 3))  # -0, +0, left, right
+    nothing = np.zeros((4, 4), bool)
+    assert (hopeful(corridor, nothing, 0.5) == 1.5).all()
+    tried = nothing.copy()
+    tried[0, 3] = tried[2, 3] = True
+    hope = hopeful(corridor, tried, 0.5)
+    assert hope[0].tolist() == [1.5, 1.5, 1.5, -0.1 + 0.5 * 1.5]
+    assert hope[2].tolist() == [1.5, 1.5, 1.5, 1.5]  # it entered the goal
+    tried[0] = tried[1] = True  # all around the start is known: the first three moves stay there or in cell 1
+    hope = hopeful(corridor, tried, 0.5)
+    assert hope[1, 3] == pytest.approx(-0.1 + 0.5 * 1.5)
+    assert hope[0, 3] == pytest.approx(-0.1 + 0.5 * 0.65)
 
 
 def test_going_on_keeps_the_history(teacher: Teacher) -> None:

@@ -233,7 +233,7 @@ def test_piped_answers(piped: Callable[[str], Any]) -> None:
     assert ran.code == 0
     assert (ran.json["requests"], ran.json["helped_steps"]) == (1, 1)
     assert ran.out.count("\n") == 1
-    assert f"{QUESTION} [enter = ← left, ? explains] right\n" in ran.err
+    assert f"{QUESTION} [enter = ↑ forward, ? explains] right\n" in ran.err
     assert ran.err.count(QUESTION) == 4
     assert "\x1b" not in ran.err
 
