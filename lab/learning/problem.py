@@ -8,9 +8,13 @@ from lab.mdp import TabularMDP
 
 @dataclass(frozen=True)
 class Problem:
-    """What one lesson teaches: its name, the sub-task, the table's problem; environment: where its steps are made."""
+    """What one lesson teaches: its name, the sub-task, the table's problem; environment: where its steps are made.
+
+    scene: where that is, in words, where the name does not tell.
+    """
 
     name: str
     subtask: str
     mdp: TabularMDP
     environment: Environment | None = None
+    scene: str = ""

@@ -1,6 +1,7 @@
 """The main job: find or learn the skills, measure their durations, sequence, carry out in physics."""
 
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -86,6 +87,10 @@ def run(
     )
     if taught.durations_key:
         teacher.toolbox.save_record(RECORDS, taught.durations_key, taught.durations.after(outcome.timed).to_json())
+    for policy in {lesson.policy.name: lesson.policy for lesson in taught.lessons.values()}.values():
+        with suppress(LabError):  # it may be gone meanwhile, and the run counts without it
+            delivered = f"{len(outcome.delivered)} of {prepared.toasts}"
+            teacher.toolbox.note(policy.name, "used", task=prepared.task.name, seed=prepared.seed, delivered=delivered)
     report = Report(prepared, taught, found, proven, outcome, recording, began)
     teacher.tell(PhaseBegan("draw", 1))
     write_files(report, out)

@@ -20,6 +20,7 @@ from lab.seat.request_text import percent, verdict
 from lab.sequencing.cell.schedule import Move
 from lab.teaching.events import (
     Event,
+    KeptBeside,
     LessonContinued,
     MoveMade,
     MoveRetried,
@@ -185,6 +186,8 @@ def run_text(event: Event) -> str:
             return PHASES.get(event.name, event.name)
         case RecordSkipped():
             return f"skipped: {event.why}"
+        case KeptBeside():
+            return f"'{event.name}', version {event.version} is kept, but not put in use: {event.why}"
         case MoveRetried():
             return f"failed, trying again: {event.why}"
         case SkillReady():

@@ -12,6 +12,7 @@ from lab.learning.session_events import AdviceRejected, AdviceRequested
 from lab.seat.event_text import PARTS_DONE, lesson_parts, move_text, run_text, saved_text, sequence_parts
 from lab.teaching.events import (
     Event,
+    KeptBeside,
     LessonContinued,
     LessonEvent,
     MoveMade,
@@ -80,7 +81,7 @@ class RunProgress:
                 self._begin(run_text(event), event.parts)
             case LessonContinued():
                 self._say(run_text(event))
-            case RecordSkipped() | MoveRetried():
+            case RecordSkipped() | MoveRetried() | KeptBeside():
                 self._say((f"  {run_text(event)}", "yellow"))
             case SkillReady():
                 self._lesson(event.name, event.lesson)

@@ -1,11 +1,11 @@
 """A task whose scene is laid out and surveyed: what there is to learn, before anything is learned."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lab.errors import LabError
+from lab.errors import LabError, counted
 from lab.learning.problem import Problem
 from lab.sim.scene import Layout, check_apart, draw_layout
 from lab.skills.skillset import SkillSet
@@ -39,8 +39,20 @@ def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prep
     skillset = SkillSet.of(task, toasts)
     layout = draw_layout(task, toasts, np.random.default_rng([seed, 1]))
     surveys = Surveys(task, layout)
-    problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items() if only in (None, name)}
+    scene = in_words(task, toasts, layout)
+    problems = {
+        name: replace(skill.setup(surveys), scene=scene)
+        for name, skill in skillset.skills.items()
+        if only in (None, name)
+    }
     return Prepared(task, toasts, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
+
+
+def in_words(task: Task, toasts: int, layout: Layout) -> str:
+    """A scene as a policy's card tells of it: how many slices there are, and where the obstacles stand [m]."""
+    places = zip(task.obstacles, layout.obstacles, strict=True)
+    stand = [f"{obstacle.name} at ({x:.3f}, {y:.3f})" for obstacle, (x, y) in places]
+    return ", ".join([counted(toasts, "slice"), *stand])
 
 
 def check_task(file: str, toasts: int | None, seed: int) -> tuple[list[str], list[str]]:

@@ -88,6 +88,15 @@ class RecordSkipped:
 
 
 @dataclass(frozen=True)
+class KeptBeside:
+    """What was learned is kept as a version of that name, but another one stays in use, and why."""
+
+    name: str
+    version: int
+    why: str
+
+
+@dataclass(frozen=True)
 class SkillReady:
     """A skill was found or learned."""
 
@@ -144,6 +153,7 @@ Event = (
     | QuestionAnswered
     | PhaseBegan
     | RecordSkipped
+    | KeptBeside
     | SkillReady
     | MoveTimed
     | SequencingBegan

@@ -11,7 +11,7 @@ from lab.errors import BadInput, WorkFailed, counted
 from lab.learning.problem import Problem
 from lab.learning.session import SessionResult
 from lab.mdp import TabularMDP
-from lab.teaching.events import LessonContinued, Tell, unheard
+from lab.teaching.events import KeptBeside, LessonContinued, Tell, unheard
 from lab.teaching.lesson_plan import Interrupted, Keep, Lesson, LessonPlan, Source, Trial
 from lab.teaching.lesson_sessions import fits, joined, learn
 from lab.toolbox.fitness import Fitness, best_fit, reference
@@ -138,12 +138,14 @@ class Teacher:
             name = plan.name or self._free_name(problem, result.solved)
             origin = Origin(name, problem.subtask, plan.task, str(self.advising), self.seed)
             policy = Policy.of(joined(unfinished, result), problem.mdp, plan.learner, plan.gate, origin)
-            policy = replace(policy, parent=_parent(plan))
+            policy = replace(policy, parent=_parent(plan), scene=problem.scene)
             failure = None
             if not (result.interrupted or journal.read_only):
                 policy, failure = self._tried(problem, policy)
             if not (result.interrupted and journal.folding):  # what it was before is more
-                self.toolbox.save(policy)
+                saved = self.toolbox.put(policy)
+                if not saved.in_use:
+                    self.tell(KeptBeside(policy.name, saved.version, saved.why_not))
             if not result.interrupted:
                 ended = (len(result.steps), result.final_steps, result.optimal_steps, policy.solved)
                 journal.closes(Closed(*ended, saved_as=policy.name))

@@ -170,6 +170,18 @@ def test_a_second_run_learns_nothing_and_does_the_same(cold: Ran, warm: Ran) -> 
     assert "of another problem: their ways are free here" in reused[1]
 
 
+def test_a_skills_log_tells_what_became_of_it(cold: Ran, warm: Ran) -> None:
+    box, row = Toolbox(cold.folder / "toolbox"), cold.document["skills"][0]
+    events = box.log(row["policy"])
+    assert [event["what"] for event in events][:3] == ["learned", "used", "used"]
+    assert {name: events[1][name] for name in ("task", "seed", "delivered")} == {
+        "task": "toast",
+        "seed": 0,
+        "delivered": "1 of 1",
+    }
+    assert events[0]["scene"].startswith("1 slice, cubes A at (0.7")
+
+
 # ---- what is reused, and what is not -------------------------------------------------------------------------------
 
 

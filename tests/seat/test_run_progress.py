@@ -22,6 +22,7 @@ from lab.teaching.events import (
     MoveRetried,
     MoveTimed,
     PhaseBegan,
+    KeptBeside,
     RecordSkipped,
     SequenceFound,
     SkillReady,
@@ -170,6 +171,7 @@ def test_the_rest_of_a_run() -> None:
         progress.hear(MoveMade(Move(2, "toaster", "toaster", "oven [hot]", 20.0, 21.0, 81.0, 84.4)))
         progress.hear(MoveRetried("toast 2 at 'oven': it [slipped]"))
         progress.hear(RecordSkipped("policy file x.safetensors: cut [off]"))
+        progress.hear(KeptBeside("grasp", 2, "version 1 does better"))
         progress.hear(PhaseBegan("another", 1))
     assert lines(shown) == [
         "Time every move in simulation",
