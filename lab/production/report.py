@@ -107,6 +107,7 @@ def _skill_row(name: str, lesson: Lesson) -> dict[str, Any]:
         "saved_helped_steps": lesson.saved[1],
         "fitness": None if lesson.fitness is None else asdict(lesson.fitness),
         "episodes": 0 if result is None else len(result.steps),
+        "moves": 0 if result is None else int(result.visits.sum()),
         "requests": 0 if result is None else result.requests,
         "helped_steps": 0 if result is None else result.helped_steps,
         "rejected_at_episode": None if result is None else result.rejected_at_episode,

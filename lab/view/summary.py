@@ -35,7 +35,10 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     found = [f"{learned} learned", *([f"{n} adapted"] if (n := sources.count("adapted")) else [])]
     elsewhere = sum(row["source"] == "reused" and row["fitness"] is not None for row in skills)
     found += [f"{sources.count('reused')} reused{f' ({elsewhere} of another problem)' if elsewhere else ''}"]
-    table.add_row("skills", ", ".join([*found, counted(helped, "helped step")]))
+    table.add_row("skills", ", ".join(found))
+    if moves := sum(row["moves"] for row in skills):
+        episodes = counted(sum(row["episodes"] for row in skills), "episode")
+        table.add_row("learned in", f"{episodes}, {counted(moves, 'move')}, {helped} of them advised")
     saved = [sum(row[f"saved_{what}"] for row in skills) for what in ("episodes", "helped_steps")]
     if any(saved):
         table.add_row("saved", f"{counted(saved[0], 'episode')}, {counted(saved[1], 'helped step')}")

@@ -28,6 +28,8 @@ def skill(source: str, helped_steps: int = 0, *, elsewhere: bool = False, saved:
     return {
         "source": source,
         "helped_steps": helped_steps,
+        "episodes": 0 if source == "reused" else 200,
+        "moves": 0 if source == "reused" else 3000,
         "fitness": fitness,
         "saved_episodes": saved,
         "saved_helped_steps": saved,
@@ -59,14 +61,16 @@ RUN: dict[str, Any] = {
 def test_a_run_says_what_was_found_and_saved() -> None:
     skills = [skill("learned", 3), skill("adapted", saved=171), skill("reused", saved=200)]
     found = shown(run_summary(RUN | {"skills": [*skills, skill("reused", elsewhere=True, saved=200)]}))
-    assert found[1] == "         skills  1 learned, 1 adapted, 2 reused (1 of another problem), 3 helped steps"
-    assert found[2] == "          saved  571 episodes, 571 helped steps"
+    assert found[1] == "         skills  1 learned, 1 adapted, 2 reused (1 of another problem)"
+    assert found[2] == "     learned in  400 episodes, 6000 moves, 3 of them advised"
+    assert found[3] == "          saved  571 episodes, 571 helped steps"
 
 
 def test_a_run_that_went_well() -> None:
     assert shown(run_summary(RUN)) == [
         "        outcome  2 of 2 toasts delivered (seed 7)",
-        "         skills  2 learned, 1 reused, 42 helped steps",
+        "         skills  2 learned, 1 reused",
+        "     learned in  400 episodes, 6000 moves, 42 of them advised",
         "       sequence  1 2 1 2",
         "       makespan  100.0 s predicted, 101.0 s measured (+1.00%)",
         " proven optimum  80.0 s, gap 25.00%",
