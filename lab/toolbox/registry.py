@@ -20,7 +20,7 @@ Rows = list[Row]
 Words = list[str]
 Report = list[tuple[Path, bool, str]]  # path, whether it is sound, what is wrong
 _NOT_LISTED = ("action_labels", "shape")
-_MOST_NAMED = 30  # policies that an error lists; of more, only the nearest
+_MOST_NAMED = 12  # policies that an error lists; of more, only the nearest
 _NEAREST = 5
 _LONGEST_LINE = 100  # ancestors that are looked up
 
