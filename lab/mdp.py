@@ -313,26 +313,6 @@ def shortest_steps(mdp: TabularMDP) -> int:
     return int(distance[distance >= 0].min())
 
 
-def fewest_moves(mdp: TabularMDP) -> FloatArray:
-    """The fewest moves from each state to a goal that enter no other terminal state; (S,) float64, inf where none lead there."""
-    return _moves_along(mdp, mdp.successor)
-
-
-def greedy_moves(q: FloatArray, mdp: TabularMDP) -> FloatArray:
-    """The moves to a goal by the best action of each state, as `greedy_path`; (S,) float64, inf where they miss it."""
-    return _moves_along(mdp, mdp.successor[np.arange(mdp.n_states), q.argmax(axis=1)][:, None])
-
-
-def _moves_along(mdp: TabularMDP, onward: IntArray) -> FloatArray:
-    """The fewest moves to a goal when a state leads on to `onward` (S, choices)."""
-    left = np.where(mdp.goal, 0.0, np.inf)
-    while True:
-        updated: FloatArray = np.where(mdp.terminal, left, 1.0 + left[onward].min(axis=1))
-        if np.array_equal(updated, left):
-            return left
-        left = updated
-
-
 def greedy_path(
     q: FloatArray, mdp: TabularMDP, max_steps: int, start: int | None = None
 ) -> tuple[list[int], list[int], bool]:

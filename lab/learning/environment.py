@@ -9,7 +9,8 @@ import numpy as np
 
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
-from lab.mdp import FloatArray, TabularMDP, greedy_moves, greedy_path, optimal_values, shortest_steps
+from lab.learning.values import greedy_moves
+from lab.mdp import FloatArray, TabularMDP, greedy_path, optimal_values, shortest_steps
 
 
 class Step(NamedTuple):

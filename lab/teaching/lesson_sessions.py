@@ -16,14 +16,15 @@ from lab.learning.requests import Advisor, Request, Walked
 from lab.learning.session import Session, SessionResult
 from lab.learning.session_events import AdviceEnded, AdviceRejected
 from lab.learning.settings import LearnerSettings
-from lab.mdp import BoolArray, FloatArray, TabularMDP, fewest_moves, greedy_moves, greedy_path
+from lab.learning.values import fewest_moves, greedy_moves, known_values
+from lab.mdp import BoolArray, FloatArray, TabularMDP, greedy_path
 from lab.teaching.events import AdvisorGathered, LessonBegan, LessonEvent, QuestionAnswered, SessionBegan, Tell
 from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.fitness import warm_start
 from lab.toolbox.policy import Policy
 
 MORE_SESSIONS = 8  # to find a shorter way once the goal is reached
-_MOST_SWEEPS, _SETTLED = 1000, 1e-6
+WARM_EPISODES = 29  # of a session that begins from what was learned elsewhere
 WARM_EXPLORATION = 0.1  # of what a beginner explores: what was learned elsewhere is to be tried, not forgotten
 
 
@@ -37,7 +38,7 @@ def learn(plan: LessonPlan, advising: Advising, seed: int, journal: Journal, tel
     left to ask, does not go on from the best table but with hope (see `hopeful`): then every move that might lead to a
     shorter way is tried. A session whose advisor has left, or was rejected, ends at once, and one alone follows.
 
-    With a policy to begin from, a short session alone comes before them, as long as a beginner's until it may first ask.
+    With a policy to begin from, a short session alone comes before them.
     """
     while True:
         tell(LessonBegan(plan, journal))
@@ -111,7 +112,7 @@ class _Sessions:
         """A short session without advice that begins from a policy of another problem; the better of both tables."""
         plan, mdp = self.plan, self.place.mdp
         q0 = warm_start(warm, mdp, plan.learner.discount)
-        episodes = min(plan.learner.episodes, max(1, plan.gate.first_episode - 1))
+        episodes = min(plan.learner.episodes, WARM_EPISODES)
         short = replace(plan.learner, episodes=episodes, exploration=WARM_EXPLORATION * plan.learner.exploration)
         self.tell(AdvisorGathered(None))
         result = self._run(short, None, q0)
@@ -132,21 +133,8 @@ class _Sessions:
 
 
 def hopeful(mdp: TabularMDP, tried: BoolArray, discount: float) -> FloatArray:
-    """Start values (S, A) for one who goes on alone: a move that was not tried yet is as good as the best reward.
-
-    tried (S, A): what tried moves led to is known, so they are worth what comes after them (value iteration over them).
-    Source: Brafman and Tennenholtz 2002 (R-max), here in certain problems.
-    """
-    best = np.full(mdp.successor.shape, mdp.reward.max())
-    q = best
-    onward = discount * ~mdp.terminal[mdp.successor]
-    for _ in range(_MOST_SWEEPS):
-        found = np.where(tried, mdp.reward + onward * q.max(axis=1)[mdp.successor], best)
-        settled = np.abs(found - q).max() < _SETTLED
-        q = found
-        if settled:
-            break
-    return q
+    """Start values (S, A) for one who goes on alone: a move that was not tried yet is as good as the best reward."""
+    return known_values(mdp, tried, np.full(mdp.successor.shape, mdp.reward.max()), discount)
 
 
 class TellingAdvisor:

@@ -179,7 +179,7 @@ def _fact(name: str, value: object) -> str:
 
 def _use(policy: Policy, telling: Telling) -> str:
     state = f"state {policy.start}"
-    return f"""Into a toolbox, from where `lab run` takes it for its own problem, and for another one where its way is free and short:
+    return f"""Into a toolbox, from where `lab run` takes it for its own problem, and for others where its way is free and short:
 
 ```sh
 {telling.bring_in}

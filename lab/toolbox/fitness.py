@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import counted
-from lab.mdp import BoolArray, FloatArray, IntArray, TabularMDP, fewest_moves
+from lab.learning.values import fewest_moves, known_values
+from lab.mdp import BoolArray, FloatArray, IntArray, TabularMDP
 from lab.toolbox.names import hash_of
 from lab.toolbox.policy import GOAL, ON, OUT, Policy
 
@@ -25,8 +26,6 @@ TOLERATED = 0.25  # moves above the shortest, mean over several starts: what is 
 MOST_JUDGED = 64  # policies that are looked at for one problem
 MOST_WARMED = 8  # of these whose warm start is looked at
 DISCOUNT = 0.99
-_MOST_SWEEPS = 1000
-_SETTLED = 1e-9
 _UNKNOWN = 255  # of a state: an older file does not say how episodes end there
 _ORDER = ("use", "adapt", "refuse")
 
@@ -194,15 +193,7 @@ def warm_start(policy: Policy, mdp: TabularMDP, discount: float = DISCOUNT) -> F
     as_it_was = now == then
     kept = (policy.visits > 0) & as_it_was[:, None] & as_it_was[mdp.successor] & ~mdp.terminal[:, None]
     seen = ~as_it_was[mdp.successor] & mdp.terminal[mdp.successor] & ~mdp.terminal[:, None]
-    q = np.where(seen, mdp.reward, 0.0)
-    onward = discount * ~mdp.terminal[mdp.successor]
-    for _ in range(_MOST_SWEEPS):
-        found = np.where(kept, mdp.reward + onward * q.max(axis=1)[mdp.successor], q)
-        settled = np.abs(found - q).max() < _SETTLED
-        q = found
-        if settled:
-            break
-    return q
+    return known_values(mdp, kept, np.where(seen, mdp.reward, 0.0), discount)
 
 
 def _kinds_then(policy: Policy) -> KindArray:

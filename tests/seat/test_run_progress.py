@@ -17,12 +17,12 @@ from lab.seat.run_progress import ALL_FREE, RunProgress
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.search import Reference, SequenceResult
 from lab.teaching.events import (
+    KeptBeside,
     LessonEvent,
     MoveMade,
     MoveRetried,
     MoveTimed,
     PhaseBegan,
-    KeptBeside,
     RecordSkipped,
     SequenceFound,
     SkillReady,

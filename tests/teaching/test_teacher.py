@@ -18,7 +18,7 @@ from lab.mdp import TabularMDP, greedy_path, grid
 from lab.teaching.events import AdvisorGathered, LessonEvent
 from lab.teaching.events import Event as LessonsEvent
 from lab.teaching.lesson_plan import MAX_SESSIONS, Interrupted, LessonPlan
-from lab.teaching.lesson_sessions import MORE_SESSIONS, fits, hopeful
+from lab.teaching.lesson_sessions import MORE_SESSIONS, WARM_EPISODES, fits, hopeful
 from lab.teaching.teacher import Teacher, candidates
 from lab.toolbox.fitness import reference
 from lab.toolbox.index import KnownPolicies
@@ -136,11 +136,15 @@ def test_what_is_in_the_way_is_learned_around(teacher: Teacher) -> None:
     assert (lesson.source, lesson.policy.solved, lesson.policy.final_steps) == ("adapted", True, 5)
     assert lesson.reason.startswith(f"'{first.name}': its way meets what is in the way at {way(first)[3]}; 1 of 12")
     assert lesson.result is not None
-    assert (len(lesson.result.steps), lesson.result.helped_steps) == (GATE.first_episode - 1, 0)  # alone, and no longer
-    assert lesson.saved == (60 - 11, first.helped_steps)
+    assert (len(lesson.result.steps), lesson.result.helped_steps) == (WARM_EPISODES, 0)  # alone, and no longer
+    assert lesson.saved == (60 - WARM_EPISODES, first.helped_steps)
     kept = teacher.toolbox.find("insert", about.mdp.signature)
     assert kept is not None
-    assert (kept.parent, len(kept.curve), kept.helped_steps) == (reference(first), 11, 0)  # its history is its own
+    assert (kept.parent, len(kept.curve), kept.helped_steps) == (
+        reference(first),
+        WARM_EPISODES,
+        0,
+    )  # its history is its own
     assert not fits(first.q, about, QUICK)
     assert fits(kept.q, about, QUICK)
 

@@ -12,7 +12,8 @@ from lab.advice.advising import Advising
 from lab.advice.advisors import SKILL_TAUS
 from lab.advice.journal import Journal
 from lab.learning.session_events import EpisodeEnded
-from lab.mdp import FloatArray, TabularMDP, fewest_moves, greedy_moves
+from lab.learning.values import fewest_moves, greedy_moves
+from lab.mdp import FloatArray, TabularMDP
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.studies.charts import bars, legend_below
 from lab.studies.findings import Findings, Row, row, share_row, varying_row
