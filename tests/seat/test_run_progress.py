@@ -183,6 +183,7 @@ def test_the_rest_of_a_run() -> None:
         "     84.4 s  toast 2: toaster to oven [hot], waited 60.0 s",
         "  failed, trying again: toast 2 at 'oven': it [slipped]",
         "  skipped: policy file x.safetensors: cut [off]",
+        "  'grasp', version 2 is kept, but not put in use: version 1 does better",
         "another",
     ]
 
