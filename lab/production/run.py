@@ -1,7 +1,6 @@
 """The main job: find or learn the skills, measure their durations, sequence, carry out in physics."""
 
 import time
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -85,13 +84,22 @@ def run(
     outcome, recording = carry_out(
         prepared, taught.cell, found.sequence, override=override, viewer=viewer, tell=teacher.tell
     )
-    if taught.durations_key:
-        teacher.toolbox.save_record(RECORDS, taught.durations_key, taught.durations.after(outcome.timed).to_json())
-    for policy in {lesson.policy.name: lesson.policy for lesson in taught.lessons.values()}.values():
-        with suppress(LabError):  # it may be gone meanwhile, and the run counts without it
-            delivered = f"{len(outcome.delivered)} of {prepared.toasts}"
-            teacher.toolbox.note(policy.name, "used", task=prepared.task.name, seed=prepared.seed, delivered=delivered)
     report = Report(prepared, taught, found, proven, outcome, recording, began)
     teacher.tell(PhaseBegan("draw", 1))
     write_files(report, out)
+    remember(report, teacher)
     return report
+
+
+def remember(report: Report, teacher: Teacher) -> None:
+    """Keeps how long moves took, and in each skill's log that it was used; what cannot be kept is told: the run counts."""
+    taught, outcome, prepared = report.taught, report.outcome, report.prepared
+    used = {"task": prepared.task.name, "seed": prepared.seed}
+    used["delivered"] = f"{len(outcome.delivered)} of {prepared.toasts}"
+    try:
+        if taught.durations_key:
+            teacher.toolbox.save_record(RECORDS, taught.durations_key, taught.durations.after(outcome.timed).to_json())
+        for name in sorted({lesson.policy.name for lesson in taught.lessons.values()}):
+            teacher.toolbox.note(name, "used", **used)
+    except LabError as error:
+        teacher.tell(RecordSkipped(f"what this run measured: {error}"))

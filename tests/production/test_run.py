@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from shutil import copytree
+from shutil import copytree, rmtree
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from lab.mdp import shortest_steps
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
 from lab.production.report import FILES, Report, Taught, write_files
-from lab.production.run import teach_all
+from lab.production.run import remember, teach_all
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import optimum
@@ -358,6 +358,17 @@ def failed(prepared: Prepared, toolbox: Toolbox) -> Report:
     settings = prepared.task.sequencing
     found = find_sequence(taught.cell, settings.method, search_for(settings), 0)
     return Report(prepared, taught, found, optimum(taught.cell), outcome, Recording((), []), 0.0)
+
+
+def test_what_a_run_measured_may_be_lost_but_not_the_run(failed: Report, toolbox: Toolbox) -> None:
+    """Its files are written by then; a file stands where the toolbox keeps its records."""
+    rmtree(toolbox.folder / "records", ignore_errors=True)
+    (toolbox.folder / "records").write_text("in the way")
+    heard: list[Event] = []
+    failed.taught.durations_key = "k"
+    remember(failed, Teacher(toolbox, tell=heard.append))
+    (why,) = skipped(heard)
+    assert why.startswith("what this run measured: cannot write ")
 
 
 def drawn(monkeypatch: pytest.MonkeyPatch, stop: BaseException | None = None) -> list[str]:
