@@ -1,0 +1,17 @@
+"""What a two-finger gripper can take between its fingers."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Gripper:
+    """Two parallel fingers of a vertical tool, which close along the tool's y axis [m].
+
+    opening_m: between the open fingers' pads. depth_m: from the finger tips up to the palm. width_m, thick_m: of a
+    finger, across the way it closes and along it.
+    """
+
+    opening_m: float
+    depth_m: float
+    width_m: float
+    thick_m: float
