@@ -115,3 +115,18 @@ def _locked(folder: Path, how: int = 0) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+def beside_or_asset(name: str, folder: Path, what: str) -> Path:
+    """A file that a task file names, in the task file's folder or below it, else in the lab's own assets.
+
+    BadInput, beginning with `what`, when it is in neither, or when the name leads out of the folder.
+    """
+    for place in (folder, assets_folder()):
+        found = (place / name).resolve()
+        if place.resolve() not in found.parents:
+            raise BadInput(f"{what} '{name}': a file's name may not lead out of the task file's folder")
+        if found.is_file():
+            return found
+    known = ", ".join(sorted(path.name for path in assets_folder().glob("*.urdf")))
+    raise BadInput(f"{what} '{name}': no such file in {folder}; of its own the lab has {known}")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.options import Json, Seed, Toasts
+from lab.cli.options import Json, Parts, Seed, Toasts
 from lab.cli.output import end, write, write_json
 from lab.errors import BadInput
 
@@ -16,7 +16,8 @@ def view(
     what: Annotated[
         str, typer.Argument(help="A task (its scene is shown) or the folder of a run (its replay is served).")
     ],
-    toasts: Toasts = 3,
+    toasts: Toasts = None,
+    parts: Parts = None,
     port: Annotated[int, typer.Option("--port", min=0, max=65535, help="0: any free one.")] = 0,
     seed: Seed = 0,
     as_json: Json = False,

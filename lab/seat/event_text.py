@@ -37,7 +37,7 @@ PHASES = {
     "learn": "Find or learn the skills",
     "measure": "Time every move in simulation",
     "sequence": "Find the order of the transfers",
-    "carry out": "Make toast in physics",
+    "carry out": "Carry the order out in physics",
     "draw": "Draw the pictures",
 }
 ENDED = {
@@ -172,11 +172,13 @@ def sequence_parts(event: SequenceFound) -> tuple[str, str]:
     return f"parts {order}{more}:", f"{found}, {reference}"
 
 
-def move_text(move: Move) -> str:
+def move_text(made: MoveMade) -> str:
     """What a move brought where."""
+    move = made.move
     waited_s = move.pick_s - move.reach_s
     wait = f", waited {waited_s:.1f} s" if waited_s > _LEAST_WAIT_S else ""
-    return f"toast {move.part}: {move.origin} to {move.target}{wait}"
+    what = made.part if move.carries == "part" else f"{made.part}'s pallet"
+    return f"{what}: {move.origin} to {move.target}{wait}"
 
 
 def run_text(event: Event) -> str:

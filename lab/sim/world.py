@@ -100,6 +100,10 @@ class World:
         self._call("stepSimulation")
         self.steps += 1
 
+    def pass_time(self, steps: int) -> None:
+        """Let the clock go on by so many steps in which nothing moves: no physics is simulated."""
+        self.steps += steps
+
     # ---- bodies -------------------------------------------------------------------------------------------------
 
     def load(
