@@ -13,6 +13,7 @@ from lab.files import tasks_folder
 from lab.tasks.cell_file import CellFile
 from lab.tasks.grid_world import RANDOM, GridWorld, from_text, from_words
 from lab.tasks.record import MAX_SHORT_BYTES, Count, Learned, Name, Record, as_tuple, read_text
+from lab.tasks.robot_fields import RobotSettings
 from lab.tasks.sequencing import Sequencing
 from lab.tasks.toml_text import TomlText, explain
 
@@ -35,15 +36,6 @@ XYZ = Annotated[tuple[Number, Number, Number], BeforeValidator(as_tuple)]
 Above = Annotated[tuple[Number, Number, Size], BeforeValidator(as_tuple)]
 Sizes = Annotated[tuple[Size, Size, Size], BeforeValidator(as_tuple)]
 Area = Annotated[tuple[Off, Off], BeforeValidator(as_tuple)]
-
-
-class RobotSettings(Record):
-    """Where the arm starts, and how fast and firm it works [m/s], [m/s2], [N]."""
-
-    start: Name
-    speed_m_s: Annotated[float, Field(ge=0.01, le=1.5)] = 0.5
-    acceleration_m_s2: Annotated[float, Field(ge=0.01, le=10)] = 2.0
-    grip_force_n: Annotated[float, Field(gt=0, le=100)] = 25.0  # from about 150 N on it squeezes slices out
 
 
 class Slices(Record):
