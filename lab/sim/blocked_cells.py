@@ -11,7 +11,7 @@ from lab.files import assets_folder
 from lab.sim import models
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME
-from lab.sim.scene import NEAREST_M, Scene
+from lab.sim.scene import Scene
 
 OUT_OF_REACH = "out of reach"
 CARRIED = "carried slice"
@@ -48,7 +48,7 @@ class Surveyor:
 
     def cause(self, pose: ToolPose) -> str:
         """'' when the tool can be at `pose`, else why not."""
-        if hypot(pose.x, pose.y) < NEAREST_M or not self.scene.robot.stand(pose):
+        if hypot(pose.x, pose.y) < self.scene.robot.arm.nearest_m or not self.scene.robot.stand(pose):
             return OUT_OF_REACH
         world = self.scene.world
         if self.loaded:

@@ -9,14 +9,14 @@ import numpy as np
 
 from lab.errors import BadInput
 from lab.files import assets_folder
-from lab.sim import kinematics, models
+from lab.sim import models
+from lab.sim.arm_models import arm_of
 from lab.sim.frames import Rgba, Vector
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import Robot
 from lab.sim.world import World
 from lab.tasks.task_file import NEAREST_STATIONS_M, Obstacle, Station, Task
 
-NEAREST_M = 0.36  # [m] nearer to its own axis than this the arm would touch itself
 SLAB = 0.012  # [m] plates and buffers are slabs this thick
 GRASP_DEPTH = 0.03  # [m] how far the fingers reach below a slice's top
 COLUMN_M, ROW_M = 0.14, 0.055  # [m] between spots, along and across the slices
@@ -170,7 +170,7 @@ class Scene:
         robot = task.robot
         self.solid: list[str] = []  # what the arm must not touch
         world.box("table", (2.2, 2.9, 0.04), (0.35, 0.0, -0.02), TABLE_RGBA)
-        self.robot = Robot(world, robot.speed_m_s, robot.acceleration_m_s2, robot.grip_force_n)
+        self.robot = Robot(world, arm_of(robot, task.folder), robot.speed_m_s, robot.acceleration_m_s2, robot.grip_force_n)
         for station in task.stations:
             self._build_station(station)
         for obstacle, place in zip(task.obstacles, layout.obstacles, strict=True):
@@ -252,6 +252,7 @@ def check_scene(task: Task) -> None:
             f"workspace.lower_m: the lowest tool height {low:.3f} m would sweep a carried slice through standing ones"
         )
     _check_toaster(task)
+    arm = arm_of(task.robot, task.folder)
     for station in task.stations:
         if station.kind == "machine" and station.capacity > 1:
             raise BadInput(
@@ -260,10 +261,10 @@ def check_scene(task: Task) -> None:
         for spot in spots(station):
             pose = spot.grasp()
             for at in (pose, ToolPose(pose.x, pose.y, low, pose.yaw)):
-                if kinematics.inverse(at) is None or hypot(at.x, at.y) < NEAREST_M:
+                if arm.inverse(at) is None or hypot(at.x, at.y) < arm.nearest_m:
                     raise BadInput(
                         f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m is "
-                        f"{hypot(at.x, at.y):.2f} m from the robot; the arm reaches {NEAREST_M:.2f} to about 1.2 m"
+                        f"{hypot(at.x, at.y):.2f} m from the robot; the arm '{arm.name}' {arm.reach_in_words(at.z)}"
                     )
 
 

@@ -1,5 +1,6 @@
 """A URDF is checked before PyBullet sees it: PyBullet loads negative masses, NaN inertia and garbage meshes in silence."""
 
+from collections.abc import Sequence
 from math import cos, sin
 from pathlib import Path
 from xml.etree import ElementTree as Xml
@@ -92,15 +93,22 @@ def _quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 def placed(origin: Xml.Element | None) -> NDArray[np.float64]:
     """The frame (4, 4) of an <origin> [m] in its parent's; of none, the parent's own."""
-    x, y, z, w = _quaternion(*floats(origin, "rpy", "0 0 0"))
     frame = np.eye(4)
-    frame[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
+    frame[:3, :3] = rotation(_quaternion(*floats(origin, "rpy", "0 0 0")))
     frame[:3, 3] = floats(origin, "xyz", "0 0 0")
     return frame
+
+
+def rotation(quaternion: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """The axes (3, 3), as columns, of a quaternion xyzw of length 1."""
+    x, y, z, w = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def _value(path: Path, what: str, text: str | None) -> float:

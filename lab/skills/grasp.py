@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from math import hypot
 from typing import TYPE_CHECKING, ClassVar
 
-from lab.sim.kinematics import ToolPose, inverse
+from lab.sim.kinematics import ToolPose
 from lab.sim.scene import spots
 from lab.skills.around_slice import SLOW, AroundSlice
 from lab.skills.skill import Bench, SkillFailed, over_everything
@@ -42,7 +42,7 @@ class Grasp(AroundSlice):
         if robot.closed:
             yield from robot.release()
         goal = bench.slice_pose(name)
-        if inverse(goal) is None:
+        if robot.arm.inverse(goal) is None:
             raise SkillFailed(f"{name} is out of reach at ({goal.x:.2f}, {goal.y:.2f}) m")
         tool, approach = robot.tool(), self.surveys.approach(self.station)
         if tool.z < approach.z - 0.01 or hypot(tool.x - approach.x, tool.y - approach.y) > FAR_M:

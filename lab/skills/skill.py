@@ -15,7 +15,6 @@ from lab.mdp import NoPath, TabularMDP, greedy_path
 from lab.sim import models
 from lab.sim.frames import Body
 from lab.sim.kinematics import ToolPose
-from lab.sim.robot import NAME as ROBOT
 from lab.sim.scene import GRASP_DEPTH, Scene, Spot, spots
 from lab.tasks.task_file import Task
 from lab.vision import GridView
@@ -76,10 +75,8 @@ class Bench:
 
     def holds(self, name: str) -> bool:
         """Whether both fingers touch the slice and it is where they hold it."""
-        world = self.scene.world
-        touched = all(world.touching(ROBOT, name, finger) for finger in ("finger_left", "finger_right"))
         tool, at = self.scene.robot.tool(), self.slice_pose(name)
-        return touched and hypot(tool.x - at.x, tool.y - at.y, tool.z - at.z) < LOST_M
+        return self.scene.robot.touches(name) and hypot(tool.x - at.x, tool.y - at.y, tool.z - at.z) < LOST_M
 
     def stands(self, name: str, foot: ToolPose, within: float) -> bool:
         """Whether the slice stands upright within `within` [m] of where `foot` as a grasp pose would hold it."""

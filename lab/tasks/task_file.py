@@ -6,7 +6,7 @@ from math import hypot
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar, cast, get_args
 
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 
 from lab.errors import BadInput, unknown
 from lab.files import tasks_folder
@@ -132,6 +132,12 @@ class Task(Record):
     obstacles: Annotated[tuple[Obstacle, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
     subtasks: dict[str, Subtask] = Field(default={})
     sequencing: Sequencing = Sequencing()
+    _folder: Path = PrivateAttr(default=Path())
+
+    @property
+    def folder(self) -> Path:
+        """The task file's own, in which what it names is looked for."""
+        return self._folder
 
     def station(self, name: str) -> Station:
         """The station called `name`; BadInput lists the known ones."""
@@ -245,7 +251,11 @@ def load_any(word: str, wanted: FileKind | None = None) -> Task | CellFile | Gri
     _check_wanted(word, kind, wanted)
     if kind == "cell":
         return CellFile.checked(toml)
-    return _checked(Task, toml) if kind == "task" else _checked(GridWorld, toml)
+    if kind == "world":
+        return _checked(GridWorld, toml)
+    task = _checked(Task, toml)
+    task._folder = path.resolve().parent
+    return task
 
 
 def describe(word: str) -> tuple[str, dict[str, Any]]:
