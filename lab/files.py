@@ -5,6 +5,7 @@ import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from secrets import token_hex
 from shutil import rmtree
@@ -23,6 +24,14 @@ def tasks_folder() -> Path:
 def assets_folder() -> Path:
     """The folder of the shipped URDFs and meshes; raises WorkFailed when the installation lost it."""
     return find("assets", PACKAGE)
+
+
+def pybullet_data_folder() -> Path:
+    """The folder of the models that PyBullet's package brings; raises WorkFailed when the installation lost it."""
+    spec = find_spec("pybullet_data")
+    for folder in (spec.submodule_search_locations or []) if spec else []:
+        return Path(folder)
+    raise WorkFailed("PyBullet's own models (its package 'pybullet_data') are not installed: reinstall 'pybullet'")
 
 
 def find(name: str, package: Path) -> Path:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import cos, sin
 
 from lab.sim import models, station_bodies
-from lab.sim.arm import arm_of
+from lab.sim.arm_models import arm_of
 from lab.sim.frames import Rgba, Vector
 from lab.sim.kinds import Kind, Spot, beside, comes_as, kinds_of
 from lab.sim.kinematics import ToolPose

@@ -4,7 +4,8 @@ from itertools import combinations
 from math import hypot
 
 from lab.errors import BadInput
-from lab.sim.arm import Arm, arm_of
+from lab.sim.arm import Arm
+from lab.sim.arm_models import arm_of
 from lab.sim.kinds import Kind, Spot, comes_as, kinds_of
 from lab.sim.kinematics import ToolPose
 from lab.sim.places import Places, Rectangle
@@ -67,7 +68,7 @@ def _check_reach(arm: Arm, station: Station, at: ToolPose) -> None:
     if arm.inverse(at) is None or hypot(at.x, at.y) < arm.nearest_m:
         raise BadInput(
             f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m is "
-            f"{hypot(at.x, at.y):.2f} m from the robot; {arm.name} reaches {arm.nearest_m:.2f} to about {arm.reach_m:.2f} m"
+            f"{hypot(at.x, at.y):.2f} m from the robot; the arm '{arm.name}' {arm.reach_in_words(at.z)}"
         )
 
 

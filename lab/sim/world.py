@@ -107,10 +107,18 @@ class World:
     # ---- bodies -------------------------------------------------------------------------------------------------
 
     def load(
-        self, name: str, path: Path, position: Position = (0, 0, 0), yaw: float = 0.0, *, fixed: bool = True
+        self,
+        name: str,
+        path: Path,
+        position: Position = (0, 0, 0),
+        yaw: float = 0.0,
+        *,
+        fixed: bool = True,
+        checked: bool = False,
     ) -> None:
-        """Load a URDF, after validating it, as body `name` at `position` [m], turned by `yaw` [rad]."""
-        urdf_reader.validate(path)
+        """Load a URDF, after validating it unless it is `checked`, as body `name` at `position` [m], turned by `yaw` [rad]."""
+        if not checked:
+            urdf_reader.validate(path)
         turn = self._p.getQuaternionFromEuler([0, 0, yaw])
         with _silence():
             flags = self._p.URDF_USE_INERTIA_FROM_FILE
@@ -197,7 +205,7 @@ class World:
         positions: Sequence[float] | Array,
         velocities: Sequence[float] | Array | None = None,
         *,
-        force: float = 2000.0,
+        force: float | Sequence[float] = 2000.0,
     ) -> None:
         """Set the position motors' targets [rad or m], with velocities fed forward; `force` [Nm or N] is the most they use."""
         if not (np.isfinite(positions).all() and (velocities is None or np.isfinite(velocities).all())):
@@ -210,20 +218,20 @@ class World:
             self._p.POSITION_CONTROL,
             targetPositions=[float(v) for v in positions],
             targetVelocities=[0.0] * len(names) if velocities is None else [float(v) for v in velocities],
-            forces=[force] * len(names),
+            forces=[force] * len(names) if isinstance(force, float) else list(force),
             positionGains=[0.3] * len(names),
             velocityGains=[1.0] * len(names),
         )
 
-    def gear(self, name: str, link_a: str, link_b: str) -> None:
-        """Couple two sliding links so that they move as one (a two-finger gripper drifts without it)."""
+    def gear(self, name: str, joint_a: str, joint_b: str, ratio: float = 1.0) -> None:
+        """Couple two joints: b moves `ratio` times as far as a (a two-finger gripper drifts without it)."""
         entry = self._bodies[name]
-        first, second = entry.links[link_a], entry.links[link_b]
+        first, second = entry.joints[joint_a], entry.joints[joint_b]
         axis, zero = [1, 0, 0], [0, 0, 0]
         gear = self._call(
             "createConstraint", entry.number, first, entry.number, second, self._p.JOINT_GEAR, axis, zero, zero
         )
-        self._call("changeConstraint", gear, gearRatio=-1, erp=0.1, maxForce=100)
+        self._call("changeConstraint", gear, gearRatio=-1.0 / ratio, erp=0.1, maxForce=100)
 
     # ---- questions ----------------------------------------------------------------------------------------------
 
