@@ -48,7 +48,9 @@ def run(
     folder = out or Path(f"{loaded.name}-run")
     check_out(folder)
     names = tuple(advisor or DEFAULT_ADVISORS)
-    options = LessonOptions(task=task, advisors=names, asked=asked, decide=decide, seed=seed, toasts=toasts, parts=parts)
+    options = LessonOptions(
+        task=task, advisors=names, asked=asked, decide=decide, seed=seed, toasts=toasts, parts=parts
+    )
     options.advising()
     prepared = prepare(loaded, loaded.ordered(toasts, parts), seed)
     with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:

@@ -67,7 +67,9 @@ def task_check(
     toasts: Annotated[
         int | None,
         typer.Option(
-            "--toasts", "-n", help="How many parts of the first kind, 1 to 50. Of a cell: parts, 1 to 200. Default: as it says."
+            "--toasts",
+            "-n",
+            help="How many parts of the first kind, 1 to 50. Of a cell: parts, 1 to 200. Default: as it says.",
         ),
     ] = None,
     seed: Seed = 0,

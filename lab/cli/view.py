@@ -31,18 +31,19 @@ def view(
             write(f"{url}\nfrom another machine: {hint}\nCtrl-C ends it\n")
 
     try:
-        show(what, toasts, seed, port, tell)
+        show(what, toasts, parts, seed, port, tell)
     except KeyboardInterrupt:
         end("stopped by Ctrl-C", 130)
 
 
-def show(what: str, toasts: int, seed: int, port: int, tell: Callable[[str, str], None]) -> None:
+def show(
+    what: str, toasts: int | None, parts: str | None, seed: int, port: int, tell: Callable[[str, str], None]
+) -> None:
     """Serve a run's replay, or a task's scene, on 127.0.0.1 until interrupted; `tell(url, hint)` once it is there."""
-    import numpy as np
-
     from lab.production.recorder import show_scene
-    from lab.sim.scene import check_scene, draw_layout
-    from lab.tasks.task_file import check_number, load
+    from lab.sim.scene_check import check_scene
+    from lab.skills.prepared_scene import lay_out
+    from lab.tasks.task_file import load
     from lab.view.meshcat import LiveView
 
     folder = Path(what)
@@ -53,11 +54,11 @@ def show(what: str, toasts: int, seed: int, port: int, tell: Callable[[str, str]
         with LiveView(port, replay=replay) as page:
             tell(page.url, page.hint)
             _wait()
-    check_number(toasts)
     task = load(what)
+    order = task.ordered(toasts, parts)
     check_scene(task)
     with LiveView(port) as live:
-        show_scene(task, toasts, draw_layout(task, toasts, np.random.default_rng([seed, 1])), live)
+        show_scene(task, order, lay_out(task, order, seed), live)
         tell(live.url, live.hint)
         _wait()
 

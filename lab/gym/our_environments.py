@@ -108,7 +108,9 @@ class InsertEnv(TableEnv):
 
         found = load(task)
         order = found.fitting(TAUGHT_WITH)
-        name = next((name for name, skill in SkillSet.of(found, order).skills.items() if skill.subtask == Insert.subtask), None)
+        name = next(
+            (name for name, skill in SkillSet.of(found, order).skills.items() if skill.subtask == Insert.subtask), None
+        )
         if name is None:
             raise BadInput(f"task '{found.name}': no station is approached through the camera's grid")
         problem = prepare(found, order, layout_seed, name).problems[name]  # as for a lesson of this seed

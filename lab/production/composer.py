@@ -109,7 +109,9 @@ class Production:
         if option.waits:
             self._await(part, way.origin)
         served_s = floor.now_s
-        for skill in floor.skillset.services.get((self.cell.order[part - 1], way.origin), ()) if option.service_s else ():
+        for skill in (
+            floor.skillset.services.get((self.cell.order[part - 1], way.origin), ()) if option.service_s else ()
+        ):
             self._try(part, way.origin, skill)
         pick_s, tried = floor.now_s, len(self.retries)
         spot = self._spot_for(part, way)

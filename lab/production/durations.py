@@ -85,7 +85,12 @@ class Durations:
         empty, loaded = {_word(pair): pair for pair in skillset.travels}, {_word(way): way for way in skillset.legs}
         services = {_service(own): own for own, skills in skillset.services.items() if skills}
         processes = [station for station, skills in skillset.processes.items() if skills]
-        wanted = {"empty_s": set(empty), "loaded_s": set(loaded), "process_s": set(processes), "service_s": set(services)}
+        wanted = {
+            "empty_s": set(empty),
+            "loaded_s": set(loaded),
+            "process_s": set(processes),
+            "service_s": set(services),
+        }
         tables = {name: _times(record, name, names) for name, names in wanted.items()}
         return cls(
             {empty[word]: seconds for word, seconds in tables["empty_s"].items()},

@@ -17,7 +17,6 @@ from lab.learning.session_events import (
 from lab.learning.session_events import Event as SessionEvent
 from lab.mdp import TabularMDP
 from lab.seat.request_text import percent, verdict
-from lab.sequencing.cell.schedule import Move
 from lab.teaching.events import (
     Event,
     KeptBeside,
@@ -199,7 +198,7 @@ def run_text(event: Event) -> str:
         case SequenceFound():
             return " ".join(sequence_parts(event))
         case MoveMade():
-            return f"{event.move.drop_s:.1f} s: {move_text(event.move)}"
+            return f"{event.move.drop_s:.1f} s: {move_text(event)}"
         case LessonContinued(unfinished=left):
             length = counted(len(left.curve), "episode")
             return f"'{left.name}' was left unfinished after {length}: it is learned on"

@@ -23,7 +23,9 @@ Array = NDArray[np.float64]
 
 ALONG_X = np.eye(3)  # a tool link's axes are the tool's own: x out of the gripper
 ALONG_Z = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])  # the tool's axes (columns) where z points out
-FARTHEST_TURN = pi - 0.15  # [rad] of a first joint that could go farther: behind it, neighbours would be a whole turn apart
+FARTHEST_TURN = (
+    pi - 0.15
+)  # [rad] of a first joint that could go farther: behind it, neighbours would be a whole turn apart
 MOST_BYTES = 5_000_000  # of a URDF
 OWN_NEAREST_M = 0.25  # [m] of a URDF file that says nothing
 
@@ -72,7 +74,9 @@ def arm_of(settings: RobotSettings, folder: Path = Path()) -> Arm:
             raise BadInput(f"robot.model '{settings.model}': no such file beside the task file, or over 5 MB")
         changed = path.stat().st_mtime_ns
     mount = (settings.opening_m, settings.base_up_m, settings.nearest_m)
-    return _made(settings.model, path, changed, (settings.tool_link or "", settings.fingers or (), settings.tip_m), mount)
+    return _made(
+        settings.model, path, changed, (settings.tool_link or "", settings.fingers or (), settings.tip_m), mount
+    )
 
 
 def arm_named(name: str) -> Arm:

@@ -74,7 +74,7 @@ class Kind:
         """How far a carried part reaches from the tool's axis at most, along the tool's x and y axes [m]."""
         reach = np.zeros(2)
         for kind in self.stack():
-            points = kind.shape.vertices[:, :2] - (self.grip.x, self.grip.y)
+            points = kind.shape.hull[:, :2] - (self.grip.x, self.grip.y)
             c, s = cos(self.grip.yaw), sin(self.grip.yaw)
             reach = np.maximum(reach, np.abs(points @ np.array([[c, -s], [s, c]])).max(axis=0))
         return float(reach[0]), float(reach[1])

@@ -12,9 +12,11 @@ from lab.sim.frames import Rgba, Vector
 from lab.sim.world import World
 from lab.tasks.task_fields import Station
 
-PLATE_RGBA, BUFFER_RGBA: tuple[Rgba, Rgba] = (0.97, 0.97, 0.98, 1.0), (0.55, 0.57, 0.6, 1.0)
-MACHINE_RGBA: Rgba = (0.72, 0.73, 0.76, 1.0)
-RGBA = {"storage": PLATE_RGBA, "buffer": BUFFER_RGBA, "machine": MACHINE_RGBA}
+RGBA: dict[str, Rgba] = {
+    "storage": (0.97, 0.97, 0.98, 1.0),
+    "buffer": (0.55, 0.57, 0.6, 1.0),
+    "machine": (0.72, 0.73, 0.76, 1.0),
+}
 FRICTION = {"storage": 0.8, "buffer": 0.8, "machine": 0.5}
 MESHES = (".obj", ".stl")
 
@@ -58,5 +60,7 @@ def _file(station: Station, folder: Path) -> Path:
             f"station '{station.name}': body '{station.stands_on}': wanted 'slab', 'box', or a .urdf, .obj or .stl file"
         )
     if station.floor_m is None:
-        raise BadInput(f"station '{station.name}': floor_m is missing: how high parts stand in or on '{station.stands_on}'")
+        raise BadInput(
+            f"station '{station.name}': floor_m is missing: how high parts stand in or on '{station.stands_on}'"
+        )
     return path

@@ -74,6 +74,38 @@ def _shape(path: Path, visual: Xml.Element) -> Shape | None:
     return Shape("mesh", floats(mesh, "scale", ""), path.parent / mesh.get("filename", ""), rgba, at, turn)
 
 
+def bounds(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The lowest and the highest corner (3,) [m] of what is solid in the root link of a valid URDF, in its frame."""
+    validate(path)
+    root = Xml.parse(path).getroot()
+    children = {child.get("link") for child in root.iterfind("joint/child")}
+    solids = (
+        solid for link in root.iter("link") if link.get("name") not in children for solid in link.iter("collision")
+    )
+    corners = [corner for solid in solids for corner in _corners(path, solid)]
+    if not corners:
+        raise BadInput(f"{path}: its root link has nothing solid (no <collision>)")
+    return np.min(corners, axis=0), np.max(corners, axis=0)
+
+
+def _corners(path: Path, solid: Xml.Element) -> NDArray[np.float64]:
+    """Points (n, 3) that bound a solid, in its link's frame [m]."""
+    shape = _shape(path, solid)
+    if shape is None:
+        return np.zeros((0, 3))
+    if shape.kind == "mesh" and shape.mesh is not None:
+        points = mesh_file.vertices(shape.mesh) * (shape.size or (1.0, 1.0, 1.0))
+    else:
+        half = {
+            "box": shape.size,
+            "cylinder": (2 * shape.size[0],) * 2 + shape.size[1:],
+            "sphere": (2 * shape.size[0],) * 3,
+        }
+        signs = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+        points = signs * np.array(half[shape.kind]) / 2
+    return np.asarray(points @ rotation(shape.quaternion).T + np.array(shape.position))
+
+
 def floats(element: Xml.Element | None, name: str, default: str) -> tuple[float, ...]:
     """The numbers of an attribute."""
     text = default if element is None else element.get(name, default)

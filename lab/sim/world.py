@@ -139,6 +139,15 @@ class World:
         visual = self._call("createVisualShape", self._p.GEOM_BOX, halfExtents=half, rgbaColor=list(rgba))
         self._fixed(name, shape, visual, position, turn, Shape("box", tuple(size), None, rgba))
 
+    def mesh(self, name: str, path: Path, position: Position, rgba: Rgba, *, yaw: float = 0.0) -> None:
+        """A mesh file that never moves, hollows and all: its origin at `position` [m]."""
+        turn = tuple(self._p.getQuaternionFromEuler([0, 0, yaw]))
+        with _silence():
+            hollow = self._p.GEOM_FORCE_CONCAVE_TRIMESH
+            shape = self._call("createCollisionShape", self._p.GEOM_MESH, fileName=str(path), flags=hollow)
+            visual = self._call("createVisualShape", self._p.GEOM_MESH, fileName=str(path), rgbaColor=list(rgba))
+        self._fixed(name, shape, visual, position, turn, Shape("mesh", (), path, rgba))
+
     def disc(self, name: str, radius: float, height: float, position: Position, rgba: Rgba) -> None:
         """A flat round marker: only seen; `position` [m] is its centre."""
         visual = self._call(
@@ -149,6 +158,27 @@ class World:
     def _fixed(self, name: str, shape: int, visual: int, position: Position, turn: Position, look: Shape) -> None:
         number = self._call("createMultiBody", 0, shape, visual, list(position), list(turn))
         self._add(name, _Entry(number, False, (tuple(position), tuple(turn)), looks={"": (look,)}))
+
+    def part(self, name, shape, mass_kg, friction, position, yaw=0.0):  # stand-in
+        turn = tuple(self._p.getQuaternionFromEuler([0, 0, yaw]))
+        if shape.solid == "box":
+            solid = self._call("createCollisionShape", self._p.GEOM_BOX, halfExtents=[s / 2 for s in shape.size])
+            seen = self._call(
+                "createVisualShape",
+                self._p.GEOM_BOX,
+                halfExtents=[s / 2 for s in shape.size],
+                rgbaColor=list(shape.looks[0].rgba),
+            )
+        else:
+            d, h = shape.size
+            solid = self._call("createCollisionShape", self._p.GEOM_CYLINDER, radius=d / 2, height=h)
+            seen = self._call(
+                "createVisualShape", self._p.GEOM_CYLINDER, radius=d / 2, length=h, rgbaColor=list(shape.looks[0].rgba)
+            )
+        number = self._call("createMultiBody", mass_kg, solid, seen, list(position), list(turn))
+        self._call("changeDynamics", number, -1, localInertiaDiagonal=[m * mass_kg for m in shape.inertia_m2])
+        self._add(name, _Entry(number, True, (tuple(position), turn), looks={"": shape.looks}))
+        self.friction(name, friction, spinning=0.001)
 
     def _add(self, name: str, entry: _Entry) -> None:
         self._bodies[name] = entry

@@ -13,7 +13,6 @@ from lab.sim.blocked_cells import Survey
 from lab.sim.kinematics import ToolPose
 from lab.skills.skill import Bench, Skill, learned_path, no_way
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
-
 from lab.tasks.task import Task
 
 if TYPE_CHECKING:

@@ -31,7 +31,14 @@ class SurveyedGrid:
     """The camera's grid before a station, as a carried part of one kind finds it; each survey is made once."""
 
     def __init__(self, task: Task, layout: Layout, places: Places, station: str, kind: str, parts: int) -> None:
-        self.task, self.layout, self.places, self.station, self.kind, self.parts = task, layout, places, station, kind, parts
+        self.task, self.layout, self.places, self.station, self.kind, self.parts = (
+            task,
+            layout,
+            places,
+            station,
+            kind,
+            parts,
+        )
         self.settings = settings_of(task.station(station))
         self.picture = cache(self._picture)
         self.survey = cache(self._survey)

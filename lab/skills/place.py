@@ -8,8 +8,8 @@ import numpy as np
 from lab.sim.kinds import Spot
 from lab.sim.kinematics import ToolPose
 from lab.skills.around_part import SLOW, AroundPart
+from lab.skills.camera_grids import RELEASE_ABOVE
 from lab.skills.skill import Bench, SkillFailed
-from lab.skills.surveys import RELEASE_ABOVE
 from lab.tasks.task import Task
 
 if TYPE_CHECKING:

@@ -241,8 +241,8 @@ class Skill:
                 bench.scene.add(name, str(pallet), spot)
 
     def tried_with(self) -> str:
-        """What the part is called with which the skill is tried."""
-        return f"{self.surveys.task.made_as(self.kind).name} 1"
+        """What the part is called with which the skill is tried; "": there is none."""
+        return self.kind and f"{self.surveys.task.made_as(self.kind).name} 1"
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Carry the policy out: each `next` sets what one physics step needs; raises SkillFailed."""

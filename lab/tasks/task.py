@@ -202,7 +202,9 @@ class Task(Record):
             if stage.processing_s is not None:
                 raise ValueError(f"{where}: only a machine has processing_s, it is a {place.kind}")
         elif place.process is not None and stage.processing_s is not None:
-            raise ValueError(f"{where}: processing_s = {stage.processing_s:g}, but its process '{place.process}' is learned")
+            raise ValueError(
+                f"{where}: processing_s = {stage.processing_s:g}, but its process '{place.process}' is learned"
+            )
         elif place.process is None and place.processing_s is None and stage.processing_s is None:
             raise ValueError(f"machine '{place.name}' needs either processing_s or process, a sub-task to learn")
 

@@ -60,7 +60,9 @@ class Process(Record):
     `area_m` [m] around the station's pose, moved by `off_m` along its axes; z is the height of the finger tips.
     """
 
-    grid: Annotated[tuple[Annotated[int, Field(ge=1, le=4)], Annotated[int, Field(ge=1, le=4)]], BeforeValidator(as_tuple)]
+    grid: Annotated[
+        tuple[Annotated[int, Field(ge=1, le=4)], Annotated[int, Field(ge=1, le=4)]], BeforeValidator(as_tuple)
+    ]
     dwell_s: Time = 3.0
     speed_m_s: Annotated[float, Field(ge=0.001, le=2)] = 0.02
     color: Color = (1.0, 0.87, 0.25)
@@ -71,9 +73,13 @@ class Process(Record):
     @model_validator(mode="after")
     def _area_for_the_robot(self) -> Self:
         if (self.by == "robot") == (self.area_m is None):
-            raise ValueError(f"by = '{self.by}': area_m is the surface that the robot covers, and only the robot needs it")
+            raise ValueError(
+                f"by = '{self.by}': area_m is the surface that the robot covers, and only the robot needs it"
+            )
         if self.grid[0] * self.grid[1] > 12:
-            raise ValueError(f"grid = {list(self.grid)}: at most 12 cells are covered, for each doubles what is learned")
+            raise ValueError(
+                f"grid = {list(self.grid)}: at most 12 cells are covered, for each doubles what is learned"
+            )
         return self
 
 
@@ -104,7 +110,9 @@ class Station(Record):
             if self.kind != "machine" and getattr(self, field) is not None:
                 raise ValueError(f"station '{self.name}' is a {self.kind}: only a machine has {field}")
         if self.processing_s is not None and self.process is not None:
-            raise ValueError(f"machine '{self.name}' needs either processing_s or process, a sub-task to learn, not both")
+            raise ValueError(
+                f"machine '{self.name}' needs either processing_s or process, a sub-task to learn, not both"
+            )
         return self
 
     @model_validator(mode="after")
@@ -155,14 +163,12 @@ Route = Annotated[
 class Part(PartFields):
     """A kind of part: its shape, how many there are, and the routes that one of them may take.
 
-    pallet: the kind, without routes of its own, that it comes and goes on. area: how far one may stand off its spot at the
-    start, x, y [m] and yaw [rad].
+    pallet: the kind, without routes of its own, that it comes and goes on.
     """
 
     count: Annotated[int, Field(ge=0, le=MAX_PARTS)] = 1
     pallet: Name | None = None
     routes: Annotated[tuple[Route, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
-    area: Annotated[tuple[Off, Off, Off], BeforeValidator(as_tuple)] = (0.0, 0.0, 0.0)
 
     @property
     def places(self) -> tuple[str, ...]:

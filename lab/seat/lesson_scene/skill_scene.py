@@ -84,7 +84,7 @@ class SkillScene:
         station = scene.task.station(skill.station)
         stand = [self._world.pose(part_name(scene.order, number))[0] for number in range(1, len(scene.order) + 1)]
         near_m = skill.own_kind.footprint_m()[0] / 2
-        colors = {}
+        colors: dict[str, Rgba] = {}
         for name, (kind, spot) in skill.surveys.places.neighbours(station, foot).items():
             if all(hypot(spot.x - at[0], spot.y - at[1]) > near_m for at in stand):
                 scene.add(name, kind, spot)
