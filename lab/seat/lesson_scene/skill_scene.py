@@ -5,8 +5,7 @@ from math import hypot, radians
 
 import numpy as np
 
-from lab.seat.lesson_scene.camera_placement import camera_for, corners, vector
-from lab.seat.lesson_scene.episode_trail import GREEN, STEP_S, Changes, EpisodeTrail
+from lab.seat.lesson_scene.episode_trail import STEP_S, Changes, EpisodeTrail
 from lab.sim import models
 from lab.sim.frames import Body, Frame, Rgba, Shape, Vector, Viewpoint
 from lab.sim.scene import Layout, Scene, spots
@@ -15,6 +14,8 @@ from lab.skills import Skill
 from lab.skills.skill import FINGERS_OFF_M, Bench
 from lab.skills.surveys import neighbours
 from lab.tasks.task_file import Task
+from lab.view.camera_placement import camera_for, corners, vector
+from lab.view.world_bodies import GREEN
 
 NUMBER = 1  # of the slice that the lesson is about
 SLICE = f"slice {NUMBER}"
