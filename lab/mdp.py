@@ -313,6 +313,17 @@ def shortest_steps(mdp: TabularMDP) -> int:
     return int(distance[distance >= 0].min())
 
 
+def shortest_way(mdp: TabularMDP) -> list[int]:
+    """The states of a way of `shortest_steps` moves, from the start to a goal. Raises NoPath."""
+    moves = shortest_steps(mdp)
+    distance = _distances(mdp.successor, mdp.terminal, mdp.start)
+    way = [int(np.flatnonzero(mdp.goal & (distance == moves))[0])]
+    for left in range(moves - 1, -1, -1):
+        before = np.flatnonzero((distance == left) & ~mdp.terminal)
+        way.append(int(before[np.any(mdp.successor[before] == way[-1], axis=1)][0]))
+    return way[::-1]
+
+
 def greedy_path(
     q: FloatArray, mdp: TabularMDP, max_steps: int, start: int | None = None
 ) -> tuple[list[int], list[int], bool]:

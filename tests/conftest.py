@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from io import StringIO
+from math import radians, tan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
     from websockets.sync.client import ClientConnection
 
+    from lab.mdp import FloatArray
+    from lab.sim.frames import Viewpoint
     from lab.view.meshcat import LiveView
 
 settings.register_profile("lab", deadline=None, derandomize=bool(os.environ.get("CI")), max_examples=50)
@@ -89,6 +92,25 @@ def lab(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ran]:
         return Ran(int(ended.value.code or 0), out.getvalue(), err.getvalue())
 
     return run
+
+
+@pytest.fixture(scope="session")
+def in_picture() -> "Callable[[Viewpoint, FloatArray], bool]":
+    """Whether a page 1.2 times as wide as high, with 38 degrees from bottom to top, has all points (n, 3) in it."""
+    import numpy as np
+
+    def seen(camera: "Viewpoint", points: "FloatArray") -> bool:
+        eye, target = np.array(camera.eye), np.array(camera.target)
+        ahead = (target - eye) / np.linalg.norm(target - eye)
+        right = np.cross(ahead, (0.0, 0.0, 1.0))
+        right /= np.linalg.norm(right)
+        off = points - eye
+        far = off @ ahead
+        up, aside = off @ np.cross(right, ahead) / far, off @ right / far
+        reach = tan(radians(19.0))
+        return bool(np.all(far > 0) and np.all(abs(up) <= reach) and np.all(abs(aside) <= 1.2 * reach))
+
+    return seen
 
 
 @pytest.fixture(scope="session")

@@ -12,14 +12,14 @@ from typing import Literal
 
 from lab.errors import BadInput, unknown
 
-ShapeKind = Literal["box", "cylinder", "sphere", "mesh"]
+ShapeKind = Literal["box", "cylinder", "sphere", "mesh", "label"]
 Rgba = tuple[float, float, float, float]
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 Pose = tuple[float, float, float, float, float, float, float]
 
 IDENTITY: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-SIZES: dict[str, int] = {"box": 3, "cylinder": 2, "sphere": 1, "mesh": 3}
+SIZES: dict[str, int] = {"box": 3, "cylinder": 2, "sphere": 1, "mesh": 3, "label": 1}
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,8 @@ class Shape:
     """One visible piece of a body, placed in the body's frame.
 
     `size` [m]: box (x, y, z) full edges; cylinder (radius, length) along z; sphere (radius,); mesh: scale (x, y, z),
-    unitless, () for 1. `mesh`: an OBJ or STL file, for kind "mesh" only. `rgba` within 0..1. Raises BadInput for
-    anything else.
+    unitless, () for 1; label (height,). `mesh`: an OBJ or STL file, for kind "mesh" only. `text`: what a label says, which
+    always faces who looks. `rgba` within 0..1. Raises BadInput for anything else.
     """
 
     kind: ShapeKind
@@ -37,12 +37,17 @@ class Shape:
     rgba: Rgba = (0.7, 0.7, 0.7, 1.0)
     position: Vector = (0.0, 0.0, 0.0)
     quaternion: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    text: str = ""
 
     def __post_init__(self) -> None:
         if self.kind not in SIZES:
             raise unknown("shape kind", self.kind, SIZES, "Shape")
         if self.kind == "mesh" and self.mesh is None:
             raise BadInput("Shape of kind 'mesh' without a file: `mesh` must be a path")
+        if (self.kind == "label") != bool(self.text):
+            raise BadInput(
+                f"Shape of kind '{self.kind}' with the text '{self.text}': a label has one, and nothing else"
+            )
         expected = SIZES[self.kind]
         if len(self.size) != expected and not (self.kind == "mesh" and not self.size):
             raise BadInput(f"Shape size {self.size}: a {self.kind} takes {expected} numbers")

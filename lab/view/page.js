@@ -81,7 +81,24 @@ function lookFrom(camera) {
   viewer.controls.update();
 }
 
+// A word that always faces the camera
+function labelOf({ size: [height], text }, rgba) {
+  const canvas = document.createElement("canvas"), pen = canvas.getContext("2d"), font = "600 96px system-ui, sans-serif";
+  pen.font = font;
+  canvas.width = Math.ceil(pen.measureText(text).width) + 8;
+  canvas.height = 128;
+  Object.assign(pen, { font, textAlign: "center", textBaseline: "middle", fillStyle: "white" });
+  pen.fillText(text, canvas.width / 2, canvas.height / 2);
+  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(canvas) }));
+  sprite.scale.set((height * canvas.width) / canvas.height, height, 1);
+  paint(sprite, rgba);
+  Object.assign(sprite.material, { transparent: true, depthWrite: false });
+  sprite.castShadow = false;
+  return sprite;
+}
+
 function geometryOf(spec) {
+  if (spec.kind === "label") return spec;
   if (spec.kind === "box") return new THREE.BoxGeometry(...spec.size);
   if (spec.kind === "sphere") return new THREE.SphereGeometry(spec.size[0], 48, 32);
   if (spec.kind === "cylinder") {
@@ -123,7 +140,9 @@ function showScene(scene) {
   for (const body of scene.bodies) {
     viewer.scene_tree.find([LAB, body.name]);
     body.shapes.forEach((shape, number) => {
-      viewer.set_object([LAB, body.name, String(number)], meshOf(geometries[shape.geometry], shape));
+      const geometry = geometries[shape.geometry];
+      const object = geometry.kind === "label" ? labelOf(geometry, shape.rgba) : meshOf(geometry, shape);
+      viewer.set_object([LAB, body.name, String(number)], object);
       place([LAB, body.name, String(number)], shape.pose);
     });
   }
@@ -180,7 +199,7 @@ function follow(pause = 300) {
       timed = true;
       setTimeout(keepUp, 0, PLAINER);
     }
-    if (frame && frame.time_s !== null) note(`${frame.time_s.toFixed(1)} s`);
+    if (frame && frame.time_s !== null) note(frame.time_s ? `${frame.time_s.toFixed(1)} s` : "");
     if (panel && scene) panel.hasScene();
     if (panel && parts) panel.update(parts);
     if (panel && refusal) panel.refused(refusal);

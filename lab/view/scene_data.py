@@ -30,7 +30,7 @@ def describe(bodies: Sequence[Body], camera: Viewpoint) -> Json:
     for body in bodies:
         shapes = []
         for shape in body.shapes:
-            key = (shape.kind, shape.mesh if shape.kind == "mesh" else shape.size)
+            key = (shape.kind, shape.mesh if shape.kind == "mesh" else shape.size, shape.text)
             if key not in geometries:
                 geometries[key] = len(contents)
                 contents.append(_geometry(shape))
@@ -47,6 +47,8 @@ def _shape(shape: Shape, geometry: int) -> Json:
 
 
 def _geometry(shape: Shape) -> Json:
+    if shape.kind == "label":
+        return {"kind": "label", "size": list(shape.size), "text": shape.text}
     if shape.kind != "mesh":
         return {"kind": shape.kind, "size": list(shape.size)}
     path = Path(shape.mesh or "")

@@ -1,14 +1,19 @@
-"""`lab view`: a scene and a replay on a page."""
+"""`lab view`: a scene, a grid world and a replay on a page."""
 
+import json
+from collections.abc import Callable
 from pathlib import Path
 from signal import SIGINT, pthread_kill
 from threading import Thread, main_thread
+from typing import Any
 from urllib.request import urlopen
 
 import pytest
 
-from lab.cli.view import show
+from lab.cli.view import serve, write_page
 from lab.errors import BadInput
+
+Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 
 
 def looked_at(what: str) -> tuple[str, str]:
@@ -21,7 +26,7 @@ def looked_at(what: str) -> tuple[str, str]:
         pthread_kill(main_thread().ident or 0, SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        show(what, 1, 0, 0, lambda url, hint: Thread(target=look, args=(url,)).start())
+        serve(what, 1, 0, 0, lambda url, hint: Thread(target=look, args=(url,)).start())
     url, page = told
     return url, page
 
@@ -42,6 +47,56 @@ def test_a_runs_replay_is_served(tmp_path: Path) -> None:
 
 def test_what_is_neither_a_task_nor_a_run(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"holds no replay.html: give the folder of a run"):
-        show(str(tmp_path), 3, 0, 0, lambda url, hint: None)
+        serve(str(tmp_path), 3, 0, 0, lambda url, hint: None)
     with pytest.raises(BadInput, match=r"^51 toasts"):
-        show("toast", 51, 0, 0, lambda url, hint: None)
+        serve("toast", 51, 0, 0, lambda url, hint: None)
+
+
+def data(file: str) -> Any:
+    """What a page in a file has of its scene."""
+    text = Path(file).read_text(encoding="utf-8")
+    return json.loads(text.partition('type="application/json">')[2].partition("</script>")[0])
+
+
+def test_a_world_is_shown_and_written_as_a_page(tmp_path: Path) -> None:
+    _, page = looked_at("world-1")
+    assert "World I: a path through 10 x 10 x 10 cells; shortest way: 12 moves" in page
+    document = write_page("world-1", 3, 0, tmp_path / "w.html")
+    assert document == {"file": str(tmp_path / "w.html")}
+    assert {body["name"] for body in data(document["file"])["scene"]["bodies"]} == {
+        *("ground", "room", "obstacles", "start", "goal", "shortest way", "limited view", "axes")
+    }
+
+
+@pytest.mark.parametrize(
+    ("what", "title"),
+    [
+        ("w.txt", "w; shortest way: 3 moves"),
+        ("random:20x20x20:0.3:3", "Random world of 20x20x20 cells, density 0.3, seed 3; shortest way: "),
+        ("toast", "Toast making with one robot"),
+    ],
+)
+def test_any_world_or_task_is_written_as_a_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str, title: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("w.txt").write_text("S#.\n..G\n")
+    text = Path(write_page(what, 1, 0, Path("page.html"))["file"]).read_text(encoding="utf-8")
+    said = text.partition("<title>")[2].partition("</title>")[0]
+    assert said.startswith(title)
+    assert ("1500 of 2400 obstacles drawn" in said) == what.startswith("random")
+
+
+def test_a_page_that_cannot_be_written(tmp_path: Path, lab: Lab) -> None:
+    for what, out, line in (
+        ("world-1", tmp_path / "w.png", r"its name must end in \.html"),
+        (str(tmp_path), tmp_path / "w.html", r"its replay\.html is such a page already"),
+        ("fms", tmp_path / "w.html", r"it is a cell, which has no scene"),
+    ):
+        with pytest.raises(BadInput, match=line):
+            write_page(what, 3, 0, out)
+    (tmp_path / "w.txt").write_text("S#G\n")
+    ran = lab("view", str(tmp_path / "w.txt"), "--out", str(tmp_path / "w.html"))
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err == "lab: world 'w': no path from (0, 0) to (0, 2): the goal is enclosed by (0, 1)\n"
+    assert {path.name for path in tmp_path.iterdir()} == {"w.txt"}

@@ -15,7 +15,8 @@ BOX = Shape("box", (1.0, 2.0, 3.0))
 
 def test_shapes_of_every_kind() -> None:
     for kind, count in SIZES.items():
-        Shape(kind, (0.1,) * count, mesh=Path("part.stl") if kind == "mesh" else None)  # type: ignore[arg-type]
+        mesh, text = Path("part.stl") if kind == "mesh" else None, "x" if kind == "label" else ""
+        Shape(kind, (0.1,) * count, mesh=mesh, text=text)  # type: ignore[arg-type]
     assert Shape("mesh", mesh=Path("part.stl")).size == ()
 
 
@@ -25,6 +26,8 @@ def test_shapes_of_every_kind() -> None:
         ({"kind": "ball", "size": (1.0,)}, "unknown shape kind 'ball'"),
         ({"kind": "box", "size": (1.0,)}, "a box takes 3 numbers"),
         ({"kind": "mesh"}, "`mesh` must be a path"),
+        ({"kind": "label", "size": (0.1,)}, "the text '': a label has one, and nothing else"),
+        ({"kind": "sphere", "size": (0.1,), "text": "x"}, "the text 'x': a label has one, and nothing else"),
         ({"kind": "sphere", "size": (-1.0,)}, "above 0"),
         ({"kind": "sphere", "size": (math.nan,)}, "above 0"),
         ({"kind": "sphere", "size": (1.0,), "rgba": (0, 0, 2, 1)}, "within 0..1"),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import trimesh
 
-from lab.sim.frames import Body, Frame, Recording, Shape
+from lab.sim.frames import IDENTITY, Body, Frame, Recording, Shape
 from lab.view.meshcat import LiveView, replay_html
 
 if TYPE_CHECKING:
@@ -121,6 +121,23 @@ def test_a_new_scene_replaces_the_old_one(browser_page: "Page", recording: Recor
         view.show([Body("plate", (Shape("box", (1, 1, 1)),))])
         until(browser_page, "viewer.scene_tree.children.lab?.children.plate")
         assert browser_page.evaluate("Object.keys(viewer.scene_tree.children.lab.children)") == ["plate"]
+
+
+def test_a_label_is_as_high_as_it_says_and_a_page_of_one_picture_has_no_player(
+    browser_page: "Page", tmp_path: Path, until: Until
+) -> None:
+    label = Shape("label", (0.2,), rgba=BROWN, position=(0.1, 0.2, 0.3), text="column")
+    still = Recording((Body("axes", (label,)),), [Frame(0.0, {"axes": IDENTITY})])
+    browser_page.goto(replay_html(still, tmp_path / "still.html").as_uri())
+    until(browser_page, "viewer.scene_tree.children.lab?.children.axes")
+    sprite = "viewer.scene_tree.find(['lab', 'axes', '0', '<object>']).object"
+    wide, high = browser_page.evaluate(f"[{sprite}.scale.x, {sprite}.scale.y]")
+    assert (high, browser_page.evaluate(f"{sprite}.isSprite")) == (pytest.approx(0.2), True)
+    assert 2.0 < wide / high < 5.0
+    assert pose_of(browser_page, "axes", "0")[:3] == pytest.approx([0.1, 0.2, 0.3])
+    assert look_of(browser_page, "axes")["opacity"] == 0.5
+    assert browser_page.inner_text("#note") == ""
+    assert not browser_page.is_visible("#player")
 
 
 def test_the_replay_plays_from_disk_without_a_network(

@@ -36,6 +36,13 @@ def test_every_kind_of_shape_is_described(cube: Path) -> None:
     assert scene["bodies"][0]["shapes"][1]["rgba"] == [1, 0, 0, 0.5]
 
 
+def test_labels_of_one_text_share_it_and_others_do_not() -> None:
+    texts = [Shape("label", (0.1,), text=text) for text in ("x", "y", "x")]
+    scene = describe([Body("axes", tuple(texts))], Viewpoint())
+    assert scene["geometries"] == [{"kind": "label", "size": [0.1], "text": text} for text in ("x", "y")]
+    assert [shape["geometry"] for shape in scene["bodies"][0]["shapes"]] == [0, 1, 0]
+
+
 def test_bodies_share_geometry(cube: Path) -> None:
     shapes = (Shape("mesh", mesh=cube), Shape("box", (1, 1, 1)))
     scene = describe([Body(name, shapes) for name in "abc"], Viewpoint())

@@ -8,7 +8,6 @@ from lab.sim.frames import Body, Pose, Rgba, Shape, Vector
 
 STEP_S = 0.1  # [s] between two frames: nothing is simulated, the times only count up
 TRAIL = 48  # cells of the episode that stay marked
-GREEN: Rgba = (0.16, 0.62, 0.30, 0.5)
 RED: Rgba = (0.86, 0.16, 0.14, 0.6)
 FAINT: Rgba = (0.16, 0.38, 0.78, 0.35)
 

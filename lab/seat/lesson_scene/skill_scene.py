@@ -5,8 +5,7 @@ from math import hypot, radians
 
 import numpy as np
 
-from lab.seat.lesson_scene.camera_placement import camera_for, corners, vector
-from lab.seat.lesson_scene.episode_trail import GREEN, STEP_S, Changes, EpisodeTrail
+from lab.seat.lesson_scene.episode_trail import STEP_S, Changes, EpisodeTrail
 from lab.sim.blocked_cells import FINGERS_OFF_M
 from lab.sim.frames import Body, Frame, Rgba, Shape, Vector, Viewpoint
 from lab.sim.kinds import Spot
@@ -16,6 +15,8 @@ from lab.sim.world import World
 from lab.skills import Skill
 from lab.skills.skill import Bench
 from lab.tasks.task import Order, Task, part_name
+from lab.view.camera_placement import camera_for, corners, vector
+from lab.view.world_bodies import GREEN
 
 GHOST: Rgba = (0.80, 0.68, 0.48, 0.3)
 TRAIL_M, COLLISION_M = 0.004, 0.045  # [m] at least: the gripper must not hide them

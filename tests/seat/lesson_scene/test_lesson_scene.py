@@ -1,10 +1,9 @@
 """The live scene of a lesson: the robot is where the state has it, all of it is in the picture, frames fit the bodies."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from functools import cache
 from itertools import pairwise
-from math import radians, tan
 
 import numpy as np
 import pytest
@@ -14,11 +13,9 @@ from hypothesis import strategies as st
 from lab.learning.problem import Problem
 from lab.mdp import FloatArray, TabularMDP, grid
 from lab.seat.lesson_scene import LessonScene, SkillScene, WorldScene, lesson_scene_of
-from lab.seat.lesson_scene.camera_placement import camera_for
 from lab.seat.lesson_scene.episode_trail import TRAIL
-from lab.seat.lesson_scene.world_scene import MOST_OBSTACLES, WORLD_M
 from lab.sim import models
-from lab.sim.frames import Frame, Recording, Shape, Viewpoint
+from lab.sim.frames import Frame, Recording, Viewpoint
 from lab.sim.kinematics import TOOL, ToolPose, inverse
 from lab.sim.scene import GRASP_DEPTH
 from lab.skills.prepared_scene import prepare
@@ -27,6 +24,7 @@ from lab.tasks.grid_world import GridWorld, random_world
 from lab.tasks.task_file import load, load_world
 from lab.teaching.world_subject import WorldSubject
 from lab.view.scene_data import describe
+from lab.view.world_bodies import WORLD_M
 
 SKILLS = (
     "insert at toaster",
@@ -64,25 +62,15 @@ def world_scene(world: GridWorld) -> WorldScene:
     return made
 
 
+InPicture = Callable[[Viewpoint, FloatArray], bool]  # the fixture of tests/conftest.py
+
+
 def place(frame: Frame, name: str) -> FloatArray:
     return np.array(frame.poses[name][:3])
 
 
 def shown(frame: Frame) -> set[str]:
     return {name for name, visible in frame.visible.items() if visible}
-
-
-def in_picture(camera: Viewpoint, points: FloatArray) -> bool:
-    """Whether a page 1.2 times as wide as high, with 38 degrees from bottom to top, has all points (n, 3) in it."""
-    eye, target = np.array(camera.eye), np.array(camera.target)
-    ahead = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(ahead, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    off = points - eye
-    far = off @ ahead
-    up, aside = off @ np.cross(right, ahead) / far, off @ right / far
-    reach = tan(radians(19.0))
-    return bool(np.all(far > 0) and np.all(abs(up) <= reach) and np.all(abs(aside) <= 1.2 * reach))
 
 
 def free(mdp: TabularMDP) -> st.SearchStrategy[int]:
@@ -134,9 +122,9 @@ def test_an_action_moves_the_robot_by_a_cell_the_way_it_says(world: GridWorld, d
     assert moved == pytest.approx(way * WORLD_M / max(world.shape), abs=1e-9)
 
 
-@given(worlds, st.data())
+@given(world=worlds, data=st.data())
 def test_the_robot_is_in_the_world_and_in_the_picture_and_never_in_an_obstacle_unless_it_ran_into_it(
-    world: GridWorld, data: st.DataObject
+    in_picture: InPicture, world: GridWorld, data: st.DataObject
 ) -> None:
     mdp = world.mdp()
     state = data.draw(st.integers(0, mdp.n_states - 1))
@@ -191,48 +179,6 @@ def test_a_long_way_gives_up_its_oldest_marks() -> None:
         assert place(frames[TRAIL + 1], "trail 0") == pytest.approx(place(frames[TRAIL], "robot"))
 
 
-def boxes_of(shape: Shape) -> FloatArray:
-    """The middles (n, 3) of the boxes in a mesh file of boxes that do not touch."""
-    import trimesh
-
-    mesh = trimesh.load(shape.mesh, force="mesh")
-    assert isinstance(mesh, trimesh.Trimesh)
-    corners: FloatArray = np.asarray(mesh.triangles, dtype=np.float64).reshape(-1, 36, 3)
-    return np.asarray((corners.min(axis=1) + corners.max(axis=1)) / 2)
-
-
-def test_hundreds_of_obstacles_are_one_mesh_that_goes_with_the_scene() -> None:
-    world = random_world((60, 50), 0.3, 1)
-    with closing(world_scene(world)) as scene:
-        (body,) = (body for body in scene.bodies if body.name == "obstacles")
-        (shape,) = body.shapes
-        expected = scene.centres(world.obstacles)
-        found = boxes_of(shape)
-        assert len(found) == len(world.obstacles) == 900
-        assert found[:, :2] == pytest.approx(expected[:, :2], abs=1e-6)
-        assert len(scene.bodies) < 70
-        assert len(describe(scene.bodies, scene.camera)["geometries"]) < 20
-        assert shape.mesh is not None
-        assert shape.mesh.is_file()
-    assert not shape.mesh.exists()
-    scene.close()  # safe to call again
-
-
-def test_of_too_many_obstacles_in_a_room_those_near_the_shortest_ways_are_drawn() -> None:
-    world = random_world((20, 20, 20), 0.25, 3)
-    assert len(world.obstacles) > MOST_OBSTACLES[3]
-    ends = np.array([world.start, world.goal])
-    detours = np.abs(np.array(world.obstacles)[:, None] - ends).sum(axis=(1, 2))
-    with closing(world_scene(world)) as scene:
-        (body,) = (body for body in scene.bodies if body.name == "obstacles")
-        found = boxes_of(body.shapes[0])
-        size, middle = WORLD_M / 20, np.array([9.5, 9.5, -0.5])
-        cells = np.round(found / size + middle)
-        drawn = np.abs(cells[:, None] - ends).sum(axis=(1, 2))
-        assert len(found) == MOST_OBSTACLES[3]
-        assert sorted(drawn.tolist()) == sorted(detours.tolist())[: len(found)]
-
-
 @pytest.mark.parametrize("name", ["world-1", "world-2"])
 def test_the_shipped_worlds_have_a_scene_that_the_page_can_draw(name: str) -> None:
     world = load_world(name)
@@ -285,7 +231,7 @@ def test_frames_of_a_skill_fit_its_bodies(name: str, data: st.DataObject) -> Non
 
 
 @every_skill
-def test_all_places_of_the_tool_are_in_the_picture(name: str) -> None:
+def test_all_places_of_the_tool_are_in_the_picture(in_picture: InPicture, name: str) -> None:
     scene, skill, mdp = lesson(name)
     places = np.array([at(skill.pose(int(state))) for state in np.flatnonzero(~mdp.terminal | mdp.goal)])
     assert in_picture(scene.camera, places)
@@ -364,27 +310,3 @@ def test_a_problem_without_a_scene_has_no_scene() -> None:
     assert lesson_scene_of(None, Problem("FrozenLake-v1", "gym", mdp)) is None
     prepared = prepare(load("toast"), 2, 0, "place at butter_buffer")
     assert lesson_scene_of(prepared, Problem("FrozenLake-v1", "gym", mdp)) is None
-
-
-coordinate = st.floats(-3.0, 3.0)
-points = st.lists(st.tuples(coordinate, coordinate, coordinate), min_size=1, max_size=12)
-
-
-@given(points, st.floats(-3.0, 3.0), st.floats(0.1, 1.4))
-def test_a_camera_has_all_points_in_its_picture_and_looks_from_where_it_is_told(
-    seen: list[tuple[float, float, float]], azimuth: float, elevation: float
-) -> None:
-    cloud = np.array(seen) + np.array([[0.0, 0.0, 0.0], [0.1, 0.1, 0.1]])[:, None]
-    camera = camera_for(cloud.reshape(-1, 3), azimuth, elevation)
-    assert in_picture(camera, cloud.reshape(-1, 3))
-    x, y, z = np.subtract(camera.eye, camera.target)
-    assert np.arctan2(y, x) == pytest.approx(azimuth)
-    assert np.arctan2(z, np.hypot(x, y)) == pytest.approx(elevation)
-
-
-def test_a_nearer_camera_would_not_do() -> None:
-    """The unit square from straight in front fills the picture but for the margin: 0.5 / tan(19 degrees) away, and 6 %."""
-    square = np.array([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0], [-0.5, 0.0, 1.0], [0.5, 0.0, 1.0]])
-    camera = camera_for(square, radians(-90.0), 0.0)
-    assert camera.target == pytest.approx((0.0, 0.0, 0.5))
-    assert camera.eye == pytest.approx((0.0, -1.06 * 0.5 / tan(radians(19.0)), 0.5))

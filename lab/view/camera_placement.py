@@ -1,4 +1,4 @@
-"""Where the camera of a lesson's scene stands, so that all of it is in the picture."""
+"""Where a camera stands so that all of a scene is in its picture."""
 
 from itertools import product
 from math import cos, radians, sin, tan
