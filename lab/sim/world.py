@@ -75,6 +75,10 @@ class World:
             deterministicOverlappingPairs=1,
         )
 
+    def iterations(self, count: int) -> None:
+        """Solve contacts and constraints in so many iterations a step: a linkage of fingers needs more than bodies do."""
+        self._call("setPhysicsEngineParameter", numSolverIterations=count)
+
     def _call(self, name: str, *args: Any, **kwargs: Any) -> Any:
         return getattr(self._p, name)(*args, physicsClientId=self._client, **kwargs)
 
