@@ -58,7 +58,9 @@ ARMS: dict[str, ArmModel] = {
     "iiwa": ArmModel(
         "kuka_iiwa/model.urdf", "tool", _OWN_GRIPPER, kinematics.TOOL, 0.42, ALONG_X, ("lbr_iiwa_link_7", 0.045)
     ),
-    "xarm6": ArmModel("xarm/xarm6_with_gripper.urdf", "xarm_gripper_base_link", ("drive_joint",), 0.1765, 0.25, ALONG_Z),
+    "xarm6": ArmModel(
+        "xarm/xarm6_with_gripper.urdf", "xarm_gripper_base_link", ("drive_joint",), 0.1765, 0.25, ALONG_Z
+    ),
 }
 
 

@@ -82,6 +82,9 @@ def load_any(word: str, wanted: FileKind | None = None) -> Task | CellFile | Gri
         return from_words(word) if drawn else from_text(path)
     toml = _toml(path)
     kind = _kind(toml)
+    if kind == "cell" and wanted == "task" and (cell := CellFile.checked(toml)).in_physics is not None:
+        other = cell.in_physics
+        return load_any(str(path.parent / other) if is_path(other) else other, wanted)
     _check_wanted(word, kind, wanted)
     if kind == "cell":
         return CellFile.checked(toml)
