@@ -1,6 +1,6 @@
 """Place: set a part down on a plate, a buffer, a pallet or in a machine's groove, and let go."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -45,7 +45,7 @@ class Place(AroundPart):
             raise SkillFailed(f"nothing in the gripper to place at '{self.station}'")
         goal = release_pose(bench, body, spot)
         yield from self.down(bench, policy, goal)
-        yield from let_go(bench, goal, self.surveys.approach(self.station))
+        yield from let_go(bench, self.surveys.way_out(self.station, goal))
         if not bench.stands(body, spot, NEAR_M):
             raise SkillFailed(f"{body} does not stand on '{self.station}'")
 
@@ -59,10 +59,10 @@ def release_pose(bench: Bench, body: str, spot: Spot) -> ToolPose:
     return wanted.local(-along, 0.0, tool.z - hangs.z + RELEASE_ABOVE)
 
 
-def let_go(bench: Bench, at: ToolPose, approach: ToolPose) -> Iterator[None]:
-    """Open the fingers, rise straight up, and come to the station's approach."""
+def let_go(bench: Bench, way_out: Sequence[ToolPose]) -> Iterator[None]:
+    """Open the fingers, and go the way out of the station."""
     robot = bench.scene.robot
     yield from robot.release()
     bench.held = None
-    yield from robot.follow([ToolPose(at.x, at.y, approach.z, at.yaw)], slow=SLOW)
-    yield from robot.follow([approach], slow=SLOW)
+    for pose in way_out:
+        yield from robot.follow([pose], slow=SLOW)
