@@ -23,7 +23,9 @@ Array = NDArray[np.float64]
 
 ALONG_X = np.eye(3)  # a tool link's axes are the tool's own: x out of the gripper
 ALONG_Z = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])  # the tool's axes (columns) where z points out
-FARTHEST_TURN = pi - 0.15  # [rad] of a first joint that could go farther: behind it, neighbours would be a whole turn apart
+FARTHEST_TURN = (
+    pi - 0.15
+)  # [rad] of a first joint that could go farther: behind it, neighbours would be a whole turn apart
 MOST_BYTES = 5_000_000  # of a URDF
 OWN_NEAREST_M = 0.25  # [m] of a URDF file that says nothing
 
@@ -32,8 +34,9 @@ OWN_NEAREST_M = 0.25  # [m] of a URDF file that says nothing
 class ArmModel:
     """Where an arm that ships comes from: a URDF in a folder, its tool, and what no URDF says.
 
-    axes (3, 3): the tool's axes in its link; tip_m: the finger tips along x [m], with what physics adds to meshes; nearest_m: see `Arm`; flange: where the
-    lab's own gripper is mounted, as a link and how far out [m], of an arm that has none; closed_form: of the lab's own arm.
+    axes (3, 3): the tool's axes in its link; tip_m: the finger tips along x [m], with the margin that physics gives meshes;
+    nearest_m: see `Arm`; flange: where the lab's own gripper is mounted, as a link and how far out [m], of an arm that has
+    none; opening_m: see `RobotSettings`; closed_form: of the lab's own arm.
     """
 
     urdf: str
@@ -56,7 +59,9 @@ ARMS: dict[str, ArmModel] = {
     "iiwa": ArmModel(
         "kuka_iiwa/model.urdf", "tool", _OWN_GRIPPER, kinematics.TOOL, 0.42, ALONG_X, ("lbr_iiwa_link_7", 0.045)
     ),
-    "xarm6": ArmModel("xarm/xarm6_with_gripper.urdf", "xarm_gripper_base_link", ("drive_joint",), 0.1765, 0.25, ALONG_Z),
+    "xarm6": ArmModel(
+        "xarm/xarm6_with_gripper.urdf", "xarm_gripper_base_link", ("drive_joint",), 0.1765, 0.25, ALONG_Z
+    ),
 }
 
 
@@ -72,7 +77,9 @@ def arm_of(settings: RobotSettings, folder: Path = Path()) -> Arm:
             raise BadInput(f"robot.model '{settings.model}': no such file beside the task file, or over 5 MB")
         changed = path.stat().st_mtime_ns
     mount = (settings.opening_m, settings.base_up_m, settings.nearest_m)
-    return _made(settings.model, path, changed, (settings.tool_link or "", settings.fingers or (), settings.tip_m), mount)
+    return _made(
+        settings.model, path, changed, (settings.tool_link or "", settings.fingers or (), settings.tip_m), mount
+    )
 
 
 def arm_named(name: str) -> Arm:

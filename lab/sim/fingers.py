@@ -110,7 +110,10 @@ class _Ends:
     def _ranges(self) -> Array:
         """Where each joint is when the fingers are closed and when they are open (k, 2); what mimics another goes with it."""
         self.ranges = np.array(
-            [[floats(self.urdf.joints[name].find("limit"), end, "0")[0] for end in ("lower", "upper")] for name in self.names]
+            [
+                [floats(self.urdf.joints[name].find("limit"), end, "0")[0] for end in ("lower", "upper")]
+                for name in self.names
+            ]
         )
         ranges = self.ranges.copy()
         for k, name in enumerate(self.names):

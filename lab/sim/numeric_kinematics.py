@@ -23,7 +23,9 @@ _SEEDS, _TRIES = 96, 60
 _UPRIGHT = 1e-6
 
 Array = NDArray[np.float64]
-DOWN = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])  # the tool's axes (columns) at yaw 0: x down, y across
+DOWN = np.array(
+    [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
+)  # the tool's axes (columns) at yaw 0: x down, y across
 
 
 class NumericKinematics:

@@ -170,7 +170,9 @@ class Scene:
         robot = task.robot
         self.solid: list[str] = []  # what the arm must not touch
         world.box("table", (2.2, 2.9, 0.04), (0.35, 0.0, -0.02), TABLE_RGBA)
-        self.robot = Robot(world, arm_of(robot, task.folder), robot.speed_m_s, robot.acceleration_m_s2, robot.grip_force_n)
+        self.robot = Robot(
+            world, arm_of(robot, task.folder), robot.speed_m_s, robot.acceleration_m_s2, robot.grip_force_n
+        )
         for station in task.stations:
             self._build_station(station)
         for obstacle, place in zip(task.obstacles, layout.obstacles, strict=True):
