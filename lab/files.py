@@ -5,6 +5,7 @@ import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from secrets import token_hex
 from shutil import rmtree
@@ -23,6 +24,14 @@ def tasks_folder() -> Path:
 def assets_folder() -> Path:
     """The folder of the shipped URDFs and meshes; raises WorkFailed when the installation lost it."""
     return find("assets", PACKAGE)
+
+
+def pybullet_data_folder() -> Path:
+    """The folder of the models that PyBullet's package brings; raises WorkFailed when the installation lost it."""
+    spec = find_spec("pybullet_data")
+    for folder in (spec.submodule_search_locations or []) if spec else []:
+        return Path(folder)
+    raise WorkFailed("PyBullet's own models (its package 'pybullet_data') are not installed: reinstall 'pybullet'")
 
 
 def find(name: str, package: Path) -> Path:
@@ -115,3 +124,18 @@ def _locked(folder: Path, how: int = 0) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+def beside_or_asset(name: str, folder: Path, what: str) -> Path:
+    """A file that a task file names, in the task file's folder or below it, else in the lab's own assets.
+
+    BadInput, beginning with `what`, when it is in neither, or when the name leads out of the folder.
+    """
+    for place in (folder, assets_folder()):
+        found = (place / name).resolve()
+        if place.resolve() not in found.parents:
+            raise BadInput(f"{what} '{name}': a file's name may not lead out of the task file's folder")
+        if found.is_file():
+            return found
+    known = ", ".join(sorted(path.name for path in assets_folder().glob("*.urdf")))
+    raise BadInput(f"{what} '{name}': no such file in {folder}; of its own the lab has {known}")

@@ -51,4 +51,10 @@ TrustModule = Annotated[
         "--trust-module", help="A module that the session names (gym:MODULE:ID) may be imported: its code runs."
     ),
 ]
-Toasts = Annotated[int, typer.Option("--toasts", "-n", help="How many slices, 1 to 50.")]
+Toasts = Annotated[
+    int | None,
+    typer.Option("--toasts", "-n", help="How many parts of the task's first kind, 1 to 50; default: as its file says."),
+]
+Parts = Annotated[
+    str | None, typer.Option("--parts", help="How many parts of each kind, such as slice=2,cup=1; others: none.")
+]

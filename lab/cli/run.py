@@ -6,14 +6,14 @@ from typing import Annotated
 import typer
 
 from lab.cli.lessons import lesson_seat, teacher_of
-from lab.cli.options import AdvisorNames, Asked, Decide, Json, Port, Seed, ShowPage, Toasts, ToolboxPlace, Wait
+from lab.cli.options import AdvisorNames, Asked, Decide, Json, Parts, Port, Seed, ShowPage, Toasts, ToolboxPlace, Wait
 from lab.cli.output import end, show
-from lab.errors import counted
 
 
 def run(
     task: Annotated[str, typer.Argument(help="A task that ships, or a .toml file.")] = "toast",
-    toasts: Toasts = 3,
+    toasts: Toasts = None,
+    parts: Parts = None,
     advisor: AdvisorNames = None,
     asked: Asked = "together",
     decide: Decide = "trust-weighted",
@@ -48,9 +48,11 @@ def run(
     folder = out or Path(f"{loaded.name}-run")
     check_out(folder)
     names = tuple(advisor or DEFAULT_ADVISORS)
-    options = LessonOptions(task=task, advisors=names, asked=asked, decide=decide, seed=seed, toasts=toasts)
+    options = LessonOptions(
+        task=task, advisors=names, asked=asked, decide=decide, seed=seed, toasts=toasts, parts=parts
+    )
     options.advising()
-    prepared = prepare(loaded, toasts, seed)
+    prepared = prepare(loaded, loaded.ordered(toasts, parts), seed)
     with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
         teacher = teacher_of(toolbox, options, seat)
         if any(name in PEOPLE for name in options.advisors):
@@ -62,4 +64,4 @@ def run(
             raise KeyboardInterrupt(str(stopped) or "stopped by Ctrl-C; what was learned is kept") from None
     show(report.to_json(), as_json, run_summary)
     if not report.success:
-        end(report.outcome.failure or f"{len(report.outcome.delivered)} of {counted(toasts, 'toast')} delivered", 1)
+        end(report.outcome.failure or f"{len(report.outcome.delivered)} of {prepared.words} delivered", 1)

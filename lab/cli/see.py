@@ -67,10 +67,14 @@ def _shape(grid: str | None) -> tuple[int, int]:
 
 def _camera(task: str, pixels: int, wanted: tuple[int, int] | None) -> "View":
     """How a task's camera with so many pixels a side sees its grid; BadInput when a grid of another shape is wanted."""
-    from lab.skills.surveys import camera_view
+    from lab.skills.camera_grids import camera_view
     from lab.tasks.task_file import load
 
-    camera = camera_view(load(task), pixels)
+    loaded = load(task)
+    station = next((station.name for station in loaded.stations if station.grid is not None), None)
+    if station is None:
+        raise BadInput(f"task '{task}' (--task): no station of it is approached through the camera's grid")
+    camera = camera_view(loaded, station, pixels)
     if wanted is not None and wanted != camera.shape:
         own, other = (f"{shape[0]}x{shape[1]}" for shape in (camera.shape, wanted))
         raise BadInput(f"grid '{other}' (--grid): the grid of the task's camera is {own}; leave --grid away")

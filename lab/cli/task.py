@@ -70,7 +70,9 @@ def task_check(
     toasts: Annotated[
         int | None,
         typer.Option(
-            "--toasts", "-n", help="How many slices, 1 to 50; default: 3, if they fit. Of a cell: parts, 1 to 200."
+            "--toasts",
+            "-n",
+            help="How many parts of the first kind, 1 to 50. Of a cell: parts, 1 to 200. Default: as it says.",
         ),
     ] = None,
     plot: Annotated[

@@ -4,11 +4,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from lab.cli.options import Json, Seed, Toasts
+from lab.cli.options import Json, Parts, Seed, Toasts
 from lab.cli.output import end, show, write, write_json
 from lab.errors import BadInput, counted
 
@@ -16,6 +16,14 @@ if TYPE_CHECKING:
     from lab.sim.frames import Recording
 
 Tell = Callable[[str, str], None]
+
+
+class Asked(NamedTuple):
+    """What of a task is shown: --toasts, --parts and --seed."""
+
+    toasts: int | None
+    parts: str | None
+    seed: int
 
 
 def view(
@@ -26,7 +34,8 @@ def view(
             "or the folder of a run (its replay is served)."
         ),
     ],
-    toasts: Toasts = 3,
+    toasts: Toasts = None,
+    parts: Parts = None,
     port: Annotated[int, typer.Option("--port", min=0, max=65535, help="0: any free one.")] = 0,
     out: Annotated[
         Path | None, typer.Option("--out", help="An .html file to write instead: the page, for any browser, offline.")
@@ -36,7 +45,7 @@ def view(
 ) -> None:
     """Look at a task's scene, at a grid world in 3D or at a run's replay, on a page on 127.0.0.1, until Ctrl-C."""
     if out is not None:
-        show(write_page(what, toasts, seed, out), as_json, lambda document: document["file"])
+        show(write_page(what, Asked(toasts, parts, seed), out), as_json, lambda document: document["file"])
         return
 
     def tell(url: str, hint: str) -> None:
@@ -46,12 +55,12 @@ def view(
             write(f"{url}\nfrom another machine: {hint}\nCtrl-C ends it\n")
 
     try:
-        serve(what, toasts, seed, port, tell)
+        serve(what, Asked(toasts, parts, seed), port, tell)
     except KeyboardInterrupt:
         end("stopped by Ctrl-C", 130)
 
 
-def serve(what: str, toasts: int, seed: int, port: int, tell: Tell) -> None:
+def serve(what: str, asked: Asked, port: int, tell: Tell) -> None:
     """Serve a run's replay, a task's scene or a world on 127.0.0.1 until interrupted; `tell(url, hint)` once it is there."""
     from lab.view.meshcat import LiveView
 
@@ -64,14 +73,14 @@ def serve(what: str, toasts: int, seed: int, port: int, tell: Tell) -> None:
         with LiveView(port, replay=replay) as page:
             tell(page.url, page.hint)
             _wait()
-    with seen(what, toasts, seed) as (title, recording), LiveView(port, title=title) as live:
+    with seen(what, asked) as (title, recording), LiveView(port, title=title) as live:
         live.show(recording.bodies, recording.camera)
         live.update(recording.frames[-1])
         tell(live.url, live.hint)
         _wait()
 
 
-def write_page(what: str, toasts: int, seed: int, out: Path) -> dict[str, str]:
+def write_page(what: str, asked: Asked, out: Path) -> dict[str, str]:
     """Write a task's scene or a world as one HTML file; the document of `lab view --out --json`."""
     from lab.view.meshcat import replay_html
 
@@ -79,24 +88,23 @@ def write_page(what: str, toasts: int, seed: int, out: Path) -> dict[str, str]:
         raise BadInput(f"'{what}' is the folder of a run: its replay.html is such a page already (--out)")
     if out.suffix != ".html":
         raise BadInput(f"page '{out}' (--out): its name must end in .html")
-    with seen(what, toasts, seed) as (title, recording):
+    with seen(what, asked) as (title, recording):
         return {"file": str(replay_html(recording, out, title=title))}
 
 
 @contextmanager
-def seen(what: str, toasts: int, seed: int) -> "Iterator[tuple[str, Recording]]":
+def seen(what: str, asked: Asked) -> "Iterator[tuple[str, Recording]]":
     """What a page calls a task or a world, and one frame of it; a large world's mesh is there as long as the block lasts."""
-    import numpy as np
-
     from lab.mdp import shortest_way
     from lab.production.recorder import show_scene
-    from lab.sim.scene import check_scene, draw_layout
+    from lab.sim.scene_check import check_scene
+    from lab.skills.prepared_scene import lay_out
     from lab.tasks.grid_world import GridWorld
-    from lab.tasks.task_file import Task, check_number, load_any
+    from lab.tasks.task import Task
+    from lab.tasks.task_file import load_any
     from lab.view.still import Still
     from lab.view.world_bodies import WorldBodies
 
-    check_number(toasts)
     found = load_any(what)
     if isinstance(found, GridWorld):
         mdp = found.mdp()
@@ -111,9 +119,10 @@ def seen(what: str, toasts: int, seed: int) -> "Iterator[tuple[str, Recording]]"
         raise BadInput(
             f"{what}: it is a cell, which has no scene: look at its order with lab sequence {what} --gantt x.svg"
         )
+    order = found.ordered(asked.toasts, asked.parts)
     check_scene(found)
     still = Still()
-    show_scene(found, toasts, draw_layout(found, toasts, np.random.default_rng([seed, 1])), still)
+    show_scene(found, order, lay_out(found, order, asked.seed), still)
     yield found.title or found.name, still.recording
 
 

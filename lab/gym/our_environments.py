@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from lab.errors import BadInput
 from lab.mdp import FloatArray, TabularMDP
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
@@ -100,15 +101,19 @@ class InsertEnv(TableEnv):
     """The camera's grid around a task's toaster, surveyed in simulation in the scene that a seed lays out. Raises BadInput."""
 
     def __init__(self, task: str = "toast", layout_seed: int = 0, render_mode: str | None = None):
-        from lab.sim.scene import draw_layout, is_toaster
         from lab.skills.insert import Insert
-        from lab.skills.surveys import Surveys
+        from lab.skills.prepared_scene import prepare
+        from lab.skills.skillset import SkillSet
+        from lab.teaching.skill_subject import TAUGHT_WITH
 
         found = load(task)
-        station = next(stage.station for stage in found.route if is_toaster(found.station(stage.station)))
-        slices = min(2, *(found.station(stage.station).capacity for stage in (found.route[0], found.route[-1])))
-        layout = draw_layout(found, slices, np.random.default_rng([layout_seed, 1]))  # as for a lesson of this seed
-        problem = Insert(station).setup(Surveys(found, layout))
+        order = found.fitting(TAUGHT_WITH)
+        name = next(
+            (name for name, skill in SkillSet.of(found, order).skills.items() if skill.subtask == Insert.subtask), None
+        )
+        if name is None:
+            raise BadInput(f"task '{found.name}': no station is approached through the camera's grid")
+        problem = prepare(found, order, layout_seed, name).problems[name]  # as for a lesson of this seed
         super().__init__(problem.mdp, found.subtask(Insert.subtask).learner.max_steps, render_mode)
 
 

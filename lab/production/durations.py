@@ -3,9 +3,10 @@
 import hashlib
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import packages_distributions, version
 from math import isfinite
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,48 +16,49 @@ from lab.files import assets_folder
 from lab.learning.sources import sources
 from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.routes import NeededMoves
-from lab.sim.scene import Layout
+from lab.sim.places import Layout
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared
-from lab.skills.skill import TRIED_WITH, Status
-from lab.skills.skillset import route, stations
-from lab.tasks.task_file import Task
+from lab.skills.skill import Status
+from lab.skills.skillset import Carried, Pair, SkillSet, products, stations
+from lab.tasks.task import Order, Task
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
 
 RECORDS = "durations"  # the kind of record in the toolbox
 LONGEST_S = 86_400.0  # of a move or a process
 MEASURED_BY = (__name__,)  # the modules that carry moves out, with all that they import
+MODELS = (".urdf", ".obj", ".stl")
 DECIDED_BY_RESULT = ("lab.sequencing", "lab.learning", "lab.advice", "lab.view")  # moves and policies hold it
 
-Pair = tuple[str, str]
+Way = Pair | Carried
 
 
 class TimedMove(NamedTuple):
-    """How long the robot took in a run [s] from one station to another, with a part or without."""
+    """How long the robot took in a run [s] from one station to another, with something in the gripper (`Carried`) or without."""
 
-    pair: Pair
-    loaded: bool
+    way: Way
     seconds: float
 
 
 @dataclass(frozen=True)
 class Durations:
-    """Measured times [s]: the robot's moves by (origin, target), empty and loaded; what each machine takes."""
+    """Measured times [s]: the robot's moves, empty and with what it carries; what machines take, and the robot's services there."""
 
     empty_s: Mapping[Pair, float]
-    loaded_s: Mapping[Pair, float]
+    loaded_s: Mapping[Carried, float]
     process_s: Mapping[str, float]
+    service_s: Mapping[Pair, float] = field(default_factory=dict)
     sim_s: float = 0.0
 
     def to_json(self) -> dict[str, object]:
-        """Plain dicts: 'origin > target' -> seconds."""
+        """Plain dicts: 'origin > target' or 'origin > target with kind' -> seconds."""
         return {
             "empty_s": {_word(pair): seconds for pair, seconds in self.empty_s.items()},
-            "loaded_s": {_word(pair): seconds for pair, seconds in self.loaded_s.items()},
+            "loaded_s": {_word(way): seconds for way, seconds in self.loaded_s.items()},
             "process_s": dict(self.process_s),
+            "service_s": {_service(own): seconds for own, seconds in self.service_s.items()},
         }
 
     def after(self, timed: Sequence[TimedMove]) -> "Durations":
@@ -64,34 +66,46 @@ class Durations:
 
         Source: thesis, section 10.2.1 (i).
         """
-        times: dict[tuple[Pair, bool], list[float]] = {}
-        for pair, loaded, seconds in timed:
-            times.setdefault((pair, loaded), []).append(seconds)
-        means = {move: sum(all_s) / len(all_s) for move, all_s in times.items()}
+        times: dict[Way, list[float]] = {}
+        for way, seconds in timed:
+            times.setdefault(way, []).append(seconds)
+        means = {way: sum(all_s) / len(all_s) for way, all_s in times.items()}
         return replace(
             self,
-            empty_s={pair: means.get((pair, False), seconds) for pair, seconds in self.empty_s.items()},
-            loaded_s={pair: means.get((pair, True), seconds) for pair, seconds in self.loaded_s.items()},
+            empty_s={pair: means.get(pair, seconds) for pair, seconds in self.empty_s.items()},
+            loaded_s={way: means.get(way, seconds) for way, seconds in self.loaded_s.items()},
         )
 
     @classmethod
-    def from_json(cls, record: Mapping[str, Any], moves: NeededMoves, processes: Sequence[str]) -> "Durations":
-        """What `to_json` wrote of these moves and of the stations with a process to learn.
+    def from_json(cls, record: Mapping[str, Any], skillset: SkillSet) -> "Durations":
+        """What `to_json` wrote of the moves, processes and services of these skills.
 
         BadInput for a move or station too many or too few, and for what is no time [s].
         """
-        empty, loaded = ({_word(pair): pair for pair in pairs} for pairs in (moves.empty, moves.loaded))
-        wanted = {"empty_s": set(empty), "loaded_s": set(loaded), "process_s": set(processes)}
+        empty, loaded = {_word(pair): pair for pair in skillset.travels}, {_word(way): way for way in skillset.legs}
+        services = {_service(own): own for own, skills in skillset.services.items() if skills}
+        processes = [station for station, skills in skillset.processes.items() if skills]
+        wanted = {
+            "empty_s": set(empty),
+            "loaded_s": set(loaded),
+            "process_s": set(processes),
+            "service_s": set(services),
+        }
         tables = {name: _times(record, name, names) for name, names in wanted.items()}
         return cls(
             {empty[word]: seconds for word, seconds in tables["empty_s"].items()},
             {loaded[word]: seconds for word, seconds in tables["loaded_s"].items()},
             tables["process_s"],
+            {services[word]: seconds for word, seconds in tables["service_s"].items()},
         )
 
 
-def _word(pair: Pair) -> str:
-    return " > ".join(pair)
+def _word(way: Way) -> str:
+    return f"{way[0]} > {way[1]}" + (f" with {way.kind}" if isinstance(way, Carried) else "")
+
+
+def _service(own: Pair) -> str:
+    return f"{own[0]} at {own[1]}"
 
 
 def _times(record: Mapping[str, Any], table: str, wanted: set[str]) -> dict[str, float]:
@@ -112,72 +126,88 @@ def _times(record: Mapping[str, Any], table: str, wanted: set[str]) -> dict[str,
 def measure(prepared: Prepared, on_move: Callable[[str, float], None] | None = None) -> Durations:
     """Carry every needed move out once in simulation and time it [s]; WorkFailed when one does not succeed."""
     tell, skillset = on_move or (lambda name, seconds: None), prepared.skillset
-    loaded: dict[Pair, float] = {}
+    loaded: dict[Carried, float] = {}
     process: dict[str, float] = {}
     steps = 0
-    for (origin, target), leg in skillset.legs.items():
+    for way, leg in skillset.legs.items():
         with World() as world:
-            floor = Floor(world, skillset, prepared.surveys.layout, 0)
+            floor = Floor(world, skillset, prepared.surveys.layout)
+            for skill in leg:
+                skill.furnish(floor.bench)
             leg[0].begin(floor.bench)
-            loaded[origin, target] = _timed(floor, leg)
-            tell(f"{origin} > {target}, loaded", loaded[origin, target])
-            for skill in () if target in process else skillset.processes[target]:
-                process[target] = _timed(floor, [skill])
-                tell(skill.name, process[target])
+            part = leg[0].part
+            loaded[way] = _timed(floor, leg, part)
+            tell(f"{_word(way)}, loaded", loaded[way])
+            for skill in () if way.target in process else skillset.processes[way.target]:
+                process[way.target] = _timed(floor, [skill], part)
+                tell(skill.name, process[way.target])
             steps += world.steps
-    empty, more = _measure_empty(prepared, tell)
-    return Durations(empty, loaded, process, (steps + more) * TIME_STEP)
+    empty, service, more = _measure_empty(prepared, tell)
+    return Durations(empty, loaded, process, service, (steps + more) * TIME_STEP)
 
 
-def _measure_empty(prepared: Prepared, tell: Callable[[str, float], None]) -> tuple[dict[Pair, float], int]:
-    """The times [s] of all ways of the empty gripper, one after the other in one scene, and the physics steps that took."""
+def _measure_empty(
+    prepared: Prepared, tell: Callable[[str, float], None]
+) -> tuple[dict[Pair, float], dict[Pair, float], int]:
+    """The times [s] of all ways of the empty gripper and of all services, one after the other, and the physics steps that took."""
     empty: dict[Pair, float] = {}
+    service: dict[Pair, float] = {}
+    skillset = prepared.skillset
     with World() as world:
-        floor = Floor(world, prepared.skillset, prepared.surveys.layout, 0)
-        for (origin, target), way in prepared.skillset.travels.items():
+        floor = Floor(world, skillset, prepared.surveys.layout)
+        for pair, way in skillset.travels.items():
             way[0].begin(floor.bench)
-            empty[origin, target] = _timed(floor, way)
-            tell(f"{origin} > {target}, empty", empty[origin, target])
-        return empty, world.steps
+            empty[pair] = _timed(floor, way)
+            tell(f"{_word(pair)}, empty", empty[pair])
+        for own, skills in skillset.services.items():
+            if skills:
+                skills[0].begin(floor.bench)
+                service[own] = _timed(floor, skills)
+                tell(_service(own), service[own])
+        return empty, service, world.steps
 
 
-def _timed(floor: Floor, skills: Sequence[Skill]) -> float:
-    """How long skills take one after the other with the slice that they are tried with [s]; WorkFailed."""
+def _timed(floor: Floor, skills: Sequence[Skill], part: str = "") -> float:
+    """How long skills take one after the other with the part that they are tried with [s]; WorkFailed."""
     start = floor.now_s
     for skill in skills:
-        if floor.run(skill.aim(TRIED_WITH)) is not Status.SUCCESS:
+        if floor.run(skill.aim(part)) is not Status.SUCCESS:
             raise WorkFailed(f"measuring '{skill.name}': {skill.reason}")
     return floor.now_s - start
 
 
-def cell_of(task: Task, durations: Durations, toasts: int) -> Cell:
-    """The sequencing problem that the measured durations make."""
+def cell_of(task: Task, durations: Durations, order: Order) -> Cell:
+    """The sequencing problem that the measured durations make; kinds that share a way share its mean time."""
     places = stations(task, durations.process_s)
     names = [place.name for place in places]
+    wanted = [part for part in task.made if part.name in order]
+    shared: dict[Pair, list[float]] = {}
+    for way, seconds in durations.loaded_s.items():
+        shared.setdefault(way[:2], []).append(seconds)
     tables = []
-    for times in (durations.empty_s, durations.loaded_s):
+    for times in (durations.empty_s, {pair: sum(all_s) / len(all_s) for pair, all_s in shared.items()}):
         table = np.full((len(names), len(names)), np.nan)
         for (origin, target), seconds in times.items():
             table[names.index(origin), names.index(target)] = seconds
         tables.append(table)
-    return Cell.alike(places, route(task), tables[0], tables[1], task.robot.start, toasts)
+    return Cell(places, products(wanted, durations.service_s), order, tables[0], tables[1], task.robot.start)
 
 
-def kept_durations(toolbox: Toolbox, key: str, task: Task, moves: NeededMoves) -> Durations | None:
+def kept_durations(toolbox: Toolbox, key: str, skillset: SkillSet) -> Durations | None:
     """The durations kept under a key, None when there are none; BadInput for a record that does not hold them."""
     record = toolbox.load_record(RECORDS, key)
     if record is None:
         return None
     try:
-        return Durations.from_json(record, moves, [s.name for s in task.stations if s.process is not None])
+        return Durations.from_json(record, skillset)
     except BadInput as error:
         raise BadInput(f"record '{key}' in toolbox {toolbox.address}: {error}") from None
 
 
 def durations_key(
-    task: Task, layout: Layout, moves: NeededMoves, policies: Mapping[str, Policy], modules: Sequence[str] = MEASURED_BY
+    task: Task, layout: Layout, skillset: SkillSet, policies: Mapping[str, Policy], modules: Sequence[str] = MEASURED_BY
 ) -> str:
-    """A hash of all that the durations depend on: task, layout, moves, policies, assets, source and libraries.
+    """A hash of all that the durations depend on: task and its files, layout, moves, policies, assets, source and libraries.
 
     `modules` are the ones that measure. WorkFailed when a source or a library's version cannot be found.
     """
@@ -185,13 +215,19 @@ def durations_key(
     decides = {
         "task": task.model_dump(mode="json", exclude={"name", "title", "sequencing", "subtasks"}),
         "obstacles": layout.obstacles,
-        "moves": asdict(moves),
+        "moves": [asdict(skillset.moves), [*skillset.legs]],
         "policies": {name: [policy.signature, _hash(policy.q.tobytes())] for name, policy in policies.items()},
-        "assets": {path.name: _hash(path.read_bytes()) for path in assets_folder().iterdir() if path.is_file()},
+        "assets": {path.name: _hash(path.read_bytes()) for path in files_of(task)},
         "source": code.texts,
         "libraries": _versions(code.libraries),
     }
     return _hash(json.dumps(decides, sort_keys=True).encode())[:24]
+
+
+def files_of(task: Task) -> list[Path]:
+    """The lab's assets, and the meshes and URDFs beside the task file."""
+    own = [path for path in task.folder.iterdir() if path.suffix.lower() in MODELS]
+    return sorted({path for path in (*assets_folder().iterdir(), *own) if path.is_file()})
 
 
 def _hash(content: bytes) -> str:

@@ -9,13 +9,14 @@ from lab.errors import BadInput, LabError, counted, unknown
 from lab.mdp import TabularMDP, greedy_path
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared, prepare
+from lab.skills.skill import NOT_OFF
 from lab.skills.skillset import SkillSet
 from lab.skills.trial import carry_out
-from lab.tasks.task_file import Task, fitting, load
+from lab.tasks.task import Task
+from lab.tasks.task_file import load
 from lab.toolbox.policy import Policy
 
-TOASTS = 3  # slices for which the scene has room, or as many as it holds: as `lab run` has it
-NOT_OFF = (0.0, 0.0, 0.0)
+PARTS = 3  # of the first kind for which the scene has room, or as many as it holds
 Told = Callable[[int, int], None]  # hears how many scenes are done, of how many
 Why = Literal["scene", "table", "physics"]
 
@@ -97,9 +98,9 @@ def evaluate(policy: Policy, task: Task, skill: str, scenes: int, seed: int, tol
 
 
 def in_scene(policy: Policy, task: Task, name: str, seed: int) -> SceneResult:
-    """One scene, drawn with this seed; where slices are taken up first, the slice stands off its spot as drawn."""
+    """One scene, drawn with this seed; where parts are taken up first, the part stands off its spot as drawn."""
     try:
-        prepared = prepare(task, fitting(task, TOASTS), seed, name)
+        prepared = prepare(task, task.fitting(PARTS), seed, name)
     except BadInput as error:
         return SceneResult(seed, "scene", str(error), 0.0)
     skill, mdp = prepared.skillset.skills[name], prepared.problems[name].mdp
@@ -142,9 +143,10 @@ def _astray(policy: Policy, mdp: TabularMDP, start: int) -> str:
 
 
 def _off(prepared: Prepared, skill: Skill) -> tuple[float, float, float]:
-    """How far off its spot a slice stands where the skill takes it up: elsewhere than at first the robot has set it down."""
-    slices, first = prepared.layout.slices, prepared.task.route[0].station
-    return slices[0] if slices and skill.station == first and not skill.carries else NOT_OFF
+    """How far off its spot a part stands where the skill takes it up: elsewhere than at first the robot has set it down."""
+    stand = zip(prepared.order, prepared.layout.parts, strict=True)
+    first = (off for kind, off in stand if prepared.task.starts(kind) == skill.station)
+    return NOT_OFF if skill.carries else next(first, NOT_OFF)
 
 
 def task_of(policy: Policy, file: str | None) -> Task:
@@ -165,7 +167,7 @@ def skill_of(policy: Policy, task: Task, name: str | None) -> str:
     By its name, or the one that the policy's name begins with (the longest), or the only one of its sub-task. BadInput
     lists what there is.
     """
-    skills = SkillSet.of(task, fitting(task, TOASTS)).skills
+    skills = SkillSet.of(task, task.fitting(PARTS)).skills
     own = [known for known, skill in skills.items() if skill.subtask == policy.subtask]
     if name is not None:
         if name not in skills:

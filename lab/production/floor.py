@@ -1,14 +1,19 @@
 """A scene with the robot and the machines at work in it: who is where, at one clock."""
 
 from collections.abc import Callable
+from math import ceil
 
-from lab.production.recorder import Recorder, Viewer
+from lab.production.recorder import Recorder, Viewer, extras_of
 from lab.sim.kinematics import ToolPose
-from lab.sim.scene import Layout, Scene
+from lab.sim.places import Layout
+from lab.sim.scene import Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
 from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, Status
 from lab.skills.skillset import SkillSet
+from lab.tasks.task import Order
+
+AT_REST_STEPS = 60  # physics steps at the end of a wait that are simulated in any case
 
 
 class Floor:
@@ -19,21 +24,22 @@ class Floor:
         world: World,
         skillset: SkillSet,
         layout: Layout,
-        toasts: int,
+        order: Order = (),
         *,
         film: bool = False,
         viewer: Viewer | None = None,
     ) -> None:
         """Build the scene and let it settle; `film` keeps frames, `viewer` sees them live."""
         self.world, self.skillset = world, skillset
-        self.scene = Scene(world, skillset.task, toasts, layout)
+        self.scene = Scene(world, skillset.task, order, layout)
         self.bench = Bench(self.scene)
         self.machines: dict[str, Skill] = {}
         self.on_tick: Callable[[], None] | None = None
         for _ in range(SETTLE_STEPS):
             world.step()
-        self.recorder = Recorder(world, toasts, viewer) if film or viewer else None
+        self.recorder = Recorder(world, extras_of(self.scene, skillset), viewer) if film or viewer else None
         self._zero = world.steps
+        self.skipped_s = 0.0
 
     @property
     def now_s(self) -> float:
@@ -53,6 +59,14 @@ class Floor:
             self.on_tick()
         if self.recorder is not None:
             self.recorder.step()
+
+    def wait(self, until_s: float) -> None:
+        """One physics step, or, when no machine's head moves, all of the time until then: nothing happens meanwhile."""
+        steps = ceil((until_s - self.now_s) / TIME_STEP) - AT_REST_STEPS
+        if steps > 0 and not any(machine.status is Status.RUNNING for machine in self.machines.values()):
+            self.skipped_s += steps * TIME_STEP
+            self.world.pass_time(steps)
+        self.tick()
 
     def start(self, skill: Skill) -> None:
         """Begin to carry a skill out with its policy."""

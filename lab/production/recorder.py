@@ -1,17 +1,20 @@
 """What a run looked like: frames of the world, and what a viewer shows beside the bodies, such as toasted sides."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from lab.sim import models
-from lab.sim.frames import Body, Frame, Recording, Shape
-from lab.sim.scene import Layout, Scene
+from lab.sim.frames import Body, Frame, Recording, Rgba, Shape
+from lab.sim.kinds import Kind
+from lab.sim.places import Layout
+from lab.sim.scene import Scene
 from lab.sim.world import TIME_STEP, World
-from lab.skills import SKILLS
-from lab.tasks.task_file import Task
+from lab.skills.skillset import SkillSet
+from lab.tasks.task import Order, Task
 
 FRAME_EVERY = 24  # physics steps: ten frames a simulated second
-TOASTED = (0.70, 0.42, 0.16, 1.0)
+RIM_M, PROUD_M = 0.022, 0.0016  # [m] that the finish of a flat part leaves free around it, and is thicker than it
+LARGER = 1.01  # than another part is its finish
 
 
 class Viewer(Protocol):
@@ -26,17 +29,19 @@ class Viewer(Protocol):
 
 @dataclass
 class Recorder:
-    """Takes a frame every FRAME_EVERY steps; a viewer gets each at once. Slices change their looks as they are told."""
+    """Takes a frame every FRAME_EVERY steps; a viewer gets each at once. Parts change their looks as they are told.
+
+    extras: by the part that carries it, what may come to be seen on it.
+    """
 
     world: World
-    slices: int
+    extras: Mapping[str, tuple[Body, ...]] = field(default_factory=dict)
     viewer: Viewer | None = None
-    _shown: dict[str, int] = field(default_factory=dict)  # extra body -> the slice that carries it
+    _shown: dict[str, str] = field(default_factory=dict)  # extra body -> the part that carries it
 
     def __post_init__(self) -> None:
-        extras = [(body, number) for number in range(1, self.slices + 1) for body in _extras(number)]
-        self._carrier = {body.name: number for body, number in extras}
-        self.bodies = (*self.world.bodies(), *(body for body, _ in extras))
+        self._carrier = {body.name: part for part, bodies in self.extras.items() for body in bodies}
+        self.bodies = (*self.world.bodies(), *(body for bodies in self.extras.values() for body in bodies))
         self.recording = Recording(self.bodies)
         self._start = self.world.steps
         self._pending = dict.fromkeys(self._carrier, False)
@@ -52,35 +57,59 @@ class Recorder:
         """Take a frame now."""
         frame = self.world.frame()
         poses = dict(frame.poses)
-        for name, number in self._shown.items():
-            poses[name] = poses[f"slice {number}"]
+        for name, part in self._shown.items():
+            poses[name] = poses[part]
         pending, self._pending = self._pending, {}
         made = Frame((self.world.steps - self._start) * TIME_STEP, poses, visible=pending)
         self.recording.frames.append(made)
         if self.viewer is not None:
             self.viewer.update(made)
 
-    def toast(self, number: int) -> None:
-        """From now on slice `number` is seen toasted."""
-        self.show(f"toasted {number}")
-
     def show(self, name: str) -> None:
-        """From now on this extra body is seen on its slice."""
+        """From now on this extra body is seen on its part."""
         if name not in self._shown:
             self._shown[name] = self._carrier[name]
             self._pending[name] = True
 
 
-def show_scene(task: Task, toasts: int, layout: Layout, viewer: Viewer) -> None:
+def show_scene(task: Task, order: Order, layout: Layout, viewer: Viewer) -> None:
     """Show a viewer the scene before anything has happened in it."""
     with World() as world:
-        Scene(world, task, toasts, layout)
-        Recorder(world, toasts, viewer).take()
+        Scene(world, task, order, layout)
+        Recorder(world, viewer=viewer).take()
 
 
-def _extras(number: int) -> list[Body]:
-    """What may come to be seen on a slice: both sides toasted, and what skills make."""
-    width, thick, height = models.SLICE
-    toasted = Shape("box", (width - 0.022, thick + 0.0016, height - 0.022), None, TOASTED)
-    made = (body for kind in SKILLS.values() for body in kind.on_slice(number))
-    return [Body(f"toasted {number}", (toasted,)), *made]
+def extras_of(scene: Scene, skillset: SkillSet) -> dict[str, tuple[Body, ...]]:
+    """What may come to be seen on each part of a scene: what machines leave on it, by their processes or their finish."""
+    found: dict[str, tuple[Body, ...]] = {}
+    for name, kind in scene.kind_of.items():
+        bodies: list[Body] = []
+        for station in (scene.task.station(place) for place in kind.part.places):
+            if station.finish is not None:
+                bodies.append(finish_on(name, kind, station.name, (*station.finish, 1.0)))
+            for skill in skillset.processes[station.name]:
+                bodies += skill.on_part(name, kind)
+        if bodies:
+            found[name] = tuple(bodies)
+    return found
+
+
+def finish_name(name: str, station: str) -> str:
+    """What the finish of a part is called that a machine has left on it."""
+    return f"done {name} at {station}"
+
+
+def finish_on(name: str, kind: Kind, station: str, rgba: Rgba) -> Body:
+    """A part's finish: both sides of a flat part within its rim, all of another."""
+    fields = kind.part
+    if fields.shape == "box" and fields.size_m is not None and min(fields.size_m) < RIM_M:
+        size = tuple(edge + PROUD_M if edge < RIM_M else edge - RIM_M for edge in fields.size_m)
+        return Body(finish_name(name, station), (Shape("box", size, None, rgba),))
+    shapes = tuple(
+        Shape(look.kind, _larger(look), look.mesh, rgba, look.position, look.quaternion) for look in kind.shape.looks
+    )
+    return Body(finish_name(name, station), shapes)
+
+
+def _larger(look: Shape) -> tuple[float, ...]:
+    return tuple(LARGER * size for size in (look.size or (1.0, 1.0, 1.0)))

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lab.errors import WorkFailed, counted
+from lab.errors import WorkFailed
 from lab.files import draft
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
@@ -59,8 +59,8 @@ class Report:
 
     @property
     def success(self) -> bool:
-        """Whether every toast was delivered."""
-        return self.outcome.failure is None and len(self.outcome.delivered) == self.prepared.toasts
+        """Whether every part was delivered."""
+        return self.outcome.failure is None and len(self.outcome.delivered) == len(self.prepared.order)
 
     @property
     def gap(self) -> float:
@@ -73,7 +73,8 @@ class Report:
         return {
             "task": prepared.task.name,
             "seed": prepared.seed,
-            "toasts": prepared.toasts,
+            "toasts": len(prepared.order),
+            "parts": {kind: prepared.order.count(kind) for kind in dict.fromkeys(prepared.order)},
             "success": self.success,
             "delivered": len(outcome.delivered),
             "dropped": len(outcome.dropped),
@@ -88,7 +89,8 @@ class Report:
             "optimality_gap": self.gap,
             "optimum_proven": self.proven.proven,
             "camera_deviation_m": max(outcome.camera_deviations_m, default=None),
-            "sim_s": outcome.sim_s + self.taught.durations.sim_s,
+            "sim_s": outcome.sim_s - outcome.skipped_s + self.taught.durations.sim_s,
+            "skipped_s": outcome.skipped_s,
             "wall_s": self.wall_s,
             "files": self.files,
         }
@@ -169,7 +171,7 @@ def _draw_all(report: Report, folder: Path) -> None:
             taught.lessons[skill.name].policy.q, skill.problem.mdp, photo.picture, photo.seen, paths["value_map"]
         )
         write_picture(paths["overhead"], photo.picture)
-    title = f"{prepared.task.title or prepared.task.name}: {counted(prepared.toasts, 'toast')}"
+    title = f"{prepared.task.title or prepared.task.name}: {prepared.words}"
     replay_html(report.recording, paths["replay"], title=title)
     _write_json(paths["sequence"], _sequence_document(report, predicted))
     report.wall_s = time.perf_counter() - report.began_s

@@ -40,7 +40,7 @@ def teach_all(prepared: Prepared, teacher: Teacher) -> Taught:
         lessons[name] = lesson
         teacher.tell(SkillReady(name, lesson))
     durations, key = _durations(prepared, teacher)
-    return Taught(lessons, durations, cell_of(task, durations, prepared.toasts), key)
+    return Taught(lessons, durations, cell_of(task, durations, prepared.order), key)
 
 
 def _durations(prepared: Prepared, teacher: Teacher) -> tuple[Durations, str]:
@@ -50,14 +50,14 @@ def _durations(prepared: Prepared, teacher: Teacher) -> tuple[Durations, str]:
     """
     skillset, key, kept = prepared.skillset, "", None
     try:
-        key = durations_key(prepared.task, prepared.layout, skillset.moves, skillset.policies)
-        kept = kept_durations(teacher.toolbox, key, prepared.task, skillset.moves)
+        key = durations_key(prepared.task, prepared.layout, skillset, skillset.policies)
+        kept = kept_durations(teacher.toolbox, key, skillset)
     except LabError as error:  # then they are measured: nothing is lost but time
         teacher.tell(RecordSkipped(f"durations measured earlier: {error}"))
     if kept is not None:
         return kept, key
-    processes = sum(station.process is not None for station in prepared.task.stations)
-    teacher.tell(PhaseBegan("measure", len(skillset.moves.loaded) + len(skillset.moves.empty) + processes))
+    works = sum(bool(skills) for skills in (*skillset.processes.values(), *skillset.services.values()))
+    teacher.tell(PhaseBegan("measure", len(skillset.legs) + len(skillset.travels) + works))
     durations = measure(prepared, lambda name, seconds: teacher.tell(MoveTimed(name, seconds)))
     if key:
         teacher.toolbox.save_record(RECORDS, key, durations.to_json())
@@ -73,7 +73,7 @@ def run(
     """
     began = time.perf_counter() - prepared.wall_s
     if viewer is not None:
-        show_scene(prepared.task, prepared.toasts, prepared.layout, viewer)
+        show_scene(prepared.task, prepared.order, prepared.layout, viewer)
     taught = teach_all(prepared, teacher)
     teacher.tell(PhaseBegan("sequence", 1))
     settings = prepared.task.sequencing
@@ -95,7 +95,7 @@ def remember(report: Report, teacher: Teacher) -> None:
     """Keeps how long moves took, and in each skill's log that it was used; what cannot be kept is told: the run counts."""
     taught, outcome, prepared = report.taught, report.outcome, report.prepared
     used = {"task": prepared.task.name, "seed": prepared.seed}
-    used["delivered"] = f"{len(outcome.delivered)} of {prepared.toasts}"
+    used["delivered"] = f"{len(outcome.delivered)} of {len(prepared.order)}"
     try:
         if taught.durations_key:
             teacher.toolbox.save_record(RECORDS, taught.durations_key, taught.durations.after(outcome.timed).to_json())

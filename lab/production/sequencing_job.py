@@ -33,7 +33,8 @@ from lab.sequencing.simulate.run import follow, simulate
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.sequencing import Sequencing, search_for
-from lab.tasks.task_file import Task, load_any
+from lab.tasks.task import Task
+from lab.tasks.task_file import load_any
 from lab.teaching.events import ORDER, LessonEvent, PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.lesson_sessions import TellingAdvisor
 from lab.teaching.teacher import Teacher
@@ -41,7 +42,6 @@ from lab.teaching.teacher import Teacher
 if TYPE_CHECKING:
     from lab.sequencing.methods.srl_advised import AdvisedResult
 
-DEFAULT_TOASTS = 3
 NOBODY = AdvisorName.of("none")
 KeepOrder = Callable[[Cell, str], Journal]  # given the cell and the objective
 SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
@@ -89,8 +89,7 @@ def sequence_named(
         if case is not None:
             which = "toast has I, II and III, a cell its orders"
             raise BadInput(f"case '{case}' (--case): task '{name}' has none; {which}")
-        wanted_toasts = DEFAULT_TOASTS if toasts is None else toasts
-        cell, chance = measured_cell(loaded, wanted_toasts, wanted, teacher), Chance()
+        cell, chance = measured_cell(loaded, toasts, wanted, teacher), Chance()
     check_objective(wanted.objective or loaded.sequencing.objective, cell)
     teacher.tell(PhaseBegan("sequence", wanted.sessions))
     document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, tell=teacher.tell)
@@ -119,7 +118,7 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
     return file.cell(order_from_word(file, case) if case is not None else toasts)
 
 
-def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher) -> Cell:
+def measured_cell(task: Task, toasts: int | None, wanted: Wanted, teacher: Teacher) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
     from lab.production.run import teach_all
     from lab.skills.prepared_scene import prepare
@@ -127,7 +126,7 @@ def measured_cell(task: Task, toasts: int, wanted: Wanted, teacher: Teacher) -> 
     objective = wanted.objective or task.sequencing.objective
     if objective in WITH_DUE_TIMES:
         raise BadInput(f"objective '{objective}' (--objective) needs due times, and a task has none: use a cell file")
-    return teach_all(prepare(task, toasts, teacher.seed), teacher).cell
+    return teach_all(prepare(task, task.order(toasts), teacher.seed), teacher).cell
 
 
 def sequence_cell(

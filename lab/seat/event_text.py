@@ -17,7 +17,6 @@ from lab.learning.session_events import (
 from lab.learning.session_events import Event as SessionEvent
 from lab.mdp import TabularMDP
 from lab.seat.request_text import percent, verdict
-from lab.sequencing.cell.schedule import Move
 from lab.teaching.events import (
     Event,
     KeptBeside,
@@ -37,7 +36,7 @@ PHASES = {
     "learn": "Find or learn the skills",
     "measure": "Time every move in simulation",
     "sequence": "Find the order of the transfers",
-    "carry out": "Make toast in physics",
+    "carry out": "Carry the order out in physics",
     "draw": "Draw the pictures",
 }
 ENDED = {
@@ -172,11 +171,13 @@ def sequence_parts(event: SequenceFound) -> tuple[str, str]:
     return f"parts {order}{more}:", f"{found}, {reference}"
 
 
-def move_text(move: Move) -> str:
+def move_text(made: MoveMade) -> str:
     """What a move brought where."""
+    move = made.move
     waited_s = move.pick_s - move.reach_s
     wait = f", waited {waited_s:.1f} s" if waited_s > _LEAST_WAIT_S else ""
-    return f"toast {move.part}: {move.origin} to {move.target}{wait}"
+    what = made.part if move.carries == "part" else f"{made.part}'s pallet"
+    return f"{what}: {move.origin} to {move.target}{wait}"
 
 
 def run_text(event: Event) -> str:
@@ -197,7 +198,7 @@ def run_text(event: Event) -> str:
         case SequenceFound():
             return " ".join(sequence_parts(event))
         case MoveMade():
-            return f"{event.move.drop_s:.1f} s: {move_text(event.move)}"
+            return f"{event.move.drop_s:.1f} s: {move_text(event)}"
         case LessonContinued(unfinished=left):
             length = counted(len(left.curve), "episode")
             return f"'{left.name}' was left unfinished after {length}: it is learned on"

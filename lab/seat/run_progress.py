@@ -91,7 +91,7 @@ class RunProgress:
                 order, found = sequence_parts(event)
                 self._pack([Text(f"  {order}"), Text(found)], gap=" ")
             case MoveMade():
-                self._say(f"  {event.move.drop_s:7.1f} s  {move_text(event.move)}")
+                self._say(f"  {event.move.drop_s:7.1f} s  {move_text(event)}")
         if self._task is not None and isinstance(event, PARTS_DONE):
             self._progress.advance(self._task)
 

@@ -7,15 +7,15 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.files import assets_folder
-from lab.sim import models
+from lab.sim.kinds import Spot
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME
-from lab.sim.scene import NEAREST_M, Scene
+from lab.sim.scene import Scene
 
 OUT_OF_REACH = "out of reach"
-CARRIED = "carried slice"
-_AWAY = (0.0, 0.0, -5.0)
+CARRIED = "carried part"
+FINGERS_OFF_M = 0.0005  # [m] of a finger off a part that is put between them
+_AWAY = Spot(0.0, 0.0, -5.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -35,28 +35,27 @@ class Survey:
 
 
 class Surveyor:
-    """Puts the arm at one pose after the other in a scene and measures what is near; with or without a slice in the fingers."""
+    """Puts the arm at one pose after the other in a scene and measures what is near; with or without a part in the fingers."""
 
-    def __init__(self, scene: Scene, *, loaded: bool, clearance: float, ignore: Sequence[str] = ()) -> None:
-        """`clearance` [m] is how far everything must stay away; bodies in `ignore` may be touched."""
-        self.scene, self.loaded, self.clearance = scene, loaded, clearance
+    def __init__(self, scene: Scene, carried: str | None, *, clearance: float, ignore: Sequence[str] = ()) -> None:
+        """carried: the kind in the fingers; `clearance` [m] is how far everything must stay away; `ignore` may be touched."""
+        self.scene, self.carried, self.clearance = scene, carried, clearance
         self.solid = [name for name in scene.solid if name not in ignore]
-        world = scene.world
-        if loaded:
-            world.load(CARRIED, assets_folder() / "slice.urdf", _AWAY, fixed=False)
-            scene.robot.open_at_once(models.SLICE[1] / 2 + 0.0005)
+        self.moving = [NAME]
+        if carried is not None:
+            scene.add(CARRIED, carried, _AWAY)
+            self.moving += scene.bodies_of(CARRIED, carried)
+            scene.robot.open_at_once(scene.kinds[carried].grip.width_m / 2 + FINGERS_OFF_M)
 
     def cause(self, pose: ToolPose) -> str:
         """'' when the tool can be at `pose`, else why not."""
-        if hypot(pose.x, pose.y) < NEAREST_M or not self.scene.robot.stand(pose):
+        if hypot(pose.x, pose.y) < self.scene.robot.arm.nearest_m or not self.scene.robot.stand(pose):
             return OUT_OF_REACH
         world = self.scene.world
-        if self.loaded:
-            self.scene.put_slice(CARRIED, pose)
+        if self.carried is not None:
+            self.scene.put(CARRIED, self.carried, pose)
         for name in self.solid:
-            if world.nearest(NAME, name, self.clearance) < self.clearance:
-                return name
-            if self.loaded and world.nearest(CARRIED, name, self.clearance) < self.clearance:
+            if any(world.nearest(moving, name, self.clearance) < self.clearance for moving in self.moving):
                 return name
         return ""
 

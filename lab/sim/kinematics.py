@@ -7,7 +7,8 @@ is a planar arm, solved exactly: no iteration, no flips between branches.
 """
 
 from dataclasses import dataclass
-from math import acos, atan2, cos, hypot, pi, radians, sin
+from math import atan2, cos, hypot, pi, radians, sin
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +24,12 @@ JOINTS = ("joint_s", "joint_l", "joint_u", "joint_r", "joint_b", "joint_t")
 LOWER = np.radians([-170.0, -90.0, -170.0, -180.0, -45.0, -360.0])  # [rad]
 UPPER = np.radians([170.0, 155.0, 190.0, 180.0, 225.0, 360.0])  # [rad]
 SPEED = np.radians([140.0, 160.0, 170.0, 335.0, 335.0, 500.0])  # [rad/s]
+HOME = np.array([0.0, 0.0, 0.0, 0.0, radians(90.0), 0.0])  # upper arm up, forearm level, tool down
 
 _FOREARM_LENGTH = hypot(FOREARM, ELBOW_UP)
 _FOREARM_TILT = atan2(ELBOW_UP, FOREARM)
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -47,31 +51,30 @@ class ToolPose:
         return self.shifted(c * dx - s * dy, s * dx + c * dy, dz, dyaw)
 
 
-def inverse(pose: ToolPose) -> NDArray[np.float64] | None:
-    """The six joint angles [rad], shape (6,), that hold the tool at `pose`, elbow up; None when out of reach or range."""
-    out = hypot(pose.x, pose.y) - SHOULDER_OUT
-    up = pose.z + TOOL_DOWN - SHOULDER_UP
-    distance = hypot(out, up)
-    if out < 0.0 or not abs(UPPER_ARM - _FOREARM_LENGTH) < distance < UPPER_ARM + _FOREARM_LENGTH:
-        return None
-    at_shoulder = acos((UPPER_ARM**2 + distance**2 - _FOREARM_LENGTH**2) / (2.0 * UPPER_ARM * distance))
-    elevation = atan2(up, out) + at_shoulder
-    to_wrist_out, to_wrist_up = out - UPPER_ARM * cos(elevation), up - UPPER_ARM * sin(elevation)
-    pitch = _FOREARM_TILT - atan2(to_wrist_up, to_wrist_out)
-    turn = atan2(pose.y, pose.x)
-    tool = (turn - pose.yaw + pi) % (2.0 * pi) - pi
-    joints = np.array([turn, pi / 2 - elevation, pitch - (pi / 2 - elevation), 0.0, pi / 2 - pitch, tool])
-    within = bool(np.all(joints >= LOWER) and np.all(joints <= UPPER))
-    return joints if within else None
+class ClosedForm:
+    """How the arm bends, between its first joint, which turns it, and its last, which turns its tool: exactly."""
 
+    home: ClassVar[Array] = HOME
+    spins: ClassVar[tuple[float, float]] = (1.0, -1.0)  # of the first and the last joint: how the tool turns with them
 
-def forward(joints: NDArray[np.float64]) -> ToolPose:
-    """The vertical tool pose that `joints` [rad], shape (6,), hold; for joints that `inverse` gave (R = 0, tool down)."""
-    turn, lean, bend, tool = float(joints[0]), float(joints[1]), float(joints[2]), float(joints[5])
-    elevation, forearm = pi / 2 - lean, _FOREARM_TILT - lean - bend
-    out = SHOULDER_OUT + UPPER_ARM * cos(elevation) + _FOREARM_LENGTH * cos(forearm)
-    up = SHOULDER_UP + UPPER_ARM * sin(elevation) + _FOREARM_LENGTH * sin(forearm)
-    return ToolPose(out * cos(turn), out * sin(turn), up - TOOL_DOWN, turn - tool)
+    def bent(self, out: Array, up: Array) -> Array:
+        """The joints (n, 6) for a tool `out` (n,) [m] ahead of the S axis and `up` (n,) [m], at yaw 0, elbow up; NaN: none."""
+        out, up = out - SHOULDER_OUT, up + TOOL_DOWN - SHOULDER_UP
+        distance = np.hypot(out, up)
+        with np.errstate(invalid="ignore", divide="ignore"):  # out of reach
+            cosine = (UPPER_ARM**2 + distance**2 - _FOREARM_LENGTH**2) / (2.0 * UPPER_ARM * distance)
+            reached = (out >= 0.0) & (abs(UPPER_ARM - _FOREARM_LENGTH) < distance)
+            reached &= distance < UPPER_ARM + _FOREARM_LENGTH
+            elevation = np.arctan2(up, out) + np.arccos(cosine)
+        pitch = _FOREARM_TILT - np.arctan2(up - UPPER_ARM * np.sin(elevation), out - UPPER_ARM * np.cos(elevation))
+        none = np.zeros_like(elevation)
+        joints = np.stack([none, pi / 2 - elevation, pitch - (pi / 2 - elevation), none, pi / 2 - pitch, none], axis=1)
+        return np.where(reached[:, None], joints, np.nan)
 
-
-HOME = np.array([0.0, 0.0, 0.0, 0.0, radians(90.0), 0.0])  # upper arm up, forearm level, tool down
+    def tools(self, joints: Array) -> Array:
+        """The vertical tool poses x, y, z [m], yaw [rad] (n, 4) that joints (n, 6) from `bent` hold (R = 0, tool down)."""
+        turn, lean, bend, tool = joints[:, 0], joints[:, 1], joints[:, 2], joints[:, 5]
+        elevation, forearm = pi / 2 - lean, _FOREARM_TILT - lean - bend
+        out = SHOULDER_OUT + UPPER_ARM * np.cos(elevation) + _FOREARM_LENGTH * np.cos(forearm)
+        up = SHOULDER_UP + UPPER_ARM * np.sin(elevation) + _FOREARM_LENGTH * np.sin(forearm)
+        return np.stack([out * np.cos(turn), out * np.sin(turn), up - TOOL_DOWN, turn - tool], axis=1)

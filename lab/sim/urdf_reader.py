@@ -1,21 +1,20 @@
 """A URDF is checked before PyBullet sees it: PyBullet loads negative masses, NaN inertia and garbage meshes in silence."""
 
+from collections.abc import Sequence
+from math import cos, sin
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 import numpy as np
+from numpy.typing import NDArray
 
-from lab.errors import BadInput
-from lab.sim.frames import Shape
+from lab.errors import BadInput, counted, unknown
+from lab.sim import mesh_file
+from lab.sim.frames import Quaternion, Shape
 
-_MAX_BYTES = 20_000_000
 
-
-def validate(path: Path) -> None:
-    """BadInput unless `path` is a URDF whose masses and inertias are finite and positive and whose meshes exist and are finite.
-
-    Inertia tensors must be positive definite [kg m2]; mesh files must lie in the URDF's own folder.
-    """
+def read(path: Path) -> Xml.Element:
+    """The root of a URDF; BadInput when it cannot be read, declares entities, or has no links."""
     try:
         text = path.read_text(encoding="utf-8")
         if "<!DOCTYPE" in text or "<!ENTITY" in text:
@@ -23,21 +22,32 @@ def validate(path: Path) -> None:
         root = Xml.fromstring(text)
     except (OSError, UnicodeDecodeError, Xml.ParseError) as error:
         raise BadInput(f"{path}: not a readable URDF: {error}") from None
-    links = [link.get("name", "") for link in root.iter("link")]
+    links = root.findall("link")
     if root.tag != "robot" or not links:
         raise BadInput(
             f"{path}: not a URDF: the root is <{root.tag}> with {len(links)} links, wanted <robot> with at least one"
         )
-    for link in root.iter("link"):
-        _check_inertial(path, link)
-    for joint in root.iter("joint"):
-        _check_joint(path, joint, links)
+    return root
+
+
+def validate(path: Path, meshes: Path | None = None) -> None:
+    """BadInput unless `path` is a URDF whose masses and inertias are finite and positive and whose meshes exist and are finite.
+
+    Inertia tensors must be positive definite [kg m2]; mesh files must lie in the folder `meshes`, by default the URDF's own.
+    """
+    root = read(path)
+    links = [link.get("name", "") for link in root.findall("link")]
+    check_numbers(path, root)
+    for link in root.findall("link"):
+        check_inertial(path, link)
+    for joint in root.findall("joint"):
+        check_joint(path, joint, links)
     for mesh in root.iter("mesh"):
-        _check_mesh(path, mesh.get("filename", ""))
+        check_mesh(path, mesh.get("filename", ""), meshes or path.parent)
 
 
 def looks(path: Path) -> dict[str, tuple[Shape, ...]]:
-    """The visuals of each link of a valid URDF of this lab: boxes and meshes, with their colours; the root link is ''."""
+    """The visuals of each link of a valid URDF, with their colours; the root link is ''."""
     root = Xml.parse(path).getroot()
     children = {child.get("link") for child in root.iterfind("joint/child")}
     found = {}
@@ -49,18 +59,88 @@ def looks(path: Path) -> dict[str, tuple[Shape, ...]]:
 
 
 def _shape(path: Path, visual: Xml.Element) -> Shape | None:
-    origin, color = visual.find("origin"), visual.find("material/color")
-    x, y, z = _floats(origin, "xyz", "0 0 0")
-    r, g, b, alpha = _floats(color, "rgba", "0.8 0.8 0.8 1")
-    mesh, box = visual.find("geometry/mesh"), visual.find("geometry/box")
-    if mesh is not None:
-        return Shape("mesh", (), path.parent / mesh.get("filename", ""), (r, g, b, alpha), (x, y, z))
-    return None if box is None else Shape("box", _floats(box, "size", ""), None, (r, g, b, alpha), (x, y, z))
+    x, y, z = floats(visual.find("origin"), "xyz", "0 0 0")
+    r, g, b, alpha = floats(visual.find("material/color"), "rgba", "0.8 0.8 0.8 1")
+    rgba, at, turn = (r, g, b, alpha), (x, y, z), _quaternion(*floats(visual.find("origin"), "rpy", "0 0 0"))
+    box, cylinder, sphere, mesh = (visual.find(f"geometry/{kind}") for kind in ("box", "cylinder", "sphere", "mesh"))
+    if box is not None:
+        return Shape("box", floats(box, "size", ""), None, rgba, at, turn)
+    if cylinder is not None:
+        return Shape("cylinder", floats(cylinder, "radius", "") + floats(cylinder, "length", ""), None, rgba, at, turn)
+    if sphere is not None:
+        return Shape("sphere", floats(sphere, "radius", ""), None, rgba, at, turn)
+    if mesh is None:
+        return None
+    return Shape("mesh", floats(mesh, "scale", ""), path.parent / mesh.get("filename", ""), rgba, at, turn)
 
 
-def _floats(element: Xml.Element | None, name: str, default: str) -> tuple[float, ...]:
+def bounds(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The lowest and the highest corner (3,) [m] of what is solid in the root link of a valid URDF, in its frame."""
+    validate(path)
+    root = Xml.parse(path).getroot()
+    children = {child.get("link") for child in root.iterfind("joint/child")}
+    solids = (
+        solid for link in root.iter("link") if link.get("name") not in children for solid in link.iter("collision")
+    )
+    corners = [corner for solid in solids for corner in _corners(path, solid)]
+    if not corners:
+        raise BadInput(f"{path}: its root link has nothing solid (no <collision>)")
+    return np.min(corners, axis=0), np.max(corners, axis=0)
+
+
+def _corners(path: Path, solid: Xml.Element) -> NDArray[np.float64]:
+    """Points (n, 3) that bound a solid, in its link's frame [m]."""
+    shape = _shape(path, solid)
+    if shape is None:
+        return np.zeros((0, 3))
+    if shape.kind == "mesh" and shape.mesh is not None:
+        points = mesh_file.vertices(shape.mesh) * (shape.size or (1.0, 1.0, 1.0))
+    else:
+        half = {
+            "box": shape.size,
+            "cylinder": (2 * shape.size[0],) * 2 + shape.size[1:],
+            "sphere": (2 * shape.size[0],) * 3,
+        }
+        signs = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+        points = signs * np.array(half[shape.kind]) / 2
+    return np.asarray(points @ rotation(shape.quaternion).T + np.array(shape.position))
+
+
+def floats(element: Xml.Element | None, name: str, default: str) -> tuple[float, ...]:
+    """The numbers of an attribute."""
     text = default if element is None else element.get(name, default)
     return tuple(float(word) for word in text.split())
+
+
+def _quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """A URDF's rpy [rad], about fixed x, then y, then z, as xyzw."""
+    (cr, cp, cy), (sr, sp, sy) = ([f(angle / 2) for angle in (roll, pitch, yaw)] for f in (cos, sin))
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+def placed(origin: Xml.Element | None) -> NDArray[np.float64]:
+    """The frame (4, 4) of an <origin> [m] in its parent's; of none, the parent's own."""
+    frame = np.eye(4)
+    frame[:3, :3] = rotation(_quaternion(*floats(origin, "rpy", "0 0 0")))
+    frame[:3, 3] = floats(origin, "xyz", "0 0 0")
+    return frame
+
+
+def rotation(quaternion: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """The axes (3, 3), as columns, of a quaternion xyzw of length 1."""
+    x, y, z, w = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def _value(path: Path, what: str, text: str | None) -> float:
@@ -73,7 +153,26 @@ def _value(path: Path, what: str, text: str | None) -> float:
     return value
 
 
-def _check_inertial(path: Path, link: Xml.Element) -> None:
+_NUMBERS = {"xyz": 3, "rpy": 3, "size": 3, "scale": 3, "rgba": 4, "radius": 1, "length": 1}
+
+
+def check_numbers(path: Path, root: Xml.Element) -> None:
+    """BadInput unless every place, size, axis and colour in a URDF is as many finite numbers as it takes."""
+    for element in root.iter():
+        for name, count in _NUMBERS.items():
+            text = element.get(name)
+            if text is None:
+                continue
+            what = f"{name} of a <{element.tag}>"
+            numbers = [_value(path, what, word) for word in text.split()]
+            if len(numbers) != count:
+                raise BadInput(f"{path}: {what} is '{text}', wanted {counted(count, 'number')}")
+            if name in ("size", "radius", "length", "scale") and min(numbers) <= 0:
+                raise BadInput(f"{path}: {what} is '{text}', wanted above 0")
+
+
+def check_inertial(path: Path, link: Xml.Element) -> None:
+    """BadInput unless a link has a mass and an inertia that a body can have."""
     name = link.get("name", "")
     mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
     if mass is None or inertia is None:
@@ -89,13 +188,14 @@ def _check_inertial(path: Path, link: Xml.Element) -> None:
         )
 
 
-def _check_joint(path: Path, joint: Xml.Element, links: list[str]) -> None:
+def check_joint(path: Path, joint: Xml.Element, links: list[str]) -> None:
+    """BadInput unless a joint joins known links, within limits that are in order."""
     name = joint.get("name", "")
     for end in ("parent", "child"):
         element = joint.find(end)
         link = element.get("link", "") if element is not None else ""
         if link not in links:
-            raise BadInput(f"{path}: joint '{name}' has the {end} '{link}', known links: {', '.join(links)}")
+            raise BadInput(f"{path}: {unknown('link', link, links, f'{end} of joint {name!r}')}")
     limit = joint.find("limit")
     if limit is not None:
         low, high = (_value(path, f"{key} limit of joint '{name}'", limit.get(key)) for key in ("lower", "upper"))
@@ -103,17 +203,18 @@ def _check_joint(path: Path, joint: Xml.Element, links: list[str]) -> None:
             raise BadInput(f"{path}: joint '{name}' has lower limit {low:g} above upper limit {high:g}")
 
 
-def _check_mesh(path: Path, name: str) -> None:
+def check_mesh(path: Path, name: str, folder: Path) -> None:
+    """BadInput unless the mesh that the URDF at `path` names is an OBJ or STL file in `folder` with finite vertices."""
     file = (path.parent / name).resolve()
-    if path.parent.resolve() not in file.parents:
+    if folder.resolve() not in file.parents:
         raise BadInput(f"{path}: mesh '{name}' lies outside the URDF's folder")
-    if not file.is_file() or not 0 < file.stat().st_size <= _MAX_BYTES:
-        raise BadInput(f"{path}: mesh '{name}' is missing, empty or over {_MAX_BYTES // 1_000_000} MB")
+    if not file.is_file() or not 0 < file.stat().st_size <= mesh_file.MAX_BYTES:
+        raise BadInput(f"{path}: mesh '{name}' is missing, empty or over {mesh_file.MAX_BYTES // 1_000_000} MB")
+    kind = "an STL" if file.suffix.lower() == ".stl" else "an OBJ"
     try:
-        rows = [line.split()[1:4] for line in file.read_text(encoding="utf-8").splitlines() if line.startswith("v ")]
-        vertices = np.array(rows, dtype=float)
+        vertices = mesh_file.vertices(file)
     except (UnicodeDecodeError, ValueError) as error:
-        raise BadInput(f"{path}: mesh '{name}' is not an OBJ file: {error}") from None
+        raise BadInput(f"{path}: mesh '{name}' is not {kind} file: {error}") from None
     if len(vertices) < 4 or vertices.shape[1] < 3 or not np.isfinite(vertices).all():
         raise BadInput(
             f"{path}: mesh '{name}' has {len(vertices)} vertices or one that is not three finite numbers; wanted 4 or more"

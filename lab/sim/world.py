@@ -75,6 +75,10 @@ class World:
             deterministicOverlappingPairs=1,
         )
 
+    def iterations(self, count: int) -> None:
+        """Solve contacts and constraints in so many iterations a step: a linkage of fingers needs more than bodies do."""
+        self._call("setPhysicsEngineParameter", numSolverIterations=count)
+
     def _call(self, name: str, *args: Any, **kwargs: Any) -> Any:
         return getattr(self._p, name)(*args, physicsClientId=self._client, **kwargs)
 
@@ -100,13 +104,25 @@ class World:
         self._call("stepSimulation")
         self.steps += 1
 
+    def pass_time(self, steps: int) -> None:
+        """Let the clock go on by so many steps in which nothing moves: no physics is simulated."""
+        self.steps += steps
+
     # ---- bodies -------------------------------------------------------------------------------------------------
 
     def load(
-        self, name: str, path: Path, position: Position = (0, 0, 0), yaw: float = 0.0, *, fixed: bool = True
+        self,
+        name: str,
+        path: Path,
+        position: Position = (0, 0, 0),
+        yaw: float = 0.0,
+        *,
+        fixed: bool = True,
+        checked: bool = False,
     ) -> None:
-        """Load a URDF, after validating it, as body `name` at `position` [m], turned by `yaw` [rad]."""
-        urdf_reader.validate(path)
+        """Load a URDF, after validating it unless it is `checked`, as body `name` at `position` [m], turned by `yaw` [rad]."""
+        if not checked:
+            urdf_reader.validate(path)
         turn = self._p.getQuaternionFromEuler([0, 0, yaw])
         with _silence():
             flags = self._p.URDF_USE_INERTIA_FROM_FILE
@@ -127,6 +143,15 @@ class World:
         visual = self._call("createVisualShape", self._p.GEOM_BOX, halfExtents=half, rgbaColor=list(rgba))
         self._fixed(name, shape, visual, position, turn, Shape("box", tuple(size), None, rgba))
 
+    def mesh(self, name: str, path: Path, position: Position, rgba: Rgba, *, yaw: float = 0.0) -> None:
+        """A mesh file that never moves, hollows and all: its origin at `position` [m]."""
+        turn = tuple(self._p.getQuaternionFromEuler([0, 0, yaw]))
+        with _silence():
+            hollow = self._p.GEOM_FORCE_CONCAVE_TRIMESH
+            shape = self._call("createCollisionShape", self._p.GEOM_MESH, fileName=str(path), flags=hollow)
+            visual = self._call("createVisualShape", self._p.GEOM_MESH, fileName=str(path), rgbaColor=list(rgba))
+        self._fixed(name, shape, visual, position, turn, Shape("mesh", (), path, rgba))
+
     def disc(self, name: str, radius: float, height: float, position: Position, rgba: Rgba) -> None:
         """A flat round marker: only seen; `position` [m] is its centre."""
         visual = self._call(
@@ -137,6 +162,27 @@ class World:
     def _fixed(self, name: str, shape: int, visual: int, position: Position, turn: Position, look: Shape) -> None:
         number = self._call("createMultiBody", 0, shape, visual, list(position), list(turn))
         self._add(name, _Entry(number, False, (tuple(position), tuple(turn)), looks={"": (look,)}))
+
+    def part(self, name, shape, mass_kg, friction, position, yaw=0.0):  # stand-in
+        turn = tuple(self._p.getQuaternionFromEuler([0, 0, yaw]))
+        if shape.solid == "box":
+            solid = self._call("createCollisionShape", self._p.GEOM_BOX, halfExtents=[s / 2 for s in shape.size])
+            seen = self._call(
+                "createVisualShape",
+                self._p.GEOM_BOX,
+                halfExtents=[s / 2 for s in shape.size],
+                rgbaColor=list(shape.looks[0].rgba),
+            )
+        else:
+            d, h = shape.size
+            solid = self._call("createCollisionShape", self._p.GEOM_CYLINDER, radius=d / 2, height=h)
+            seen = self._call(
+                "createVisualShape", self._p.GEOM_CYLINDER, radius=d / 2, length=h, rgbaColor=list(shape.looks[0].rgba)
+            )
+        number = self._call("createMultiBody", mass_kg, solid, seen, list(position), list(turn))
+        self._call("changeDynamics", number, -1, localInertiaDiagonal=[m * mass_kg for m in shape.inertia_m2])
+        self._add(name, _Entry(number, True, (tuple(position), turn), looks={"": shape.looks}))
+        self.friction(name, friction, spinning=0.001)
 
     def _add(self, name: str, entry: _Entry) -> None:
         self._bodies[name] = entry
@@ -193,7 +239,7 @@ class World:
         positions: Sequence[float] | Array,
         velocities: Sequence[float] | Array | None = None,
         *,
-        force: float = 2000.0,
+        force: float | Sequence[float] = 2000.0,
     ) -> None:
         """Set the position motors' targets [rad or m], with velocities fed forward; `force` [Nm or N] is the most they use."""
         if not (np.isfinite(positions).all() and (velocities is None or np.isfinite(velocities).all())):
@@ -206,20 +252,20 @@ class World:
             self._p.POSITION_CONTROL,
             targetPositions=[float(v) for v in positions],
             targetVelocities=[0.0] * len(names) if velocities is None else [float(v) for v in velocities],
-            forces=[force] * len(names),
+            forces=[force] * len(names) if isinstance(force, float) else list(force),
             positionGains=[0.3] * len(names),
             velocityGains=[1.0] * len(names),
         )
 
-    def gear(self, name: str, link_a: str, link_b: str) -> None:
-        """Couple two sliding links so that they move as one (a two-finger gripper drifts without it)."""
+    def gear(self, name: str, joint_a: str, joint_b: str, ratio: float = 1.0) -> None:
+        """Couple two joints: b moves `ratio` times as far as a (a two-finger gripper drifts without it)."""
         entry = self._bodies[name]
-        first, second = entry.links[link_a], entry.links[link_b]
+        first, second = entry.joints[joint_a], entry.joints[joint_b]
         axis, zero = [1, 0, 0], [0, 0, 0]
         gear = self._call(
             "createConstraint", entry.number, first, entry.number, second, self._p.JOINT_GEAR, axis, zero, zero
         )
-        self._call("changeConstraint", gear, gearRatio=-1, erp=0.1, maxForce=100)
+        self._call("changeConstraint", gear, gearRatio=-1.0 / ratio, erp=0.1, maxForce=100)
 
     # ---- questions ----------------------------------------------------------------------------------------------
 

@@ -1,57 +1,52 @@
-"""Grasp: the gripper comes to a slice, aligns itself, closes, and lifts the slice."""
+"""Grasp: the gripper comes to a part, aligns itself, closes, and lifts the part."""
 
 from collections.abc import Iterator
 from math import hypot
 from typing import TYPE_CHECKING, ClassVar
 
-from lab.sim.kinematics import ToolPose, inverse
-from lab.sim.scene import spots
-from lab.skills.around_slice import SLOW, AroundSlice
+from lab.sim.kinematics import ToolPose
+from lab.skills.around_part import SLOW, AroundPart
 from lab.skills.skill import Bench, SkillFailed, over_everything
-from lab.tasks.task_file import Task
+from lab.tasks.task import Task
 
 if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
 
-ACTIONS = ("left", "right", "backward", "forward", "down", "up", "turn right", "turn left")  # of the slice's axes
+ACTIONS = ("left", "right", "backward", "forward", "down", "up", "turn right", "turn left")  # of the part's axes
 GOAL = (2, 2, 0, 2)
 FAR_M = 0.2  # [m] a tool farther from the station's approach, as when trying again, comes over everything
 
 
-class Grasp(AroundSlice):
-    """Take a slice at one station: the table holds the tool's pose relative to the slice (x, y, z, yaw)."""
+class Grasp(AroundPart):
+    """Take a part at one station: the table holds the tool's pose relative to the part (x, y, z, yaw)."""
 
     subtask: ClassVar[str] = "grasp"
-    help: ClassVar[str] = "the gripper comes to a slice, closes and lifts it"
+    help: ClassVar[str] = "the gripper comes to a part, closes and lifts it"
     tried: ClassVar[bool] = True
     actions: ClassVar[tuple[str, ...]] = ACTIONS
     goal: ClassVar[tuple[int, ...]] = GOAL
 
     @classmethod
-    def at_pick(cls, task: Task, station: str) -> "Grasp":
-        """It takes slices up everywhere."""
-        return cls(station)
-
-    def goal_pose(self) -> ToolPose:
-        """That of a slice on the station's first spot."""
-        return spots(self.surveys.task.station(self.station))[0].grasp()
+    def at_pick(cls, task: Task, kind: str, station: str) -> "Grasp":
+        """It takes parts up everywhere."""
+        return cls(task, kind, station)
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
-        """Open, go above the slice, follow the learned cells down, close, lift, and see that the slice came along."""
-        robot, name = bench.scene.robot, self.slice
+        """Open, go above the part, follow the learned cells down, close, lift, and see that the part came along."""
+        robot, body = bench.scene.robot, bench.scene.body_of(self.part, self.kind)
         if robot.closed:
             yield from robot.release()
-        goal = bench.slice_pose(name)
-        if inverse(goal) is None:
-            raise SkillFailed(f"{name} is out of reach at ({goal.x:.2f}, {goal.y:.2f}) m")
+        goal = bench.part_pose(body, self.goal_pose().yaw)
+        if robot.arm.inverse(goal) is None:
+            raise SkillFailed(f"{body} is out of reach at ({goal.x:.2f}, {goal.y:.2f}) m")
         tool, approach = robot.tool(), self.surveys.approach(self.station)
         if tool.z < approach.z - 0.01 or hypot(tool.x - approach.x, tool.y - approach.y) > FAR_M:
             yield from over_everything(bench, approach)
         yield from self.down(bench, policy, goal)
         yield from robot.grip()
-        bench.held = name
+        bench.held = body
         yield from robot.follow([ToolPose(goal.x, goal.y, approach.z, goal.yaw)], slow=SLOW)
         yield from robot.follow([approach], slow=SLOW)
-        if not bench.holds(name):
+        if not bench.holds(body):
             bench.held = None
-            raise SkillFailed(f"{name} is not in the gripper after grasping at '{self.station}'")
+            raise SkillFailed(f"{body} is not in the gripper after grasping at '{self.station}'")

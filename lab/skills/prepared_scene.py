@@ -5,13 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lab.errors import LabError, counted
+from lab.errors import LabError
 from lab.learning.problem import Problem
-from lab.sim.scene import Layout, check_apart, draw_layout
+from lab.sim.places import Layout
+from lab.sim.scene_check import check_apart, check_scene, places_of
 from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.grid_world import RANDOM, GridWorld
-from lab.tasks.task_file import Task, check_number, check_toasts, find, fitting, load_any
+from lab.tasks.task import Order, Task, check_number, in_words
+from lab.tasks.task_file import find, load_any
 
 
 @dataclass
@@ -19,7 +21,7 @@ class Prepared:
     """A task whose scene is surveyed, which took `wall_s`: nothing is learned yet, and nothing is written."""
 
     task: Task
-    toasts: int
+    order: Order
     seed: int
     layout: Layout
     surveys: Surveys
@@ -27,38 +29,48 @@ class Prepared:
     problems: dict[str, Problem]
     wall_s: float = 0.0
 
+    @property
+    def words(self) -> str:
+        """What is made, such as "3 slices"."""
+        return in_words(self.order)
 
-def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prepared:
+
+def lay_out(task: Task, order: Order, seed: int) -> Layout:
+    """The scene as the seed lays it out; BadInput for what cannot be."""
+    return places_of(task).draw(order, np.random.default_rng([seed, 1]))
+
+
+def prepare(task: Task, order: Order, seed: int, only: str | None = None) -> Prepared:
     """Lay the scene out as the seed says and survey every problem of it, or `only` one skill's.
 
     BadInput for whatever cannot be; writes nothing.
     """
     began = time.perf_counter()
-    check_toasts(toasts, task)
-    check_apart(task, toasts)
-    skillset = SkillSet.of(task, toasts)
-    layout = draw_layout(task, toasts, np.random.default_rng([seed, 1]))
-    surveys = Surveys(task, layout)
-    scene = in_words(task, toasts, layout)
+    check_scene(task)
+    check_apart(task, len(order))
+    skillset = SkillSet.of(task, order)
+    layout = lay_out(task, order, seed)
+    surveys = Surveys(task, order, layout)
+    scene = scene_in_words(task, order, layout)
     problems = {
         name: replace(skill.setup(surveys), scene=scene)
         for name, skill in skillset.skills.items()
         if only in (None, name)
     }
-    return Prepared(task, toasts, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
+    return Prepared(task, order, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
 
 
-def in_words(task: Task, toasts: int, layout: Layout) -> str:
-    """A scene as a policy's card tells of it: how many slices there are, and where the obstacles stand [m]."""
+def scene_in_words(task: Task, order: Order, layout: Layout) -> str:
+    """A scene as a policy's card tells of it: how many parts there are, and where the obstacles stand [m]."""
     places = zip(task.obstacles, layout.obstacles, strict=True)
     stand = [f"{obstacle.name} at ({x:.3f}, {y:.3f})" for obstacle, (x, y) in places]
-    return ", ".join([counted(toasts, "slice"), *stand])
+    return ", ".join([in_words(order), *stand])
 
 
 def check_task(file: str, toasts: int | None, seed: int) -> tuple[list[str], list[str]]:
-    """What is wrong with a task file, its scene and its problems for so many toasts, or with a cell or a world; warnings.
+    """What is wrong with a task file, its scene and its problems for so many parts of its first kind, or with a cell or a world; warnings.
 
-    Without a number: a task for 3 toasts, or as many as there is room for; a cell for its own order. A warning is of what
+    Without a number: a task or a cell for its own order. A warning is of what
     can be learned, but hardly by a learner that nobody helps.
     Raises BadInput for a file that is not there, and for a number that this kind of file never takes.
     """
@@ -73,7 +85,7 @@ def check_task(file: str, toasts: int | None, seed: int) -> tuple[list[str], lis
     warnings: list[str] = []
     try:
         if isinstance(task, Task):
-            prepared = prepare(task, fitting(task, 3) if toasts is None else toasts, seed)
+            prepared = prepare(task, task.order(toasts), seed)
             crash = {p.subtask: None for p in prepared.problems.values() if (p.mdp.terminal & ~p.mdp.goal).any()}
             slips = {name: task.subtask(name).warning() for name in crash}
             warnings += [f"subtasks.{name}.{slip}" for name, slip in slips.items() if slip]

@@ -1,7 +1,7 @@
 """What all skills share: one life, from what a task needs of them to what they show, and the bench they work at."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from math import atan2, hypot
 from typing import TYPE_CHECKING, ClassVar, Self
@@ -12,24 +12,24 @@ from numpy.typing import NDArray
 from lab.errors import BadInput, WorkFailed
 from lab.learning.problem import Problem
 from lab.mdp import NoPath, TabularMDP, greedy_path
-from lab.sim import models
+from lab.sim.blocked_cells import FINGERS_OFF_M
 from lab.sim.frames import Body
+from lab.sim.kinds import Kind, Spot, on_its_pallet
 from lab.sim.kinematics import ToolPose
-from lab.sim.robot import NAME as ROBOT
-from lab.sim.scene import GRASP_DEPTH, Scene, Spot, spots
-from lab.tasks.task_file import Task
+from lab.sim.scene import Scene, pallet_of
+from lab.tasks.task import Task
+from lab.tasks.task_fields import Stage
 from lab.vision import GridView
 
 if TYPE_CHECKING:
     from lab.skills.surveys import Surveys
     from lab.toolbox.policy import Policy
 
-LOST_M = 0.03  # [m] a slice farther than this from where the fingers hold it is not held
-UPRIGHT = 0.97  # cosine of the largest tilt of a slice that stands
-FINGERS_OFF_M = 0.0005  # [m] of a finger off a slice that is put between them
-TRIED_WITH = "slice 1"
+LOST_M = 0.03  # [m] a part farther than this from where the fingers hold it is not held
+UPRIGHT = 0.97  # cosine of the largest tilt of a part that stands
 SETTLE_STEPS = 60  # physics steps until a new scene is at rest
 STAND_STEPS = 15  # physics steps until what was put somewhere at once is at rest
+NOT_OFF = (0.0, 0.0, 0.0)  # of a part that stands on its spot
 
 
 class Status(Enum):
@@ -47,45 +47,48 @@ class SkillFailed(Exception):
 
 @dataclass
 class Bench:
-    """The cell in which skills are carried out, and the slice that the robot holds."""
+    """The cell in which skills are carried out, and the body that the robot holds: a part, or a pallet."""
 
     scene: Scene
     held: str | None = None
 
-    def slice_pose(self, name: str) -> ToolPose:
-        """The tool pose that would hold the slice where it is now, its yaw within a quarter turn of the world's x axis."""
-        position, turn = self.scene.world.pose(name)
+    def part_pose(self, body: str, like: float = 0.0) -> ToolPose:
+        """The tool pose that would hold a part where it is now; of the yaws that do, the one nearest to `like` [rad]."""
+        position, turn = self.scene.world.pose(body)
+        kind = self.scene.kind_of[body]
         yaw = 2.0 * atan2(float(turn[2]), float(turn[3]))
-        half = (yaw + np.pi / 2) % np.pi - np.pi / 2
-        z = float(position[2]) + models.SLICE[2] / 2 - GRASP_DEPTH
-        return ToolPose(float(position[0]), float(position[1]), z, float(half))
+        spot = Spot(float(position[0]), float(position[1]), float(position[2]) - kind.shape.foot_m, yaw)
+        pose = kind.held_at(spot)
+        return replace(pose, yaw=kind.turned_like(pose.yaw, like))
 
-    def hold(self, name: str, pose: ToolPose) -> None:
-        """Stand a new slice between the fingers of the tool that is at `pose`, and grip it."""
+    def hold(self, name: str, kind: str, pose: ToolPose) -> None:
+        """Stand a new part between the fingers of the tool that is at `pose`, and grip it."""
         scene = self.scene
-        scene.robot.open_at_once(models.SLICE[1] / 2 + FINGERS_OFF_M)
-        scene.add_slice(name, Spot(pose.x, pose.y, pose.z + GRASP_DEPTH - models.SLICE[2], pose.yaw))
+        own = scene.kinds[kind]
+        scene.robot.open_at_once(own.grip.width_m / 2 + FINGERS_OFF_M)
+        scene.add(name, kind, own.foot_at(pose))
         for _ in scene.robot.grip():
             scene.world.step()
-        self.held = name
+        self.held = scene.body_of(name, kind)
 
-    def upright(self, name: str) -> float:
-        """Cosine of a slice's tilt: 1 when it stands."""
-        x, y, _, _ = self.scene.world.pose(name)[1]
+    def upright(self, body: str) -> float:
+        """Cosine of a part's tilt: 1 when it stands."""
+        x, y, _, _ = self.scene.world.pose(body)[1]
         return float(1.0 - 2.0 * (x * x + y * y))
 
-    def holds(self, name: str) -> bool:
-        """Whether both fingers touch the slice and it is where they hold it."""
-        world = self.scene.world
-        touched = all(world.touching(ROBOT, name, finger) for finger in ("finger_left", "finger_right"))
-        tool, at = self.scene.robot.tool(), self.slice_pose(name)
-        return touched and hypot(tool.x - at.x, tool.y - at.y, tool.z - at.z) < LOST_M
+    def holds(self, body: str) -> bool:
+        """Whether the fingers touch the part on both sides and it is where they hold it."""
+        tool = self.scene.robot.tool()
+        at = self.part_pose(body, tool.yaw)
+        near = hypot(tool.x - at.x, tool.y - at.y, tool.z - at.z) < LOST_M
+        return near and self.scene.robot.touches(body)
 
-    def stands(self, name: str, foot: ToolPose, within: float) -> bool:
-        """Whether the slice stands upright within `within` [m] of where `foot` as a grasp pose would hold it."""
-        at = self.slice_pose(name)
+    def stands(self, body: str, spot: Spot, within: float) -> bool:
+        """Whether the part stands upright within `within` [m] of a spot."""
+        foot = self.scene.kind_of[body].held_at(spot)
+        at = self.part_pose(body, foot.yaw)
         near = hypot(at.x - foot.x, at.y - foot.y) < within and abs(at.z - foot.z) < 0.006
-        return near and self.upright(name) > UPRIGHT
+        return near and self.upright(body) > UPRIGHT
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +102,7 @@ class Photo:
 class Skill:
     """One sub-task at one place, with all of its life; a new one is a class of these in a file, and a row in `SKILLS`.
 
-    What a task needs of it (`at_pick` to `at_machine`), the survey of its problem (`setup`), what it is about (`aim`), its
+    What a task needs of it (`at_pick` to `at_service`), the survey of its problem (`setup`), what it is about (`aim`), its
     motion (`start`, `step`, `stop`), what it shows (`show` to `photo`), and how it is tried in physics (`begins_at`).
     """
 
@@ -111,13 +114,14 @@ class Skill:
     near: ClassVar[bool] = False  # whether all takes place around its station's first spot; looks_from is then its own
 
     station = ""  # where it takes place, if it is at one
-    carries = False  # whether a slice is in the gripper meanwhile
+    carries = False  # whether a part is in the gripper meanwhile
     surveys: "Surveys"  # once it is set up
     problem: Problem
 
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.slice = ""
+    def __init__(self, name: str, kind: str = "") -> None:
+        """kind: of the part that it is about, or the one that it carries; "": none."""
+        self.name, self.kind = name, kind
+        self.part = ""  # the one part that it is about, once it is aimed
         self.spot: Spot | None = None
         self.deviations_m: list[float] = []  # how far off a camera has seen the gripper
         self.status = Status.IDLE
@@ -127,23 +131,28 @@ class Skill:
     # ---- what a task needs of it: None where it has no part ------------------------------------------------------
 
     @classmethod
-    def at_pick(cls, task: Task, station: str) -> "Skill | None":
-        """The skill that takes a slice up from a station."""
+    def at_pick(cls, task: Task, kind: str, station: str) -> "Skill | None":
+        """The skill that takes a part of a kind up from a station."""
         return None
 
     @classmethod
-    def on_carry(cls, task: Task, origin: str, target: str) -> "Skill | None":
-        """The skill's part in bringing a slice that is in the gripper from one station to another, and setting it down."""
+    def on_carry(cls, task: Task, kind: str, origin: str, target: str) -> "Skill | None":
+        """The skill's share in bringing a part that is in the gripper from one station to another, and setting it down."""
         return None
 
     @classmethod
     def on_travel(cls, task: Task, origin: str, target: str) -> "Skill | None":
-        """The skill's part in taking the empty gripper from one station to another."""
+        """The skill's share in taking the empty gripper from one station to another."""
         return None
 
     @classmethod
     def at_machine(cls, task: Task, station: str) -> "Skill | None":
-        """What a machine does by itself with the slice that stands in it."""
+        """What a machine does by itself with the part that stands in it."""
+        return None
+
+    @classmethod
+    def at_service(cls, task: Task, stage: Stage) -> "Skill | None":
+        """What the robot does at a stage of a route before it takes the part out."""
         return None
 
     # ---- survey and aim ------------------------------------------------------------------------------------------
@@ -153,9 +162,19 @@ class Skill:
         raise NotImplementedError
 
     def aim(self, name: str, spot: Spot | None = None) -> Self:
-        """The same skill, told which slice it is about, and on which spot to set it down, by default the station's first."""
-        self.slice, self.spot = name, spot
+        """The same skill, told which part it is about, and on which spot to set it down, by default the station's first."""
+        self.part, self.spot = name, spot
         return self
+
+    @property
+    def own_kind(self) -> Kind:
+        """The kind that it is about, as physics has it, once it is set up."""
+        return self.surveys.kinds[self.kind]
+
+    def stands_on(self) -> Spot:
+        """Where the part that it is about stands or is to stand: on its spot, or on the pallet there."""
+        places, station = self.surveys.places, self.surveys.task.station(self.station)
+        return places.raised(self.kind, station, self.spot or places.spots(station)[0])
 
     def pose(self, state: int) -> ToolPose:
         """The tool pose that the motion goes through in a state of the problem; a blocked one may be out of reach."""
@@ -169,20 +188,19 @@ class Skill:
         if not bench.scene.robot.stand(pose):
             return False
         if bench.held is not None:
-            bench.scene.put_slice(bench.held, pose)
+            bench.scene.put(self.part, self.kind, pose)
         return True
 
-    @classmethod
-    def on_slice(cls, number: int) -> tuple[Body, ...]:
-        """What this skill may make to be seen on slice `number`."""
+    def on_part(self, name: str, kind: Kind) -> tuple[Body, ...]:
+        """What this skill may make to be seen on a part."""
         return ()
 
     def shown(self) -> list[str]:
-        """The names of what is to be seen on its slice now."""
+        """The names of what is to be seen on its part now."""
         return []
 
-    def shown_in(self, state: int, number: int) -> dict[str, bool]:
-        """What is to be seen on slice `number` in a state of the problem, and what is not, by name."""
+    def shown_in(self, state: int, name: str) -> dict[str, bool]:
+        """What is to be seen on a part in a state of the problem, and what is not, by name."""
         return {}
 
     def photo(self) -> Photo | None:
@@ -195,23 +213,36 @@ class Skill:
         """Where the tool is when the skill begins; None: anywhere."""
         return None
 
-    def begin(self, bench: Bench, off: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
-        """Put all at once to where the set-up skill begins, to try it: the arm, and a slice on its spot or in the gripper.
+    def begin(self, bench: Bench, off: Sequence[float] = NOT_OFF) -> None:
+        """Put all at once to where the set-up skill begins, to try it: the arm, and a part on its spot or in the gripper.
 
-        off: how far off its spot the slice stands, x, y [m] and yaw [rad].
+        off: how far off its spot the part stands, x, y [m] and yaw [rad].
         """
-        scene, pose = bench.scene, self.begins_at()
-        self.aim(TRIED_WITH)
+        scene, pose, name = bench.scene, self.begins_at(), self.tried_with()
+        self.aim(name)
+        self.furnish(bench)
         if self.near and not self.carries:
-            scene.add_slice(TRIED_WITH, spots(self.surveys.task.station(self.station))[0], off)
+            scene.add(name, self.kind, self.stands_on(), off)
         if pose is not None:
             scene.robot.stand(pose)
             if self.carries:
-                bench.hold(TRIED_WITH, pose)
+                bench.hold(name, self.kind, pose)
             else:
                 scene.robot.open_at_once()
         for _ in range(STAND_STEPS):
             scene.world.step()
+
+    def furnish(self, bench: Bench) -> None:
+        """Put there what its part stands on, or is to be set down on: its pallet, where it stands on one."""
+        task, name = self.surveys.task, self.tried_with()
+        if self.station and self.kind and on_its_pallet(task, self.kind, self.station):
+            pallet, spot = task.part(self.kind).pallet, self.surveys.places.spots(task.station(self.station))[0]
+            if pallet_of(name) not in bench.scene.kind_of:
+                bench.scene.add(name, str(pallet), spot)
+
+    def tried_with(self) -> str:
+        """What the part is called with which the skill is tried; "": there is none."""
+        return self.kind and f"{self.surveys.task.made_as(self.kind).name} 1"
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Carry the policy out: each `next` sets what one physics step needs; raises SkillFailed."""

@@ -1,4 +1,4 @@
-"""Transfer: the tool's way through the workspace between two approaches, with or without a slice in the fingers."""
+"""Transfer: the tool's way through the workspace between two approaches, with or without a part in the fingers."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, ClassVar
@@ -7,10 +7,9 @@ from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import NoPath, grid
 from lab.sim.kinematics import ToolPose
-from lab.sim.scene import is_toaster
 from lab.skills.skill import Bench, Skill, SkillFailed, learned_path, no_way
-from lab.skills.surveys import INSERT_START, Surveys
-from lab.tasks.task_file import Task
+from lab.skills.surveys import Surveys, grid_of, way_to
+from lab.tasks.task import Task
 
 if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
@@ -20,31 +19,32 @@ _BLEND_M = 0.10
 
 
 class Transfer(Skill):
-    """From one approach to another; a place is a station or the start of the insert grid."""
+    """From one approach to another; a place is a station or the start of a camera's grid."""
 
     subtask: ClassVar[str] = "transfer"
     help: ClassVar[str] = "the tool's way through the workspace from one station to another"
 
-    def __init__(self, origin: str, target: str, *, loaded: bool) -> None:
-        super().__init__(f"transfer {origin} to {target}{' with slice' if loaded else ''}")
-        self.origin, self.target, self.loaded = origin, target, loaded
-        self.carries = loaded
+    def __init__(self, origin: str, target: str, kind: str = "") -> None:
+        """kind: what is carried; "": nothing."""
+        super().__init__(f"transfer {origin} to {target}{f' with {kind}' if kind else ''}", kind)
+        self.origin, self.target = origin, target
+        self.carries = bool(kind)
 
     @classmethod
-    def on_carry(cls, task: Task, origin: str, target: str) -> "Transfer":
-        """First of all, to where the slice is set down, or on through the camera's grid."""
-        return cls(origin, INSERT_START if is_toaster(task.station(target)) else target, loaded=True)
+    def on_carry(cls, task: Task, kind: str, origin: str, target: str) -> "Transfer":
+        """First of all, to where the part is set down, or on through the camera's grid."""
+        return cls(origin, way_to(task, target), kind)
 
     @classmethod
     def on_travel(cls, task: Task, origin: str, target: str) -> "Transfer":
         """All of it."""
-        return cls(origin, target, loaded=False)
+        return cls(origin, target)
 
     def setup(self, surveys: Surveys) -> Problem:
         """The workspace as a 3D grid: cells that are out of reach or too near to something are blocked."""
         self.surveys = surveys
-        survey = surveys.workspace(self.loaded)
-        start, goal = surveys.dock(self.origin, self.loaded), surveys.dock(self.target, self.loaded)
+        survey = surveys.workspace(self.kind)
+        start, goal = surveys.dock(self.origin, self.kind), surveys.dock(self.target, self.kind)
         if start == goal:
             raise BadInput(
                 f"{self.name}: both ends are approached from the same cell {goal} of the workspace: "
@@ -78,10 +78,11 @@ class Transfer(Skill):
         )
         if end.yaw:
             yield from robot.follow([end])
-        if self.target == INSERT_START:
-            yield from robot.follow([ToolPose(end.x, end.y, self.surveys.task.insert.height_m, 0.0)])
-        if self.loaded and (bench.held is None or not bench.holds(bench.held)):
-            raise SkillFailed(f"the slice is not in the gripper on the way to '{self.target}'")
+        grid = grid_of(self.surveys.task, self.target)
+        if grid is not None:
+            yield from robot.follow([ToolPose(end.x, end.y, grid.height_m, 0.0)])
+        if self.carries and (bench.held is None or not bench.holds(bench.held)):
+            raise SkillFailed(f"the part is not in the gripper on the way to '{self.target}'")
 
 
 def _still(tool: ToolPose, first: ToolPose) -> ToolPose:

@@ -7,12 +7,12 @@ from lab.learning.problem import Problem
 from lab.sim.scene import Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills.prepared_scene import Prepared
-from lab.skills.skill import SETTLE_STEPS, Bench, Skill, Status
+from lab.skills.skill import NOT_OFF, SETTLE_STEPS, Bench, Skill, Status
 from lab.toolbox.policy import Policy
 
 
 def trial_of(prepared: Prepared) -> Callable[[Problem, Policy], str | None]:
-    """What tries a skill of a prepared scene: a grasp must lift its slice; most skills are not tried."""
+    """What tries a skill of a prepared scene: a grasp must lift its part; most skills are not tried."""
 
     def trial(problem: Problem, policy: Policy) -> str | None:
         skill = prepared.skillset.skills[problem.name]
@@ -33,10 +33,10 @@ def try_out(prepared: Prepared, skill: Skill, policy: Policy) -> str | None:
     return carry_out(prepared, skill, policy).failure
 
 
-def carry_out(prepared: Prepared, skill: Skill, policy: Policy, off: Sequence[float] = (0.0, 0.0, 0.0)) -> Trial:
+def carry_out(prepared: Prepared, skill: Skill, policy: Policy, off: Sequence[float] = NOT_OFF) -> Trial:
     """Carry a skill out once in physics; `off`: as `Skill.begin` has it."""
     with World() as world:
-        bench = Bench(Scene(world, prepared.task, 0, prepared.surveys.layout))
+        bench = Bench(Scene(world, prepared.task, (), prepared.surveys.layout))
         for _ in range(SETTLE_STEPS):
             world.step()
         skill.begin(bench, off)

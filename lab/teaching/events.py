@@ -131,9 +131,10 @@ class SequenceFound:
 
 @dataclass(frozen=True)
 class MoveMade:
-    """A part was brought on."""
+    """A part was brought on; part: what it is called."""
 
     move: Move
+    part: str
 
 
 @dataclass(frozen=True)

@@ -52,8 +52,8 @@ def whole_path(name: str | None) -> str | None:
 class LessonOptions(SessionOptions):
     """The options of `lab teach` that a session depends on, by name; None or empty: not given.
 
-    view: where in a world the advisor sees (--sight); toasts and sessions: how many slices, and at most how many
-    sessions, the lesson of a `lab run` had.
+    view: where in a world the advisor sees (--sight); toasts, parts and sessions: how many parts, and at most
+    how many sessions, the lesson of a `lab run` had.
     """
 
     command = "teach"
@@ -78,6 +78,7 @@ class LessonOptions(SessionOptions):
     seed: Annotated[int, Ge(0)] = 0
     save: str | None = None
     toasts: int | None = None
+    parts: str | None = None
     sessions: Annotated[int, Ge(1), Le(MAX_SESSIONS)] | None = None
 
     def complete(self) -> "LessonOptions":

@@ -11,19 +11,22 @@ from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.skillset import SkillSet
 from lab.skills.trial import trial_of
 from lab.tasks.record import Learned
-from lab.tasks.task_file import Task, check_toasts, fitting, load, names_of
+from lab.tasks.task import Order, Task
+from lab.tasks.task_file import load, names_of
 from lab.teaching.lesson import Subject
 from lab.teaching.lesson_options import LessonOptions
 from lab.toolbox.policy import Policy
 
+TAUGHT_WITH = 2  # parts of the first kind in the scene of a lesson, where there is room
+
 
 @dataclass
 class SkillSubject(Subject):
-    """A skill of a task, by its full name; toasts: how many slices the scene has."""
+    """A skill of a task, by its full name; order: the parts that the scene has."""
 
     task: Task
     skill: str
-    toasts: int
+    order: Order
     settings: Learned
     scene: Prepared | None = None
 
@@ -36,14 +39,14 @@ class SkillSubject(Subject):
         if options.view is not None:
             raise BadInput(f"sight '{options.view}' (--sight): only a world has one, '{options.subtask}' is none")
         task = task or load(options.task or "toast")
-        toasts = fitting(task, 2) if options.toasts is None else options.toasts
-        check_toasts(toasts, task)
-        wanted = find_skill(SkillSet.of(task, toasts).skills, options.subtask)
-        return cls(task, wanted.name, toasts, options.changed(task.subtask(wanted.subtask)))
+        given = options.toasts is not None or options.parts is not None
+        order = task.ordered(options.toasts, options.parts) if given else task.fitting(TAUGHT_WITH)
+        wanted = find_skill(SkillSet.of(task, order).skills, options.subtask)
+        return cls(task, wanted.name, order, options.changed(task.subtask(wanted.subtask)))
 
     def prepare(self, seed: int) -> Problem:
         """Lay the scene out as the seed says, and survey the skill's problem."""
-        self.scene = prepare(self.task, self.toasts, seed, self.skill)
+        self.scene = prepare(self.task, self.order, seed, self.skill)
         return self.scene.problems[self.skill]
 
     def tried(self, problem: Problem, policy: Policy) -> str | None:
@@ -65,11 +68,11 @@ class SkillSubject(Subject):
 
 
 def find_skill(skills: "dict[str, Skill]", name: str) -> "Skill":
-    """The skill of that full name, or the first of that sub-task; BadInput lists what there is."""
+    """The skill of that full name, or the first of that sub-task or process; BadInput lists what there is."""
     if name in skills:
         return skills[name]
     for skill in skills.values():
-        if skill.subtask == name:
+        if name in (skill.subtask, skill.name.partition(" at ")[0]):
             return skill
     subtasks = sorted({skill.subtask for skill in skills.values()})
     worlds = names_of("world")

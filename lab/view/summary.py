@@ -23,10 +23,11 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", justify="right")
     table.add_column(overflow="fold")
-    done = f"{report['delivered']} of {counted(report['toasts'], 'toast')} delivered"
+    made = " and ".join(counted(count, kind) for kind, count in report["parts"].items())
+    done = f"{report['delivered']} of {made} delivered"
     table.add_row("outcome", Text(f"{done} (seed {report['seed']})", "green" if report["success"] else "red"))
     if report["dropped"]:
-        table.add_row("dropped", counted(report["dropped"], "toast"))
+        table.add_row("dropped", counted(report["dropped"], "part"))
     if report["failure"]:
         table.add_row("stopped", Text(report["failure"], "red"))
     if report["retries"]:

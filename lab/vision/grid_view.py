@@ -106,6 +106,11 @@ class GridView:
     markers: tuple[Marker, ...]
     view: View
 
+    @property
+    def goal_marker(self) -> Marker:
+        """The marker of the machine in the goal's cell."""
+        return next(m for m in self.markers if m.kind == "toaster" and m.cell == self.goal)
+
     def to_json(self) -> dict[str, Any]:
         """The record for `lab see --json`: '.' free, 'S' start, 'G' goal, '#' an obstacle's marker."""
         rows, columns = self.shape

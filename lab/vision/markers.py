@@ -4,8 +4,9 @@ Round coloured markers are told apart by hue and saturation, never by brightness
 balls, and a room has shadows.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import pi
+from math import hypot, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,8 +73,18 @@ def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
     return tuple(sorted(markers, key=lambda m: (m.kind, m.cell, m.pixel))), ignored
 
 
-def see(image: Image, view: View | None = None, *, shape: Cell = (12, 12), where: str = "picture") -> GridView:
+def see(
+    image: Image,
+    view: View | None = None,
+    *,
+    shape: Cell = (12, 12),
+    goal_near_m: Sequence[float] | None = None,
+    where: str = "picture",
+) -> GridView:
     """The grid that a picture (H, W, 3) shows; without a view the picture itself is a grid of `shape`.
+
+    goal_near_m: about where the goal's machine is (x, y) [m], in a cell with several: of theirs the nearest marker counts,
+    and what lies outside the view's grid belongs to another one.
 
     Raises BadInput, naming `where`: no markers, not exactly one gripper or one toaster, a marker outside the grid, the
     start or the goal on an obstacle, a picture of another shape or dtype. Thesis ch. 8.3, fig. 8.2.
@@ -81,6 +92,8 @@ def see(image: Image, view: View | None = None, *, shape: Cell = (12, 12), where
     check_picture(image, where)
     view = view or plain_view(image.shape[:2], shape)
     markers, ignored = find_markers(image, view)
+    if goal_near_m is not None:
+        markers = _of_this_grid(markers, view, goal_near_m)
     if not markers:
         wanted = ", ".join(f"{name} ({hue.colour})" for name, hue in MARKERS.items())
         raise BadInput(f"{where}: no round coloured marker found: wanted {wanted}{_passed_over(ignored)}")
@@ -95,6 +108,14 @@ def see(image: Image, view: View | None = None, *, shape: Cell = (12, 12), where
                 f"{where}: the {name} {marker.cell} ({marker.kind} marker) is on a cell that an obstacle covers"
             )
     return GridView(view.shape, gripper.cell, toaster.cell, tuple(sorted(obstacles)), markers, view)
+
+
+def _of_this_grid(markers: tuple[Marker, ...], view: View, goal_near_m: Sequence[float]) -> tuple[Marker, ...]:
+    """The markers that belong to one grid of several."""
+    mine = [m for m in markers if m.kind == "gripper" or view.holds(m.cell)]
+    goals = [m for m in mine if m.kind == "toaster"]
+    goal = min(goals, key=lambda m: hypot(m.world_m[0] - goal_near_m[0], m.world_m[1] - goal_near_m[1]), default=None)
+    return tuple(m for m in mine if m.kind != "toaster" or m is goal)
 
 
 def locate(image: Image, view: View, kind: str) -> Marker:

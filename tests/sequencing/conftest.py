@@ -174,7 +174,7 @@ def _random_route(
     seconds: SearchStrategy[float],
     many: bool,
 ) -> Route:
-    """A route from "in" to "out" through stations of its own, which are added; with `many` also with pallets."""
+    """A route from "in" to "out" through stations of its own, which are added; with `many` also with pallets, or back to "in"."""
     route = [Stage("in")]
     for number in range(draw(st.integers(1, max_machines))):
         label = f"{name}{number}"
@@ -193,7 +193,7 @@ def _random_route(
         room = draw(st.integers(1, 2))
         stations.append(Station(f"stage {label}", kind, room, time_s if kind == "machine" else 0.0))  # type: ignore[arg-type]
         route.append(Stage(f"stage {label}", buffer))
-    return (*route, Stage("out"))
+    return (*route, Stage(draw(st.sampled_from(["out", "in"])) if many else "out"))
 
 
 @pytest.fixture(scope="session")

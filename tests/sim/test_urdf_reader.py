@@ -49,8 +49,9 @@ def test_a_sound_urdf_is_accepted_and_its_looks_are_read(tmp_path: Path) -> None
     urdf_reader.validate(path)
     looks = urdf_reader.looks(path)
     assert set(looks) == {"", "arm"}
-    (mesh,) = looks[""]  # the sphere is none of this lab's shapes
+    mesh, ball = looks[""]
     assert (mesh.kind, mesh.mesh, mesh.rgba, mesh.position) == ("mesh", tmp_path / "part.obj", (1, 0, 0, 1), (0, 0, 1))
+    assert (ball.kind, ball.size) == ("sphere", (1,))
     (box,) = looks["arm"]
     assert (box.kind, box.size) == ("box", (1, 2, 3))
 
@@ -68,10 +69,13 @@ def test_a_sound_urdf_is_accepted_and_its_looks_are_read(tmp_path: Path) -> None
         ('ixx="2" ixy="0"', 'ixx="-2" ixy="0"', "inertia of link 'root' is not positive definite"),
         ('ixx="2" ixy="0"', 'ixx="2" ixy="3"', "not positive definite"),
         ('ixx="2" ixy="0"', 'ixy="0"', "ixx of link 'root' is 'None'"),
-        ('parent link="root"', 'parent link="rot"', "joint 'turn' has the parent 'rot', known links: root, arm"),
-        ('<child link="arm"/>', "", "joint 'turn' has the child ''"),
+        ('parent link="root"', 'parent link="rot"', "unknown link 'rot' (parent of joint 'turn'): did you mean 'root'?"),
+        ('<child link="arm"/>', "", "unknown link ''"),
         ('lower="-1"', 'lower="2"', "lower limit 2 above upper limit 1"),
         ('upper="1"', 'upper="nan"', "upper limit of joint 'turn' is 'nan'"),
+        ('xyz="0 0 1"', 'xyz="0 0"', "xyz of a <origin> is '0 0', wanted 3 numbers"),
+        ('xyz="0 0 1"', 'xyz="0 0 up"', "xyz of a <origin> is 'up', wanted a finite number"),
+        ('radius="1"', 'radius="-1"', "radius of a <sphere> is '-1', wanted above 0"),
         ("part.obj", "missing.obj", "mesh 'missing.obj' is missing"),
         ("part.obj", "../part.obj", "mesh '../part.obj' lies outside"),
         ("part.obj", "/etc/hostname", "mesh '/etc/hostname' lies outside"),

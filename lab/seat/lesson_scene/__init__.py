@@ -35,7 +35,7 @@ def lesson_scene_of(where: "Prepared | GridWorld | None", problem: Problem) -> L
         return WorldScene(where, problem.mdp)
     if where is None or problem.name not in where.problems:
         return None
-    return SkillScene(where.task, where.toasts, where.layout, where.skillset.skills[problem.name])
+    return SkillScene(where.task, where.order, where.layout, where.skillset.skills[problem.name])
 
 
 __all__ = ["LessonScene", "SkillScene", "WorldScene", "lesson_scene_of"]

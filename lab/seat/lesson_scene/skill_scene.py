@@ -1,4 +1,4 @@
-"""The scene of a skill: the cell with the arm, or the applier's head, where the state has it."""
+"""The scene of a skill: the cell with the arm, or a machine's head, where the state has it."""
 
 from dataclasses import dataclass
 from math import hypot, radians
@@ -6,54 +6,55 @@ from math import hypot, radians
 import numpy as np
 
 from lab.seat.lesson_scene.episode_trail import STEP_S, Changes, EpisodeTrail
-from lab.sim import models
+from lab.sim.blocked_cells import FINGERS_OFF_M
 from lab.sim.frames import Body, Frame, Rgba, Shape, Vector, Viewpoint
-from lab.sim.scene import Layout, Scene, spots
+from lab.sim.kinds import Spot
+from lab.sim.places import Layout
+from lab.sim.scene import Scene
 from lab.sim.world import World
 from lab.skills import Skill
-from lab.skills.skill import FINGERS_OFF_M, Bench
-from lab.skills.surveys import neighbours
-from lab.tasks.task_file import Task
+from lab.skills.skill import Bench
+from lab.tasks.task import Order, Task, part_name
 from lab.view.camera_placement import camera_for, corners, vector
 from lab.view.world_bodies import GREEN
 
-NUMBER = 1  # of the slice that the lesson is about
-SLICE = f"slice {NUMBER}"
 GHOST: Rgba = (0.80, 0.68, 0.48, 0.3)
 TRAIL_M, COLLISION_M = 0.004, 0.045  # [m] at least: the gripper must not hide them
-_ROOM = np.array([0.09, 0.09, 0.10])  # [m] of a slice and the gripper around the places of the tool
+_ROOM = np.array([0.09, 0.09, 0.10])  # [m] of a part and the gripper around the places of the tool
 
 
 @dataclass
-class OnSlice:
-    """What a skill has made to be seen on the slice in the states of its problem."""
+class OnPart:
+    """What a skill has made to be seen on its part in the states of its problem."""
 
     skill: Skill
     world: World
+    name: str
 
     def bodies(self) -> tuple[Body, ...]:
         """All of it, as a run's replay has it."""
-        return self.skill.on_slice(NUMBER)
+        return self.skill.on_part(self.name, self.skill.own_kind)
 
     def at(self, state: int) -> Changes:
-        """What there is in `state`, where the slice is."""
-        seen = self.skill.shown_in(state, NUMBER)
-        position, (i, j, k, w) = self.world.pose(SLICE)
+        """What there is in `state`, where the part is."""
+        seen = self.skill.shown_in(state, self.name)
+        position, (i, j, k, w) = self.world.pose(self.name)
         pose = (*vector(position), float(i), float(j), float(k), float(w))
         return dict.fromkeys(seen, pose), seen
 
 
 class SkillScene:
-    """A skill's scene with the first slice in the gripper, or before it on its spot."""
+    """A skill's scene with a part in the gripper, or before it on its spot."""
 
-    def __init__(self, task: Task, toasts: int, layout: Layout, skill: Skill) -> None:
-        """Build the scene; `skill` is set up, `toasts` at least 1. A state out of reach leaves the arm where it was."""
+    def __init__(self, task: Task, order: Order, layout: Layout, skill: Skill) -> None:
+        """Build the scene; `skill` is set up. A state out of reach leaves the arm where it was."""
         self._skill, self._mdp, self._frames = skill, skill.problem.mdp, 0
         self._world = World()
         try:
-            self._bench = Bench(Scene(self._world, task, toasts, layout))
+            self._bench = Bench(Scene(self._world, task, order, layout))
             self._ghosts = self._set_up(task)
-            self._extra = OnSlice(skill, self._world) if skill.on_slice(NUMBER) else self._marks()
+            seen = OnPart(skill, self._world, self._part) if skill.kind else None
+            self._extra = seen if seen is not None and seen.bodies() else self._marks()
             self.bodies: tuple[Body, ...] = (*self._world.bodies(), *self._goal(), *self._extra.bodies())
             self.camera = self._camera()
         except BaseException:
@@ -61,31 +62,38 @@ class SkillScene:
             raise
 
     def _set_up(self, task: Task) -> dict[str, Rgba]:
-        """The slice into the gripper or onto its spot; the colours of the slices that are not really there.
+        """The part into the gripper or onto its spot; the colours of the parts that are not really there.
 
-        These are the ones that the survey reckons with beside the spot, and the slice as it is to be set down.
+        These are the ones that the survey reckons with beside the spot, and the part as it is to be set down.
         """
-        bench, skill = self._bench, self._skill
+        bench, skill, scene = self._bench, self._skill, self._bench.scene
+        kind = task.made_as(skill.kind).name if skill.kind else ""
+        numbers = [number for number, own in enumerate(scene.order, 1) if own == kind]
+        self._part = part_name(scene.order, numbers[0]) if numbers else ""
+        skill.aim(self._part)
         if skill.carries:
-            bench.held = SLICE
-            bench.scene.robot.open_at_once(models.SLICE[1] / 2 + FINGERS_OFF_M)
+            bench.held = scene.body_of(self._part, skill.kind)
+            scene.robot.open_at_once(skill.own_kind.grip.width_m / 2 + FINGERS_OFF_M)
         elif skill.near:
-            bench.scene.put_slice(SLICE, spots(task.station(skill.station))[0].grasp())
+            scene.put(self._part, skill.kind, skill.own_kind.held_at(skill.stands_on()))
         if not skill.near:
             return {}
-        station = task.station(skill.station)
-        slices = [bench.slice_pose(f"slice {number}") for number in range(1, bench.scene.toasts + 1)]
-        foot = spots(station)[0]
-        ghosts = {
-            name: (spot, GHOST)
-            for name, spot in neighbours(station, foot).items()
-            if all(hypot(spot.x - at.x, spot.y - at.y) > models.SLICE[0] / 4 for at in slices)
-        }
+        return self._ghosts_at(skill.stands_on())
+
+    def _ghosts_at(self, foot: Spot) -> dict[str, Rgba]:
+        skill, scene = self._skill, self._bench.scene
+        station = scene.task.station(skill.station)
+        stand = [self._world.pose(part_name(scene.order, number))[0] for number in range(1, len(scene.order) + 1)]
+        near_m = skill.own_kind.footprint_m()[0] / 2
+        colors: dict[str, Rgba] = {}
+        for name, (kind, spot) in skill.surveys.places.neighbours(station, foot).items():
+            if all(hypot(spot.x - at[0], spot.y - at[1]) > near_m for at in stand):
+                scene.add(name, kind, spot)
+                colors |= dict.fromkeys(scene.bodies_of(name, kind), GHOST)
         if skill.carries:
-            ghosts["goal"] = (foot, GREEN)
-        for name, (spot, _) in ghosts.items():
-            bench.scene.add_slice(name, spot)
-        return {name: rgba for name, (_, rgba) in ghosts.items()}
+            scene.add("goal", skill.kind, foot)
+            colors |= dict.fromkeys(scene.bodies_of("goal", skill.kind), GREEN)
+        return colors
 
     def _place(self, state: int) -> Vector:
         pose = self._skill.pose(state)
@@ -117,7 +125,7 @@ class SkillScene:
         if not self._skill.near:
             return camera_for(np.vstack([places * [1.0, 1.0, 0.0], places + _ROOM]), azimuth, elevation)
         if not self._skill.moves_arm:
-            places = np.vstack([places, self._world.pose(SLICE)[0]])
+            places = np.vstack([places, self._world.pose(self._part)[0]])
         yaw = self._skill.surveys.task.station(self._skill.station).pose[2]
         seen = corners(places.min(axis=0) - _ROOM, places.max(axis=0) + _ROOM)
         return camera_for(seen, yaw + azimuth, elevation)

@@ -45,7 +45,10 @@ Route = tuple[Stage, ...]
 
 @dataclass(frozen=True)
 class Product:
-    """A type of part: its name and the routes that a part of it may take; all begin at the same station."""
+    """A type of part: its name and the routes that a part of it may take.
+
+    All begin at the same station, and may end there, too: the part then comes back to where it was.
+    """
 
     name: str
     routes: tuple[Route, ...]
@@ -120,7 +123,8 @@ def _check_route(stations: Sequence[Station], route: Route, one_of: str) -> None
                 continue
             if name not in kinds:
                 raise unknown("station", name, kinds, where)
-            if name in visited:
+            back = number == len(route) > 2 and name == route[0].station
+            if name in visited and not back:
                 raise BadInput(f"{where}: station '{name}' is on the route twice, a cycle; once is allowed")
             visited.add(name)
             if is_buffer and kinds[name] != "buffer":

@@ -120,7 +120,8 @@ def advice_worth(job: Job, reading: Mapping[str, Any]) -> Findings:
 @cache
 def scene() -> Prepared:
     """The scene whose skills are learned."""
-    return prepare(load(TASK), TOASTS, SCENE_SEED)
+    task = load(TASK)
+    return prepare(task, task.order(TOASTS), SCENE_SEED)
 
 
 def taught(pupil: Pupil, *, lessons: int, seed: int) -> Cost:

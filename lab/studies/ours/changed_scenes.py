@@ -8,9 +8,11 @@ from zlib import crc32
 import numpy as np
 
 from lab.errors import BadInput
-from lab.sim.scene import Layout, in_camera_grid
+from lab.sim.places import Layout
+from lab.sim.scene import in_grid
 from lab.skills.prepared_scene import Prepared, prepare
-from lab.tasks.task_file import Obstacle, Task
+from lab.tasks.task import Order, Task
+from lab.tasks.task_fields import Obstacle
 
 NEAREST_M, FARTHEST_M = 0.01, 0.10  # how far a thing is moved
 TURN_RAD = 0.15  # how far every other station that is moved is turned, too
@@ -43,7 +45,7 @@ def still(task: Task, layout: Layout) -> Task:
     return _with(task, obstacles=tuple(o.model_copy(update={"position_m": p, "area": (0.0, 0.0)}) for o, p in stand))
 
 
-def surveyed(scene: Scene, task: Task, layout: Layout, seed: int, toasts: int) -> tuple[Prepared, str, int]:
+def surveyed(scene: Scene, task: Task, layout: Layout, seed: int, order: Order) -> tuple[Prepared, str, int]:
     """A changed scene, surveyed; the change in words; how many draws before it could not be surveyed.
 
     task, layout, seed: those of the scene that is changed. BadInput when no draw can be surveyed.
@@ -52,7 +54,7 @@ def surveyed(scene: Scene, task: Task, layout: Layout, seed: int, toasts: int) -
     for refused in range(MAX_DRAWS):
         try:
             changed = KINDS[scene.kind](task, layout, seed, rng)
-            return prepare(changed.task, toasts, changed.seed), changed.words, refused
+            return prepare(changed.task, order, changed.seed), changed.words, refused
         except (BadInput, ValueError) as error:
             last = error
     raise BadInput(f"{scene.kind}, scene {scene.number}: none of {MAX_DRAWS} draws can be surveyed; the last: {last}")
@@ -60,7 +62,12 @@ def surveyed(scene: Scene, task: Task, layout: Layout, seed: int, toasts: int) -
 
 def _with(task: Task, **changed: object) -> Task:
     """A copy of a task, checked again."""
-    return Task.model_validate({**dict(task), **changed})
+    return task.changed(**changed)
+
+
+def _seen(task: Task, place: tuple[float, float]) -> bool:
+    """Whether a point (x, y) [m] lies in a grid that the camera looks at."""
+    return any(in_grid(station.grid, place) for station in task.stations if station.grid is not None)
 
 
 def _shift(rng: np.random.Generator) -> tuple[float, float, float]:
@@ -90,7 +97,7 @@ def _station_moved(task: Task, layout: Layout, seed: int, rng: np.random.Generat
 def _cubes_added(task: Task, layout: Layout, seed: int, rng: np.random.Generator) -> Changed:
     xs, ys = zip(*(station.pose[:2] for station in task.stations), strict=True)
     x, y = float(rng.uniform(min(xs), max(xs))), float(rng.uniform(min(ys), max(ys)))
-    cubes = SEEN if in_camera_grid(task, (x, y)) else int(rng.integers(1, HIGHEST + 1))
+    cubes = SEEN if _seen(task, (x, y)) else int(rng.integers(1, HIGHEST + 1))
     added = Obstacle(name="cubes added", position_m=(x, y), cubes=cubes)
     obstacles = (*still(task, layout).obstacles, added)
     return Changed(_with(task, obstacles=obstacles), seed, f"{cubes} cubes added at ({x:.2f}, {y:.2f}) m")
@@ -99,7 +106,7 @@ def _cubes_added(task: Task, layout: Layout, seed: int, rng: np.random.Generator
 def _cubes_taken(task: Task, layout: Layout, seed: int, rng: np.random.Generator) -> Changed:
     obstacles, which = [*still(task, layout).obstacles], int(rng.integers(len(task.obstacles)))
     lower = obstacles[which]
-    seen = in_camera_grid(task, lower.position_m)
+    seen = _seen(task, lower.position_m)
     taken = lower.cubes if seen else int(rng.integers(1, lower.cubes + 1))
     left = [lower.model_copy(update={"cubes": lower.cubes - taken})] if taken < lower.cubes else []
     obstacles[which : which + 1] = left

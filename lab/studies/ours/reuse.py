@@ -97,7 +97,8 @@ def learned_here() -> tuple[Prepared, Known, Known]:
 
     Both by (sub-task, signature), and the same in each process.
     """
-    prepared = prepare(load(TASK), TOASTS, 0)
+    task = load(TASK)
+    prepared = prepare(task, task.order(TOASTS), 0)
     problems = _distinct(prepared)
     lessons = taught(prepared, {}, problems)
     anew = {_key(problem): _from_nothing(prepared, problem) for problem in problems}
@@ -129,7 +130,7 @@ def taught(prepared: Prepared, known: Known, problems: Iterable[Problem]) -> lis
 def tried(scene: Scene) -> Outcome:
     """One changed scene, with what was learned before and from nothing."""
     base, known, learned = learned_here()
-    prepared, words, refused = surveyed(scene, base.task, base.layout, base.seed, TOASTS)
+    prepared, words, refused = surveyed(scene, base.task, base.layout, base.seed, base.order)
     problems = _distinct(prepared)
     here = taught(prepared, known, problems)
     anew = [learned.get(_key(problem)) or _from_nothing(prepared, problem) for problem in problems]

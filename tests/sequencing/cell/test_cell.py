@@ -88,6 +88,15 @@ def test_one_toast_needs_no_empty_way_back(oven_cell: CellMaker) -> None:
         oven_cell(2, empty_s=nowhere)
 
 
+def test_a_route_may_lead_back_to_where_it_began(oven_cell: CellMaker) -> None:
+    """A can is emptied and brought back: there at 2 s, empty at 12, back at 14; the other one is begun from there at once."""
+    cell = oven_cell(2, **route(Stage("in"), Stage("oven"), Stage("in")))
+    assert (cell.needed.empty, cell.needed.loaded) == ((), (("in", "oven"), ("oven", "in")))
+    run = Run(cell)
+    assert [run.move(decision).drop_s for decision in (1, 1, 2, 2)] == [2.0, 14.0, 16.0, 28.0]
+    assert run.done
+
+
 def test_tables_are_copies_that_cannot_be_written(oven_cell: CellMaker) -> None:
     given_table = np.ones((3, 3)) - np.eye(3)
     cell = oven_cell(empty_s=given_table)
@@ -135,6 +144,8 @@ def table(value: float) -> np.ndarray:
         (route(Stage("in")), "at least 2"),
         (route(Stage("in"), Stage("ovens"), Stage("out")), "unknown station 'ovens'.*stage 2.*'oven'"),
         (route(Stage("in"), Stage("oven"), Stage("oven"), Stage("out")), "'oven' is on the route twice, a cycle"),
+        (route(Stage("in"), Stage("in")), "stage 2 of the route: station 'in' is on the route twice, a cycle"),
+        (route(Stage("in"), Stage("in"), Stage("oven"), Stage("in")), "stage 2 of the route: station 'in' is on the"),
         (route(Stage("in", "oven"), Stage("out")), "buffer 'oven' before the start"),
         (route(Stage("in"), Stage("out", "oven")), "'oven' is a machine; a buffer fits"),
         (route(Stage("in"), Stage("oven")), "'oven' is a machine; a route starts and ends in storage"),

@@ -1,4 +1,4 @@
-"""What grasp and place share: the tool's poses around one slice, from anywhere above it down to where fingers close or open."""
+"""What grasp and place share: the tool's poses around one part, from anywhere above it down to where fingers close or open."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,6 +13,7 @@ from lab.sim.blocked_cells import Survey
 from lab.sim.kinematics import ToolPose
 from lab.skills.skill import Bench, Skill, learned_path, no_way
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
+from lab.tasks.task import Task
 
 if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
@@ -21,22 +22,22 @@ SLOW = 0.6
 _BLEND_M = 0.008
 
 
-class AroundSlice(Skill):
-    """At one station: the table holds the tool's pose relative to the slice (x, y, z, and yaw where it may turn)."""
+class AroundPart(Skill):
+    """At one station: the table holds the tool's pose relative to the part (x, y, z, and yaw where it may turn)."""
 
     near: ClassVar[bool] = True
     looks_from: ClassVar[tuple[float, float]] = (-60.0, 28.0)
     actions: ClassVar[tuple[str, ...]]
     goal: ClassVar[tuple[int, ...]]  # the cell where the fingers close or open
 
-    def __init__(self, station: str) -> None:
-        super().__init__(f"{self.subtask} at {station}")
+    def __init__(self, task: Task, kind: str, station: str) -> None:
+        super().__init__(f"{self.subtask}{task.called(kind)} at {station}", kind)
         self.station = station
 
     def setup(self, surveys: Surveys) -> Problem:
-        """The poses around a slice with slices beside it; episodes begin anywhere above it."""
+        """The poses around a part with parts beside it; episodes begin anywhere above it."""
         self.surveys = surveys
-        survey = surveys.around(self.station, self.carries)
+        survey = surveys.around(self.station, self.kind, self.carries)
         rewards = surveys.task.subtask(self.subtask).rewards
         try:
             start = free_above(self.name, survey, self.goal)
@@ -47,11 +48,11 @@ class AroundSlice(Skill):
         return self.problem
 
     def goal_pose(self) -> ToolPose:
-        """The tool pose of the goal's cell, for a slice that stands, or is to stand, on its spot."""
-        raise NotImplementedError
+        """The tool pose of the goal's cell, for a part that stands, or is to stand, on its spot."""
+        return self.own_kind.held_at(self.stands_on())
 
     def pose(self, state: int, goal: ToolPose | None = None) -> ToolPose:
-        """Around `goal`, by default where the slice is by the task."""
+        """Around `goal`, by default where the part is by the task."""
         return near_pose(goal or self.goal_pose(), self.problem.mdp.state_cell(state))
 
     def begins_at(self) -> ToolPose:
@@ -59,7 +60,7 @@ class AroundSlice(Skill):
         return self.surveys.approach(self.station)
 
     def down(self, bench: Bench, policy: "Policy", goal: ToolPose) -> Iterator[None]:
-        """Above the slice, and down the learned cells to the tool pose `goal`."""
+        """Above the part, and down the learned cells to the tool pose `goal`."""
         robot, mdp = bench.scene.robot, self.problem.mdp
         entry = entry_cell(goal, robot.tool())[: len(mdp.shape)]
         path = learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))
@@ -75,7 +76,7 @@ def free_above(what: str, survey: Survey, goal: tuple[int, ...]) -> tuple[int, .
     free = [cell for cell in top if not survey.blocked[cell]]
     if survey.blocked[goal] or not free:
         names = survey.names([goal] if survey.blocked[goal] else top)
-        raise BadInput(f"{what}: no room for gripper and slice; in the way: {', '.join(names)}")
+        raise BadInput(f"{what}: no room for gripper and part; in the way: {', '.join(names)}")
     return free[0]
 
 
@@ -87,7 +88,7 @@ def from_above(mdp: TabularMDP) -> TabularMDP:
 
 
 def entry_cell(goal: ToolPose, tool: ToolPose) -> tuple[int, int, int, int]:
-    """The cell of the highest level that is nearest to where the tool is, seen from the slice."""
+    """The cell of the highest level that is nearest to where the tool is, seen from the part."""
     c, s = np.cos(goal.yaw), np.sin(goal.yaw)
     dx, dy = tool.x - goal.x, tool.y - goal.y
     along, across = c * dx + s * dy, -s * dx + c * dy

@@ -1,0 +1,223 @@
+"""An arm's URDF from elsewhere as this lab's own: one tree, limits, masses, colours, and every mesh by its full path.
+
+What physics could not make sense of is refused in one line; what only says less than it could is filled in.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from lab.errors import BadInput, unknown
+from lab.files import write_whole
+from lab.sim import mesh_file
+from lab.sim.urdf_reader import check_inertial, check_joint, check_mesh, check_numbers, floats, read
+
+MOVING = ("revolute", "prismatic")
+_FRAME_KG, _FRAME_KGM2 = 1e-3, 1e-7  # of a link that is only a frame: physics wants all links to weigh something
+_ROOT_KG, _ROOT_KGM2 = 1.0, 0.01  # of a foot that says nothing: it is bolted down, so that it does not matter
+_GREY = "0.8 0.8 0.8 1"
+_PACKAGE = "package://"
+
+
+@dataclass(frozen=True, eq=False)
+class Urdf:
+    """A URDF's tree: where it came from, its XML, its joints by the link that they carry, and the link that carries all."""
+
+    path: Path
+    root: Xml.Element
+    carrying: dict[str, Xml.Element]
+    foot: str
+
+    @property
+    def links(self) -> dict[str, Xml.Element]:
+        """Its links by name."""
+        return {link.get("name", ""): link for link in self.root.findall("link")}
+
+    @property
+    def joints(self) -> dict[str, Xml.Element]:
+        """Its joints by name."""
+        return {joint.get("name", ""): joint for joint in self.root.findall("joint")}
+
+    def link(self, name: str, what: str) -> Xml.Element:
+        """A link; BadInput lists the known ones, `what` says where the name came from."""
+        if name not in self.links:
+            raise BadInput(f"{self.path}: {unknown('link', name, self.links, what)}")
+        return self.links[name]
+
+    def joint(self, name: str, what: str) -> Xml.Element:
+        """A joint that moves; BadInput lists the known ones, `what` says where the name came from."""
+        moving = {name: joint for name, joint in self.joints.items() if joint.get("type") in MOVING}
+        if name not in moving:
+            raise BadInput(f"{self.path}: {unknown('joint', name, moving, what)}")
+        return moving[name]
+
+    def down_to(self, link: str) -> list[Xml.Element]:
+        """The joints from the foot to a link, in order."""
+        way = []
+        while link != self.foot:
+            way.append(self.carrying[link])
+            link = _end(self.carrying[link], "parent")
+        return way[::-1]
+
+    def below(self, link: str) -> list[str]:
+        """A link and all that it carries."""
+        carried = [name for name, joint in self.carrying.items() if _end(joint, "parent") == link]
+        return [link, *(name for one in carried for name in self.below(one))]
+
+
+def child(joint: Xml.Element) -> str:
+    """The link that a joint carries."""
+    return _end(joint, "child")
+
+
+def _end(joint: Xml.Element, end: str) -> str:
+    element = joint.find(end)
+    return "" if element is None else element.get("link", "")
+
+
+def settled(path: Path, folder: Path) -> Urdf:
+    """The URDF at `path`, whose meshes lie in `folder`, with all that physics and viewer need; BadInput says what is wrong."""
+    root = read(path)
+    for element in [one for one in root if one.tag not in ("link", "joint", "material")]:
+        root.remove(element)  # transmissions, and what other simulators want to know
+    check_numbers(path, root)
+    links = [link.get("name", "") for link in root.findall("link")]
+    for joint in root.findall("joint"):
+        check_joint(path, joint, links)
+        _check_limits(path, joint)
+    carrying, foot = _tree(path, root, links)
+    for link in root.findall("link"):
+        name = link.get("name", "")
+        _fill_inertial(path, link, name == foot, carrying.get(name))
+        _find_meshes(path, link, folder)
+    _paint(root)
+    return Urdf(path, root, carrying, foot)
+
+
+def _check_limits(path: Path, joint: Xml.Element) -> None:
+    name, kind, limit = joint.get("name", ""), joint.get("type", ""), joint.find("limit")
+    if kind == "fixed":
+        return
+    if kind not in MOVING:
+        raise BadInput(f"{path}: joint '{name}' is {kind or 'of no type'}: wanted revolute or prismatic, with limits")
+    if limit is None or joint.find("axis") is None:
+        raise BadInput(f"{path}: joint '{name}' has no limits or no axis")
+    speed = float(limit.get("velocity", "nan") or "nan") if _is_number(limit.get("velocity")) else float("nan")
+    if not speed > 0 or not np.isfinite(speed):
+        raise BadInput(f"{path}: joint '{name}' has the velocity limit '{limit.get('velocity')}', wanted above 0")
+    if np.linalg.norm(floats(joint.find("axis"), "xyz", "0 0 0")) < 1e-6:
+        raise BadInput(f"{path}: joint '{name}' has an axis of length 0")
+
+
+def _is_number(text: str | None) -> bool:
+    try:
+        float(text or "")
+    except ValueError:
+        return False
+    return True
+
+
+def _tree(path: Path, root: Xml.Element, links: Sequence[str]) -> tuple[dict[str, Xml.Element], str]:
+    joints = root.findall("joint")
+    names = [joint.get("name", "") for joint in joints]
+    for kind, all_names in (("link", links), ("joint", names)):
+        twice = sorted({name for name in all_names if list(all_names).count(name) > 1})
+        if twice:
+            raise BadInput(f"{path}: {kind} '{twice[0]}' stands twice in it")
+    carrying: dict[str, Xml.Element] = {}
+    for joint in joints:
+        if child(joint) in carrying:
+            raise BadInput(f"{path}: link '{child(joint)}' is carried by two joints: a tree is wanted")
+        carrying[child(joint)] = joint
+    feet = [link for link in links if link not in carrying]
+    if len(feet) != 1:
+        raise BadInput(f"{path}: {len(feet)} links are carried by no joint, wanted one: {', '.join(feet)}")
+    found = Urdf(path, root, carrying, feet[0]).below(feet[0])
+    apart = [link for link in links if link not in found]
+    if apart:
+        raise BadInput(f"{path}: link '{apart[0]}' hangs on itself: its joints lead round in a circle")
+    return carrying, feet[0]
+
+
+def _fill_inertial(path: Path, link: Xml.Element, is_foot: bool, joint: Xml.Element | None) -> None:
+    """A frame, and a foot that does not say its mass, get a little; an inertia that no body has becomes one that is near."""
+    mass = link.find("inertial/mass")
+    weightless = mass is None or (_is_number(mass.get("value")) and float(mass.get("value", "0")) == 0.0)
+    is_frame = link.find("collision") is None and joint is not None and joint.get("type") == "fixed"
+    if weightless and (is_frame or is_foot):
+        old = link.find("inertial")
+        if old is not None:
+            link.remove(old)
+        kg, kgm2 = (_ROOT_KG, _ROOT_KGM2) if is_foot else (_FRAME_KG, _FRAME_KGM2)
+        inertial = Xml.SubElement(link, "inertial")
+        Xml.SubElement(inertial, "mass", value=f"{kg:g}")
+        _set_inertia(Xml.SubElement(inertial, "inertia"), np.eye(3) * kgm2)
+        return
+    check_inertial(path, link)
+    inertia = link.find("inertial/inertia")
+    assert inertia is not None
+    xx, xy, xz, yy, yz, zz = (float(inertia.get(key, "")) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    if moments[2] > moments[0] + moments[1]:  # PyBullet would take none at all
+        moments[0] = moments[2] - moments[1] + 1e-3 * moments[2]
+        moments[1] = max(moments[1], moments[0])
+        _set_inertia(inertia, axes @ np.diag(moments) @ axes.T)
+
+
+def _set_inertia(element: Xml.Element, tensor: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> None:
+    names = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    element.attrib.update({name: f"{float(tensor[at]):.9g}" for name, at in names.items()})
+
+
+def _find_meshes(path: Path, link: Xml.Element, folder: Path) -> None:
+    """Meshes by their full paths. What is only seen may be of a kind that nobody here reads: it is left out."""
+    for piece in [one for one in link if one.tag in ("visual", "collision")]:
+        mesh = piece.find("geometry/mesh")
+        if mesh is None:
+            continue
+        name = mesh.get("filename", "")
+        if piece.tag == "visual" and Path(name).suffix.lower() not in mesh_file.SUFFIXES:
+            link.remove(piece)
+            continue
+        places = [name]
+        if name.startswith(_PACKAGE):
+            rest = name.removeprefix(_PACKAGE)
+            places = [rest, rest.partition("/")[2]]
+        place = next((one for one in places if (path.parent / one).is_file()), places[0])
+        check_mesh(path, place, folder)
+        mesh.set("filename", str((path.parent / place).resolve()))
+
+
+def _paint(root: Xml.Element) -> None:
+    """Every visual says its own colour."""
+    named = {}
+    for material in root.iter("material"):
+        color = material.find("color")
+        if color is not None:
+            named[material.get("name", "")] = color.get("rgba", _GREY)
+    for material in root.findall("material"):
+        root.remove(material)
+    for number, visual in enumerate(root.iter("visual")):
+        old = visual.find("material")
+        rgba = named.get("" if old is None else old.get("name", ""), _GREY)
+        if old is not None:
+            visual.remove(old)
+        Xml.SubElement(Xml.SubElement(visual, "material", name=f"paint {number}"), "color", rgba=rgba)
+
+
+def written(root: Xml.Element, name: str) -> Path:
+    """The file of a settled URDF, in a folder that goes when this process ends."""
+    Xml.indent(root)
+    path = Path(_folder().name) / f"{name}.urdf"
+    write_whole(path, Xml.tostring(root, encoding="unicode").encode())
+    return path
+
+
+@cache
+def _folder() -> TemporaryDirectory[str]:
+    return TemporaryDirectory(prefix="lab-arms-")

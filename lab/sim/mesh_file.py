@@ -1,0 +1,26 @@
+"""The vertices of a mesh file, OBJ or STL, read without a heavy library."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+MAX_BYTES = 20_000_000
+SUFFIXES = (".obj", ".stl")
+_HEAD, _FACE = 84, 50  # [bytes] of a binary STL: header and count, and each triangle
+
+
+def vertices(path: Path) -> Array:
+    """The vertices (n, 3) of an OBJ or STL file, in its own unit. ValueError when they cannot be read as numbers."""
+    data = path.read_bytes()
+    if path.suffix.lower() == ".stl" and len(data) >= _HEAD and len(data) == _HEAD + _FACE * _count(data):
+        faces = np.frombuffer(data, np.uint8, offset=_HEAD).reshape(-1, _FACE)[:, 12:48]
+        return np.ascontiguousarray(faces).view("<f4").reshape(-1, 3).astype(float)
+    word = "vertex" if path.suffix.lower() == ".stl" else "v"
+    lines = (line.split() for line in data.decode("utf-8").splitlines())
+    return np.array([parts[1:4] for parts in lines if parts[:1] == [word]], dtype=float)
+
+
+def _count(data: bytes) -> int:
+    return int.from_bytes(data[80:_HEAD], "little")

@@ -1,0 +1,246 @@
+"""A part's shape as physics and gripper have it: hull, how it stands, inertia, looks; from a record of a task file.
+
+Physics knows a part as a box, a cylinder or a convex hull: hollows of a mesh are seen and weighed, not felt.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from io import BytesIO
+from math import cos, pi, sin
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput, counted
+from lab.files import assets_folder
+from lab.sim import urdf_reader
+from lab.sim.frames import Quaternion, Shape, ShapeKind, Vector
+from lab.tasks.part_fields import PartFields
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+MOST_BYTES = 20_000_000  # of a mesh file
+MOST_HULL = 256  # vertices: more make physics slow and no rounder
+LARGEST_M, SMALLEST_M = 2.0, 0.002  # of a part's longest edge: beyond them its unit is not the metre
+ROUND = 64  # sides of a cylinder's hull
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class PartShape:
+    """A part in its own frame: origin at the centre of mass, z up as it stands, at yaw 0.
+
+    solid: what physics makes of it, with size [m] (box x, y, z; cylinder diameter, height; mesh ()), in its principal axes,
+    which `turn`, a quaternion xyzw, takes to the part's. hull (n, 3): the corners of its convex hull, in the part's axes [m].
+    inertia_m2 (3,): moments of inertia about the principal axes, for 1 kg. looks: what is seen, in the part's axes.
+    """
+
+    name: str
+    solid: ShapeKind
+    size: tuple[float, ...]
+    turn: Quaternion
+    hull: Array
+    inertia_m2: Vector
+    looks: tuple[Shape, ...]
+
+    @cached_property
+    def low(self) -> Array:
+        """The lower corner (3,) of its bounds [m]."""
+        return np.asarray(self.hull.min(axis=0))
+
+    @cached_property
+    def high(self) -> Array:
+        """The upper corner (3,) of its bounds [m]."""
+        return np.asarray(self.hull.max(axis=0))
+
+    @property
+    def foot_m(self) -> float:
+        """How far the origin is above the foot [m]."""
+        return -float(self.low[2])
+
+    @property
+    def height_m(self) -> float:
+        """From foot to top [m]."""
+        return float(self.high[2] - self.low[2])
+
+    @property
+    def footprint(self) -> tuple[float, float]:
+        """The part's extents along its x and y [m]."""
+        x, y = self.high[:2] - self.low[:2]
+        return float(x), float(y)
+
+
+def shape_of(part: PartFields, folder: Path) -> PartShape:
+    """The shape that a record describes; its files lie in `folder`, the task file's, or in the lab's assets.
+
+    Raises BadInput, in one line, for a file that is missing, too large, no mesh, has holes, or is in another unit.
+    """
+    tilt, (r, g, b) = _tilt(*part.stands), part.color
+    if part.shape == "mesh":
+        path = _found(part, "file", part.file or "", folder)
+        mesh = _mesh(part, path)
+        middle, tensor = np.array(mesh.center_mass), np.array(mesh.moment_inertia) / float(mesh.mass)
+        moments, axes = np.linalg.eigh(tensor)
+        axes = axes * np.sign(np.linalg.det(axes))  # a turn, not a mirror
+        solid, size = "mesh", ()
+        hull = _few(np.array(mesh.convex_hull.vertices) - middle)
+        seen = Shape("mesh", (part.scale,) * 3, path, (r, g, b, 1.0))
+    else:
+        middle, axes = np.zeros(3), np.eye(3)
+        solid, size = part.shape, part.size_m or ()
+        hull, moments = _box(*size) if part.shape == "box" else _cylinder(*size)
+        half = size if part.shape == "box" else (size[0] / 2, size[1])
+        seen = Shape(part.shape, half, None, (r, g, b, 1.0))
+    looks = (seen,) if part.look is None else _look(part, folder)
+    return PartShape(
+        part.name,
+        solid,
+        size,
+        _quaternion(tilt @ axes),
+        hull @ tilt.T,
+        tuple(float(f"{one:.12g}") for one in moments),  # without the noise of the last bits
+        tuple(_placed(one, tilt, middle) for one in looks),
+    )
+
+
+def _tilt(roll: float, pitch: float) -> Array:
+    """The turn (3, 3) by roll about x, then by pitch about the old y, as in a URDF."""
+    (c, s), (d, t) = (cos(roll), sin(roll)), (cos(pitch), sin(pitch))
+    about_x = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    return np.asarray(np.array([[d, 0, t], [0, 1, 0], [-t, 0, d]]) @ about_x)
+
+
+def _quaternion(turn: Array) -> Quaternion:
+    """Of a turn (3, 3), as xyzw; exactly (0, 0, 0, 1) for none."""
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = (float(one) + 0.0 for one in Rotation.from_matrix(turn).as_quat(canonical=True))
+    return x, y, z, w
+
+
+def _placed(look: Shape, tilt: Array, middle: Array) -> Shape:
+    """What is seen, from the axes of size, file or URDF to the part's; it has no turn of its own."""
+    x, y, z = (float(one) + 0.0 for one in tilt @ (np.array(look.position) - middle))
+    return replace(look, position=(x, y, z), quaternion=_quaternion(tilt))
+
+
+def _box(x: float, y: float, z: float) -> tuple[Array, Array]:
+    """Corners (8, 3) [m], and moments of inertia (3,) for 1 kg [m2]."""
+    corners = np.array([(i, j, k) for i in (-x, x) for j in (-y, y) for k in (-z, z)]) / 2
+    return corners, np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 12
+
+
+def _cylinder(diameter: float, height: float) -> tuple[Array, Array]:
+    """Corners (2 ROUND, 3) [m], and moments of inertia (3,) for 1 kg [m2]."""
+    turns = np.arange(ROUND) * 2 * pi / ROUND
+    ring = diameter / 2 * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    corners = np.concatenate([np.column_stack([ring, np.full(ROUND, z)]) for z in (-height / 2, height / 2)])
+    across = diameter**2 / 16 + height**2 / 12
+    return corners, np.array([across, across, diameter**2 / 8])
+
+
+def _few(hull: Array) -> Array:
+    """The corners (n, 3) of a hull, at most about MOST_HULL: those that lie farthest in many directions."""
+    if len(hull) <= MOST_HULL:
+        return hull
+    count = 2 * MOST_HULL
+    z = 1 - (2 * np.arange(count) + 1) / count
+    turns = np.arange(count) * pi * (3 - 5**0.5)  # Fibonacci's lattice on a sphere
+    out = np.sqrt(1 - z * z)
+    ways = np.stack([out * np.cos(turns), out * np.sin(turns), z], axis=1)
+    return np.asarray(hull[np.unique(np.argmax(ways @ hull.T, axis=1))])
+
+
+# ---- files ----------------------------------------------------------------------------------------------------------
+
+
+def _found(part: PartFields, field: str, name: str, folder: Path) -> Path:
+    """The file of a field, beside the task file or of the assets; what leads out of both, as a link may, is refused."""
+    where = f"part '{part.name}': {field} = '{name}'"
+    for place in (folder, assets_folder()):
+        path = (place / name).resolve()
+        if not path.is_file():
+            continue
+        if place.resolve() not in path.parents:
+            raise BadInput(f"{where}: it lies outside the folder '{place}'")
+        size = path.stat().st_size
+        if not 0 < size <= MOST_BYTES:
+            raise BadInput(f"{where}: {size} bytes: wanted 1 to {MOST_BYTES // 1_000_000} MB")
+        return path
+    raise BadInput(f"{where}: no such file, neither in '{folder}' nor in the lab's assets")
+
+
+def _look(part: PartFields, folder: Path) -> tuple[Shape, ...]:
+    path = _found(part, "look", part.look or "", folder)
+    urdf_reader.validate(path)
+    links = urdf_reader.looks(path)
+    if len(links) != 1 or not links[""]:
+        words = f"{counted(len(links), 'link')}, {counted(len(next(iter(links.values()))), 'visual')}"
+        raise BadInput(
+            f"part '{part.name}': look = '{part.look}': it has {words}: wanted one link with boxes or meshes to see"
+        )
+    return links[""]
+
+
+def _mesh(part: PartFields, path: Path) -> "Trimesh":
+    """The mesh in metres, closed, its faces outwards; or its hull, where the part asks for that."""
+    import trimesh
+
+    where = f"part '{part.name}': file = '{part.file}'"
+    try:
+        kind = path.suffix.lower().removeprefix(".")
+        mesh = trimesh.load(BytesIO(path.read_bytes()), kind, force="mesh", skip_materials=True)  # opens no other file
+        points = np.asarray(mesh.vertices, dtype=float)
+    except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
+        raise BadInput(f"{where}: it cannot be read as {kind.upper()}: {type(error).__name__}: {error}") from None
+    if not isinstance(mesh, trimesh.Trimesh) or len(points) < 4 or len(mesh.faces) < 4:
+        raise BadInput(f"{where}: a mesh of {len(points)} vertices: wanted a solid, 4 or more and faces between them")
+    if not np.isfinite(points).all():
+        raise BadInput(f"{where}: vertex {int(np.argmin(np.isfinite(points).all(axis=1)))} is not finite")
+    mesh.apply_scale(part.scale)
+    _check_size(part, where, float(max(mesh.extents)))
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)  # seams of a texture are no holes
+    try:
+        hull = mesh.convex_hull
+    except Exception:  # Qhull's own kind of error
+        raise BadInput(f"{where}: it is flat: wanted a solid") from None
+    if part.hull:
+        return hull
+    _check_closed(where, mesh)
+    if not mesh.is_winding_consistent or mesh.volume <= 0:
+        trimesh.repair.fix_normals(mesh, multibody=True)
+    if not 0 < mesh.volume <= hull.volume * 1.001:
+        raise BadInput(
+            f"{where}: it encloses {mesh.volume * 1e6:.3g} cm3, its hull {hull.volume * 1e6:.3g} cm3: parts of it overlap or are "
+            "inside out; mend it, or set hull = true, which takes its convex hull"
+        )
+    return mesh
+
+
+def _check_size(part: PartFields, where: str, longest: float) -> None:
+    if SMALLEST_M <= longest <= LARGEST_M:
+        return
+    factor = 0.001 if longest > LARGEST_M else 1000.0
+    other = longest * factor
+    may = f"; scale = {part.scale * factor:g} would make it {other:.3g} m" if SMALLEST_M <= other <= LARGEST_M else ""
+    raise BadInput(
+        f"{where}, scale = {part.scale:g}: it is {longest:.3g} m long: allowed are {SMALLEST_M} to {LARGEST_M} m{may}"
+    )
+
+
+def _check_closed(where: str, mesh: "Trimesh") -> None:
+    """A mesh with holes encloses nothing: neither mass nor inertia are known."""
+    if mesh.is_watertight:
+        return
+    shared = np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1]
+    alone, many = int((shared == 1).sum()), int((shared > 2).sum())
+    faults = [f"{counted(alone, 'open edge')} (a hole)"] if alone else []
+    faults += [f"{counted(many, 'edge')} of more than two faces"] if many else []
+    raise BadInput(
+        f"{where}: its surface is not closed: {' and '.join(faults) or 'faces are missing'}; close it, "
+        "or set hull = true, which takes its convex hull"
+    )

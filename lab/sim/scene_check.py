@@ -1,0 +1,98 @@
+"""What is wrong with a task's cell before anything is surveyed in it: reach, heights, and stations in each other's way."""
+
+from itertools import combinations
+from math import hypot
+
+from lab.errors import BadInput
+from lab.sim.arm import Arm
+from lab.sim.arm_models import arm_of
+from lab.sim.kinds import Kind, Spot, comes_as, kinds_of
+from lab.sim.kinematics import ToolPose
+from lab.sim.places import Places, Rectangle
+from lab.tasks.task import Task
+from lab.tasks.task_fields import Station
+
+OVER_M = 0.01  # [m] between a carried part and what stands below its way
+INTO_M = 0.005  # [m] the same above a machine that it is let down into
+
+
+def places_of(task: Task) -> Places:
+    """The stations of a task as places for its parts, as its robot grips them. Raises BadInput."""
+    return Places(task, kinds_of(task, arm_of(task.robot, task.folder).gripper))
+
+
+def check_scene(task: Task) -> None:
+    """BadInput when a part cannot be gripped, spots are out of the arm's reach, or transfers would sweep parts."""
+    arm, places = arm_of(task.robot, task.folder), places_of(task)
+    low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
+    _check_lowest(places, low)
+    for station in task.stations:
+        spots, own = places.spots(station), places.kinds_at(station.name)
+        for kind in own:
+            _check_grid(station, kind, places.floor(station))
+            for spot in spots:
+                pose = kind.held_at(spot)
+                for at in (pose, ToolPose(pose.x, pose.y, low, pose.yaw)):
+                    _check_reach(arm, station, at)
+
+
+def _check_lowest(places: Places, low: float) -> None:
+    """BadInput when what is carried in the lowest cells would meet what stands at the stations."""
+    standing = {
+        station.name: places.floor(station) + kind.height_m
+        for station in places.task.stations
+        for kind in places.kinds_at(station.name)
+    }
+    where = max(standing, key=lambda name: standing[name])
+    for kind in (places.kinds[comes_as(part)] for part in places.task.made):
+        if low - kind.grip.up_m < standing[where] + OVER_M:
+            raise BadInput(
+                f"workspace.lower_m: the lowest tool height {low:.3f} m would sweep a carried {kind.name} through what "
+                f"stands at '{where}': at least {standing[where] + OVER_M + kind.grip.up_m:.3f} needed"
+            )
+
+
+def _check_grid(station: Station, kind: Kind, floor: float) -> None:
+    """BadInput when a carried part would hit the machine to which the camera's grid leads."""
+    if station.grid is None:
+        return
+    lowest = max(station.grid.marker_m[2], floor) + kind.grip.up_m + INTO_M
+    if station.grid.height_m < lowest:
+        raise BadInput(
+            f"station '{station.name}': grid.height_m {station.grid.height_m}: a carried {kind.name} would hit it, "
+            f"at least {lowest:.3f} needed"
+        )
+
+
+def _check_reach(arm: Arm, station: Station, at: ToolPose) -> None:
+    if arm.inverse(at) is None or hypot(at.x, at.y) < arm.nearest_m:
+        raise BadInput(
+            f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m is "
+            f"{hypot(at.x, at.y):.2f} m from the robot; the arm '{arm.name}' {arm.reach_in_words(at.z)}"
+        )
+
+
+def check_apart(task: Task, parts: int) -> None:
+    """BadInput when two stations stand in each other's place, with so many parts under way."""
+    places = places_of(task)
+    ground = {station.name: _ground(places, station, parts) for station in task.stations}
+    for (one, here), (other, there) in combinations(ground.items(), 2):
+        for a in here:
+            for b in there:
+                if a.meets(b):
+                    raise BadInput(
+                        f"stations '{one}' and '{other}' overlap: at ({a.x:.2f}, {a.y:.2f}) and ({b.x:.2f}, {b.y:.2f}) m "
+                        f"parts, machines and the gripper around them need {2 * a.half_along:.2f} x "
+                        f"{2 * a.half_across:.2f} and {2 * b.half_along:.2f} x {2 * b.half_across:.2f} m"
+                    )
+
+
+def _ground(places: Places, station: Station, parts: int) -> list[Rectangle]:
+    """What a station takes: its machine's body, and around each spot in use a part and the gripper."""
+    along, across = places.room(station)
+
+    def around(spot: Spot) -> Rectangle:
+        return Rectangle(spot.x, spot.y, along, across, spot.yaw)
+
+    found = [around(spot) for spot in places.spots(station)[:parts]]
+    return [*found, places.body(station, parts)] if station.kind == "machine" else found

@@ -1,0 +1,163 @@
+"""A grid that the overhead camera looks at, before one station and for one kind of part: its picture, view and survey."""
+
+from functools import cache
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput
+from lab.sim import models
+from lab.sim.blocked_cells import OUT_OF_REACH, Survey, Surveyor
+from lab.sim.camera import Camera
+from lab.sim.kinds import Spot, beside
+from lab.sim.kinematics import ToolPose
+from lab.sim.places import Layout, Places
+from lab.sim.scene import MARKER_ABOVE, Scene, in_grid
+from lab.sim.world import World
+from lab.tasks.task import Task
+from lab.tasks.task_fields import CameraGrid, Station
+from lab.vision import View
+
+RELEASE_ABOVE = 0.002  # [m] a part is let go this high above its foot
+TOUCH_CLEARANCE = {True: 0.0012, False: 0.004}  # [m] near a station, by whether a part is carried
+OUT_OF_SIGHT = "out of the camera's sight"
+_MARGIN = 0.005  # [m] beyond half a cell: a move between free cells then touches nothing
+_WAITING_WITHIN = 0.25  # [m] of the grid: no part farther off can meet the carried one
+_MARKER = models.MARKER_RADIUS + 0.003  # [m] half of what the camera must see around the gripper's marker
+
+
+class SurveyedGrid:
+    """The camera's grid before a station, as a carried part of one kind finds it; each survey is made once."""
+
+    def __init__(self, task: Task, layout: Layout, places: Places, station: str, kind: str, parts: int) -> None:
+        self.task, self.layout, self.places, self.station, self.kind, self.parts = (
+            task,
+            layout,
+            places,
+            station,
+            kind,
+            parts,
+        )
+        self.settings = settings_of(task.station(station))
+        self.picture = cache(self._picture)
+        self.survey = cache(self._survey)
+
+    def camera(self, pixels: int | None = None) -> Camera:
+        """The overhead camera, with `pixels` a side if given."""
+        return overhead_camera(self.task, pixels)
+
+    def view(self, pixels: int | None = None) -> View:
+        """How the overhead picture maps to this grid."""
+        return camera_view(self.task, self.station, pixels, self.layout)
+
+    def pose(self, cell: tuple[int, ...]) -> ToolPose:
+        """The tool pose on the way through the grid, over the middle of a cell."""
+        grid = self.settings
+        x, y = ((o + (i + 0.5) * grid.cell_m) for o, i in zip(grid.origin_m, cell, strict=True))
+        return ToolPose(x, y, grid.height_m, 0.0)
+
+    def _picture(self) -> NDArray[np.uint8]:
+        """The overhead picture with the arm at the grid's start, (pixels, pixels, 3) uint8 RGB."""
+        x, y = self.settings.start_m
+        start = ToolPose(x, y, self.settings.height_m, 0.0)
+        with World() as world:
+            scene = Scene(world, self.task, (), self.layout)
+            cause = Surveyor(scene, self.kind, clearance=TOUCH_CLEARANCE[True]).cause(start)
+        if cause:
+            why = (
+                "out of the arm's reach"
+                if cause == OUT_OF_REACH
+                else f"{cause} is in the way of a carried {self.kind} there"
+            )
+            raise BadInput(f"station '{self.station}': grid.start_m {[x, y]}: {why}")
+        with World() as world:
+            scene = Scene(world, self.task, (), self.layout)
+            scene.robot.stand(start)
+            scene.robot.open_at_once(scene.kinds[self.kind].grip.width_m / 2)
+            return self.camera().picture(world)
+
+    def _survey(self, seen: frozenset[str]) -> Survey:
+        """The cells that a carried part or the arm cannot be in, whatever the camera has `seen` left out."""
+        with World() as world:
+            scene = Scene(world, self.task, (), self.layout)
+            for name, (kind, spot) in self._waiting().items():
+                scene.add(name, kind, spot)
+                scene.solid += scene.bodies_of(name, kind)
+            clearance = self.settings.cell_m / 2 + _MARGIN
+            surveyor = Surveyor(scene, self.kind, clearance=clearance, ignore=[*seen, self.station])
+            survey = surveyor.grid(self.settings.shape, self.pose)
+        for cell in np.ndindex(*survey.causes.shape):
+            if not survey.causes[cell] and not self._in_sight(self.pose(cell)):
+                survey.causes[cell] = OUT_OF_SIGHT
+        return survey
+
+    def _in_sight(self, pose: ToolPose) -> bool:
+        """Whether the gripper's marker lies wholly in the overhead picture when the tool is at `pose`."""
+        camera = self.camera()
+        x, y, z = pose.x + models.MARKER_OUT, pose.y, pose.z + models.MARKER_UP
+        edges = [(x + dx, y + dy, z, 1.0) for dx in (-_MARKER, _MARKER) for dy in (-_MARKER, _MARKER)]
+        across, down, far = camera.pixel_from_world() @ np.array(edges).T
+        pixels = np.concatenate([across / far, down / far])
+        return bool(pixels.min() >= 0.0 and pixels.max() <= camera.width - 1)
+
+    def _waiting(self) -> dict[str, tuple[str, Spot]]:
+        """Parts that may stand near while another is carried through the grid: the kind and spot of each, by name."""
+        waiting = {}
+        for station in self.task.stations:
+            tallest = max(self.places.kinds_at(station.name), key=lambda kind: kind.height_m, default=None)
+            if station.grid is not None or tallest is None:
+                continue
+            for number, spot in enumerate(self.places.used_spots(station, self.parts), start=1):
+                if _far_from(self.settings, spot) < _WAITING_WITHIN:
+                    waiting[f"{tallest.name} {number} at {station.name}"] = (tallest.name, spot)
+        return waiting
+
+
+def settings_of(station: Station) -> CameraGrid:
+    """The grid of a station that is approached through one; BadInput for another."""
+    if station.grid is None:
+        raise BadInput(f"station '{station.name}' is approached from {station.approach}, not through the camera's grid")
+    return station.grid
+
+
+def overhead_camera(task: Task, pixels: int | None = None) -> Camera:
+    """The task's overhead camera, with `pixels` a side if given; BadInput when it has none."""
+    if task.camera is None:
+        raise BadInput(f"task '{task.name}' has no [camera]")
+    return Camera.overhead(task.camera.position_m, task.camera.field_of_view_rad, pixels or task.camera.pixels)
+
+
+def camera_view(task: Task, station: str, pixels: int | None = None, layout: Layout | None = None) -> View:
+    """How the overhead picture maps to a station's grid: projection, grid, the markers' heights and offsets [m].
+
+    Without a layout the obstacles are taken to stand where the task file has them.
+    """
+    place = task.station(station)
+    grid, upper = settings_of(place), models.MARKER_THICK / 2
+    places = [o.position_m for o in task.obstacles] if layout is None else layout.obstacles
+    stand = zip(task.obstacles, places, strict=True)
+    heights = [obstacle.size[2] + MARKER_ABOVE for obstacle, at in stand if in_grid(grid, at)]
+    if len({round(height, 6) for height in heights}) > 1:
+        raise BadInput(
+            f"task '{task.name}': obstacles in the camera's grid must be equally high, got {sorted(set(heights))} m"
+        )
+    along, across = beside((0.0, 0.0), place.pose[2], grid.marker_m[:2])
+    return View(
+        pixel_from_world=overhead_camera(task, pixels).pixel_from_world(),
+        origin_m=grid.origin_m,
+        cell_m=grid.cell_m,
+        shape=grid.shape,
+        heights_m={
+            "gripper": grid.height_m + models.MARKER_UP + upper,
+            "obstacle": (heights or [0.18])[0] + upper,
+            "toaster": grid.marker_m[2] + MARKER_ABOVE + upper,
+        },
+        offsets_m={"gripper": (-models.MARKER_OUT, 0.0), "toaster": (-along, -across)},
+    )
+
+
+def _far_from(grid: CameraGrid, spot: Spot) -> float:
+    """How far a spot is from the grid [m], 0 within it."""
+    sides = zip((spot.x, spot.y), grid.origin_m, grid.shape, strict=True)
+    return hypot(*(max(low - at, at - (low + count * grid.cell_m), 0.0) for at, low, count in sides))

@@ -1,0 +1,226 @@
+"""Cover: a surface is covered cell by cell, by the shortest learned path: with butter, glue or paint, or by vacuuming."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from lab.learning.problem import Problem
+from lab.mdp import coverage
+from lab.sim import models
+from lab.sim.frames import Body, Shape
+from lab.sim.kinds import Kind
+from lab.sim.kinematics import ToolPose
+from lab.sim.world import TIME_STEP, Array
+from lab.skills.skill import Bench, Skill, SkillFailed, learned_path
+from lab.skills.surveys import Surveys
+from lab.tasks.task import Task
+from lab.tasks.task_fields import Process, Stage
+
+if TYPE_CHECKING:
+    from lab.toolbox.policy import Policy
+
+JOINTS = ("head_x", "head_z")
+REST = (0.0, 0.0)  # where a machine's head waits, low, out of the gripper's way
+HEAD_BEHIND_M = 0.03  # the head's frame behind the nozzle's plane
+PATCH_M = 0.0024  # thickness of what is seen on the part
+OVER_M = 0.004  # [m] a tool this near to the middle of a cell covers it
+_RAY_M = 0.2
+
+
+class Cover(Skill):
+    """Cover a surface; `covered` are the cells that were met, in order. A head does it on a part, or the robot at a station."""
+
+    subtask: ClassVar[str] = "cover"
+    help: ClassVar[str] = "a surface is covered cell by cell, as with butter or by vacuuming"
+
+    def __init__(self, task: Task, name: str, station: str, kind: str) -> None:
+        super().__init__(f"{name} at {station}", kind)
+        self.process: Process = task.processes[name]
+        self.shape = self.process.grid
+        self.station = station
+        self.covered: list[tuple[int, int]] = []
+
+    @classmethod
+    def at_machine(cls, task: Task, station: str) -> "CoverPart | None":
+        """In a machine with a process."""
+        process, kinds = task.station(station).process, task.kinds_at(station)
+        return CoverPart(task, process, station, kinds[0].name) if process is not None and kinds else None
+
+    @classmethod
+    def at_service(cls, task: Task, stage: Stage) -> "CoverPlace | None":
+        """Where a stage names a service."""
+        return None if stage.service is None else CoverPlace(task, stage.service, stage.station, "")
+
+    def setup(self, surveys: Surveys) -> Problem:
+        """Which cell the tool is at and which are covered: the shortest complete coverage."""
+        self.surveys = surveys
+        mdp = coverage(self.shape, surveys.task.subtask(self.subtask).rewards)
+        self.problem = Problem(self.name, self.subtask, mdp)
+        return self.problem
+
+    def _complete(self) -> None:
+        """SkillFailed when a cell was missed."""
+        missed = sorted(set(np.ndindex(*self.shape)) - set(self.covered))
+        if missed:
+            cells = f"{len(missed)} of {self.shape[0] * self.shape[1]} cells"
+            raise SkillFailed(f"'{self.name}' missed {cells} of {self.part or self.station}: {missed}")
+
+
+class CoverPart(Cover):
+    """A machine's own head covers the side of the part that stands in it: the side towards its negative y axis."""
+
+    near: ClassVar[bool] = True
+    moves_arm: ClassVar[bool] = False
+    looks_from: ClassVar[tuple[float, float]] = (-42.0, 28.0)  # the head stands before the part
+
+    def cell_m(self, kind: Kind | None = None) -> tuple[float, float]:
+        """Height and width of a cell on the part's side [m]."""
+        low, high = (kind or self.own_kind).shape.low, (kind or self.own_kind).shape.high
+        return float(high[2] - low[2]) / self.shape[0], float(high[0] - low[0]) / self.shape[1]
+
+    def head(self, state: int) -> tuple[float, float]:
+        """The head's joints in a state [m]: across from the part's middle, and up from the machine's floor."""
+        row, column = self.problem.mdp.state_cell(state)
+        high, wide = self.cell_m()
+        return ((column - (self.shape[1] - 1) / 2) * wide, (self.shape[0] - 1 - row + 0.5) * high)
+
+    def pose(self, state: int) -> ToolPose:
+        """Where the machine's head is; the arm has no part in this."""
+        x, y, yaw = self.surveys.task.station(self.station).pose
+        across, up = self.head(state)
+        floor = self.surveys.places.floor(self.surveys.task.station(self.station))
+        return ToolPose(x, y, floor, yaw).local(across, models.NOZZLE_OUT - HEAD_BEHIND_M, up)
+
+    def show(self, bench: Bench, state: int) -> bool:
+        """Put the head over the state's cell at once, without physics."""
+        bench.scene.world.set_joints(self.station, JOINTS, self.head(state))
+        return True
+
+    def on_part(self, name: str, kind: Kind) -> tuple[Body, ...]:
+        """A patch on each cell of the part's side of its negative y axis."""
+        high, wide = self.cell_m(kind)
+        low, top = kind.shape.low, kind.shape.high
+        patches = []
+        for row, column in np.ndindex(*self.shape):
+            middle = (float(low[0] + top[0]) / 2, float(low[1]) - 2 * PATCH_M / 3, float(low[2] + top[2]) / 2)
+            across, up = (column - (self.shape[1] - 1) / 2) * wide * 0.9, ((self.shape[0] - 1) / 2 - row) * high * 0.9
+            at = (middle[0] + across, middle[1], middle[2] + up)
+            shape = Shape("box", (wide * 0.82, PATCH_M, high * 0.82), None, (*self.process.color, 1.0), at)
+            patches.append(Body(self._patch(name, row, column), (shape,)))
+        return tuple(patches)
+
+    def _patch(self, name: str, row: int, column: int) -> str:
+        """What a covered cell of a part is called."""
+        return f"{self.name.partition(' at ')[0]} on {name} {row}{column}"
+
+    def shown(self) -> list[str]:
+        """The patches that were covered in this motion."""
+        return [self._patch(self.part, *cell) for cell in self.covered]
+
+    def shown_in(self, state: int, name: str) -> dict[str, bool]:
+        """What is covered in `state`."""
+        covered = np.ndenumerate(self.problem.mdp.covered(state))
+        return {self._patch(name, row, column): bool(on) for (row, column), on in covered}
+
+    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+        """Move the head along the learned cells, stay on each, note where its ray meets the part, and go to rest."""
+        mdp, process = self.problem.mdp, self.process
+        self.covered = []
+        for state in learned_path(policy, mdp, mdp.start):
+            yield from self._slide(bench, self.head(state), process.speed_m_s)
+            for _ in range(round(process.dwell_s / TIME_STEP)):
+                yield
+            met = self._met(bench)
+            if met is not None and met not in self.covered:
+                self.covered.append(met)
+        yield from self._slide(bench, REST, process.speed_m_s)  # so that every part takes the same time
+        self._complete()
+
+    def _slide(self, bench: Bench, target: tuple[float, float], speed: float) -> Iterator[None]:
+        world = bench.scene.world
+        here = world.joints(self.station, JOINTS)
+        way = np.array(target) - here
+        steps = max(1, int(np.ceil(np.linalg.norm(way) / speed / TIME_STEP)))
+        for step in range(1, steps + 1):
+            world.drive(self.station, JOINTS, here + way * step / steps, way / steps / TIME_STEP, force=300.0)
+            yield
+        world.drive(self.station, JOINTS, target, force=300.0)
+
+    def _met(self, bench: Bench) -> tuple[int, int] | None:
+        """The cell of the part that the nozzle's ray meets, in the part's own frame."""
+        world = bench.scene.world
+        nozzle, _ = world.pose(self.station, "head")
+        yaw = self.surveys.task.station(self.station).pose[2]
+        ahead = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+        hit = world.ray(nozzle + 0.035 * ahead, nozzle + _RAY_M * ahead)
+        if hit is None or hit[0] != self.part:
+            return None
+        centre, turn = world.pose(self.part)
+        local, (high, wide) = _unrotated(hit[1] - centre, turn), self.cell_m()
+        shape = self.own_kind.shape
+        row = int((shape.high[2] - local[2]) // high)
+        column = int((local[0] - shape.low[0]) // wide)
+        return (row, column) if 0 <= row < self.shape[0] and 0 <= column < self.shape[1] else None
+
+
+class CoverPlace(Cover):
+    """The robot's empty tool covers a surface at a station, before it takes the part out, as when a mill is vacuumed."""
+
+    def pose(self, state: int) -> ToolPose:
+        """Over the middle of the state's cell."""
+        return self.over(self.problem.mdp.state_cell(state))
+
+    def over(self, cell: tuple[int, ...]) -> ToolPose:
+        """Over the middle of a cell."""
+        (row, column), process = cell, self.process
+        assert process.area_m is not None
+        x, y, yaw = self.surveys.task.station(self.station).pose
+        dx, dy, high = process.off_m
+        across = (column - (self.shape[1] - 1) / 2) * process.area_m[0] / self.shape[1]
+        along = ((self.shape[0] - 1) / 2 - row) * process.area_m[1] / self.shape[0]
+        return ToolPose(x, y, high, yaw).local(dx + across, dy + along)
+
+    def setup(self, surveys: Surveys) -> Problem:
+        """As for any surface, where the tool can be over all of its cells."""
+        problem = super().setup(surveys)
+        surveys.check_free(self.name, [self.over(cell) for cell in np.ndindex(*self.shape)])
+        return problem
+
+    def begins_at(self) -> ToolPose:
+        """At the station's approach."""
+        return self.surveys.approach(self.station)
+
+    def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
+        """Down to the first cell, along the learned ones, staying on each, and up to the approach again."""
+        robot, mdp, process = bench.scene.robot, self.problem.mdp, self.process
+        approach = self.surveys.approach(self.station)
+        slow = min(1.0, process.speed_m_s / robot.speed)
+        self.covered = []
+        path = learned_path(policy, mdp, mdp.start)
+        first = self.pose(path[0])
+        yield from robot.follow([ToolPose(first.x, first.y, approach.z, first.yaw)])
+        for state in path:
+            yield from robot.follow([self.pose(state)], slow=slow)
+            yield from robot.rest(round(process.dwell_s / TIME_STEP))
+            cell = self._under(robot.tool())
+            if cell is not None and cell not in self.covered:
+                self.covered.append(cell)
+        last = self.pose(path[-1])
+        yield from robot.follow([ToolPose(last.x, last.y, approach.z, last.yaw), approach])
+        self._complete()
+
+    def _under(self, tool: ToolPose) -> tuple[int, int] | None:
+        """The cell that the tool is over, by where its tips are."""
+        for cell in np.ndindex(*self.shape):
+            over = self.over(cell)
+            if abs(tool.x - over.x) < OVER_M and abs(tool.y - over.y) < OVER_M and abs(tool.z - over.z) < OVER_M:
+                return (int(cell[0]), int(cell[1]))
+        return None
+
+
+def _unrotated(vector: Array, turn: Array) -> Array:
+    """`vector` (3,) in the frame that the quaternion `turn` (4,) xyzw describes."""
+    axis, w = -turn[:3], turn[3]
+    twice = 2.0 * np.cross(axis, vector)
+    return np.asarray(vector + w * twice + np.cross(axis, twice))

@@ -1,0 +1,40 @@
+"""Task files as they were before there were kinds of parts: slices on one route, a toaster, a butter applier."""
+
+from typing import Any
+
+TOASTER = {"body": "toaster.urdf", "floor_m": 0.015, "approach": "camera", "finish": [0.70, 0.42, 0.16]}
+TOASTER_MARKER = [0.0, 0.03825, 0.1]
+APPLIER = {"body": "applier.urdf", "floor_m": 0.02}
+SLICE = {"name": "slice", "count": 3, "shape": "box", "size_m": [0.12, 0.015, 0.12], "look": "slice.urdf"}
+HEAD = {"head_speed_m_s": ("speed_m_s", 0.02), "dwell_s": ("dwell_s", 3.0)}
+
+
+def renewed(raw: dict[str, Any]) -> dict[str, Any]:
+    """A file's values with [slices], [[route]] and [insert] as parts, stations and processes; others as they are."""
+    old = ("slices", "route", "insert")
+    if "parts" in raw or not any(name in raw for name in old):
+        return raw
+    kept = {name: value for name, value in raw.items() if name not in old}
+    slices, grid = raw.get("slices", {}), raw.get("insert", {})
+    kept["parts"] = [SLICE | (slices if isinstance(slices, dict) else {}) | {"routes": [raw.get("route", [])]}]
+    stations = raw.get("stations")
+    if isinstance(stations, list):
+        kept["stations"] = [_station(station, grid) if isinstance(station, dict) else station for station in stations]
+        heads = {s["process"]: s for s in stations if isinstance(s, dict) and isinstance(s.get("process"), str)}
+        kept["processes"] = {
+            name: {"grid": [3, 3]} | {new: station.get(was, value) for was, (new, value) in HEAD.items()}
+            for name, station in heads.items()
+        }
+    subtasks = raw.get("subtasks")
+    if isinstance(subtasks, dict) and "butter" in subtasks:
+        kept["subtasks"] = {("cover" if name == "butter" else name): table for name, table in subtasks.items()}
+    return kept
+
+
+def _station(station: dict[str, Any], grid: Any) -> dict[str, Any]:
+    own = {name: value for name, value in station.items() if name not in HEAD}
+    if station.get("kind") != "machine":
+        return own
+    if "process" in station:
+        return APPLIER | own
+    return TOASTER | {"grid": grid | {"marker_m": TOASTER_MARKER} if isinstance(grid, dict) else grid} | own

@@ -1,0 +1,96 @@
+"""What a task file says of a kind of part: shape, mass, friction, how it stands, how it looks, where it is gripped."""
+
+from pathlib import PurePosixPath
+from typing import Annotated, Literal, Self, get_args
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from lab.errors import unknown
+from lab.tasks.record import Name, Record, as_tuple
+
+ShapeName = Literal["box", "cylinder", "mesh"]
+Edge = Annotated[float, Field(ge=0.001, le=10)]  # [m]
+Angle = Annotated[float, Field(ge=-7, le=7)]  # [rad], a full turn and a bit
+Off = Annotated[float, Field(ge=0, le=10)]
+Share = Annotated[float, Field(ge=0, le=1)]
+
+MESH_FILES = (".obj", ".stl")
+SIZES = {"box": ("[x, y, z]", 3), "cylinder": ("[diameter, height]", 2)}  # what size_m holds, by shape
+
+
+class GripFields(Record):
+    """Where the gripper takes a part: turned by yaw [rad], finger tips up_m above its foot, the tool at_m off its middle.
+
+    At yaw 0 the fingers close along the part's y axis; at_m: x, y [m] in the part's axes.
+    """
+
+    yaw: Angle = 0.0
+    up_m: Annotated[float, Field(gt=0, le=10)]
+    at_m: Annotated[
+        tuple[Annotated[float, Field(ge=-1, le=1)], Annotated[float, Field(ge=-1, le=1)]], BeforeValidator(as_tuple)
+    ] = (0.0, 0.0)
+
+
+class PartFields(Record):
+    """A kind of part.
+
+    size_m: box [x, y, z], cylinder [diameter, height] [m]. file: of a mesh, an OBJ or STL file, whose numbers times scale are
+    metres. hull: a mesh with holes is taken as its convex hull. stands: roll, pitch [rad] of the shape as it stands. look: a
+    URDF whose visuals are shown instead of the shape in its colour. area: a part stands off its spot at the start within +- x,
+    y [m], yaw [rad]. grip: where it is gripped; left out, that is computed from the shape.
+    """
+
+    name: Name
+    shape: ShapeName
+    size_m: Annotated[tuple[Edge, ...] | None, BeforeValidator(as_tuple)] = None
+    file: str | None = None
+    scale: Annotated[float, Field(gt=0, le=1000)] = 1.0
+    hull: bool = False
+    stands: Annotated[tuple[Angle, Angle], BeforeValidator(as_tuple)] = (0.0, 0.0)
+    mass_kg: Annotated[float, Field(ge=0.001, le=6)]
+    friction: Annotated[float, Field(ge=0, le=5)] = 0.8
+    color: Annotated[tuple[Share, Share, Share], BeforeValidator(as_tuple)] = (0.62, 0.42, 0.22)
+    look: str | None = None
+    area: Annotated[tuple[Off, Off, Off], BeforeValidator(as_tuple)] = (0.0, 0.0, 0.0)
+    grip: GripFields | None = None
+
+    @field_validator("shape", mode="before")
+    @classmethod
+    def _known_shape(cls, shape: object) -> object:
+        if isinstance(shape, str) and shape not in get_args(ShapeName):
+            raise ValueError(str(unknown("shape", shape, get_args(ShapeName), "of a part")))
+        return shape
+
+    @field_validator("file", "look")
+    @classmethod
+    def _within_the_folder(cls, name: str | None) -> str | None:
+        if name is not None and (not name or PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts):
+            raise ValueError("wanted: a file beside the task file, or one of the lab's assets, without '..'")
+        return name
+
+    @model_validator(mode="after")
+    def _fields_of_the_shape(self) -> Self:
+        """Each shape has its own fields, and needs them."""
+        what = f"part '{self.name}' is a {self.shape}"
+        if self.shape in SIZES:
+            words, count = SIZES[self.shape]
+            if self.size_m is None or len(self.size_m) != count:
+                got = "none is given" if self.size_m is None else f"not {list(self.size_m)}"
+                raise ValueError(f"{what}: it needs size_m = {words} [m], {count} numbers: {got}")
+            for field in ("file", "scale", "hull"):
+                if field in self.model_fields_set:
+                    raise ValueError(f"{what}: it has no {field} (got {getattr(self, field)!r}): only a mesh has")
+        else:
+            if self.file is None:
+                raise ValueError(f"{what}: it needs file, an OBJ or STL file: none is given")
+            if self.size_m is not None:
+                raise ValueError(
+                    f"{what}: it has no size_m (got {list(self.size_m)}): its file and scale say how large"
+                )
+            if not self.file.lower().endswith(MESH_FILES):
+                raise ValueError(f"{what}: file = '{self.file}': wanted a file that ends with .obj or .stl")
+        if self.look is not None and not self.look.endswith(".urdf"):
+            raise ValueError(f"part '{self.name}': look = '{self.look}': wanted a file that ends with .urdf")
+        if self.look is not None and "color" in self.model_fields_set:
+            raise ValueError(f"part '{self.name}' has color and look = '{self.look}': allowed is one of them")
+        return self

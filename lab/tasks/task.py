@@ -1,0 +1,250 @@
+"""A task: a cell in physics, the kinds of parts that are made in it, and how its sub-tasks are learned."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Self
+
+from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
+
+from lab.errors import BadInput, counted, unknown
+from lab.files import assets_folder
+from lab.tasks.record import Name, Record, as_tuple
+from lab.tasks.robot_fields import RobotSettings
+from lab.tasks.sequencing import Sequencing
+from lab.tasks.task_fields import (
+    MAX_PARTS,
+    MOST_THINGS,
+    CameraSettings,
+    Obstacle,
+    Part,
+    Process,
+    Stage,
+    Station,
+    Subtask,
+    Workspace,
+)
+
+RESERVED = ("robot", "table", "insert", "the part", "carried part")  # names of other things in the cell
+RESERVED_ENDS = (" marker", " column", " head")
+_COUNT = re.compile(r"\s*([^=,]+?)\s*=\s*(\d{1,6})\s*")
+
+Order = tuple[str, ...]  # the kind of each part, part 1 first
+
+
+class Task(Record):
+    """A whole task file, checked."""
+
+    name: Name
+    title: str = ""
+    robot: RobotSettings
+    parts: Annotated[tuple[Part, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=MAX_PARTS)]
+    workspace: Workspace
+    camera: CameraSettings | None = None
+    stations: Annotated[tuple[Station, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=MOST_THINGS)]
+    processes: dict[Name, Process] = Field(default={})
+    obstacles: Annotated[tuple[Obstacle, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
+    subtasks: dict[str, Subtask] = Field(default={})
+    sequencing: Sequencing = Sequencing()
+    _folder: Path | None = PrivateAttr(default=None)
+
+    @property
+    def folder(self) -> Path:
+        """Where the meshes and URDFs lie that the file names, unless the lab's own assets have them."""
+        return self._folder or assets_folder()
+
+    def changed(self, **fields: object) -> Self:
+        """A copy with other fields, checked again. Raises ValueError or BadInput."""
+        other = type(self).model_validate({**dict(self), **fields})
+        other._folder = self._folder
+        return other
+
+    def station(self, name: str) -> Station:
+        """The station called `name`; BadInput lists the known ones."""
+        for station in self.stations:
+            if station.name == name:
+                return station
+        raise unknown("station", name, [s.name for s in self.stations], f"task '{self.name}'")
+
+    def part(self, kind: str) -> Part:
+        """The kind of part called so; BadInput lists the known ones."""
+        for part in self.parts:
+            if part.name == kind:
+                return part
+        raise unknown("part", kind, [part.name for part in self.parts], f"task '{self.name}'")
+
+    def subtask(self, name: str) -> Subtask:
+        """The learning settings of a sub-task (the defaults when the file has none)."""
+        return self.subtasks.get(name, Subtask())
+
+    @cached_property
+    def made(self) -> tuple[Part, ...]:
+        """The kinds with routes: those that are no other kind's pallet."""
+        return tuple(part for part in self.parts if part.routes)
+
+    def called(self, kind: str) -> str:
+        """What comes after a sub-task's name to say which kind it is about: nothing where there is only one."""
+        return f" {kind}" if len(self.parts) > 1 else ""
+
+    def made_as(self, kind: str) -> Part:
+        """The kind with routes that a part is of, whether it is named alone, on its pallet, or by its pallet."""
+        return next(part for part in self.made if kind in (part.name, part.pallet, f"{part.name} on {part.pallet}"))
+
+    def starts(self, kind: str) -> str:
+        """The station at which parts of a kind stand at the start."""
+        return self.part(kind).routes[0][0].station
+
+    def kinds_at(self, station: str) -> tuple[Part, ...]:
+        """The kinds of parts whose routes lead to a station."""
+        return tuple(part for part in self.made if station in part.places)
+
+    # ---- how many parts ------------------------------------------------------------------------------------------
+
+    def order(self, first: int | None = None, counts: Mapping[str, int] | None = None) -> Order:
+        """The kind of each part: as many as the file says, or `first` of its first kind, or `counts` of the kinds named.
+
+        BadInput for an unknown kind, for no part or more than 50, and where more begin or end at a station than it holds.
+        """
+        wanted = {part.name: part.count for part in self.made}
+        if first is not None:
+            check_number(first)
+            wanted[self.made[0].name] = first
+        if counts is not None:
+            wanted = dict.fromkeys(wanted, 0)
+            for kind, count in counts.items():
+                if kind not in wanted:
+                    raise unknown("part", kind, wanted, "--parts")
+                wanted[kind] = count
+        found = tuple(kind for kind, count in wanted.items() for _ in range(count))
+        if not 1 <= len(found) <= MAX_PARTS:
+            raise BadInput(f"{len(found)} parts (--parts) for task '{self.name}': allowed are 1 to {MAX_PARTS}")
+        self._check_room(found)
+        return found
+
+    def ordered(self, toasts: int | None = None, parts: str | None = None) -> Order:
+        """An order as --toasts, how many of the first kind, or --parts, how many of each, has it; BadInput for both."""
+        if toasts is not None and parts is not None:
+            raise BadInput(f"--toasts {toasts} and --parts {parts}: an order is one or the other")
+        return self.order(toasts, None if parts is None else counts_from_word(parts))
+
+    def fitting(self, first: int) -> Order:
+        """An order with so many parts of the first kind, or as many as there is room for."""
+        own = self.made[0]
+        ends = {route[at].station for route in own.routes for at in (0, -1)}
+        return self.order(min(first, *(self.station(end).capacity for end in ends)))
+
+    def _check_room(self, order: Order) -> None:
+        for end in dict.fromkeys(route[at].station for part in self.made for route in part.routes for at in (0, -1)):
+            ending = [p.name for p in self.made if any(end in (r[0].station, r[-1].station) for r in p.routes)]
+            most, room = sum(kind in ending for kind in order), self.station(end).capacity
+            if most > room:
+                raise BadInput(
+                    f"{in_words(kind for kind in order if kind in ending)} (--toasts, --parts) do not fit on '{end}': "
+                    f"its capacity in the task file is {room}"
+                )
+
+    # ---- what must be known, once, and have a time ---------------------------------------------------------------
+
+    @model_validator(mode="after")
+    def _names_apart(self) -> Self:
+        stations, kinds = [s.name for s in self.stations], [p.name for p in self.parts]
+        for label, names in (("part", kinds), ("station", stations), ("obstacle", [o.name for o in self.obstacles])):
+            twice = {n for n in names if names.count(n) > 1}
+            if twice:
+                raise ValueError(f"{label} '{min(twice)}' stands twice in the file")
+            for name in names:
+                starts = tuple(f"{word} " for word in ("robot", "done", *(kinds if label != "part" else ())))
+                reserved = name in RESERVED or name.startswith(starts) or name.endswith(RESERVED_ENDS)
+                if reserved or (label != "station" and name in stations) or (label == "obstacle" and name in kinds):
+                    raise ValueError(f"{label} '{name}' has the name of something else in the cell: choose another")
+        if self.robot.start not in stations:
+            raise unknown("station", self.robot.start, stations, "robot.start")
+        return self
+
+    @model_validator(mode="after")
+    def _routes_known(self) -> Self:
+        stations = [s.name for s in self.stations]
+        carriers = {part.pallet for part in self.parts}
+        for part in self.parts:
+            if not part.routes and part.name not in carriers:
+                raise ValueError(f"part '{part.name}' has no routes, and is no other part's pallet")
+            if part.pallet is not None:
+                if part.pallet not in (known := [p.name for p in self.parts if not p.routes]):
+                    raise unknown("pallet", part.pallet, known, f"part '{part.name}'")
+            for stage in stages_of(part):
+                for name in filter(None, (stage.station, stage.buffer)):
+                    if name not in stations:
+                        raise unknown("station", name, stations, f"routes of part '{part.name}'")
+                if stage.pallet and part.pallet is None:
+                    raise ValueError(f"part '{part.name}' has no pallet to be lifted off at '{stage.station}'")
+        return self
+
+    @model_validator(mode="after")
+    def _processes_known(self) -> Self:
+        heads = [name for name, process in self.processes.items() if process.by == "head"]
+        for station in self.stations:
+            if station.process is not None and station.process not in heads:
+                raise unknown("process", station.process, heads, f"station '{station.name}' (by = 'head')")
+            if station.approach == "camera" and self.camera is None:
+                raise ValueError(f"station '{station.name}' is approached by the camera: [camera] is missing")
+        for part in self.made:
+            for stage in stages_of(part):
+                self._check_work(part, stage)
+        return self
+
+    def _check_work(self, part: Part, stage: Stage) -> None:
+        robots = [name for name, process in self.processes.items() if process.by == "robot"]
+        place, where = self.station(stage.station), f"part '{part.name}' at '{stage.station}'"
+        if stage.service is not None and stage.service not in robots:
+            raise unknown("service", stage.service, robots, f"{where} (processes by = 'robot')")
+        if place.kind != "machine":
+            if stage.processing_s is not None:
+                raise ValueError(f"{where}: only a machine has processing_s, it is a {place.kind}")
+        elif place.process is not None and stage.processing_s is not None:
+            raise ValueError(
+                f"{where}: processing_s = {stage.processing_s:g}, but its process '{place.process}' is learned"
+            )
+        elif place.process is None and place.processing_s is None and stage.processing_s is None:
+            raise ValueError(f"machine '{place.name}' needs either processing_s or process, a sub-task to learn")
+
+    @model_validator(mode="after")
+    def _members_known(self) -> Self:
+        for name, subtask in self.subtasks.items():
+            subtask.check_members(f"subtasks.{name}.")
+        for _, error in self.sequencing.faults(due=False):
+            raise error
+        return self
+
+
+def stages_of(part: Part) -> Iterator[Stage]:
+    """Every stage of every route of a kind."""
+    return (stage for route in part.routes for stage in route)
+
+
+def in_words(order: Iterable[str]) -> str:
+    """An order as a person says it: "2 slices and 1 cup"."""
+    kinds = list(order)
+    return " and ".join(counted(kinds.count(kind), kind) for kind in dict.fromkeys(kinds))
+
+
+def part_name(order: Order, number: int) -> str:
+    """What part `number`, from 1, is called in physics, as in schedules (see `Cell.part_name`)."""
+    return f"{order[number - 1]} {number}"
+
+
+def counts_from_word(word: str) -> dict[str, int]:
+    """How many of each kind: "slice=2,cup=1"; BadInput for anything else."""
+    counts: dict[str, int] = {}
+    for piece in word.split(","):
+        match = _COUNT.fullmatch(piece)
+        if match is None or match[1] in counts:
+            raise BadInput(f"'{word[:80]}' (--parts): wanted kind=number once each, such as slice=2,cup=1")
+        counts[match[1]] = int(match[2])
+    return counts
+
+
+def check_number(parts: int) -> None:
+    """BadInput unless 1 <= parts <= 50."""
+    if not 1 <= parts <= MAX_PARTS:
+        raise BadInput(f"{parts} toasts (--toasts): allowed are 1 to {MAX_PARTS}")
