@@ -10,7 +10,7 @@ from lab.cli.output import console, end, show, write, write_json
 from lab.errors import BadInput, LabError, counted
 
 if TYPE_CHECKING:
-    from lab.tasks.task_file import Task
+    from lab.tasks.task import Task
 
 
 def task_list(as_json: Json = False) -> None:
@@ -111,7 +111,8 @@ def task_check(
 def _to_draw(file: str, plot: Path) -> "Task | None":
     """The task to be drawn, None when it cannot be read; BadInput for what has no picture, and for a bad path of one."""
     from lab.tasks.cell_file import CellFile
-    from lab.tasks.task_file import Task, load_any
+    from lab.tasks.task import Task
+    from lab.tasks.task_file import load_any
     from lab.view.canvas import check_picture
 
     check_picture(plot)

@@ -68,6 +68,11 @@ class PlannedObstacle:
     stands: Block
     stays_in: Block
 
+    @property
+    def moves(self) -> bool:
+        """Whether another seed may put it elsewhere."""
+        return bool(np.any(np.ptp(self.stays_in.corners(), axis=0) > np.ptp(self.stands.corners(), axis=0) + 1e-9))
+
 
 @dataclass(frozen=True)
 class BlockedCells:

@@ -1,13 +1,16 @@
 """A task's cell seen from above, as far as it can be laid out and surveyed: also of a task that a check refuses."""
 
 import re
+from contextlib import suppress
+from dataclasses import replace
+from math import hypot
 
 import numpy as np
 
 from lab.errors import BadInput
-from lab.sim import kinematics, models
+from lab.sim.arm import Arm
+from lab.sim.arm_models import arm_of
 from lab.sim.ground_plan import (
-    XY,
     Approach,
     Block,
     BlockedCells,
@@ -17,103 +20,129 @@ from lab.sim.ground_plan import (
     PlannedSpot,
     PlannedStation,
 )
+from lab.sim.kinds import comes_as
 from lab.sim.kinematics import ToolPose
+from lab.sim.places import Layout, Places
 from lab.sim.reach import ring_of
-from lab.sim.scene import (
-    APPLIER_BASE,
-    NEAREST_M,
-    Layout,
-    Spot,
-    beside,
-    draw_layout,
-    is_applier,
-    spots,
-    used_spots,
-)
-from lab.skills.surveys import INSERT_START, Surveys
-from lab.tasks.task_file import Station, Task, fitting
+from lab.sim.scene import TABLE_M, TABLE_MIDDLE_M
+from lab.sim.scene_check import places_of
+from lab.skills.prepared_scene import lay_out
+from lab.skills.surveys import Surveys, way_to
+from lab.tasks.task import Order, Task
+from lab.tasks.task_fields import Station
 
-TABLE = Block(0.35, 0.0, 2.2, 2.9)
-SLAB_AROUND_M = (0.18, 0.10)
+UNKNOWN_M = 0.1  # [m] so wide is a station drawn of which only the pose is known
 
 
 def outline(task: Task, toasts: int | None, seed: int, fault: str = "") -> GroundPlan:
-    """The cell as a seed lays it out, for so many toasts; `fault` is what a check says of it."""
-    toasts = fitting(task, toasts or 3)
-    try:
-        layout = draw_layout(task, toasts, np.random.default_rng([seed, 1]))
-    except BadInput:  # an obstacle finds no place: all stand where the file has them
-        layout = Layout(tuple(obstacle.position_m for obstacle in task.obstacles), ())
-    try:
-        surveys = Surveys(task, layout)
-    except BadInput:  # what is out of reach is not surveyed
-        surveys = None
+    """The cell as a seed lays it out, for so many parts of the first kind, None: for the file's own order.
+
+    `fault` is what a check says of it, and what that names is marked.
+    """
+    order = _order(task, toasts)
+    arm: Arm | None = None
+    places: Places | None = None
+    with suppress(BadInput):  # the check tells why; all else is drawn
+        arm = arm_of(task.robot, task.folder)
+        places = places_of(task)
+    layout = Layout(tuple(obstacle.position_m for obstacle in task.obstacles), ())
+    with suppress(BadInput):  # an obstacle finds no place: all stand where the file has them
+        layout = lay_out(task, order, seed)
     low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
-    places = [s.name for s in task.stations] + [o.name for o in task.obstacles]
+    surveys = None if places is None else Surveys(task, order, layout)
+    names = [s.name for s in task.stations] + [o.name for o in task.obstacles]
     return GroundPlan(
         title=task.title or task.name,
-        table=TABLE,
-        reach=ring_of(kinematics.inverse, low, NEAREST_M),
+        table=Block(*TABLE_MIDDLE_M[:2], *TABLE_M[:2]),
+        reach=None if arm is None else ring_of(arm.inverse, low, arm.nearest_m),
         height_m=low,
-        stations=tuple(_station(station, toasts, low) for station in task.stations),
+        stations=tuple(_station(station, places, arm, len(order), low) for station in task.stations),
         obstacles=tuple(_obstacles(task, layout)),
         blocked=None if surveys is None else _blocked(surveys),
-        cameras=(CameraCells(task.insert.origin_m, task.insert.cell_m, task.insert.shape, task.insert.start_m),),
+        cameras=tuple(_cameras(task)),
         approaches=() if surveys is None else tuple(_approaches(surveys)),
         fault=fault,
-        at_fault=frozenset(name for name in places if re.search(rf"(?<![\w-]){re.escape(name)}(?![\w-])", fault)),
+        at_fault=frozenset(name for name in names if re.search(rf"(?<![\w-]){re.escape(name)}(?![\w-])", fault)),
     )
 
 
-def _station(station: Station, toasts: int, low: float) -> PlannedStation:
-    used = len(used_spots(station, toasts))
-    feet = tuple(
-        PlannedSpot(Block(spot.x, spot.y, *models.SLICE[:2], spot.yaw), number < used, _reached(spot, low))
-        for number, spot in enumerate(spots(station))
+def _order(task: Task, toasts: int | None) -> Order:
+    """The order, or one part of each kind where that cannot be."""
+    try:
+        return task.order(toasts)
+    except BadInput:
+        return tuple(part.name for part in task.made)
+
+
+def _station(station: Station, places: Places | None, arm: Arm | None, parts: int, low: float) -> PlannedStation:
+    if places is None:
+        x, y, yaw = station.pose
+        return PlannedStation(station.name, station.kind, Block(x, y, UNKNOWN_M, UNKNOWN_M, yaw), ())
+    spots, used = places.spots(station), len(places.used_spots(station, parts))
+    reached = [True] * len(spots)
+    size = (UNKNOWN_M, UNKNOWN_M)
+    if kinds := places.kinds_at(station.name):
+        along, across = np.max([kind.footprint_m() for kind in kinds], axis=0).tolist()
+        size = (2 * along, 2 * across)
+        poses = [[kind.held_at(spot) for kind in kinds] for spot in spots]
+        reached = [arm is None or all(_reached(arm, pose, low) for pose in each) for each in poses]
+    return PlannedStation(
+        station.name,
+        station.kind,
+        _block(places, station, parts),
+        tuple(
+            PlannedSpot(Block(spot.x, spot.y, *size, spot.yaw), number < used, reached[number])
+            for number, spot in enumerate(spots)
+        ),
     )
-    return PlannedStation(station.name, station.kind, _body(station, toasts), feet)
 
 
-def _reached(spot: Spot, low: float) -> bool:
-    pose = spot.grasp()
-    poses = (pose, ToolPose(pose.x, pose.y, low, pose.yaw))
-    return np.hypot(pose.x, pose.y) >= NEAREST_M and all(kinematics.inverse(at) is not None for at in poses)
+def _block(places: Places, station: Station, parts: int) -> Block:
+    body = places.body(station, parts)
+    return Block(body.x, body.y, 2 * body.half_along, 2 * body.half_across, body.yaw)
 
 
-def _body(station: Station, toasts: int) -> Block:
-    x, y, yaw = station.pose
-    if station.kind == "machine":
-        length, width, off = APPLIER_BASE if is_applier(station) else (*models.TOASTER[:2], 0.0)
-        return Block(*beside((x, y), yaw, (0.0, off)), length, width, yaw)
-    feet = [beside((0.0, 0.0), -yaw, (spot.x - x, spot.y - y)) for spot in used_spots(station, toasts)]
-    low, high = np.min(feet, axis=0), np.max(feet, axis=0)
-    length, width = (high - low + SLAB_AROUND_M).tolist()
-    return Block(*beside((x, y), yaw, ((low + high) / 2).tolist()), length, width, yaw)
+def _reached(arm: Arm, pose: ToolPose, low: float) -> bool:
+    above = ToolPose(pose.x, pose.y, low, pose.yaw)
+    return hypot(pose.x, pose.y) >= arm.nearest_m and all(arm.inverse(at) is not None for at in (pose, above))
 
 
 def _obstacles(task: Task, layout: Layout) -> list[PlannedObstacle]:
     found = []
     for obstacle, (x, y) in zip(task.obstacles, layout.obstacles, strict=True):
-        edge, (dx, dy) = obstacle.edge_m, obstacle.area
-        around = Block(*obstacle.position_m, edge + 2 * dx, edge + 2 * dy)
-        found.append(PlannedObstacle(obstacle.name, Block(x, y, edge, edge), around))
+        own = Block(0.0, 0.0, *obstacle.size[:2], obstacle.yaw)
+        wide, high = (np.ptp(own.corners(), axis=0) + 2 * np.array(obstacle.area)).tolist()
+        around = Block(*obstacle.position_m, wide, high)
+        found.append(PlannedObstacle(obstacle.name, replace(own, x=x, y=y), around))
     return found
 
 
 def _blocked(surveys: Surveys) -> BlockedCells:
-    grid = surveys.task.workspace
-    return BlockedCells(grid.lower_m[:2], grid.cell_m[:2], surveys.workspace(True).causes[:, :, 0])
+    """What blocks the lowest level for whatever part is carried."""
+    grid, causes = surveys.task.workspace, None
+    for part in surveys.task.made:
+        found = surveys.workspace(comes_as(part)).causes[:, :, 0]
+        causes = found if causes is None else np.where(causes == "", found, causes)
+    assert causes is not None
+    return BlockedCells(grid.lower_m[:2], grid.cell_m[:2], causes)
+
+
+def _cameras(task: Task) -> list[CameraCells]:
+    grids = [station.grid for station in task.stations if station.grid is not None]
+    return [CameraCells(grid.origin_m, grid.cell_m, grid.shape, grid.start_m) for grid in grids]
 
 
 def _approaches(surveys: Surveys) -> list[Approach]:
-    found = []
-    for place in [*(station.name for station in surveys.task.stations), INSERT_START]:
-        at = surveys.approach(place)
-        try:
-            pose = surveys.cell_pose(surveys.dock(place, True))
-        except BadInput:
-            dock: XY | None = None
-        else:
-            dock = (pose.x, pose.y)
-        found.append(Approach(place, (at.x, at.y), dock))
+    """Those of every place with every kind that is carried there; of a place that one kind cannot come to, that one."""
+    task, found = surveys.task, []
+    for station in task.stations:
+        carried = [comes_as(part) for part in task.kinds_at(station.name)]
+        for place in dict.fromkeys((station.name, way_to(task, station.name))):
+            at = surveys.approach(place)
+            try:
+                docks = [surveys.cell_pose(surveys.dock(place, kind)) for kind in carried]
+            except BadInput:
+                found.append(Approach(place, (at.x, at.y), None))
+            else:
+                found += [Approach(place, (at.x, at.y), (dock.x, dock.y)) for dock in docks[:1]]
     return found

@@ -129,7 +129,8 @@ def _draw_camera(axes: "Axes", camera: CameraCells) -> None:
 
 def _draw_obstacle(axes: "Axes", obstacle: PlannedObstacle, at_fault: bool) -> None:
     edge = FAULT if at_fault else WOOD
-    _add(axes, obstacle.stays_in, facecolor="none", edgecolor=edge, linewidth=0.9, linestyle=(0, (2, 2)), zorder=4)
+    if obstacle.moves:
+        _add(axes, obstacle.stays_in, facecolor="none", edgecolor=edge, linewidth=0.9, linestyle=(0, (2, 2)), zorder=4)
     look: Look = {"edgecolor": FAULT if at_fault else "#6F4E26", "linewidth": 2.5 if at_fault else 0.8}
     tip(_add(axes, obstacle.stands, facecolor=WOOD, zorder=5, **look), obstacle.name)
     low = obstacle.stays_in.corners()[:, 1].min()
@@ -180,11 +181,14 @@ def _kinds(plan: GroundPlan) -> "Iterator[object]":
 
     for kind in dict.fromkeys(station.kind for station in plan.stations):
         yield Patch(facecolor=BODIES[kind], edgecolor=INK, label=kind)
-    yield Patch(facecolor="none", edgecolor=INK, label="spot of a part")
-    if any(not spot.reached for station in plan.stations for spot in station.spots):
+    spots = [spot for station in plan.stations for spot in station.spots]
+    if spots:
+        yield Patch(facecolor="none", edgecolor=INK, label="spot of a part")
+    if not all(spot.reached for spot in spots):
         yield Patch(facecolor="none", edgecolor=FAULT, label="spot out of reach")
     if plan.obstacles:
-        yield Patch(facecolor=WOOD, edgecolor="#6F4E26", label="obstacle, with the area\nin which it may stand")
+        area = ", with the area\nin which it may stand" if any(o.moves for o in plan.obstacles) else ""
+        yield Patch(facecolor=WOOD, edgecolor="#6F4E26", label=f"obstacle{area}")
     if plan.cameras:
         yield Line2D([], [], color=GREEN, marker="o", markerfacecolor="white", label="camera's grid and its start")
     if any(approach.dock for approach in plan.approaches):

@@ -8,9 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from lab.sim import kinematics
-from lab.sim.kinematics import FLANGE, FOREARM, SHOULDER_OUT, SHOULDER_UP, TOOL, UPPER_ARM, ToolPose
+from lab.sim.arm_models import arm_of
+from lab.sim.kinematics import ELBOW_UP, FLANGE, FOREARM, SHOULDER_OUT, SHOULDER_UP, TOOL, UPPER_ARM, ToolPose
 from lab.sim.reach import ring_of
+from lab.tasks.robot_fields import RobotSettings
+
+UP6 = arm_of(RobotSettings(start="rack"))
 
 
 def crane(nearest: float, farthest: float, right: float, left: float) -> NDArray[np.float64]:
@@ -46,11 +49,11 @@ def test_the_arm_of_the_lab_by_its_lengths() -> None:
     """Stretched out, upper arm and forearm are one side of a triangle whose other sides are its height and its distance."""
     height = 0.2
     up = SHOULDER_UP - height - FLANGE - TOOL
-    stretched = UPPER_ARM + hypot(FOREARM, kinematics.ELBOW_UP)
-    ring = ring_of(kinematics.inverse, height)
+    stretched = UPPER_ARM + hypot(FOREARM, ELBOW_UP)
+    ring = ring_of(UP6.inverse, height)
     assert ring is not None
     assert ring.farthest_m == pytest.approx(SHOULDER_OUT + (stretched**2 - up**2) ** 0.5, abs=1e-3)
     assert ring.left_rad == pytest.approx(radians(170), abs=1e-3)
     for turn in (-ring.right_rad, 1.0, ring.left_rad):
         for far in (ring.nearest_m, ring.farthest_m):
-            assert kinematics.inverse(ToolPose(far * cos(turn), far * sin(turn), height, turn)) is not None
+            assert UP6.inverse(ToolPose(far * cos(turn), far * sin(turn), height, turn)) is not None

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from lab.skills.cell_outline import outline
-from lab.tasks.task_file import Task, load
+from lab.tasks.task import Task
+from lab.tasks.task_file import load
 
 TOAST = load("toast")
 
@@ -44,6 +45,7 @@ def test_the_toast_cell() -> None:
     assert plan.blocked is not None
     assert {"", "out of reach", "tower left", "cubes A"} <= {*np.unique(plan.blocked.causes)}
     assert {approach.station for approach in plan.approaches} == {*stations, "insert"}
+    assert [camera.start for camera in plan.cameras] == [(0.575, -0.225)]
     assert all(approach.dock and hypot(*np.subtract(approach.dock, approach.at)) < 0.2 for approach in plan.approaches)
 
 
@@ -59,7 +61,17 @@ def test_a_station_out_of_reach_is_drawn_with_its_spot_marked() -> None:
     assert plan.at_fault == {"butter_applier"}
     lost = {s.name for s in plan.stations if not all(spot.reached for spot in s.spots)}
     assert lost == {"butter_applier"}
-    assert plan.blocked is None
+    assert [approach.station for approach in plan.approaches if approach.dock is None] == ["butter_applier"]
+
+
+def test_of_parts_that_cannot_be_gripped_what_is_known_is_drawn() -> None:
+    """Without a grip there are no spots; the reach and the obstacles are there."""
+    parts = tuple(part.model_copy(update={"size_m": (0.12, 0.06, 0.12)}) for part in TOAST.parts)
+    plan = outline(TOAST.model_copy(update={"parts": parts}), None, 0)
+    assert [station.name for station in plan.stations] == [station.name for station in TOAST.stations]
+    assert not any(station.spots for station in plan.stations)
+    assert (plan.reach, plan.blocked is None) == (outline(TOAST, None, 0).reach, True)
+    assert len(plan.obstacles) == len(TOAST.obstacles)
 
 
 def test_an_obstacle_on_a_station_is_drawn_where_the_file_has_it() -> None:
