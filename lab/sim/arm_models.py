@@ -34,7 +34,7 @@ OWN_NEAREST_M = 0.25  # [m] of a URDF file that says nothing
 class ArmModel:
     """Where an arm that ships comes from: a URDF in a folder, its tool, and what no URDF says.
 
-    axes (3, 3): the tool's axes in its link; tip_m: the finger tips along x [m]; nearest_m: see `Arm`; flange: where the
+    axes (3, 3): the tool's axes in its link; tip_m: the finger tips along x [m], with what physics adds to meshes; nearest_m: see `Arm`; flange: where the
     lab's own gripper is mounted, as a link and how far out [m], of an arm that has none; closed_form: of the lab's own arm.
     """
 
@@ -54,11 +54,11 @@ ARMS: dict[str, ArmModel] = {
     "up6": ArmModel(
         "robot.urdf", "tool", _OWN_GRIPPER, kinematics.TOOL, 0.36, ALONG_X, None, 2 * models.FINGER_OPEN, True
     ),
-    "panda": ArmModel("franka_panda/panda.urdf", "panda_hand", ("panda_finger_joint1",), 0.112, 0.30, ALONG_Z),
+    "panda": ArmModel("franka_panda/panda.urdf", "panda_hand", ("panda_finger_joint1",), 0.1135, 0.30, ALONG_Z),
     "iiwa": ArmModel(
         "kuka_iiwa/model.urdf", "tool", _OWN_GRIPPER, kinematics.TOOL, 0.42, ALONG_X, ("lbr_iiwa_link_7", 0.045)
     ),
-    "xarm6": ArmModel("xarm/xarm6_with_gripper.urdf", "xarm_gripper_base_link", ("drive_joint",), 0.174, 0.25, ALONG_Z),
+    "xarm6": ArmModel("xarm/xarm6_with_gripper.urdf", "xarm_gripper_base_link", ("drive_joint",), 0.1765, 0.25, ALONG_Z),
 }
 
 

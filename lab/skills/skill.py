@@ -172,9 +172,10 @@ class Skill:
         return self.surveys.kinds[self.kind]
 
     def stands_on(self) -> Spot:
-        """Where the part that it is about stands or is to stand: on its spot, or on the pallet there."""
+        """Where the part that it is about stands at its station, or is to be set down: on a spot, or on the pallet there."""
         places, station = self.surveys.places, self.surveys.task.station(self.station)
-        return places.raised(self.kind, station, self.spot or places.spots(station)[0])
+        spot = self.spot if self.carries else None
+        return places.raised(self.kind, station, spot or places.spots(station)[0])
 
     def pose(self, state: int) -> ToolPose:
         """The tool pose that the motion goes through in a state of the problem; a blocked one may be out of reach."""
