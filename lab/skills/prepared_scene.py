@@ -41,7 +41,7 @@ def prepare(task: Task, toasts: int, seed: int, only: str | None = None) -> Prep
     surveys = Surveys(task, layout)
     scene = in_words(task, toasts, layout)
     problems = {
-        name: replace(skill.setup(surveys), scene=scene)
+        name: replace(skill.setup(surveys), scene=scene, arm=task.robot.model)
         for name, skill in skillset.skills.items()
         if only in (None, name)
     }
