@@ -134,6 +134,6 @@ class Arm:
             joints = self.kinematics.bent(np.hypot(poses[:, 0], poses[:, 1]), poses[:, 2] - self.base_up_m)
             joints[:, 0] += first * turn
             joints[:, -1] = (joints[:, -1] + last * (poses[:, 3] - turn) + pi) % (2 * pi) - pi
-            inside = (joints >= self.lower) & (joints <= self.upper)
-        joints[~inside[:, :-1].all(axis=1)] = np.nan
+            inside = np.all((joints >= self.lower)[:, :-1] & (joints <= self.upper)[:, :-1], axis=1)
+        joints[~inside] = np.nan
         return joints

@@ -148,10 +148,11 @@ class NumericKinematics:
                 place = np.array([round(share * reach / STEP_M), round((foot + high * reach) / STEP_M)])
                 out, up = (np.full(_SEEDS, number * STEP_M) for number in place)
                 solved, good = self._solved(seeds, out, up, _TRIES)
-                good &= self._within(solved) & (np.abs(solved[:, 0]) < 1.0) & self._holds(solved, out, up)
+                middles = self.chain.middles(solved)
+                good &= self._within(solved) & self._holds(solved, out, up) & (middles[:, 0] > 0.0)  # not over its back
                 if good.any():
-                    solved = solved[good]
-                    heights = self.chain.heights(solved)
+                    solved, heights = solved[good], middles[good, 2]
+                    solved[:, [0, -1]] = (solved[:, [0, -1]] + np.pi) % (2 * np.pi) - np.pi
                     away = np.linalg.norm(solved[:, 1:-1] - self._rest[1:-1], axis=1)
                     best = np.lexsort((np.round(away, 6), -np.round(heights, 3)))[0]
                     return place, solved[best]
