@@ -341,6 +341,11 @@ def test_rectangles_meet_by_hand() -> None:
     assert square.meets(Rectangle(0.0, 0.0, 5.0, 0.1, 1.0))
 
 
+def test_a_rectangles_corners_go_around_it() -> None:
+    corners = Rectangle(1.0, 2.0, 0.3, 0.1, QUARTER).corners()
+    assert corners == [pytest.approx(place) for place in ((0.9, 2.3), (0.9, 1.7), (1.1, 1.7), (1.1, 2.3))]
+
+
 @given(*[st.floats(-3, 3)] * 3, *[st.floats(0.01, 2)] * 4, *[st.floats(-7, 7)] * 2)
 def test_meeting_is_mutual(
     x: float, y: float, z: float, a: float, b: float, c: float, d: float, e: float, f: float
