@@ -5,11 +5,12 @@ import pytest
 
 from lab.errors import BadInput
 from lab.production.durations import Durations, cell_of
-from lab.sim.scene import is_toaster
 from lab.skills import SKILLS, Insert, Place, Transfer
-from lab.skills.skillset import SkillSet, route, stations
-from lab.skills.surveys import INSERT_START
-from lab.tasks.task_file import Stage, Task, load
+from lab.skills.skillset import Carried, SkillSet, products, stations, ways_of
+from lab.skills.surveys import INSERT
+from lab.tasks.task import Task
+from lab.tasks.task_fields import Stage
+from lab.tasks.task_file import load
 
 
 @pytest.fixture(scope="module")
