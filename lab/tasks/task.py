@@ -152,8 +152,9 @@ class Task(Record):
             twice = {n for n in names if names.count(n) > 1}
             if twice:
                 raise ValueError(f"{label} '{min(twice)}' stands twice in the file")
+            words = ("robot", "done", *(kinds if label != "part" else ()), *(f"{process} on" for process in self.processes))
+            starts = tuple(f"{word} " for word in words)
             for name in names:
-                starts = tuple(f"{word} " for word in ("robot", "done", *(kinds if label != "part" else ())))
                 reserved = name in RESERVED or name.startswith(starts) or name.endswith(RESERVED_ENDS)
                 if reserved or (label != "station" and name in stations) or (label == "obstacle" and name in kinds):
                     raise ValueError(f"{label} '{name}' has the name of something else in the cell: choose another")
