@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -78,7 +77,7 @@ class Task(Record):
         """The learning settings of a sub-task (the defaults when the file has none)."""
         return self.subtasks.get(name, Subtask())
 
-    @cached_property
+    @property
     def made(self) -> tuple[Part, ...]:
         """The kinds with routes: those that are no other kind's pallet."""
         return tuple(part for part in self.parts if part.routes)
