@@ -1,13 +1,16 @@
 """`lab task`: task files."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from lab.cli.options import Json, Seed
 from lab.cli.output import console, end, show, write, write_json
-from lab.errors import counted
+from lab.errors import BadInput, LabError, counted
+
+if TYPE_CHECKING:
+    from lab.tasks.task import Task
 
 
 def task_list(as_json: Json = False) -> None:
@@ -72,18 +75,52 @@ def task_check(
             help="How many parts of the first kind, 1 to 50. Of a cell: parts, 1 to 200. Default: as it says.",
         ),
     ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            "--plot",
+            help="A .png or .svg file for the cell from above: reach, stations, obstacles, what is blocked by what.",
+        ),
+    ] = None,
     seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
     """Check a task file: its text, its reach, and that a way exists for every sub-task, or through the world. Exit 2 when not.
 
-    Of a cell: that its order can be made, with the line of what is wrong. With --json the document comes in both cases.
+    Of a cell: that its order can be made, with the line of what is wrong. With --json the document comes in both cases, and
+    so does the picture of a task that can be read: what is wrong is marked in it.
     """
     from lab.skills.prepared_scene import check_task
 
+    task = None if plot is None else _to_draw(file, plot)
     errors, warnings = check_task(file, toasts, seed)
+    files = {}
+    if task is not None and plot is not None:
+        from lab.skills.cell_outline import outline
+        from lab.view.cell_plan import draw_cell
+
+        draw_cell(outline(task, toasts, seed, errors[0] if errors else ""), plot)
+        files["plot"] = str(plot)
     if as_json or not errors:
-        document = {"valid": not errors, "errors": errors, "warnings": warnings}
+        document = {"valid": not errors, "errors": errors, "warnings": warnings, "files": files}
         show(document, as_json, lambda _: "\n".join([f"{file} is sound", *(f"mind: {slip}" for slip in warnings)]))
     if errors:
         end(errors[0], 2)
+
+
+def _to_draw(file: str, plot: Path) -> "Task | None":
+    """The task to be drawn, None when it cannot be read; BadInput for what has no picture, and for a bad path of one."""
+    from lab.tasks.cell_file import CellFile
+    from lab.tasks.task import Task
+    from lab.tasks.task_file import load_any
+    from lab.view.canvas import check_picture
+
+    check_picture(plot)
+    try:
+        found = load_any(file)
+    except LabError:  # which the check tells
+        return None
+    if not isinstance(found, Task):
+        instead = f"lab sequence {file} --gantt {plot}" if isinstance(found, CellFile) else f"lab view {file}"
+        raise BadInput(f"--plot draws the cell of a task from above, and {file} is none: see {instead}")
+    return found

@@ -38,8 +38,9 @@ class Kinematics(Protocol):
 class Arm:
     """One arm with its gripper, its foot `base_up_m` [m] above the origin.
 
-    urdf: what physics loads, checked; joints (k,) from the foot to the tool, their ranges lower, upper (k,) [rad] and speed (k,) [rad/s]; tool_link, tip (4, 4): the finger tips' frame in it, x out of the gripper, y
-    across; nearest_m: nearer to its own axis than this the tool would touch the arm.
+    urdf: what physics loads, checked; joints (k,) from the foot to the tool, their ranges lower, upper (k,) [rad] and speed
+    (k,) [rad/s]; tool_link, tip (4, 4): the finger tips' frame in it, x out of the gripper, y across; nearest_m: nearer to
+    its own axis than this the tool would touch the arm.
     """
 
     name: str

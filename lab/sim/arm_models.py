@@ -34,8 +34,9 @@ OWN_NEAREST_M = 0.25  # [m] of a URDF file that says nothing
 class ArmModel:
     """Where an arm that ships comes from: a URDF in a folder, its tool, and what no URDF says.
 
-    axes (3, 3): the tool's axes in its link; tip_m: the finger tips along x [m], with what physics adds to meshes; nearest_m: see `Arm`; flange: where the
-    lab's own gripper is mounted, as a link and how far out [m], of an arm that has none; closed_form: of the lab's own arm.
+    axes (3, 3): the tool's axes in its link; tip_m: the finger tips along x [m], with the margin that physics gives meshes;
+    nearest_m: see `Arm`; flange: where the lab's own gripper is mounted, as a link and how far out [m], of an arm that has
+    none; opening_m: see `RobotSettings`; closed_form: of the lab's own arm.
     """
 
     urdf: str

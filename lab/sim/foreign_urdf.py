@@ -4,6 +4,7 @@ What physics could not make sense of is refused in one line; what only says less
 """
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -20,6 +21,7 @@ from lab.sim.urdf_reader import check_inertial, check_joint, check_mesh, check_n
 MOVING = ("revolute", "prismatic")
 _FRAME_KG, _FRAME_KGM2 = 1e-3, 1e-7  # of a link that is only a frame: physics wants all links to weigh something
 _ROOT_KG, _ROOT_KGM2 = 1.0, 0.01  # of a foot that says nothing: it is bolted down, so that it does not matter
+MOST_SEEN_BYTES = 500_000  # of the meshes of one link
 _GREY = "0.8 0.8 0.8 1"
 _PACKAGE = "package://"
 
@@ -191,6 +193,25 @@ def _find_meshes(path: Path, link: Xml.Element, folder: Path) -> None:
         place = next((one for one in places if (path.parent / one).is_file()), places[0])
         check_mesh(path, place, folder)
         mesh.set("filename", str((path.parent / place).resolve()))
+    _lighten(link)
+
+
+def _lighten(link: Xml.Element) -> None:
+    """What is seen of a link in too many triangles to be shown in a browser is seen as what is solid of it."""
+    solids = [(one.find("origin"), one.find("geometry")) for one in link.findall("collision")]
+    if _bytes(link.findall("collision")) > MOST_SEEN_BYTES or _bytes(link.findall("visual")) <= MOST_SEEN_BYTES:
+        return
+    material = link.find("visual/material")
+    for visual in link.findall("visual"):
+        link.remove(visual)
+    for pieces in solids:
+        visual = Xml.SubElement(link, "visual")
+        visual.extend(deepcopy(piece) for piece in (*pieces, material) if piece is not None)
+
+
+def _bytes(pieces: Sequence[Xml.Element]) -> int:
+    files = (mesh.get("filename", "") for piece in pieces for mesh in piece.iter("mesh"))
+    return sum(Path(file).stat().st_size for file in files)
 
 
 def _paint(root: Xml.Element) -> None:

@@ -41,6 +41,7 @@ def test_task_list_show_and_check(lab: Lab, folder: Path, toml: str) -> None:
         "valid": True,
         "errors": [],
         "warnings": [],
+        "files": {},
     }
 
 
@@ -97,5 +98,30 @@ def test_a_damaged_task_file_is_reported_by_check(lab: Lab, folder: Path) -> Non
     ran = lab("task", "check", "t.toml", "--json")
     assert (ran.code, ran.json) == (
         2,
-        {"valid": False, "errors": [ran.err.removeprefix("lab: ").strip()], "warnings": []},
+        {"valid": False, "errors": [ran.err.removeprefix("lab: ").strip()], "warnings": [], "files": {}},
     )
+
+
+def test_a_cell_is_drawn_whether_it_is_sound_or_not(lab: Lab, folder: Path, toml: str, tree: Tree) -> None:
+    ran = lab("task", "check", "toast", "--plot", "cell.svg", "--json")
+    assert (ran.code, ran.json["valid"], ran.json["files"]) == (0, True, {"plot": "cell.svg"})
+    assert "blocked by tower left" in (folder / "cell.svg").read_text(encoding="utf-8")
+    (folder / "far.toml").write_text(toml.replace("pose = [0.80, -0.52, 0.0]", "pose = [1.30, -0.62, 0.0]"))
+    ran = lab("task", "check", "far.toml", "--plot", "far.svg", "--json")
+    assert (ran.code, ran.json["valid"], ran.json["files"]) == (2, False, {"plot": "far.svg"})
+    (error,) = ran.json["errors"]
+    assert ran.err == f"lab: {error}\n"
+    assert "station 'butter_applier' is out of reach" in (folder / "far.svg").read_text(encoding="utf-8")
+
+
+def test_what_cannot_be_drawn_is_refused_or_left_out(lab: Lab, folder: Path, tree: Tree) -> None:
+    (folder / "t.toml").write_text("name = 3\n")
+    ran = lab("task", "check", "t.toml", "--plot", "t.png", "--json")
+    assert (ran.code, ran.json["files"]) == (2, {})
+    for what, instead in (("world-1", "lab view world-1"), ("fms", "lab sequence fms --gantt t.png")):
+        ran = lab("task", "check", what, "--plot", "t.png")
+        assert (ran.code, ran.out) == (2, "")
+        assert ran.err == f"lab: --plot draws the cell of a task from above, and {what} is none: see {instead}\n"
+    ran = lab("task", "check", "toast", "--plot", "no/t.png")
+    assert (ran.code, ran.err) == (2, "lab: picture 'no/t.png': there is no folder 'no'\n")
+    assert tree(folder) == ["t.toml"]

@@ -10,10 +10,11 @@ from urllib.request import urlopen
 
 import pytest
 
-from lab.cli.view import serve, write_page
+from lab.cli.view import Asked, serve, write_page
 from lab.errors import BadInput
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
+ONE = Asked(1, None, 0)
 
 
 def looked_at(what: str) -> tuple[str, str]:
@@ -26,7 +27,7 @@ def looked_at(what: str) -> tuple[str, str]:
         pthread_kill(main_thread().ident or 0, SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        serve(what, 1, 0, 0, lambda url, hint: Thread(target=look, args=(url,)).start())
+        serve(what, ONE, 0, lambda url, hint: Thread(target=look, args=(url,)).start())
     url, page = told
     return url, page
 
@@ -47,9 +48,9 @@ def test_a_runs_replay_is_served(tmp_path: Path) -> None:
 
 def test_what_is_neither_a_task_nor_a_run(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"holds no replay.html: give the folder of a run"):
-        serve(str(tmp_path), 3, 0, 0, lambda url, hint: None)
+        serve(str(tmp_path), ONE, 0, lambda url, hint: None)
     with pytest.raises(BadInput, match=r"^51 toasts"):
-        serve("toast", 51, 0, 0, lambda url, hint: None)
+        serve("toast", Asked(51, None, 0), 0, lambda url, hint: None)
 
 
 def data(file: str) -> Any:
@@ -61,7 +62,7 @@ def data(file: str) -> Any:
 def test_a_world_is_shown_and_written_as_a_page(tmp_path: Path) -> None:
     _, page = looked_at("world-1")
     assert "World I: a path through 10 x 10 x 10 cells; shortest way: 12 moves" in page
-    document = write_page("world-1", 3, 0, tmp_path / "w.html")
+    document = write_page("world-1", ONE, tmp_path / "w.html")
     assert document == {"file": str(tmp_path / "w.html")}
     assert {body["name"] for body in data(document["file"])["scene"]["bodies"]} == {
         *("ground", "room", "obstacles", "start", "goal", "shortest way", "limited view", "axes")
@@ -81,7 +82,7 @@ def test_any_world_or_task_is_written_as_a_page(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("w.txt").write_text("S#.\n..G\n")
-    text = Path(write_page(what, 1, 0, Path("page.html"))["file"]).read_text(encoding="utf-8")
+    text = Path(write_page(what, ONE, Path("page.html"))["file"]).read_text(encoding="utf-8")
     said = text.partition("<title>")[2].partition("</title>")[0]
     assert said.startswith(title)
     assert ("1500 of 2400 obstacles drawn" in said) == what.startswith("random")
@@ -94,7 +95,7 @@ def test_a_page_that_cannot_be_written(tmp_path: Path, lab: Lab) -> None:
         ("fms", tmp_path / "w.html", r"it is a cell, which has no scene"),
     ):
         with pytest.raises(BadInput, match=line):
-            write_page(what, 3, 0, out)
+            write_page(what, ONE, out)
     (tmp_path / "w.txt").write_text("S#G\n")
     ran = lab("view", str(tmp_path / "w.txt"), "--out", str(tmp_path / "w.html"))
     assert (ran.code, ran.out) == (2, "")

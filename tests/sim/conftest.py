@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from lab.sim.arm_models import arm_named
 from lab.sim.robot import Robot
 from lab.sim.world import World
 from lab.tasks.task_file import Task, load
@@ -25,4 +26,4 @@ def world() -> Iterator[World]:
 @pytest.fixture
 def robot(world: World) -> Robot:
     """The arm, alone in `world`."""
-    return Robot(world, speed=0.5, acceleration=2.0, grip_force=25.0)
+    return Robot(world, arm_named("up6"), speed=0.5, acceleration=2.0, grip_force=25.0)
