@@ -112,6 +112,7 @@ def sequenced(
         options.gate,
         people,
         kept.keep,
+        options.parts,
     )
     teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
     return sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)

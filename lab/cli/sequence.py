@@ -7,7 +7,7 @@ import typer
 
 from lab.cli.families import offers
 from lab.cli.lessons import lesson_seat, say_read, sequenced
-from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Plain, Port, Seed, ShowPage, ToolboxPlace, Wait
+from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Parts, Plain, Port, Seed, ShowPage, ToolboxPlace, Wait
 from lab.cli.output import end, show
 
 
@@ -19,7 +19,11 @@ def sequence(
         str | None,
         typer.Option("--case", help="toast: I, II or III of the thesis. A cell: its order by initials, such as RSR."),
     ] = None,
-    toasts: Annotated[int | None, typer.Option("--toasts", "-n", help="How many parts of the only product.")] = None,
+    toasts: Annotated[
+        int | None,
+        typer.Option("--toasts", "-n", help="How many parts of the only product, or of a task's first kind."),
+    ] = None,
+    parts: Parts = None,
     method: Annotated[
         str | None, typer.Option("--method", help="{methods}; default: the file's.", autocompletion=offers("methods"))
     ] = None,
@@ -70,7 +74,7 @@ def sequence(
     from lab.view.summary import sequence_summary
 
     given = OrderOptions(
-        task or "", case, toasts, method, objective, episodes, sessions, stochastic, advisor, gate, seed
+        task or "", case, toasts, method, objective, episodes, sessions, stochastic, advisor, gate, seed, parts
     )
     box = Toolbox(toolbox)
     kept = OrderSession(given.complete(), box) if resume is None else gone_on(given, resume, box)

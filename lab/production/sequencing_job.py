@@ -64,6 +64,7 @@ class Wanted:
     gate: str = "ccrl"
     people: Mapping[str, Ask] = field(default_factory=dict)
     keep: KeepOrder = lambda cell, objective: Journal()
+    parts: str | None = None
 
 
 def sequence_named(
@@ -84,6 +85,8 @@ def sequence_named(
         raise BadInput(f"{name}: it is a world, there is nothing to sequence: learn it with lab teach {name}")
     _check_names(wanted, loaded.sequencing)
     if isinstance(loaded, CellFile):
+        if wanted.parts is not None:
+            raise BadInput(f"--parts {wanted.parts}: '{loaded.name}' is a cell: give its order with --case or --toasts")
         cell, chance = ordered_cell(loaded, case, toasts), loaded.chance()
     else:
         if case is not None:
@@ -126,7 +129,7 @@ def measured_cell(task: Task, toasts: int | None, wanted: Wanted, teacher: Teach
     objective = wanted.objective or task.sequencing.objective
     if objective in WITH_DUE_TIMES:
         raise BadInput(f"objective '{objective}' (--objective) needs due times, and a task has none: use a cell file")
-    return teach_all(prepare(task, task.order(toasts), teacher.seed), teacher).cell
+    return teach_all(prepare(task, task.ordered(toasts, wanted.parts), teacher.seed), teacher).cell
 
 
 def sequence_cell(

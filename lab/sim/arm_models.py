@@ -34,8 +34,9 @@ OWN_NEAREST_M = 0.25  # [m] of a URDF file that says nothing
 class ArmModel:
     """Where an arm that ships comes from: a URDF in a folder, its tool, and what no URDF says.
 
-    axes (3, 3): the tool's axes in its link; tip_m: the finger tips along x [m], with what physics adds to meshes; nearest_m: see `Arm`; flange: where the
-    lab's own gripper is mounted, as a link and how far out [m], of an arm that has none; closed_form: of the lab's own arm.
+    axes (3, 3): the tool's axes in its link; tip_m: the finger tips along x [m], with the margin that physics gives meshes;
+    nearest_m: see `Arm`; flange: where the lab's own gripper is mounted, as a link and how far out [m], of an arm that has
+    none; opening_m: see `RobotSettings`; closed_form: of the lab's own arm.
     """
 
     urdf: str
@@ -58,7 +59,9 @@ ARMS: dict[str, ArmModel] = {
     "iiwa": ArmModel(
         "kuka_iiwa/model.urdf", "tool", _OWN_GRIPPER, kinematics.TOOL, 0.42, ALONG_X, ("lbr_iiwa_link_7", 0.045)
     ),
-    "xarm6": ArmModel("xarm/xarm6_with_gripper.urdf", "xarm_gripper_base_link", ("drive_joint",), 0.1765, 0.25, ALONG_Z),
+    "xarm6": ArmModel(
+        "xarm/xarm6_with_gripper.urdf", "xarm_gripper_base_link", ("drive_joint",), 0.1765, 0.25, ALONG_Z
+    ),
 }
 
 
@@ -113,7 +116,8 @@ def _made(
     _still(urdf, (*chain.names, *fingers_found.joints))
     how: Kinematics = kinematics.ClosedForm() if model.closed_form else NumericKinematics(chain, name)
     lower, upper = chain.lower.copy(), chain.upper.copy()
-    lower[0], upper[0] = max(lower[0], -FARTHEST_TURN), min(upper[0], FARTHEST_TURN)
+    ahead = how.home[0]
+    lower[0], upper[0] = max(lower[0], ahead - FARTHEST_TURN), min(upper[0], ahead + FARTHEST_TURN)
     file = path if model.closed_form else written(urdf.root, path.stem)
     return Arm(
         name,

@@ -49,8 +49,23 @@ class Surveyor:
 
     def cause(self, pose: ToolPose) -> str:
         """'' when the tool can be at `pose`, else why not."""
-        if hypot(pose.x, pose.y) < self.scene.robot.arm.nearest_m or not self.scene.robot.stand(pose):
-            return OUT_OF_REACH
+        return self._causes([pose])[0]
+
+    def _causes(self, poses: Sequence[ToolPose]) -> list[str]:
+        """The cause of each of many poses: their joints are found all at once."""
+        robot = self.scene.robot
+        joints = robot.arm.inverse_each(np.array([[p.x, p.y, p.z, p.yaw] for p in poses]))  # (n, k)
+        found = []
+        for pose, own in zip(poses, joints, strict=True):
+            if hypot(pose.x, pose.y) < robot.arm.nearest_m or np.isnan(own[0]):
+                found.append(OUT_OF_REACH)
+                continue
+            robot.hold(own)
+            found.append(self._touched(pose))
+        return found
+
+    def _touched(self, pose: ToolPose) -> str:
+        """'' when the arm, which is at `pose`, and what it carries are clear of everything, else what is too near."""
         world = self.scene.world
         if self.carried is not None:
             self.scene.put(CARRIED, self.carried, pose)
@@ -61,7 +76,5 @@ class Surveyor:
 
     def grid(self, shape: tuple[int, ...], pose_of: Callable[[tuple[int, ...]], ToolPose]) -> Survey:
         """Survey every cell of a grid whose cell i has the tool at pose_of(i)."""
-        causes = np.full(shape, "", dtype="U40")
-        for cell in np.ndindex(*shape):
-            causes[cell] = self.cause(pose_of(cell))
-        return Survey(causes)
+        causes = np.array(self._causes([pose_of(cell) for cell in np.ndindex(*shape)]), dtype="U40")
+        return Survey(causes.reshape(shape))

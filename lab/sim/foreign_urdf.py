@@ -4,6 +4,7 @@ What physics could not make sense of is refused in one line; what only says less
 """
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -20,6 +21,7 @@ from lab.sim.urdf_reader import check_inertial, check_joint, check_mesh, check_n
 MOVING = ("revolute", "prismatic")
 _FRAME_KG, _FRAME_KGM2 = 1e-3, 1e-7  # of a link that is only a frame: physics wants all links to weigh something
 _ROOT_KG, _ROOT_KGM2 = 1.0, 0.01  # of a foot that says nothing: it is bolted down, so that it does not matter
+MOST_SEEN_BYTES = 500_000  # of the meshes of one link
 _GREY = "0.8 0.8 0.8 1"
 _PACKAGE = "package://"
 
@@ -86,7 +88,11 @@ def settled(path: Path, folder: Path) -> Urdf:
     for element in [one for one in root if one.tag not in ("link", "joint", "material")]:
         root.remove(element)  # transmissions, and what other simulators want to know
     check_numbers(path, root)
-    links = [link.get("name", "") for link in root.findall("link")]
+    links, joints = ([one.get("name", "") for one in root.findall(kind)] for kind in ("link", "joint"))
+    for kind, names in (("link", links), ("joint", joints)):
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise BadInput(f"{path}: {kind} '{twice[0]}' stands twice in it")
     for joint in root.findall("joint"):
         check_joint(path, joint, links)
         _check_limits(path, joint)
@@ -124,11 +130,6 @@ def _is_number(text: str | None) -> bool:
 
 def _tree(path: Path, root: Xml.Element, links: Sequence[str]) -> tuple[dict[str, Xml.Element], str]:
     joints = root.findall("joint")
-    names = [joint.get("name", "") for joint in joints]
-    for kind, all_names in (("link", links), ("joint", names)):
-        twice = sorted({name for name in all_names if list(all_names).count(name) > 1})
-        if twice:
-            raise BadInput(f"{path}: {kind} '{twice[0]}' stands twice in it")
     carrying: dict[str, Xml.Element] = {}
     for joint in joints:
         if child(joint) in carrying:
@@ -191,6 +192,25 @@ def _find_meshes(path: Path, link: Xml.Element, folder: Path) -> None:
         place = next((one for one in places if (path.parent / one).is_file()), places[0])
         check_mesh(path, place, folder)
         mesh.set("filename", str((path.parent / place).resolve()))
+    _lighten(link)
+
+
+def _lighten(link: Xml.Element) -> None:
+    """What is seen of a link in too many triangles to be shown in a browser is seen as what is solid of it."""
+    solids = [(one.find("origin"), one.find("geometry")) for one in link.findall("collision")]
+    if _bytes(link.findall("collision")) > MOST_SEEN_BYTES or _bytes(link.findall("visual")) <= MOST_SEEN_BYTES:
+        return
+    material = link.find("visual/material")
+    for visual in link.findall("visual"):
+        link.remove(visual)
+    for pieces in solids:
+        visual = Xml.SubElement(link, "visual")
+        visual.extend(deepcopy(piece) for piece in (*pieces, material) if piece is not None)
+
+
+def _bytes(pieces: Sequence[Xml.Element]) -> int:
+    files = (mesh.get("filename", "") for piece in pieces for mesh in piece.iter("mesh"))
+    return sum(Path(file).stat().st_size for file in files)
 
 
 def _paint(root: Xml.Element) -> None:

@@ -14,7 +14,7 @@ from lab.sim.world import World
 from lab.tasks.task import Order, Task, part_name
 from lab.tasks.task_fields import CameraGrid, Obstacle, Station
 
-WOOD, TABLE_RGBA = (0.72, 0.53, 0.33, 1.0), (0.86, 0.85, 0.83, 1.0)
+TABLE_RGBA = (0.86, 0.85, 0.83, 1.0)
 TABLE_M, TABLE_MIDDLE_M = (2.2, 2.9, 0.04), (0.35, 0.0, -0.02)
 MARKER_ABOVE = 0.002  # [m] a marker's centre above what it lies on
 ABOVE_FOOT_M = 0.0005  # [m] a part is put so high above its spot
@@ -49,7 +49,7 @@ class Scene:
 
     def _build_obstacle(self, obstacle: Obstacle, place: tuple[float, float]) -> None:
         size = obstacle.size
-        self.world.box(obstacle.name, size, (*place, size[2] / 2), WOOD, yaw=obstacle.yaw)
+        self.world.box(obstacle.name, size, (*place, size[2] / 2), (*obstacle.color, 1.0), yaw=obstacle.yaw)
         self.solid.append(obstacle.name)
         if any(in_grid(station.grid, place) for station in self.task.stations if station.grid is not None):
             self._mark(obstacle.name, (*place, size[2] + MARKER_ABOVE), models.MARKER_GREEN)

@@ -1,7 +1,7 @@
 """What is wrong with a task's cell before anything is surveyed in it: reach, heights, and stations in each other's way."""
 
 from itertools import combinations
-from math import hypot
+from math import hypot, sin
 
 from lab.errors import BadInput
 from lab.sim.arm import Arm
@@ -12,6 +12,7 @@ from lab.sim.places import Places, Rectangle
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Station
 
+ACROSS = 0.3  # sine of the angle at most between the fingers and the way in
 OVER_M = 0.01  # [m] between a carried part and what stands below its way
 INTO_M = 0.005  # [m] the same above a machine that it is let down into
 
@@ -30,6 +31,7 @@ def check_scene(task: Task) -> None:
         spots, own = places.spots(station), places.kinds_at(station.name)
         for kind in own:
             _check_grid(station, kind, places.floor(station))
+            _check_side(station, kind)
             for spot in spots:
                 pose = kind.held_at(spot)
                 for at in (pose, ToolPose(pose.x, pose.y, low, pose.yaw)):
@@ -61,6 +63,15 @@ def _check_grid(station: Station, kind: Kind, floor: float) -> None:
         raise BadInput(
             f"station '{station.name}': grid.height_m {station.grid.height_m}: a carried {kind.name} would hit it, "
             f"at least {lowest:.3f} needed"
+        )
+
+
+def _check_side(station: Station, kind: Kind) -> None:
+    """BadInput when a finger would stand in the way of a part that is brought in from the side."""
+    if station.approach == "side" and abs(sin(kind.grip.yaw)) > ACROSS:
+        raise BadInput(
+            f"station '{station.name}': approach = 'side': the fingers hold a {kind.name} before and behind, at yaw "
+            f"{kind.grip.yaw:.2f}: only what is held at its sides, at yaw 0, can be brought in along its x axis"
         )
 
 

@@ -24,13 +24,14 @@ MESHES = (".obj", ".stl")
 def build(world: World, station: Station, slab: tuple[Vector, Vector], folder: Path) -> None:
     """Put a station's body into the world; `slab`: size and centre [m] of one that is a slab or a box. Raises BadInput."""
     x, y, yaw = station.pose
+    rgba = RGBA[station.kind] if station.color is None else (*station.color, 1.0)
     if station.stands_on in ("slab", "box"):
         size, middle = slab
-        world.box(station.name, size, middle, RGBA[station.kind], yaw=yaw)
+        world.box(station.name, size, middle, rgba, yaw=yaw)
     else:
         path = _file(station, folder)
         if path.suffix.lower() in MESHES:
-            world.mesh(station.name, path, (x, y, 0.0), RGBA[station.kind], yaw=yaw)
+            world.mesh(station.name, path, (x, y, 0.0), rgba, yaw=yaw)
         else:
             world.load(station.name, path, (x, y, 0.0), yaw)
     world.friction(station.name, FRICTION[station.kind])

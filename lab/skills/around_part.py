@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
 
 SLOW = 0.6
+SIDEWAYS = {"left": "lower", "right": "higher", "down": "in", "up": "out"}  # the moves where parts come from the side
 _BLEND_M = 0.008
 
 
@@ -41,7 +42,10 @@ class AroundPart(Skill):
         rewards = surveys.task.subtask(self.subtask).rewards
         try:
             start = free_above(self.name, survey, self.goal)
-            mdp = grid(survey.causes.shape, survey.blocked, start, self.goal, rewards, self.actions)
+            actions = (
+                self.actions if surveys.into(self.station) is None else tuple(SIDEWAYS.get(a, a) for a in self.actions)
+            )
+            mdp = grid(survey.causes.shape, survey.blocked, start, self.goal, rewards, actions)
         except NoPath as error:
             raise no_way(self.name, error, survey.names(error.enclosing)) from None
         self.problem = Problem(self.name, self.subtask, from_above(mdp))
@@ -53,16 +57,16 @@ class AroundPart(Skill):
 
     def pose(self, state: int, goal: ToolPose | None = None) -> ToolPose:
         """Around `goal`, by default where the part is by the task."""
-        return near_pose(goal or self.goal_pose(), self.problem.mdp.state_cell(state))
+        return near_pose(goal or self.goal_pose(), self.problem.mdp.state_cell(state), self.surveys.into(self.station))
 
     def begins_at(self) -> ToolPose:
         """At the station's approach."""
         return self.surveys.approach(self.station)
 
     def down(self, bench: Bench, policy: "Policy", goal: ToolPose) -> Iterator[None]:
-        """Above the part, and down the learned cells to the tool pose `goal`."""
+        """Above the part, or ahead of it where it is taken from the side, and along the learned cells to the tool pose `goal`."""
         robot, mdp = bench.scene.robot, self.problem.mdp
-        entry = entry_cell(goal, robot.tool())[: len(mdp.shape)]
+        entry = entry_cell(goal, robot.tool(), self.surveys.into(self.station) is not None)[: len(mdp.shape)]
         path = learned_path(policy, mdp, int(np.ravel_multi_index(entry, mdp.shape)))
         poses = [self.pose(state, goal) for state in path]
         high = max(robot.tool().z, poses[0].z)
@@ -87,13 +91,15 @@ def from_above(mdp: TabularMDP) -> TabularMDP:
     return replace(mdp, starts=tuple(int(s) for s in starts))
 
 
-def entry_cell(goal: ToolPose, tool: ToolPose) -> tuple[int, int, int, int]:
-    """The cell of the highest level that is nearest to where the tool is, seen from the part."""
+def entry_cell(goal: ToolPose, tool: ToolPose, from_the_side: bool = False) -> tuple[int, int, int, int]:
+    """The cell of the highest level that is nearest to where the tool is, seen from the part; from the side: straight ahead."""
     c, s = np.cos(goal.yaw), np.sin(goal.yaw)
     dx, dy = tool.x - goal.x, tool.y - goal.y
     along, across = c * dx + s * dy, -s * dx + c * dy
     turn = (tool.yaw - goal.yaw + np.pi / 2) % np.pi - np.pi / 2
     x = int(np.clip(round(along / NEAR_STEP_M[0]) + 2, 0, NEAR_SHAPE[0] - 1))
     y = int(np.clip(round(across / NEAR_STEP_M[1]) + 2, 0, NEAR_SHAPE[1] - 1))
+    if from_the_side:
+        x, y = 2, 2
     yaw = int(np.clip(round(turn / NEAR_YAW_STEP) + NEAR_YAWS // 2, 0, NEAR_YAWS - 1))
     return (x, y, NEAR_SHAPE[2] - 1, yaw)

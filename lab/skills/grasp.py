@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from math import hypot
 from typing import TYPE_CHECKING, ClassVar
 
-from lab.sim.kinematics import ToolPose
 from lab.skills.around_part import SLOW, AroundPart
 from lab.skills.skill import Bench, SkillFailed, over_everything
 from lab.tasks.task import Task
@@ -45,8 +44,8 @@ class Grasp(AroundPart):
         yield from self.down(bench, policy, goal)
         yield from robot.grip()
         bench.held = body
-        yield from robot.follow([ToolPose(goal.x, goal.y, approach.z, goal.yaw)], slow=SLOW)
-        yield from robot.follow([approach], slow=SLOW)
+        for pose in self.surveys.way_out(self.station, goal):
+            yield from robot.follow([pose], slow=SLOW)
         if not bench.holds(body):
             bench.held = None
             raise SkillFailed(f"{body} is not in the gripper after grasping at '{self.station}'")

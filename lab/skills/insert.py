@@ -135,7 +135,7 @@ class Insert(Skill):
         goal = release_pose(bench, body, spot)
         yield from robot.follow([ToolPose(goal.x, goal.y, self.grid.settings.height_m, goal.yaw)], slow=_SLOW)
         yield from robot.follow([goal], slow=_SLOW)
-        yield from let_go(bench, goal, self.surveys.approach(self.station))
+        yield from let_go(bench, self.surveys.way_out(self.station, goal))
         if not bench.stands(body, spot, IN_SLOT_M):
             raise SkillFailed(f"{body} is not in the slot of '{self.station}'")
 

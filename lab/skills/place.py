@@ -1,12 +1,14 @@
 """Place: set a part down on a plate, a buffer, a pallet or in a machine's groove, and let go."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from lab.sim.kinds import Spot
+from lab.sim.kinds import Spot, on_its_pallet
 from lab.sim.kinematics import ToolPose
+from lab.sim.scene import pallet_of
 from lab.skills.around_part import SLOW, AroundPart
 from lab.skills.camera_grids import RELEASE_ABOVE
 from lab.skills.skill import Bench, SkillFailed
@@ -43,9 +45,13 @@ class Place(AroundPart):
         body, spot = bench.held, self.stands_on()
         if body is None:
             raise SkillFailed(f"nothing in the gripper to place at '{self.station}'")
+        pallet = pallet_of(self.part)
+        if pallet in bench.scene.kind_of and on_its_pallet(self.surveys.task, self.kind, self.station):
+            foot = bench.scene.kind_of[pallet].foot_at(bench.part_pose(pallet, spot.yaw))
+            spot = replace(spot, x=foot.x, y=foot.y)  # where the pallet was really set down
         goal = release_pose(bench, body, spot)
         yield from self.down(bench, policy, goal)
-        yield from let_go(bench, goal, self.surveys.approach(self.station))
+        yield from let_go(bench, self.surveys.way_out(self.station, goal))
         if not bench.stands(body, spot, NEAR_M):
             raise SkillFailed(f"{body} does not stand on '{self.station}'")
 
@@ -59,10 +65,10 @@ def release_pose(bench: Bench, body: str, spot: Spot) -> ToolPose:
     return wanted.local(-along, 0.0, tool.z - hangs.z + RELEASE_ABOVE)
 
 
-def let_go(bench: Bench, at: ToolPose, approach: ToolPose) -> Iterator[None]:
-    """Open the fingers, rise straight up, and come to the station's approach."""
+def let_go(bench: Bench, way_out: Sequence[ToolPose]) -> Iterator[None]:
+    """Open the fingers, and go the way out of the station."""
     robot = bench.scene.robot
     yield from robot.release()
     bench.held = None
-    yield from robot.follow([ToolPose(at.x, at.y, approach.z, at.yaw)], slow=SLOW)
-    yield from robot.follow([approach], slow=SLOW)
+    for pose in way_out:
+        yield from robot.follow([pose], slow=SLOW)

@@ -8,7 +8,7 @@ import numpy as np
 
 from lab.errors import BadInput
 from lab.sim.blocked_cells import Survey, Surveyor
-from lab.sim.kinds import Spot
+from lab.sim.kinds import Spot, beside
 from lab.sim.kinematics import ToolPose
 from lab.sim.places import Layout
 from lab.sim.scene import Scene
@@ -24,6 +24,10 @@ NEAR_SHAPE = (5, 5, 6)  # x, y, z around a part; z from the grasp upwards
 NEAR_STEP_M = (0.012, 0.012, 0.030)
 NEAR_YAWS = 5
 NEAR_YAW_STEP = 0.06  # [rad]
+OUT_M = NEAR_STEP_M[2] * (
+    NEAR_SHAPE[2] - 1
+)  # the approach of a station is so far ahead of it whose parts come from the side
+LIFT_M = 0.006  # a part is lifted so high before it is taken out to the side
 _TRAVEL_MARGIN = 0.01  # [m] beyond half a cell: a move between free cells then touches nothing
 _DOCK_CLEARANCE = 0.012  # [m]
 FINGER_SHARE = 0.6  # of the room between an open finger and a wide part: as near may the finger come
@@ -45,12 +49,20 @@ def _start_of(task: Task, station: str) -> str:
     return INSERT if grids == [station] else f"{INSERT} at {station}" if station in grids else ""
 
 
-def near_pose(goal: ToolPose, cell: Cell) -> ToolPose:
-    """The tool pose of a cell of the grid around a part; `goal` is the pose of the goal cell (2, 2, 0[, 2])."""
-    dx, dy, dz = (
+def near_pose(goal: ToolPose, cell: Cell, into: float | None = None) -> ToolPose:
+    """The tool pose of a cell of the grid around a part; `goal` is the pose of the goal cell (2, 2, 0[, 2]).
+
+    The levels of the third axis lead upwards; where parts are brought in from the side, along the yaw `into` [rad], they lead
+    out again, and the first axis upwards.
+    """
+    one, across, out = (
         (cell[k] - middle) * step for k, (middle, step) in enumerate(zip((2, 2, 0), NEAR_STEP_M, strict=True))
     )
-    return goal.local(dx, dy, dz, (cell[3] - NEAR_YAWS // 2) * NEAR_YAW_STEP if len(cell) > 3 else 0.0)
+    turn = (cell[3] - NEAR_YAWS // 2) * NEAR_YAW_STEP if len(cell) > 3 else 0.0
+    if into is None:
+        return goal.local(one, across, out, turn)
+    x, y = beside((goal.x, goal.y), into, (-out, across))
+    return ToolPose(x, y, goal.z + one, goal.yaw + turn)
 
 
 class Surveys:
@@ -112,7 +124,22 @@ class Surveys:
         if settings is not None:
             return ToolPose(*settings.start_m, low, 0.0)
         x, y, yaw = self.task.station(place).pose
-        return ToolPose(x, y, low, yaw)
+        ahead = 0.0 if self.into(place) is None else OUT_M
+        return ToolPose(*beside((x, y), yaw, (-ahead, 0.0)), low, yaw)
+
+    def into(self, place: str) -> float | None:
+        """The yaw along which parts are brought into a station from the side; None: from above."""
+        station = self.task.station(place)
+        return station.pose[2] if station.approach == "side" else None
+
+    def way_out(self, station: str, pose: ToolPose) -> list[ToolPose]:
+        """From where the fingers closed or opened at a station to its approach: up, or out to the side and up."""
+        into, approach = self.into(station), self.approach(station)
+        if into is None:
+            return [ToolPose(pose.x, pose.y, approach.z, pose.yaw), approach]
+        lifted = pose.shifted(dz=LIFT_M)
+        x, y = beside((lifted.x, lifted.y), into, (-OUT_M, 0.0))
+        return [lifted, ToolPose(x, y, lifted.z, pose.yaw), ToolPose(x, y, approach.z, pose.yaw), approach]
 
     # ---- grasp and place: around one part ------------------------------------------------------------------------
 
@@ -122,8 +149,8 @@ class Surveys:
         spot = self.places.spots(station)[0]
         with World() as world:
             scene = Scene(world, self.task, (), Layout(self.layout.obstacles, ()))
-            for name, (neighbour, beside) in self.places.neighbours(station, spot).items():
-                self._stand(scene, name, neighbour, beside)
+            for name, (neighbour, other) in self.places.neighbours(station, spot).items():
+                self._stand(scene, name, neighbour, other)
             foot = self.places.raised(kind, station, spot)
             if foot != spot:
                 self._stand(scene, "the part", str(self.task.part(kind).pallet), spot)
@@ -136,7 +163,7 @@ class Surveys:
             clearance = min(TOUCH_CLEARANCE[loaded], FINGER_SHARE * beside_finger)
             surveyor = Surveyor(scene, kind if loaded else None, clearance=clearance)
             shape = NEAR_SHAPE if loaded else (*NEAR_SHAPE, NEAR_YAWS)
-            return surveyor.grid(shape, lambda cell: near_pose(goal, cell))
+            return surveyor.grid(shape, lambda cell: near_pose(goal, cell, self.into(station_name)))
 
     def check_free(self, what: str, poses: Sequence[ToolPose]) -> None:
         """BadInput when the empty tool cannot be at one of these poses, naming what is in the way."""

@@ -105,12 +105,14 @@ class CellFields(Record):
 
     Either `order`, a product for each part, or, for one product, `parts`. travel: seconds from a station (the row) to
     another; a pair that is left out is no allowed move. loaded: those that differ when the robot carries something.
+    in_physics: the name of the task, or its file in the same folder, in which lab run carries such a cell out.
     due_s: one a part; due_factor: a part is due so many times its own work after it arrives (see `CellFile.work_s`).
     """
 
     kind: Literal["cell"] = "cell"
     name: Name
     title: str = ""
+    in_physics: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,80}$")] | None = None
     order: Annotated[tuple[Name, ...], BeforeValidator(as_tuple)] | None = None
     parts: int | None = None
     buffers: Literal["busy", "free"] = "busy"

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cached_property
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -13,6 +13,7 @@ from lab.files import assets_folder
 from lab.tasks.record import Name, Record, as_tuple
 from lab.tasks.robot_fields import RobotSettings
 from lab.tasks.sequencing import Sequencing
+from lab.tasks.task_faults import refusal
 from lab.tasks.task_fields import (
     MAX_PARTS,
     MOST_THINGS,
@@ -25,6 +26,7 @@ from lab.tasks.task_fields import (
     Subtask,
     Workspace,
 )
+from lab.tasks.toml_text import TomlText
 
 RESERVED = ("robot", "table", "insert", "the part", "carried part")  # names of other things in the cell
 RESERVED_ENDS = (" marker", " column", " head")
@@ -48,11 +50,22 @@ class Task(Record):
     subtasks: dict[str, Subtask] = Field(default={})
     sequencing: Sequencing = Sequencing()
     _folder: Path | None = PrivateAttr(default=None)
+    _toml: TomlText | None = PrivateAttr(default=None)
 
     @property
     def folder(self) -> Path:
         """Where the meshes and URDFs lie that the file names, unless the lab's own assets have them."""
         return self._folder or assets_folder()
+
+    @contextmanager
+    def in_its_file(self) -> Iterator[None]:
+        """Lets a BadInput from within say the file that the task was read from, and the line that it is about."""
+        try:
+            yield
+        except BadInput as error:
+            if self._toml is None or str(error).startswith(f"{self._toml.path}: "):
+                raise
+            raise refusal(self._toml, str(error)) from None
 
     def changed(self, **fields: object) -> Self:
         """A copy with other fields, checked again. Raises ValueError or BadInput."""
@@ -78,7 +91,7 @@ class Task(Record):
         """The learning settings of a sub-task (the defaults when the file has none)."""
         return self.subtasks.get(name, Subtask())
 
-    @cached_property
+    @property
     def made(self) -> tuple[Part, ...]:
         """The kinds with routes: those that are no other kind's pallet."""
         return tuple(part for part in self.parts if part.routes)
@@ -153,8 +166,9 @@ class Task(Record):
             twice = {n for n in names if names.count(n) > 1}
             if twice:
                 raise ValueError(f"{label} '{min(twice)}' stands twice in the file")
+            words = ("robot", "done", *(kinds if label != "part" else ()), *(f"{process} on" for process in self.processes))
+            starts = tuple(f"{word} " for word in words)
             for name in names:
-                starts = tuple(f"{word} " for word in ("robot", "done", *(kinds if label != "part" else ())))
                 reserved = name in RESERVED or name.startswith(starts) or name.endswith(RESERVED_ENDS)
                 if reserved or (label != "station" and name in stations) or (label == "obstacle" and name in kinds):
                     raise ValueError(f"{label} '{name}' has the name of something else in the cell: choose another")

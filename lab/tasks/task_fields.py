@@ -87,7 +87,7 @@ class Station(Record):
     """A place where parts stand: pose x, y [m], yaw [rad]; a machine has a processing time [s] or a process to learn.
 
     body: what stands there, "slab", "box" of `size_m`, or a URDF or mesh file; floor_m: how high parts stand on it;
-    spots: where, off the pose along its axes and by yaw, instead of in rows. finish: the colour of parts done here.
+    spots: where, off the pose along its axes and by yaw, instead of in rows. finish: the colour of parts done here; color: of a slab, box or mesh.
     """
 
     name: Name
@@ -103,6 +103,7 @@ class Station(Record):
     approach: Literal["above", "camera", "side"] = "above"
     grid: CameraGrid | None = None
     finish: Color | None = None
+    color: Color | None = None
 
     @model_validator(mode="after")
     def _one_time(self) -> Self:
@@ -186,6 +187,7 @@ class Obstacle(Record):
     edge_m: Annotated[float, Field(gt=0.005, le=0.3)] = 0.06
     size_m: Sizes | None = None
     yaw: Number = 0.0
+    color: Color = (0.72, 0.53, 0.33)
     area: Area = (0.0, 0.0)
 
     @property

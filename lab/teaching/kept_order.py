@@ -38,6 +38,7 @@ class OrderOptions(SessionOptions):
     advisor: str = "none"
     gate: str = "ccrl"
     seed: Annotated[int, Ge(0)] = 0
+    parts: str | None = None
 
     def complete(self) -> "OrderOptions":
         """Themselves; BadInput when nothing is named to sequence."""

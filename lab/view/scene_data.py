@@ -72,6 +72,9 @@ def read_mesh(path: Path, changed_ns: int) -> Json:
         mesh = trimesh.load(path, force="mesh")
         assert isinstance(mesh, trimesh.Trimesh)
         mesh.merge_vertices(merge_tex=True, merge_norm=True)  # files split vertices; what is sharp is decided here
+        mesh = trimesh.Trimesh(
+            mesh.vertices, mesh.faces, process=False
+        )  # a picture on it would be packed for every piece
         shaded = trimesh.graph.smooth_shade(mesh, angle=CREASE_RAD)
         if not len(shaded.faces) or not np.isfinite(shaded.vertices).all():
             raise ValueError("no triangles in it, or coordinates that are not finite")

@@ -8,9 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.sim import kinematics as arm
-from lab.sim.kinematics import ToolPose, forward, inverse
+from lab.sim.arm_models import arm_named
+from lab.sim.kinematics import ToolPose
 from lab.sim.robot import Robot
 
+inverse, forward = arm_named("up6").inverse, arm_named("up6").forward
 turns = st.floats(-2.9, 2.9)  # [rad] within the S axis
 reaches = st.floats(0.36, 1.2)  # [m]
 heights = st.floats(0.0, 0.5)  # [m]

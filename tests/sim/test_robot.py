@@ -11,11 +11,15 @@ from hypothesis import strategies as st
 from lab.errors import WorkFailed
 from lab.files import assets_folder
 from lab.sim import kinematics
-from lab.sim.kinematics import ToolPose, forward, inverse
+from lab.sim.arm_models import arm_named
+from lab.sim.kinematics import ToolPose
 from lab.sim.models import FINGER_OPEN, SLICE
-from lab.sim.robot import FINGERS, NAME, YAW_ARM, Robot, Trajectory, plan
+from lab.sim.robot import NAME, YAW_ARM, Robot, Trajectory, plan
 from lab.sim.world import TIME_STEP, World
 
+UP6 = arm_named("up6")
+FINGERS = UP6.fingers.joints
+inverse, forward = UP6.inverse, UP6.forward
 poses = st.builds(ToolPose, st.floats(0.45, 0.9), st.floats(-0.6, 0.6), st.floats(0.03, 0.45), st.floats(-1.5, 1.5))
 speeds = st.floats(0.2, 1.5)
 accelerations = st.floats(0.2, 10.0)
@@ -55,13 +59,13 @@ def test_a_plan_keeps_to_every_limit_and_ends_at_its_target(
 ) -> None:
     start = inverse(path[0])
     assert start is not None
-    way = plan(path, speed, acceleration, blend, start)
+    way = plan(UP6, path, speed, acceleration, blend, start)
     check_sound(way, path, speed, start)
 
 
 def test_a_straight_way_takes_as_long_as_by_hand() -> None:
     """0.5 m at 0.5 m/s and 2 m/s2: 0.25 s to speed up, 0.25 s to slow down, 0.75 s in between."""
-    way = plan([ToolPose(0.6, -0.25, 0.3), ToolPose(0.6, 0.25, 0.3)], 0.5, 2.0)
+    way = plan(UP6, [ToolPose(0.6, -0.25, 0.3), ToolPose(0.6, 0.25, 0.3)], 0.5, 2.0)
     assert len(way.positions) * TIME_STEP == pytest.approx(1.25)
     halfway = forward(way.positions[len(way.positions) // 2 - 1])
     assert halfway.y == pytest.approx(0.0, abs=1e-9)
@@ -71,21 +75,21 @@ def test_a_straight_way_takes_as_long_as_by_hand() -> None:
 
 
 def test_a_short_way_never_reaches_full_speed() -> None:
-    way = plan([ToolPose(0.6, 0.0, 0.3), ToolPose(0.6, 0.02, 0.3)], 0.5, 2.0)
+    way = plan(UP6, [ToolPose(0.6, 0.0, 0.3), ToolPose(0.6, 0.02, 0.3)], 0.5, 2.0)
     assert len(way.positions) == np.ceil(2 * np.sqrt(0.02 / 2.0) / TIME_STEP)
 
 
 def test_no_way_is_one_target() -> None:
     here = ToolPose(0.6, 0.1, 0.3, 0.2)
     for path in ([here], [here, here]):
-        way = plan(path, 0.5, 2.0)
+        way = plan(UP6, path, 0.5, 2.0)
         assert way.positions == pytest.approx(np.array([inverse(here)]))
         assert not way.velocities.any()
 
 
 def test_blending_cuts_the_corner_but_not_the_ends() -> None:
     path = [ToolPose(0.6, -0.2, 0.3), ToolPose(0.9, -0.2, 0.3), ToolPose(0.9, 0.2, 0.3)]
-    sharp, smooth = plan(path, 0.5, 2.0), plan(path, 0.5, 2.0, blend=0.1)
+    sharp, smooth = plan(UP6, path, 0.5, 2.0), plan(UP6, path, 0.5, 2.0, blend=0.1)
     corner = np.array([0.9, -0.2])
 
     def nearest(way: Trajectory) -> float:
@@ -106,14 +110,14 @@ def test_the_tool_is_never_thrown_round(turned: float, one: ToolPose, other: Too
     start[5] += 2 * pi * round((turned - start[5]) / (2 * pi))
     if not kinematics.LOWER[5] <= start[5] <= kinematics.UPPER[5]:
         return
-    check_sound(plan([one, other], 0.5, 2.0, before=start), [other], 0.5, start)
+    check_sound(plan(UP6, [one, other], 0.5, 2.0, before=start), [other], 0.5, start)
 
 
 def test_a_way_out_of_reach_is_refused_with_the_place() -> None:
     with pytest.raises(WorkFailed, match=r"the tool cannot reach \(1\.\d+, 0\.000, 0\.300\) m"):
-        plan([ToolPose(0.9, 0.0, 0.3), ToolPose(1.6, 0.0, 0.3)], 0.5, 2.0)
+        plan(UP6, [ToolPose(0.9, 0.0, 0.3), ToolPose(1.6, 0.0, 0.3)], 0.5, 2.0)
     with pytest.raises(WorkFailed, match="the tool cannot reach"):
-        plan([ToolPose(0.5, -0.1, 0.3), ToolPose(-0.5, 0.1, 0.3)], 0.5, 2.0)  # through its own foot
+        plan(UP6, [ToolPose(0.5, -0.1, 0.3), ToolPose(-0.5, 0.1, 0.3)], 0.5, 2.0)  # through its own foot
 
 
 def test_the_arm_comes_to_rest_where_it_was_sent(robot: Robot, world: World) -> None:

@@ -69,7 +69,11 @@ def test_a_sound_urdf_is_accepted_and_its_looks_are_read(tmp_path: Path) -> None
         ('ixx="2" ixy="0"', 'ixx="-2" ixy="0"', "inertia of link 'root' is not positive definite"),
         ('ixx="2" ixy="0"', 'ixx="2" ixy="3"', "not positive definite"),
         ('ixx="2" ixy="0"', 'ixy="0"', "ixx of link 'root' is 'None'"),
-        ('parent link="root"', 'parent link="rot"', "unknown link 'rot' (parent of joint 'turn'): did you mean 'root'?"),
+        (
+            'parent link="root"',
+            'parent link="rot"',
+            "unknown link 'rot' (parent of joint 'turn'): did you mean 'root'?",
+        ),
         ('<child link="arm"/>', "", "unknown link ''"),
         ('lower="-1"', 'lower="2"', "lower limit 2 above upper limit 1"),
         ('upper="1"', 'upper="nan"', "upper limit of joint 'turn' is 'nan'"),
