@@ -46,17 +46,18 @@ def prepare(task: Task, order: Order, seed: int, only: str | None = None) -> Pre
     BadInput for whatever cannot be; writes nothing.
     """
     began = time.perf_counter()
-    check_scene(task)
-    check_apart(task, len(order))
-    skillset = SkillSet.of(task, order)
-    layout = lay_out(task, order, seed)
-    surveys = Surveys(task, order, layout)
-    scene = scene_in_words(task, order, layout)
-    problems = {
-        name: replace(skill.setup(surveys), scene=scene)
-        for name, skill in skillset.skills.items()
-        if only in (None, name)
-    }
+    with task.in_its_file():
+        check_scene(task)
+        check_apart(task, len(order))
+        skillset = SkillSet.of(task, order)
+        layout = lay_out(task, order, seed)
+        surveys = Surveys(task, order, layout)
+        scene = scene_in_words(task, order, layout)
+        problems = {
+            name: replace(skill.setup(surveys), scene=scene, arm=task.robot.model)
+            for name, skill in skillset.skills.items()
+            if only in (None, name)
+        }
     return Prepared(task, order, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
 
 

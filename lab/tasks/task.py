@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -12,6 +13,7 @@ from lab.files import assets_folder
 from lab.tasks.record import Name, Record, as_tuple
 from lab.tasks.robot_fields import RobotSettings
 from lab.tasks.sequencing import Sequencing
+from lab.tasks.task_faults import refusal
 from lab.tasks.task_fields import (
     MAX_PARTS,
     MOST_THINGS,
@@ -24,6 +26,7 @@ from lab.tasks.task_fields import (
     Subtask,
     Workspace,
 )
+from lab.tasks.toml_text import TomlText
 
 RESERVED = ("robot", "table", "insert", "the part", "carried part")  # names of other things in the cell
 RESERVED_ENDS = (" marker", " column", " head")
@@ -47,11 +50,22 @@ class Task(Record):
     subtasks: dict[str, Subtask] = Field(default={})
     sequencing: Sequencing = Sequencing()
     _folder: Path | None = PrivateAttr(default=None)
+    _toml: TomlText | None = PrivateAttr(default=None)
 
     @property
     def folder(self) -> Path:
         """Where the meshes and URDFs lie that the file names, unless the lab's own assets have them."""
         return self._folder or assets_folder()
+
+    @contextmanager
+    def in_its_file(self) -> Iterator[None]:
+        """Lets a BadInput from within say the file that the task was read from, and the line that it is about."""
+        try:
+            yield
+        except BadInput as error:
+            if self._toml is None or str(error).startswith(f"{self._toml.path}: "):
+                raise
+            raise refusal(self._toml, str(error)) from None
 
     def changed(self, **fields: object) -> Self:
         """A copy with other fields, checked again. Raises ValueError or BadInput."""

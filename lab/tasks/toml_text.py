@@ -3,9 +3,10 @@
 import re
 import tomllib
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from pydantic import ValidationError
 from lab.errors import BadInput
 
 Loc = tuple[str | int, ...]  # the way to a value: keys of tables, and numbers in arrays from 0
+Fields = Callable[[Loc], Sequence[str]]
 
 _MOST_SHOWN = 120  # characters of a bad value
 MOST_PARTS = 100  # of a dotted key: what the TOML reader does with one grows with the square of them
@@ -172,14 +174,20 @@ class _Scan:
         return bisect_right(self._ends, self.at) + 1
 
 
-def explain(error: ValidationError) -> str:
-    """The first finding of a validation as one line: the field, the bad value, what is allowed; and how many more there are."""
+def explain(error: ValidationError, fields: Fields | None = None, own: Callable[[Loc], Loc] = tuple) -> str:
+    """The first finding of a validation as one line: the field, the bad value, what is allowed; and how many more there are.
+
+    fields: those of the record to which a way leads, to say which one may have been meant; own: the way as the file has it.
+    """
     findings = error.errors()
     first = findings[0]
-    where = ".".join(str(part) for part in first["loc"])
+    where = ".".join(str(part) for part in own(first["loc"]))
     message = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "extra_forbidden":
+    if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         message = "there is no such key"
+        known = fields(first["loc"][:-1]) if fields else []
+        if near := get_close_matches(str(first["loc"][-1]), known, n=1):
+            message += f", did you mean '{near[0]}'?"
     got = repr(first["input"])
     got = got if len(got) <= _MOST_SHOWN else f"{got[:_MOST_SHOWN]} ..."
     shown = "" if isinstance(first["input"], dict) or not where else f" (got {got})"
