@@ -9,7 +9,20 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from lab import __version__
-from lab.cli import replay, run, see, sequence, study, task, teach, toolbox, toolbox_archive, toolbox_evaluate, view
+from lab.cli import (
+    new,
+    replay,
+    run,
+    see,
+    sequence,
+    study,
+    task,
+    teach,
+    toolbox,
+    toolbox_archive,
+    toolbox_evaluate,
+    view,
+)
 from lab.cli.families import CommandOfFamilies
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError
@@ -40,6 +53,7 @@ COMMANDS = {  # what is typed after `lab` -> the command
     ),
     "see": Command(see.see, "lab see overhead.png --task toast"),
     "view": Command(view.view, "lab view toast"),
+    "new": Command(new.new, "lab new bakery --part box:0.12x0.015x0.12:2 --machine oven:60"),
     "toolbox list": Command(toolbox.toolbox_list, "lab toolbox list --subtask insert --solved"),
     "toolbox show": Command(toolbox.toolbox_show, "lab toolbox show 'insert at toaster 1a2b3c4d'"),
     "toolbox log": Command(toolbox.toolbox_log, "lab toolbox log 'insert at toaster 1a2b3c4d'"),

@@ -47,9 +47,15 @@ def _of_studies() -> Tables:
     return {"studies": STUDIES}
 
 
+def _of_tasks() -> Tables:
+    from lab.tasks.robot_fields import MODELS
+
+    return {"arms": MODELS}
+
+
 def members(family: str) -> Mapping[str, Any] | Sequence[str]:
     """The table of a family, such as "gates", or its names; only tables are loaded that are needed to find it."""
-    for room in (_of_studies, _of_teaching, _of_sequencing):
+    for room in (_of_studies, _of_teaching, _of_sequencing, _of_tasks):
         if family in (found := room()):
             return found[family]
     raise KeyError(family)

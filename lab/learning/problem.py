@@ -10,7 +10,7 @@ from lab.mdp import TabularMDP
 class Problem:
     """What one lesson teaches: its name, the sub-task, the table's problem; environment: where its steps are made.
 
-    scene: where that is, in words, where the name does not tell.
+    scene: where that is, in words, where the name does not tell; arm: which one carries it out, "": none.
     """
 
     name: str
@@ -18,3 +18,4 @@ class Problem:
     mdp: TabularMDP
     environment: Environment | None = None
     scene: str = ""
+    arm: str = ""

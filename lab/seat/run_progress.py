@@ -117,6 +117,9 @@ class RunProgress:
         elsewhere = [one for one in reused if one[1].fitness is not None]
         self._tell_found([one for one in reused if one[1].fitness is None])
         self._tell_found(elsewhere, f" (of another problem: {ALL_FREE})")
+        arms = Counter(lesson.other_arm for _, lesson in reused if lesson.other_arm)
+        for arm, count in arms.items():
+            self._say(f"{'':{_INDENT}}{count} of them learned with another arm, {arm}")
         saved = (sum(lesson.saved[n] for _, lesson in reused) for n in (0, 1))
         if text := saved_text(*saved):
             self._say(f"{'':{_INDENT}}{text}")

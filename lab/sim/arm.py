@@ -128,12 +128,13 @@ class Arm:
     def _bent(self, poses: Array) -> Array:
         """Joints (n, k) within all ranges but the last's, whose turn is within half a turn of its own zero; NaN: none."""
         with np.errstate(invalid="ignore"):
-            poses = np.where(np.isfinite(poses).all(axis=1)[:, None] & (np.abs(poses) < 1e3), poses, np.nan)
+            poses = np.where(np.abs(poses).max(axis=1, keepdims=True) < 1e3, poses, np.nan)
             first, last = self.kinematics.spins
             turn = np.arctan2(poses[:, 1], poses[:, 0])
             joints = self.kinematics.bent(np.hypot(poses[:, 0], poses[:, 1]), poses[:, 2] - self.base_up_m)
             joints[:, 0] += first * turn
             joints[:, -1] = (joints[:, -1] + last * (poses[:, 3] - turn) + pi) % (2 * pi) - pi
-            inside = (joints >= self.lower) & (joints <= self.upper)
-        joints[~inside[:, :-1].all(axis=1)] = np.nan
+            under, over = joints[:, :-1] < self.lower[:-1], joints[:, :-1] > self.upper[:-1]
+            inside = ~np.any(under | over, axis=1)
+        joints[~inside] = np.nan
         return joints

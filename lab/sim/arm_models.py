@@ -116,7 +116,8 @@ def _made(
     _still(urdf, (*chain.names, *fingers_found.joints))
     how: Kinematics = kinematics.ClosedForm() if model.closed_form else NumericKinematics(chain, name)
     lower, upper = chain.lower.copy(), chain.upper.copy()
-    lower[0], upper[0] = max(lower[0], -FARTHEST_TURN), min(upper[0], FARTHEST_TURN)
+    ahead = how.home[0]
+    lower[0], upper[0] = max(lower[0], ahead - FARTHEST_TURN), min(upper[0], ahead + FARTHEST_TURN)
     file = path if model.closed_form else written(urdf.root, path.stem)
     return Arm(
         name,

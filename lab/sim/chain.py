@@ -75,10 +75,10 @@ class Chain:
         turned = np.where(self.slides[:, None], 0.0, directions)
         return at, axes, np.concatenate([moved, turned], axis=2).transpose(0, 2, 1)
 
-    def heights(self, joints: Array) -> Array:
-        """How high the joints are on the whole (n,) [m]."""
+    def middles(self, joints: Array) -> Array:
+        """Where the joints are on the whole (n, 3) [m]."""
         _, _, origins, _ = self._along(joints)
-        return np.asarray(origins[:, :, 2].mean(axis=1))
+        return np.asarray(origins.mean(axis=1))
 
     def _along(self, joints: Array) -> tuple[Array, Array, Array, Array]:
         n, k = joints.shape

@@ -205,7 +205,7 @@ def _corners(collision: Xml.Element) -> Array:
     mesh, box = collision.find("geometry/mesh"), collision.find("geometry/box")
     if mesh is not None:
         scale = np.array(floats(mesh, "scale", "1 1 1"))
-        return mesh_file.vertices(Path(mesh.get("filename", ""))) * scale
+        return np.asarray(mesh_file.vertices(Path(mesh.get("filename", ""))) * scale)
     if box is not None:
         half = np.array(floats(box, "size", "")) / 2
     else:

@@ -88,7 +88,11 @@ def settled(path: Path, folder: Path) -> Urdf:
     for element in [one for one in root if one.tag not in ("link", "joint", "material")]:
         root.remove(element)  # transmissions, and what other simulators want to know
     check_numbers(path, root)
-    links = [link.get("name", "") for link in root.findall("link")]
+    links, joints = ([one.get("name", "") for one in root.findall(kind)] for kind in ("link", "joint"))
+    for kind, names in (("link", links), ("joint", joints)):
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise BadInput(f"{path}: {kind} '{twice[0]}' stands twice in it")
     for joint in root.findall("joint"):
         check_joint(path, joint, links)
         _check_limits(path, joint)
@@ -126,11 +130,6 @@ def _is_number(text: str | None) -> bool:
 
 def _tree(path: Path, root: Xml.Element, links: Sequence[str]) -> tuple[dict[str, Xml.Element], str]:
     joints = root.findall("joint")
-    names = [joint.get("name", "") for joint in joints]
-    for kind, all_names in (("link", links), ("joint", names)):
-        twice = sorted({name for name in all_names if list(all_names).count(name) > 1})
-        if twice:
-            raise BadInput(f"{path}: {kind} '{twice[0]}' stands twice in it")
     carrying: dict[str, Xml.Element] = {}
     for joint in joints:
         if child(joint) in carrying:

@@ -19,7 +19,7 @@ WITHIN_M, WITHIN_RAD = 5e-4, 0.0087  # what is checked of every answer: 0.5 mm, 
 _EXACT = 1e-9  # [m], [rad] at which Newton's method ends
 _JUMP = 0.35  # [rad or m] between two places of the table: farther apart, the arm has snapped over
 _DAMPING = 1e-5
-_SEEDS, _TRIES = 96, 60
+_SEEDS, _TRIES = 160, 60
 _UPRIGHT = 1e-6
 
 Array = NDArray[np.float64]
@@ -142,16 +142,16 @@ class NumericKinematics:
         reach, foot = self._stretch
         rng = np.random.default_rng(0)
         seeds = rng.uniform(self.chain.lower, self.chain.upper, (_SEEDS, self.count))
-        seeds[:, [0, -1]] = 0.0
         for share in (0.5, 0.4, 0.6, 0.3, 0.7):
             for high in (0.0, 0.2, -0.2, 0.4, -0.4):
                 place = np.array([round(share * reach / STEP_M), round((foot + high * reach) / STEP_M)])
                 out, up = (np.full(_SEEDS, number * STEP_M) for number in place)
                 solved, good = self._solved(seeds, out, up, _TRIES)
-                good &= self._within(solved) & (np.abs(solved[:, 0]) < 1.0) & self._holds(solved, out, up)
+                middles = self.chain.middles(solved)
+                good &= self._within(solved) & self._holds(solved, out, up) & (middles[:, 0] > 0.0)  # not over its back
                 if good.any():
-                    solved = solved[good]
-                    heights = self.chain.heights(solved)
+                    solved, heights = solved[good], middles[good, 2]
+                    solved[:, [0, -1]] = (solved[:, [0, -1]] + np.pi) % (2 * np.pi) - np.pi
                     away = np.linalg.norm(solved[:, 1:-1] - self._rest[1:-1], axis=1)
                     best = np.lexsort((np.round(away, 6), -np.round(heights, 3)))[0]
                     return place, solved[best]
@@ -180,12 +180,11 @@ class NumericKinematics:
         for _ in range(tries):
             at, axes, moved = self.chain.jacobian(joints[going])
             missed = np.concatenate([np.stack([out[going], 0 * going, up[going]], axis=1) - at, _turn(axes)], axis=1)
-            square = moved @ moved.transpose(0, 2, 1) + _DAMPING**2 * np.eye(6)
             aside = np.zeros((len(going), self.count))
             if self.count > 6:
                 aside[:, 1:-1] = (self._rest - joints[going])[:, 1:-1]
             wanted = missed - np.einsum("nij,nj->ni", moved, aside)
-            step = np.einsum("nji,nj->ni", moved, np.linalg.solve(square, wanted[:, :, None])[:, :, 0]) + aside
+            step = _damped(moved, wanted) + aside
             step *= np.minimum(1.0, 0.4 / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
             joints[going] += step
             left = (np.abs(missed).max(axis=1) > _EXACT) | (np.abs(step).max(axis=1) > 1e-7)
@@ -196,6 +195,16 @@ class NumericKinematics:
         held[going] = False
         joints[~held] = np.nan
         return joints, held
+
+
+def _damped(moved: Array, wanted: Array) -> Array:
+    """The joints' steps (n, k) that bring the end by `wanted` (n, 6), as far as `moved` (n, 6, k) lets them."""
+    back = moved.transpose(0, 2, 1)
+    if moved.shape[2] < 6:
+        square = back @ moved + _DAMPING**2 * np.eye(moved.shape[2])
+        return np.asarray(np.linalg.solve(square, back @ wanted[:, :, None])[:, :, 0])
+    square = moved @ back + _DAMPING**2 * np.eye(6)
+    return np.asarray((back @ np.linalg.solve(square, wanted[:, :, None]))[:, :, 0])
 
 
 def _turn(axes: Array) -> Array:

@@ -8,7 +8,7 @@ from functools import cached_property
 from io import BytesIO
 from math import cos, pi, sin
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,29 +80,28 @@ def shape_of(part: PartFields, folder: Path) -> PartShape:
     Raises BadInput, in one line, for a file that is missing, too large, no mesh, has holes, or is in another unit.
     """
     tilt, (r, g, b) = _tilt(*part.stands), part.color
+    size: tuple[float, ...] = part.size_m or ()
     if part.shape == "mesh":
         path = _found(part, "file", part.file or "", folder)
         mesh = _mesh(part, path)
         middle, tensor = np.array(mesh.center_mass), np.array(mesh.moment_inertia) / float(mesh.mass)
         moments, axes = np.linalg.eigh(tensor)
         axes = axes * np.sign(np.linalg.det(axes))  # a turn, not a mirror
-        solid, size = "mesh", ()
         hull = _few(np.array(mesh.convex_hull.vertices) - middle)
         seen = Shape("mesh", (part.scale,) * 3, path, (r, g, b, 1.0))
     else:
         middle, axes = np.zeros(3), np.eye(3)
-        solid, size = part.shape, part.size_m or ()
-        hull, moments = _box(*size) if part.shape == "box" else _cylinder(*size)
-        half = size if part.shape == "box" else (size[0] / 2, size[1])
-        seen = Shape(part.shape, half, None, (r, g, b, 1.0))
+        hull, moments = _box(size) if part.shape == "box" else _cylinder(size)
+        seen = Shape(part.shape, size if part.shape == "box" else (size[0] / 2, size[1]), None, (r, g, b, 1.0))
     looks = (seen,) if part.look is None else _look(part, folder)
+    x, y, z = (float(f"{one:.12g}") for one in moments)  # without the noise of the last bits
     return PartShape(
         part.name,
-        solid,
+        part.shape,
         size,
         _quaternion(tilt @ axes),
         hull @ tilt.T,
-        tuple(float(f"{one:.12g}") for one in moments),  # without the noise of the last bits
+        (x, y, z),
         tuple(_placed(one, tilt, middle) for one in looks),
     )
 
@@ -128,14 +127,16 @@ def _placed(look: Shape, tilt: Array, middle: Array) -> Shape:
     return replace(look, position=(x, y, z), quaternion=_quaternion(tilt))
 
 
-def _box(x: float, y: float, z: float) -> tuple[Array, Array]:
+def _box(size: tuple[float, ...]) -> tuple[Array, Array]:
     """Corners (8, 3) [m], and moments of inertia (3,) for 1 kg [m2]."""
+    x, y, z = size
     corners = np.array([(i, j, k) for i in (-x, x) for j in (-y, y) for k in (-z, z)]) / 2
     return corners, np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 12
 
 
-def _cylinder(diameter: float, height: float) -> tuple[Array, Array]:
+def _cylinder(size: tuple[float, ...]) -> tuple[Array, Array]:
     """Corners (2 ROUND, 3) [m], and moments of inertia (3,) for 1 kg [m2]."""
+    diameter, height = size
     turns = np.arange(ROUND) * 2 * pi / ROUND
     ring = diameter / 2 * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     corners = np.concatenate([np.column_stack([ring, np.full(ROUND, z)]) for z in (-height / 2, height / 2)])
@@ -193,15 +194,17 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     where = f"part '{part.name}': file = '{part.file}'"
     try:
         kind = path.suffix.lower().removeprefix(".")
-        mesh = trimesh.load(BytesIO(path.read_bytes()), kind, force="mesh", skip_materials=True)  # opens no other file
-        points = np.asarray(mesh.vertices, dtype=float)
+        mesh: Any = trimesh.load(
+            BytesIO(path.read_bytes()), kind, force="mesh", skip_materials=True
+        )  # opens no other file
+        points: Array = np.asarray(mesh.vertices, dtype=float)
     except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
         raise BadInput(f"{where}: it cannot be read as {kind.upper()}: {type(error).__name__}: {error}") from None
     if not isinstance(mesh, trimesh.Trimesh) or len(points) < 4 or len(mesh.faces) < 4:
         raise BadInput(f"{where}: a mesh of {len(points)} vertices: wanted a solid, 4 or more and faces between them")
     if not np.isfinite(points).all():
         raise BadInput(f"{where}: vertex {int(np.argmin(np.isfinite(points).all(axis=1)))} is not finite")
-    mesh.apply_scale(part.scale)
+    mesh.apply_scale(part.scale)  # type: ignore[no-untyped-call]
     _check_size(part, where, float(max(mesh.extents)))
     mesh.merge_vertices(merge_tex=True, merge_norm=True)  # seams of a texture are no holes
     try:
@@ -209,10 +212,10 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     except Exception:  # Qhull's own kind of error
         raise BadInput(f"{where}: it is flat: wanted a solid") from None
     if part.hull:
-        return hull
+        return cast("Trimesh", hull)
     _check_closed(where, mesh)
     if not mesh.is_winding_consistent or mesh.volume <= 0:
-        trimesh.repair.fix_normals(mesh, multibody=True)
+        trimesh.repair.fix_normals(mesh, multibody=True)  # type: ignore[no-untyped-call]
     if not 0 < mesh.volume <= hull.volume * 1.001:
         raise BadInput(
             f"{where}: it encloses {mesh.volume * 1e6:.3g} cm3, its hull {hull.volume * 1e6:.3g} cm3: parts of it overlap or are "

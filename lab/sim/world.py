@@ -1,9 +1,6 @@
 """One PyBullet world: bodies by name, metres, radians, seconds. The only module that imports pybullet."""
 
-import ctypes
-import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -14,8 +11,11 @@ from numpy.typing import NDArray
 from lab.errors import WorkFailed
 from lab.sim import urdf_reader
 from lab.sim.frames import Body, Frame, Pose, Rgba, Shape
+from lab.sim.part_shape import PartShape
+from lab.sim.silence import silence
 
 TIME_STEP = 1.0 / 240.0  # [s]
+PART_SPINNING = 0.001  # [m] what resists a part's turning about a contact
 
 Array = NDArray[np.float64]
 Position = Sequence[float] | Array
@@ -32,32 +32,14 @@ class _Entry:
     links: dict[str, int] = field(default_factory=dict)
     joints: dict[str, int] = field(default_factory=dict)
     looks: dict[str, tuple[Shape, ...]] = field(default_factory=dict)
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Keep PyBullet's banner and warnings, which go straight to the file descriptors, off the terminal."""
-    libc = ctypes.CDLL(None)
-    kept = [os.dup(number) for number in (1, 2)]
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        libc.fflush(None)
-        for number in (1, 2):
-            os.dup2(nowhere, number)
-        yield
-    finally:
-        libc.fflush(None)
-        for number, copy in zip((1, 2), kept, strict=True):
-            os.dup2(copy, number)
-            os.close(copy)
-        os.close(nowhere)
+    turn: Position = NO_TURN  # from PyBullet's axes of it, the principal ones of a part, to those that it is known by
 
 
 class World:
     """A PyBullet client without a window; use it as a context manager. Same calls, same result, bit for bit."""
 
     def __init__(self) -> None:
-        with _silence():
+        with silence():
             import pybullet
 
             self._p: Any = pybullet
@@ -124,7 +106,7 @@ class World:
         if not checked:
             urdf_reader.validate(path)
         turn = self._p.getQuaternionFromEuler([0, 0, yaw])
-        with _silence():
+        with silence():
             flags = self._p.URDF_USE_INERTIA_FROM_FILE
             number = self._call("loadURDF", str(path), list(position), turn, useFixedBase=fixed, flags=flags)
         entry = _Entry(number, not fixed, (tuple(position), tuple(turn)))
@@ -146,7 +128,7 @@ class World:
     def mesh(self, name: str, path: Path, position: Position, rgba: Rgba, *, yaw: float = 0.0) -> None:
         """A mesh file that never moves, hollows and all: its origin at `position` [m]."""
         turn = tuple(self._p.getQuaternionFromEuler([0, 0, yaw]))
-        with _silence():
+        with silence():
             hollow = self._p.GEOM_FORCE_CONCAVE_TRIMESH
             shape = self._call("createCollisionShape", self._p.GEOM_MESH, fileName=str(path), flags=hollow)
             visual = self._call("createVisualShape", self._p.GEOM_MESH, fileName=str(path), rgbaColor=list(rgba))
@@ -163,26 +145,62 @@ class World:
         number = self._call("createMultiBody", 0, shape, visual, list(position), list(turn))
         self._add(name, _Entry(number, False, (tuple(position), tuple(turn)), looks={"": (look,)}))
 
-    def part(self, name, shape, mass_kg, friction, position, yaw=0.0):  # stand-in
+    def part(
+        self, name: str, shape: PartShape, mass_kg: float, friction: float, position: Position, yaw: float = 0.0
+    ) -> None:
+        """A part that can move: its origin, the centre of mass, at `position` [m], turned by `yaw` [rad]."""
         turn = tuple(self._p.getQuaternionFromEuler([0, 0, yaw]))
+        entry = _Entry(-1, True, (tuple(position), turn), looks={"": shape.looks}, turn=shape.turn)
+        body = self._turned(turn, shape.turn)
+        entry.number = self._call(
+            "createMultiBody", mass_kg, self._solid(shape), self._seen(shape), list(position), list(body)
+        )
+        inertia = [moment * mass_kg for moment in shape.inertia_m2]
+        self._call("changeDynamics", entry.number, -1, localInertiaDiagonal=inertia)
+        self._add(name, entry)
+        self.friction(name, friction, spinning=PART_SPINNING)
+
+    def _solid(self, shape: PartShape) -> int:
+        """What physics feels of a part, in its principal axes."""
         if shape.solid == "box":
-            solid = self._call("createCollisionShape", self._p.GEOM_BOX, halfExtents=[s / 2 for s in shape.size])
-            seen = self._call(
-                "createVisualShape",
-                self._p.GEOM_BOX,
-                halfExtents=[s / 2 for s in shape.size],
-                rgbaColor=list(shape.looks[0].rgba),
-            )
+            return int(self._call("createCollisionShape", self._p.GEOM_BOX, halfExtents=[s / 2 for s in shape.size]))
+        if shape.solid == "cylinder":
+            diameter, height = shape.size
+            return int(self._call("createCollisionShape", self._p.GEOM_CYLINDER, radius=diameter / 2, height=height))
+        corners = shape.hull @ urdf_reader.rotation(shape.turn)  # (n, 3), from the part's axes into the principal ones
+        return int(self._call("createCollisionShape", self._p.GEOM_MESH, vertices=corners.tolist()))
+
+    def _seen(self, shape: PartShape) -> int:
+        """What cameras see of a part: the first of its looks."""
+        look = shape.looks[0]
+        back = self._p.invertTransform([0, 0, 0], list(shape.turn))[1]
+        at, turn = self._p.multiplyTransforms([0, 0, 0], back, list(look.position), list(look.quaternion))
+        size: dict[str, Any] = {}
+        if look.kind == "box":
+            kind, size = self._p.GEOM_BOX, {"halfExtents": [s / 2 for s in look.size]}
+        elif look.kind == "cylinder":
+            kind, size = self._p.GEOM_CYLINDER, {"radius": look.size[0], "length": look.size[1]}
+        elif look.kind == "sphere":
+            kind, size = self._p.GEOM_SPHERE, {"radius": look.size[0]}
         else:
-            d, h = shape.size
-            solid = self._call("createCollisionShape", self._p.GEOM_CYLINDER, radius=d / 2, height=h)
-            seen = self._call(
-                "createVisualShape", self._p.GEOM_CYLINDER, radius=d / 2, length=h, rgbaColor=list(shape.looks[0].rgba)
+            kind, size = self._p.GEOM_MESH, {"fileName": str(look.mesh), "meshScale": list(look.size or (1, 1, 1))}
+        with silence():
+            return int(
+                self._call(
+                    "createVisualShape",
+                    kind,
+                    **size,
+                    rgbaColor=list(look.rgba),
+                    visualFramePosition=list(at),
+                    visualFrameOrientation=list(turn),
+                )
             )
-        number = self._call("createMultiBody", mass_kg, solid, seen, list(position), list(turn))
-        self._call("changeDynamics", number, -1, localInertiaDiagonal=[m * mass_kg for m in shape.inertia_m2])
-        self._add(name, _Entry(number, True, (tuple(position), turn), looks={"": shape.looks}))
-        self.friction(name, friction, spinning=0.001)
+
+    def _turned(self, turn: Position, by: Position) -> Position:
+        """The turn `by` followed by `turn`, quaternions xyzw."""
+        if tuple(by) == NO_TURN:
+            return turn
+        return tuple(self._p.multiplyTransforms([0, 0, 0], list(turn), [0, 0, 0], list(by))[1])
 
     def _add(self, name: str, entry: _Entry) -> None:
         self._bodies[name] = entry
@@ -205,7 +223,9 @@ class World:
         """Set a body down somewhere while the scene is built or surveyed: `position` [m], `quaternion` xyzw."""
         if not np.isfinite([*position, *quaternion]).all():
             raise WorkFailed(f"body '{name}' cannot be put at {list(position)}: not finite")
-        self._call("resetBasePositionAndOrientation", self._bodies[name].number, list(position), list(quaternion))
+        entry = self._bodies[name]
+        turn = self._turned(quaternion, entry.turn)
+        self._call("resetBasePositionAndOrientation", entry.number, list(position), list(turn))
 
     def pose(self, name: str, link: str = "") -> tuple[Array, Array]:
         """Position (3,) [m] and quaternion (4,) xyzw of a body's or a link's frame in the world."""
@@ -214,6 +234,8 @@ class World:
             state = self._call("getLinkState", entry.number, entry.links[link], computeForwardKinematics=1)
             return np.array(state[4]), np.array(state[5])
         position, turn = self._call("getBasePositionAndOrientation", entry.number) if entry.moves else entry.pose
+        if entry.moves and tuple(entry.turn) != NO_TURN:
+            turn = self._turned(turn, self._p.invertTransform([0, 0, 0], list(entry.turn))[1])
         return np.array(position), np.array(turn)
 
     # ---- joints -------------------------------------------------------------------------------------------------

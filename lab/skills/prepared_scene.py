@@ -54,7 +54,7 @@ def prepare(task: Task, order: Order, seed: int, only: str | None = None) -> Pre
         surveys = Surveys(task, order, layout)
         scene = scene_in_words(task, order, layout)
         problems = {
-            name: replace(skill.setup(surveys), scene=scene)
+            name: replace(skill.setup(surveys), scene=scene, arm=task.robot.model)
             for name, skill in skillset.skills.items()
             if only in (None, name)
         }

@@ -87,6 +87,12 @@ def _flat(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return flat(job, reading)
 
 
+def _changed_scenes(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.changed_scenes_study import changed_scenes
+
+    return changed_scenes(job, reading)
+
+
 def _reuse(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.reuse import reuse
 
@@ -141,7 +147,10 @@ STUDIES: dict[str, Study] = {
     "appendix-iii": Study("Appendix III: a flexible manufacturing system", _appendix_iii),
     "srl-time": Study("SRL improved, beside every rival", _srl_time),
     "flat": Study("One flat problem, or two levels: the toast task on a small grid", _flat),
-    "reuse": Study("Skills in changed scenes: used as they are, adapted or learned, beside learning all anew", _reuse),
+    "changed-scenes": Study(
+        "Skills in changed scenes: used as they are, adapted or learned, beside learning all anew", _changed_scenes
+    ),
+    "reuse": Study("Several tasks in one toolbox, one after the other: does a lab that has lived longer learn less?", _reuse),
     "sequencing-speed": Study("Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }

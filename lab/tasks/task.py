@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -92,7 +91,7 @@ class Task(Record):
         """The learning settings of a sub-task (the defaults when the file has none)."""
         return self.subtasks.get(name, Subtask())
 
-    @cached_property
+    @property
     def made(self) -> tuple[Part, ...]:
         """The kinds with routes: those that are no other kind's pallet."""
         return tuple(part for part in self.parts if part.routes)
@@ -167,8 +166,9 @@ class Task(Record):
             twice = {n for n in names if names.count(n) > 1}
             if twice:
                 raise ValueError(f"{label} '{min(twice)}' stands twice in the file")
+            words = ("robot", "done", *(kinds if label != "part" else ()), *(f"{process} on" for process in self.processes))
+            starts = tuple(f"{word} " for word in words)
             for name in names:
-                starts = tuple(f"{word} " for word in ("robot", "done", *(kinds if label != "part" else ())))
                 reserved = name in RESERVED or name.startswith(starts) or name.endswith(RESERVED_ENDS)
                 if reserved or (label != "station" and name in stations) or (label == "obstacle" and name in kinds):
                     raise ValueError(f"{label} '{name}' has the name of something else in the cell: choose another")

@@ -67,6 +67,11 @@ def load(task: str) -> Task:
     return cast(Task, load_any(task, "task"))
 
 
+def task_of_text(path: Path, text: str) -> Task:
+    """As `load`, from the text of a file that may not be written yet."""
+    return _task(TomlText.parsed(path, text))
+
+
 def load_cell(cell: str) -> CellFile:
     """As `load`: a cell for the sequencer alone, by name or by file; BadInput names file and line."""
     return cast(CellFile, load_any(cell, "cell"))

@@ -46,7 +46,7 @@ class Lesson:
     reason: why it is reused, adapted or learned; parent: the policy that an adapted one was begun from; fitness: what was
     judged of that, of the one that is reused though it was learned for another problem, or of the best one that was
     refused; saved: how many episodes and helped steps fewer than the policy took that was found, or one session from
-    nothing, if that is more.
+    nothing, if that is more; other_arm: the one that the found policy was learned with, "" when it is this task's own.
     """
 
     policy: Policy
@@ -57,6 +57,7 @@ class Lesson:
     parent: Policy | None = None
     fitness: Fitness | None = None
     saved: tuple[int, int] = (0, 0)
+    other_arm: str = ""
 
     @property
     def steps(self) -> tuple[int | None, int | None]:

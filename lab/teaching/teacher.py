@@ -21,6 +21,7 @@ from lab.toolbox.registry import Toolbox
 
 _UNFINISHED = " unfinished"
 _REUSED = "reused"  # the toolbox's records of which policy was used for a problem that it was not learned in
+_FIRST_ARM = "up6"  # what every arm was before there were others
 _LONGEST_PROBLEM = MAX_NAME_LENGTH - 20  # characters of a policy's name; the rest is for its signature and state
 
 
@@ -66,14 +67,16 @@ class Teacher:
                 return _reused(plan, policy, f"'{policy.name}': {fitness.reason}", fitness)
             fitting = policy, replace(fitness, verdict="refuse", reason=f"in physics, {failure}")
         if found is not None:
-            return replace(self.teach(replace(plan, unfinished=found)), reason=f"'{found.name}' was left unfinished")
+            lesson = self.teach(replace(plan, unfinished=found))
+            return _told(lesson, f"'{found.name}' was left unfinished", found, problem)
         if fitting is None:
             return replace(self.teach(plan), reason="nothing in the toolbox has its states and moves")
         policy, fitness = fitting
         parent = policy if fitness.verdict == "adapt" else None
         lesson = self.teach(replace(plan, warm=parent))
         saved = (0, 0) if parent is None else _saved(plan, parent, lesson.result)
-        return replace(lesson, reason=f"'{policy.name}': {fitness.reason}", parent=parent, fitness=fitness, saved=saved)
+        lesson = replace(lesson, parent=parent, fitness=fitness, saved=saved)
+        return _told(lesson, f"'{policy.name}': {fitness.reason}", policy, problem)
 
     def _candidates(self, known: KnownPolicies, problem: Problem) -> Iterator[Policy]:
         """As `candidates`, but the one that was used for this problem before comes first: the next run does the same."""
@@ -138,7 +141,7 @@ class Teacher:
             name = plan.name or self._free_name(problem, result.solved)
             origin = Origin(name, problem.subtask, plan.task, str(self.advising), self.seed)
             policy = Policy.of(joined(unfinished, result), problem.mdp, plan.learner, plan.gate, origin)
-            policy = replace(policy, parent=_parent(plan), scene=problem.scene)
+            policy = replace(policy, parent=_parent(plan), scene=problem.scene, arm=problem.arm)
             failure = None
             if not (result.interrupted or journal.read_only):
                 policy, failure = self._tried(problem, policy)
@@ -200,8 +203,17 @@ def _record_key(problem: Problem) -> str:
     return f"{problem.subtask} {problem.mdp.signature}"
 
 
+def _told(lesson: Lesson, reason: str, found: Policy, problem: Problem) -> Lesson:
+    """The lesson with its reason, which says the arm that the found policy was learned with when it is another."""
+    arm = found.arm or _FIRST_ARM
+    if problem.arm in ("", arm):
+        return replace(lesson, reason=reason)
+    return replace(lesson, reason=f"learned with the arm {arm}; {reason}", other_arm=arm)
+
+
 def _reused(plan: LessonPlan, policy: Policy, reason: str, fitness: Fitness | None = None) -> Lesson:
-    return Lesson(policy, "reused", reason=reason, fitness=fitness, saved=_saved(plan, policy))
+    lesson = Lesson(policy, "reused", fitness=fitness, saved=_saved(plan, policy))
+    return _told(lesson, reason, policy, plan.problem)
 
 
 def _saved(plan: LessonPlan, found: Policy, now: SessionResult | None = None) -> tuple[int, int]:

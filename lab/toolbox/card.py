@@ -74,7 +74,9 @@ def _facts(policy: Policy, telling: Telling) -> str:
         "sub-task": policy.subtask,
         "states": f"{states}{shape}",
         "actions": f"{actions}: {', '.join(policy.action_labels)}",
-        "learned in": ", ".join(filter(None, [policy.task, policy.scene, f"seed {policy.seed}"])),
+        "learned in": ", ".join(
+            filter(None, [policy.task, policy.scene, policy.arm and f"arm {policy.arm}", f"seed {policy.seed}"])
+        ),
         "its way": _way(policy),
         "learner": _settings(policy.learner),
         "gate (when it asks)": _settings(policy.gate),

@@ -47,7 +47,7 @@ class Policy:
 
     Since lineage is kept, "" or None in older files: parent: the policy that it was warm-started from, as "name@hash";
     scene: where it was learned, in words; ends (S,) uint8: which states of that problem go on (0), are the goal (1), or
-    end without it (2).
+    end without it (2); arm: which one it was learned with, since there is more than one.
     """
 
     name: str
@@ -74,6 +74,7 @@ class Policy:
     versions: dict[str, str]
     parent: str = ""
     scene: str = ""
+    arm: str = ""
     ends: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:

@@ -16,7 +16,8 @@ from lab.toolbox.names import FORMAT
 from lab.toolbox.policy import Policy
 
 _TENSORS = {"q": "F64", "visits": "I64", "ends": "U8"}
-_SINCE_LINEAGE = {"ends", "parent", "scene"}  # older files have none of them
+_SINCE_LINEAGE = {"ends", "parent", "scene", "arm"}  # older files have none of them
+_SINCE_ARMS = {"arm"}  # left out where there is none, so that an older policy keeps its hash
 _METADATA = tuple(field.name for field in fields(Policy) if field.name not in _TENSORS)
 
 
@@ -24,7 +25,10 @@ def encode(policy: Policy) -> bytes:
     """The file's bytes: the same policy always gives the same ones."""
     from safetensors.numpy import save
 
-    metadata = {name: json.dumps(getattr(policy, name), allow_nan=False) for name in _METADATA}
+    said = {name: getattr(policy, name) for name in _METADATA}
+    metadata = {
+        name: json.dumps(value, allow_nan=False) for name, value in said.items() if value or name not in _SINCE_ARMS
+    }
     found = {name: getattr(policy, name) for name in _TENSORS}
     tensors = {name: np.ascontiguousarray(table) for name, table in found.items() if table is not None}
     return _ordered(save(tensors, {"format": FORMAT, **metadata}))

@@ -1,19 +1,43 @@
-"""What the simulator's tests stand on: the shipped task, an empty world, and the arm alone in one."""
+"""What the simulator's tests stand on: tasks that ship, changed stations, an empty world, and the arm alone in one."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
 from lab.sim.arm_models import arm_named
 from lab.sim.robot import Robot
 from lab.sim.world import World
-from lab.tasks.task_file import Task, load
+from lab.tasks.task import Task
+from lab.tasks.task_file import load
 
 
 @pytest.fixture(scope="session")
 def task() -> Task:
     """The task that ships."""
     return load("toast")
+
+
+@pytest.fixture(scope="session")
+def fms() -> Task:
+    """The task with pallets: rooks and signs come on them, are lifted off into machines, and go on them."""
+    return load("fms-arm")
+
+
+@pytest.fixture(scope="session")
+def breakfast() -> Task:
+    """The task with two kinds of parts, slices and cups."""
+    return load("breakfast")
+
+
+@pytest.fixture(scope="session")
+def moved() -> Callable[..., Task]:
+    """A task with one station changed: moved(task, "plate", capacity=2)."""
+
+    def change(task: Task, name: str, **changed: object) -> Task:
+        stations = tuple(s.model_copy(update=changed) if s.name == name else s for s in task.stations)
+        return task.changed(stations=stations)
+
+    return change
 
 
 @pytest.fixture

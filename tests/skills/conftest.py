@@ -8,26 +8,44 @@ import pytest
 
 from lab.learning.problem import Problem
 from lab.mdp import optimal_values, shortest_steps
-from lab.sim.scene import Layout, Scene, spots
+from lab.sim.places import Layout
+from lab.sim.scene import Scene
 from lab.sim.world import World
 from lab.skills import Skill
 from lab.skills.skill import Bench, Status
 from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
-from lab.tasks.task_file import Task, load
+from lab.tasks.task import Order, Task
+from lab.tasks.task_file import load
 from lab.toolbox.policy import Policy
 
 SLICE = "slice 1"
+ORDER: Order = ("slice", "slice")
+
+
+def still(task: Task) -> Task:
+    """The task with everything where the file says, and brisk processes."""
+    obstacles = tuple(o.model_copy(update={"area": (0.0, 0.0)}) for o in task.obstacles)
+    brisk = {n: p.model_copy(update={"speed_m_s": 0.2, "dwell_s": 0.05}) for n, p in task.processes.items()}
+    return task.changed(obstacles=obstacles, processes=brisk)
 
 
 @pytest.fixture(scope="session")
 def task() -> Task:
     """The shipped task with everything where the file says, and a brisk butter applier."""
-    shipped = load("toast")
-    still = tuple(o.model_copy(update={"area": (0.0, 0.0)}) for o in shipped.obstacles)
-    brisk = {"head_speed_m_s": 0.2, "dwell_s": 0.05}
-    stations = tuple(s.model_copy(update=brisk) if s.process == "butter" else s for s in shipped.stations)
-    return shipped.model_copy(update={"obstacles": still, "stations": stations})
+    return still(load("toast"))
+
+
+@pytest.fixture(scope="session")
+def fms() -> Task:
+    """The task with pallets and a service of the robot's, likewise."""
+    return still(load("fms-arm"))
+
+
+@pytest.fixture(scope="session")
+def breakfast() -> Task:
+    """The task with two kinds of parts, likewise."""
+    return still(load("breakfast"))
 
 
 @pytest.fixture(scope="session")
@@ -39,7 +57,17 @@ def layout(task: Task) -> Layout:
 @pytest.fixture(scope="session")
 def surveys(task: Task, layout: Layout) -> Surveys:
     """One set of surveys for all tests."""
-    return Surveys(task, layout)
+    return Surveys(task, ORDER, layout)
+
+
+@pytest.fixture(scope="session")
+def surveyed() -> Callable[..., Surveys]:
+    """Surveys of a task with every obstacle where the file has it: surveyed(task, order)."""
+
+    def survey(task: Task, order: Order = ORDER) -> Surveys:
+        return Surveys(task, order, Layout(tuple(o.position_m for o in task.obstacles), ()))
+
+    return survey
 
 
 @pytest.fixture(scope="session")
@@ -47,7 +75,7 @@ def make(task: Task) -> Callable[[str], Skill]:
     """A fresh skill of a kind: the first that the shipped task needs, told about its first slice."""
 
     def example(subtask: str) -> Skill:
-        skills = SkillSet.of(task, 2).skills.values()
+        skills = SkillSet.of(task, ORDER).skills.values()
         return next(skill for skill in skills if skill.subtask == subtask).aim(SLICE)
 
     return example
@@ -113,16 +141,11 @@ def stage(surveys: Surveys, layout: Layout) -> Iterator[Callable[..., Bench]]:
             task: Task = surveys.task,
             off: tuple[float, float, float] = (0.0, 0.0, 0.0),
         ) -> Bench:
-            bench = Bench(Scene(worlds.enter_context(World()), task, 0, layout))
+            bench = Bench(Scene(worlds.enter_context(World()), task, (), layout))
             vars(skill).setdefault("surveys", surveys)
             spot = skill.spot
-            skill.begin(bench)
+            skill.begin(bench, off)
             skill.spot = spot
-            if any(off):
-                foot = spots(task.station(skill.station))[0].grasp()
-                bench.scene.put_slice(SLICE, foot.local(off[0], off[1], 0.0, off[2]))
-                for _ in range(30):
-                    bench.scene.world.step()
             return bench
 
         yield make_bench

@@ -1,4 +1,4 @@
-"""Grasp: from wherever a slice may stand, it is lifted; when it is not, the skill says so."""
+"""Grasp: from wherever a part may stand, it is lifted; when it is not, the skill says so."""
 
 from collections.abc import Callable
 
@@ -9,19 +9,22 @@ from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import grid
 from lab.sim.kinematics import ToolPose
-from lab.sim.scene import Layout, Spot, spots
+from lab.sim.kinds import Spot
+from lab.sim.places import Layout
 from lab.skills import Grasp, Place
-from lab.skills.around_slice import entry_cell, from_above
+from lab.skills.around_part import entry_cell, from_above
 from lab.skills.grasp import ACTIONS, GOAL
 from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, Surveys, near_pose
-from lab.tasks.task_file import Obstacle, Task
+from lab.tasks.task import Task
+from lab.tasks.task_fields import Obstacle
 from lab.toolbox.policy import Policy
 
 PolicyOf = Callable[[Problem], Policy]
 Run = Callable[[Skill, Bench, Policy], Status]
 Stage = Callable[..., Bench]
 SLICE = "slice 1"
+ORDER = ("slice", "slice")
 MAY_STAND = np.array([0.012, 0.005, 0.08])  # [m], [m], [rad]: a little wider than what ships
 
 
@@ -29,7 +32,7 @@ MAY_STAND = np.array([0.012, 0.005, 0.08])  # [m], [m], [rad]: a little wider th
 def test_a_slice_is_lifted_from_wherever_it_stands(
     seed: int, surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
-    grasp = Grasp("plate").aim(SLICE)
+    grasp = Grasp(surveys.task, "slice", "plate").aim(SLICE)
     policy = optimal(grasp.setup(surveys))
     off = tuple(map(float, np.random.default_rng(seed).uniform(-1, 1, 3) * MAY_STAND))
     bench = stage(grasp, off=off)
@@ -45,11 +48,11 @@ def test_a_slice_is_lifted_from_wherever_it_stands(
 def test_beside_other_slices_none_of_them_is_knocked_over(
     surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run, task: Task
 ) -> None:
-    grasp = Grasp("plate").aim(SLICE)
+    grasp = Grasp(surveys.task, "slice", "plate").aim(SLICE)
     policy = optimal(grasp.setup(surveys))
     bench = stage(grasp, off=(0.008, -0.003, 0.05))
-    for number, spot in enumerate(spots(task.station("plate"))[1:6], start=2):
-        bench.scene.add_slice(f"slice {number}", spot, (-0.008, 0.003, -0.05))
+    for number, spot in enumerate(surveys.places.spots(task.station("plate"))[1:6], start=2):
+        bench.scene.add(f"slice {number}", "slice", spot, (-0.008, 0.003, -0.05))
     assert run(grasp, bench, policy) is Status.SUCCESS, grasp.reason
     assert all(bench.upright(f"slice {number}") > 0.999 for number in range(2, 7))
 
@@ -57,7 +60,7 @@ def test_beside_other_slices_none_of_them_is_knocked_over(
 def test_a_slippery_slice_is_not_lifted_and_that_is_said(
     surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
-    grasp = Grasp("plate").aim(SLICE)
+    grasp = Grasp(surveys.task, "slice", "plate").aim(SLICE)
     policy = optimal(grasp.setup(surveys))
     bench = stage(grasp)
     position, turn = bench.scene.world.pose(SLICE)
@@ -71,7 +74,7 @@ def test_a_slippery_slice_is_not_lifted_and_that_is_said(
 
 
 def test_a_slice_that_is_not_there_is_not_lifted(surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run) -> None:
-    grasp = Grasp("plate").aim(SLICE)
+    grasp = Grasp(surveys.task, "slice", "plate").aim(SLICE)
     policy = optimal(grasp.setup(surveys))
     bench = stage(grasp)
     bench.scene.world.put(SLICE, (0.5, 0.0, 0.06), (0.7071068, 0.0, 0.0, 0.7071068))  # flat on the table
@@ -82,7 +85,7 @@ def test_a_slice_that_is_not_there_is_not_lifted(surveys: Surveys, stage: Stage,
 
 def test_every_station_that_is_picked_from_has_the_same_problem_when_its_surroundings_are(surveys: Surveys) -> None:
     """A policy learned at one buffer serves at another: the table is relative to the slice."""
-    one, other = (Grasp(place).setup(surveys).mdp for place in ("toaster_buffer", "butter_buffer"))
+    one, other = (Grasp(surveys.task, "slice", place).setup(surveys).mdp for place in ("toaster_buffer", "butter_buffer"))
     assert one.signature == other.signature
     assert one.action_labels == ACTIONS
 
@@ -111,8 +114,8 @@ def test_from_far_away_the_entry_is_at_the_grids_border() -> None:
     assert entry_cell(goal, ToolPose(0.4, -2.0, 0.5, -0.3)) == (2, 0, top, 0)
 
 
-def test_near_poses_are_relative_to_the_slice() -> None:
-    goal = Spot(0.4, 0.5, 0.012, np.pi / 2).grasp()
+def test_near_poses_are_relative_to_the_slice(surveys: Surveys) -> None:
+    goal = surveys.kinds["slice"].held_at(Spot(0.4, 0.5, 0.012, np.pi / 2))
     assert near_pose(goal, GOAL) == goal
     ahead = near_pose(goal, (3, 2, 1, 3))
     assert (ahead.x, ahead.y) == pytest.approx((0.4, 0.5 + NEAR_STEP_M[0]))
@@ -122,23 +125,23 @@ def test_near_poses_are_relative_to_the_slice() -> None:
 
 
 def test_obstacles_elsewhere_do_not_change_the_problem(task: Task, surveys: Surveys) -> None:
-    bare = Surveys(task.model_copy(update={"obstacles": ()}), Layout((), ()))
-    assert Grasp("plate").setup(bare).mdp.signature == Grasp("plate").setup(surveys).mdp.signature
+    bare = Surveys(task.changed(obstacles=()), ORDER, Layout((), ()))
+    assert Grasp(surveys.task, "slice", "plate").setup(bare).mdp.signature == Grasp(surveys.task, "slice", "plate").setup(surveys).mdp.signature
 
 
 def test_no_room_beside_the_slice_is_bad_input_that_names_what_is_in_the_way(task: Task) -> None:
     x, y, _ = task.station("toaster_buffer").pose
     near = Obstacle(name="pillar", position_m=(x, y - 0.06), cubes=3)
-    crowded = Surveys(task.model_copy(update={"obstacles": (near,)}), Layout((near.position_m,), ()))
-    for skill in (Grasp("toaster_buffer"), Place("toaster_buffer")):
-        with pytest.raises(BadInput, match=rf"^{skill.name}: no room for gripper and slice; in the way: pillar$"):
-            skill.setup(crowded)
+    surveys = Surveys(task.changed(obstacles=(near,)), ORDER, Layout((near.position_m,), ()))
+    for skill in (Grasp(surveys.task, "slice", "toaster_buffer"), Place(surveys.task, "slice", "toaster_buffer")):
+        with pytest.raises(BadInput, match=rf"^{skill.name}: no room for gripper and part; in the way: pillar$"):
+            skill.setup(surveys)
 
 
 def test_a_pillar_at_one_side_leaves_the_other_side_to_begin_from(task: Task) -> None:
     x, y, _ = task.station("toaster_buffer").pose
     near = Obstacle(name="pillar", position_m=(x, y - 0.105), cubes=6)
-    narrow = Surveys(task.model_copy(update={"obstacles": (near,)}), Layout((near.position_m,), ()))
-    mdp = Grasp("toaster_buffer").setup(narrow).mdp
+    surveys = Surveys(task.changed(obstacles=(near,)), ORDER, Layout((near.position_m,), ()))
+    mdp = Grasp(surveys.task, "slice", "toaster_buffer").setup(surveys).mdp
     assert mdp.terminal[int(np.ravel_multi_index((0, 0, NEAR_SHAPE[2] - 1, 0), mdp.shape))]
     assert mdp.start in mdp.starts

@@ -8,34 +8,41 @@ import pytest
 from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import greedy_path
-from lab.sim.models import SLICE as SIZE
-from lab.sim.scene import Layout, spots
+from lab.sim.places import Layout
 from lab.skills import Insert, Place
 from lab.skills.insert import ACTIONS, IN_SLOT_M, SEEN_WITHIN_M
 from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import Surveys
-from lab.tasks.task_file import Obstacle, Task
+from lab.tasks.task import Task
+from lab.tasks.task_fields import CameraGrid, Obstacle
 from lab.toolbox.policy import Policy
 
 PolicyOf = Callable[[Problem], Policy]
 Run = Callable[[Skill, Bench, Policy], Status]
 Stage = Callable[..., Bench]
 SLICE = "slice 1"
+ORDER = ("slice", "slice")
 CELL = 0.05
 
 
 def with_cubes(task: Task, *places: tuple[float, float], cubes: int = 3) -> Task:
     """The task with these cubes alone: 'cube 1', 'cube 2', ..."""
     made = tuple(Obstacle(name=f"cube {n}", position_m=at, cubes=cubes) for n, at in enumerate(places, start=1))
-    return task.model_copy(update={"obstacles": made})
+    return task.changed(obstacles=made)
 
 
 def surveyed(task: Task) -> Surveys:
-    return Surveys(task, Layout(tuple(o.position_m for o in task.obstacles), ()))
+    return Surveys(task, ORDER, Layout(tuple(o.position_m for o in task.obstacles), ()))
+
+
+def grid_of_toaster(task: Task) -> CameraGrid:
+    grid = task.station("toaster").grid
+    assert grid is not None
+    return grid
 
 
 def centre(task: Task, cell: tuple[int, int]) -> tuple[float, float]:
-    x, y = task.insert.origin_m
+    x, y = grid_of_toaster(task).origin_m
     return x + (cell[0] + 0.5) * CELL, y + (cell[1] + 0.5) * CELL
 
 
@@ -47,14 +54,14 @@ def moved(layout: Layout, number: int, dx: float, dy: float = 0.0) -> Layout:
 def test_a_slice_ends_in_the_slot_and_the_camera_agrees_on_the_way(
     surveys: Surveys, task: Task, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
-    insert = Insert("toaster")
+    insert = Insert(surveys.task, "slice", "toaster")
     problem = insert.setup(surveys)
     bench = stage(insert)
     assert run(insert, bench, optimal(problem)) is Status.SUCCESS, insert.reason
-    spot = spots(task.station("toaster"))[0]
+    spot = surveys.places.spots(task.station("toaster"))[0]
     position, _ = bench.scene.world.pose(SLICE)
     assert np.hypot(position[0] - spot.x, position[1] - spot.y) < IN_SLOT_M
-    assert position[2] == pytest.approx(spot.z + SIZE[2] / 2, abs=2e-3)
+    assert position[2] == pytest.approx(spot.z + 0.120 / 2, abs=2e-3)
     assert bench.upright(SLICE) > 0.99
     assert bench.held is None
     states, _, _ = greedy_path(optimal(problem).q, problem.mdp, 200)
@@ -63,32 +70,32 @@ def test_a_slice_ends_in_the_slot_and_the_camera_agrees_on_the_way(
 
 
 def test_the_picture_becomes_start_goal_and_blocked_cells(surveys: Surveys, task: Task) -> None:
-    insert = Insert("toaster")
+    insert = Insert(surveys.task, "slice", "toaster")
     mdp = insert.setup(surveys).mdp
-    assert mdp.shape == task.insert.shape
+    assert mdp.shape == grid_of_toaster(task).shape
     assert mdp.action_labels == ACTIONS
-    assert centre(task, insert.seen.start) == pytest.approx(task.insert.start_m)
+    assert centre(task, insert.seen.start) == pytest.approx(grid_of_toaster(task).start_m)
     toaster = task.station("toaster").pose
     assert centre(task, insert.seen.goal) == pytest.approx(toaster[:2], abs=CELL / 2 + 1e-9)
     blocked = (mdp.terminal & ~mdp.goal).reshape(mdp.shape)
     for obstacle in task.obstacles[:3]:
         x, y = obstacle.position_m
-        cell = tuple(int((p - o) / CELL) for p, o in zip((x, y), task.insert.origin_m, strict=True))
+        cell = tuple(int((p - o) / CELL) for p, o in zip((x, y), grid_of_toaster(task).origin_m, strict=True))
         assert blocked[cell]
 
 
 def test_a_cell_is_blocked_where_the_slice_would_touch_a_cube(task: Task) -> None:
     """A cube of 6 cm in the middle of cell (6, 6): a slice of 12 x 1.5 cm needs 9.6 cm along x and 4.35 cm along y."""
     alone = with_cubes(task, centre(task, (6, 6)))
-    mdp = Insert("toaster").setup(surveyed(alone)).mdp
+    mdp = Insert(task, "slice", "toaster").setup(surveyed(alone)).mdp
     blocked = {mdp.state_cell(int(s)) for s in np.flatnonzero(mdp.terminal & ~mdp.goal)}
     assert blocked == {(5, 6), (6, 6), (7, 6)}
 
 
 def test_a_low_cube_is_passed_over_and_a_tall_one_keeps_the_wide_gripper_away(task: Task) -> None:
-    low = Insert("toaster").setup(surveyed(with_cubes(task, centre(task, (6, 6)), cubes=1))).mdp
+    low = Insert(task, "slice", "toaster").setup(surveyed(with_cubes(task, centre(task, (6, 6)), cubes=1))).mdp
     assert not (low.terminal & ~low.goal).any()
-    tall = Insert("toaster").setup(surveyed(with_cubes(task, centre(task, (6, 6)), cubes=4))).mdp
+    tall = Insert(task, "slice", "toaster").setup(surveyed(with_cubes(task, centre(task, (6, 6)), cubes=4))).mdp
     blocked = {tall.state_cell(int(s)) for s in np.flatnonzero(tall.terminal & ~tall.goal)}
     assert blocked == {(i, j) for i in (5, 6, 7) for j in (5, 6, 7)}
 
@@ -97,7 +104,7 @@ def test_a_low_cube_is_passed_over_and_a_tall_one_keeps_the_wide_gripper_away(ta
 def test_a_cube_moved_since_is_noticed(
     number: int, dx: float, dy: float, surveys: Surveys, layout: Layout, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
-    insert = Insert("toaster")
+    insert = Insert(surveys.task, "slice", "toaster")
     policy = optimal(insert.setup(surveys))
     bench = stage(insert, layout=moved(layout, number, dx, dy))
     assert run(insert, bench, policy) is Status.FAILURE
@@ -111,7 +118,7 @@ def test_a_cube_moved_since_is_noticed(
 def test_a_cube_moved_by_less_than_the_camera_trusts_is_let_pass(
     surveys: Surveys, layout: Layout, stage: Stage, optimal: PolicyOf
 ) -> None:
-    insert = Insert("toaster")
+    insert = Insert(surveys.task, "slice", "toaster")
     policy = optimal(insert.setup(surveys))
     bench = stage(insert, layout=moved(layout, 2, 0.004))
     insert.start(bench, policy)
@@ -122,14 +129,14 @@ def test_from_elsewhere_it_first_comes_to_the_start(
     surveys: Surveys, task: Task, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
     """As when it is tried again: from above the toaster, the gripper hides the toaster's marker from the camera."""
-    insert = Insert("toaster")
+    insert = Insert(surveys.task, "slice", "toaster")
     policy = optimal(insert.setup(surveys))
-    bench = stage(Place("toaster"))
+    bench = stage(Place(surveys.task, "slice", "toaster"))
     assert run(insert, bench, policy) is Status.SUCCESS, insert.reason
 
 
 def test_a_marker_that_is_hidden_is_a_reason(surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run) -> None:
-    insert = Insert("toaster")
+    insert = Insert(surveys.task, "slice", "toaster")
     policy = optimal(insert.setup(surveys))
     bench = stage(insert)
     bench.scene.world.put("toaster marker", (0.0, 0.0, -1.0))
@@ -140,7 +147,7 @@ def test_a_marker_that_is_hidden_is_a_reason(surveys: Surveys, stage: Stage, opt
 def test_a_cube_that_came_along_is_noticed(
     surveys: Surveys, layout: Layout, task: Task, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
-    insert = Insert("toaster")
+    insert = Insert(surveys.task, "slice", "toaster")
     policy = optimal(insert.setup(surveys))
     bench = stage(insert)
     x, y = centre(task, (5, 9))
@@ -153,7 +160,7 @@ def test_a_cube_that_came_along_is_noticed(
 def test_with_an_empty_gripper_there_is_nothing_to_insert(
     surveys: Surveys, stage: Stage, optimal: PolicyOf, run: Run
 ) -> None:
-    insert = Insert("toaster")
+    insert = Insert(surveys.task, "slice", "toaster")
     policy = optimal(insert.setup(surveys))
     bench = stage(insert)
     bench.held = None
@@ -162,7 +169,7 @@ def test_with_an_empty_gripper_there_is_nothing_to_insert(
 
 
 def test_a_slice_beside_the_slot_is_a_failure(surveys: Surveys, stage: Stage, optimal: PolicyOf) -> None:
-    insert = Insert("toaster")
+    insert = Insert(surveys.task, "slice", "toaster")
     policy = optimal(insert.setup(surveys))
     bench = stage(insert)
     insert.start(bench, policy)
@@ -179,7 +186,7 @@ def test_a_toaster_enclosed_by_cubes_is_bad_input_that_names_them(task: Task) ->
     wall = [centre(task, (6, j)) for j in range(12)]
     enclosed = with_cubes(task, *wall, centre(task, (1, 10)))
     with pytest.raises(BadInput) as caught:
-        Insert("toaster").setup(surveyed(enclosed))
+        Insert(task, "slice", "toaster").setup(surveyed(enclosed))
     message = str(caught.value)
     assert message.startswith("insert at toaster: no path reaches the goal; the goal is enclosed by: cube 1, ")
     assert all(f"cube {n}" in message for n in range(1, 13))
@@ -188,8 +195,8 @@ def test_a_toaster_enclosed_by_cubes_is_bad_input_that_names_them(task: Task) ->
 
 def test_a_cube_over_the_toaster_or_the_start_is_named(task: Task) -> None:
     x, y, _ = task.station("toaster").pose
-    with pytest.raises(BadInput, match=r"insert at toaster: the toaster's cell is blocked by cube 1$"):
-        Insert("toaster").setup(surveyed(with_cubes(task, (x - 0.09, y))))
-    x, y = task.insert.start_m
-    with pytest.raises(BadInput, match=r"insert\.start_m \[.*\]: cube 1 is in the way of a carried slice there$"):
-        Insert("toaster").setup(surveyed(with_cubes(task, (x + 0.08, y))))
+    with pytest.raises(BadInput, match=r"insert at toaster: the machine's cell is blocked by cube 1$"):
+        Insert(task, "slice", "toaster").setup(surveyed(with_cubes(task, (x - 0.09, y))))
+    x, y = grid_of_toaster(task).start_m
+    with pytest.raises(BadInput, match=r"station 'toaster': grid\.start_m \[.*\]: cube 1 is in the way of a carried slice there$"):
+        Insert(task, "slice", "toaster").setup(surveyed(with_cubes(task, (x + 0.08, y))))

@@ -7,12 +7,10 @@ import pytest
 
 from lab.learning.problem import Problem
 from lab.mdp import greedy_path
-from lab.sim import models
 from lab.sim.arm_models import arm_named
 from lab.sim.kinematics import ToolPose
 from lab.sim.robot import NAME as ROBOT
 from lab.skills import SKILLS, Skill, Transfer
-from lab.skills.butter import SHAPE
 from lab.skills.skill import Bench, Status
 from lab.skills.surveys import Surveys
 from lab.toolbox.policy import Policy
@@ -21,7 +19,7 @@ Make = Callable[[str], Skill]
 Stage = Callable[..., Bench]
 PolicyOf = Callable[[Problem], Policy]
 SLICE = "slice 1"
-WITHIN = {"transfer": 0.06, "grasp": 0.008, "insert": 0.003, "butter": 0.002, "place": 0.008}  # [m] corners are rounded
+WITHIN = {"transfer": 0.06, "grasp": 0.008, "insert": 0.003, "cover": 0.002, "place": 0.008}  # [m] corners are rounded
 every_skill = pytest.mark.parametrize("name", SKILLS)
 
 
@@ -30,7 +28,7 @@ def free_states(problem: Problem) -> list[int]:
 
 
 def found(skill: Skill, bench: Bench) -> ToolPose:
-    """Where the skill's tool is in physics: the arm's, or the applier's head."""
+    """Where the skill's tool is in physics: the arm's, or the machine's head."""
     if skill.moves_arm:
         return bench.scene.robot.tool()
     (x, y, z), _ = bench.scene.world.pose(skill.station, "head")
@@ -52,7 +50,7 @@ def test_shown_in_any_free_state_the_tool_is_at_its_pose(name: str, make: Make, 
         assert apart(at, pose) < 1e-6
         assert at.yaw == pytest.approx(pose.yaw, abs=1e-6)
         if skill.carries:
-            held = bench.slice_pose(SLICE)
+            held = bench.part_pose(SLICE)
             assert (held.x, held.y, held.z, held.yaw) == pytest.approx((pose.x, pose.y, pose.z, pose.yaw), abs=1e-6)
 
 
@@ -76,16 +74,16 @@ def test_the_motion_goes_through_the_poses_of_the_learned_states(
 
 
 def test_out_of_reach_nothing_moves(surveys: Surveys, stage: Stage) -> None:
-    skill = Transfer("plate", "toaster_buffer", loaded=True)
+    skill = Transfer("plate", "toaster_buffer", "slice")
     mdp = skill.setup(surveys).mdp
     bench = stage(skill)
     assert skill.show(bench, mdp.start)
-    tool, held = bench.scene.robot.tool(), bench.slice_pose(SLICE)
+    tool, held = bench.scene.robot.tool(), bench.part_pose(SLICE)
     far = [state for state in range(mdp.n_states) if arm_named("up6").inverse(skill.pose(state)) is None]
     assert far
     assert all(mdp.terminal[state] for state in far)
     assert not any(skill.show(bench, state) for state in far)
-    assert (bench.scene.robot.tool(), bench.slice_pose(SLICE)) == (tool, held)
+    assert (bench.scene.robot.tool(), bench.part_pose(SLICE)) == (tool, held)
 
 
 def test_around_another_slice_the_poses_are_that_much_away(make: Make, surveys: Surveys) -> None:
@@ -102,13 +100,13 @@ def test_around_another_slice_the_poses_are_that_much_away(make: Make, surveys: 
 
 
 def test_the_head_stands_before_the_cell_that_it_butters(surveys: Surveys, stage: Stage, make: Make) -> None:
-    butter = make("butter")
+    butter = make("cover")
     mdp = butter.setup(surveys).mdp
     bench = stage(butter)
     (x, y, z), _ = bench.scene.world.pose(SLICE)
-    third = models.SLICE[0] / 3
-    for row, column in np.ndindex(*SHAPE):
-        state = (row * SHAPE[1] + column) << 9
+    third = 0.120 / 3
+    for row, column in np.ndindex(3, 3):
+        state = (row * 3 + column) << 9
         assert mdp.state_cell(state) == (row, column)
         pose = butter.pose(state)
         assert (pose.x, pose.z) == pytest.approx((x + (column - 1) * third, z + (1 - row) * third), abs=2e-3)

@@ -14,13 +14,15 @@ from lab.mdp import NoPath, greedy_path, grid, shortest_steps
 from lab.production.durations import measure
 from lab.seat.lesson_scene import SkillScene
 from lab.sim.kinematics import ToolPose
-from lab.sim.scene import Layout
+from lab.sim.kinds import Spot
+from lab.sim.places import Layout
 from lab.skills import SKILLS, Skill
 from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Bench, SkillFailed, Status, learned_path, no_way
 from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
-from lab.tasks.task_file import Stage, Subtask, Task
+from lab.tasks.task import Task
+from lab.tasks.task_fields import Stage, Subtask
 from lab.teaching.lesson import one_lesson
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.skill_subject import SkillSubject
@@ -31,6 +33,7 @@ from lab.toolbox.registry import Toolbox
 Make = Callable[[str], Skill]
 PolicyOf = Callable[[Problem], Policy]
 Run = Callable[[Skill, Bench, Policy], Status]
+ORDER = ("slice", "slice")
 
 
 class Hover(Skill):
@@ -105,7 +108,7 @@ def test_the_problem_has_a_solution_from_every_start(
 
 @every_skill
 def test_the_same_scene_gives_the_same_problem(name: str, make: Make, surveys: Surveys) -> None:
-    again = Surveys(surveys.task, surveys.layout) if name != "transfer" else surveys
+    again = Surveys(surveys.task, ORDER, surveys.layout) if name != "transfer" else surveys
     assert make(name).setup(surveys).mdp.signature == make(name).setup(again).mdp.signature
 
 
@@ -213,38 +216,38 @@ def test_a_bench_tells_standing_leaning_and_held_slices_apart(
     world, tool = bench.scene.world, bench.scene.robot.tool()
     assert bench.holds("slice 1")
     assert bench.upright("slice 1") == pytest.approx(1.0, abs=1e-3)
-    held = bench.slice_pose("slice 1")
+    held = bench.part_pose("slice 1")
     assert (held.x, held.y, held.z) == pytest.approx((tool.x, tool.y, tool.z), abs=2e-3)
     world.put("slice 1", (0.6, 0.0, 0.06), (0.0, 0.0, np.sin(1.2), np.cos(1.2)))
     world.step()
     assert not bench.holds("slice 1")
-    assert bench.slice_pose("slice 1").yaw == pytest.approx(
-        2.4 - np.pi, abs=1e-2
-    )  # a slice looks alike after half a turn
-    assert bench.stands("slice 1", ToolPose(0.605, 0.0, 0.09), 0.01)
-    assert not bench.stands("slice 1", ToolPose(0.62, 0.0, 0.09), 0.01)
-    assert not bench.stands("slice 1", ToolPose(0.6, 0.0, 0.12), 0.01)
+    assert bench.part_pose("slice 1").yaw == pytest.approx(2.4 - np.pi, abs=1e-2)  # alike after half a turn
+    assert bench.stands("slice 1", Spot(0.605, 0.0, 0.0, 0.0), 0.01)
+    assert not bench.stands("slice 1", Spot(0.62, 0.0, 0.0, 0.0), 0.01)
+    assert not bench.stands("slice 1", Spot(0.6, 0.0, 0.03, 0.0), 0.01)
     world.put("slice 1", (0.6, 0.0, 0.06), (np.sin(0.3), 0.0, 0.0, np.cos(0.3)))
     assert bench.upright("slice 1") == pytest.approx(np.cos(0.6))
-    assert not bench.stands("slice 1", ToolPose(0.6, 0.0, 0.09), 0.01)
+    assert not bench.stands("slice 1", Spot(0.6, 0.0, 0.0, 0.0), 0.01)
 
 
 def test_a_new_skill_is_a_class_and_a_row_and_all_else_knows_it(
     task: Task, surveys: Surveys, optimal: PolicyOf, tmp_path: Path
 ) -> None:
     """The task file may have settings for it, lessons teach and show it, and jobs need it, time it and carry it out."""
-    ends = tuple(Stage(station=stage.station) for stage in (task.route[0], task.route[-1]))
-    short = task.model_copy(update={"route": ends, "subtasks": task.subtasks | {"hover": Subtask()}})
+    ((first, *_, last),) = task.parts[0].routes
+    ends = (Stage(station=first.station), Stage(station=last.station))
+    slices = task.parts[0].model_copy(update={"routes": (ends,)})
+    short = task.changed(parts=(slices,), subtasks=task.subtasks | {"hover": Subtask()})
     subject = SkillSubject.of(LessonOptions("hover", episodes=40), short)
     document = one_lesson(subject, Teacher(Toolbox(tmp_path)), out=tmp_path / "out")
     assert (document["subtask"], document["skill"], document["solved"]) == ("hover", "hover at toaster_buffer", True)
-    skillset = SkillSet.of(short, 1)
+    skillset = SkillSet.of(short, ("slice",))
     hovers = [skill for skill in skillset.skills.values() if isinstance(skill, Hover)]
     assert hovers
     assert all(way[0] in hovers for way in skillset.travels.values())
     problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items()}
     skillset.policies = {name: optimal(problem) for name, problem in problems.items()}
-    with closing(SkillScene(task, 1, Layout(surveys.layout.obstacles, ((0.0, 0.0, 0.0),)), hovers[0])) as stage:
+    with closing(SkillScene(task, ("slice",), Layout(surveys.layout.obstacles, ((0.0, 0.0, 0.0),)), hovers[0])) as stage:
         assert stage.frame(2).poses["robot tool"][2] == pytest.approx(stage.frame(0).poses["robot tool"][2] + 0.06)
-    durations = measure(Prepared(short, 1, 0, surveys.layout, surveys, skillset, problems))
+    durations = measure(Prepared(short, ("slice",), 0, surveys.layout, surveys, skillset, problems))
     assert set(durations.empty_s) == set(skillset.moves.empty)

@@ -7,7 +7,7 @@ import pytest
 from lab.learning.problem import Problem
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.trial import carry_out, try_out
-from lab.tasks.task_file import Task
+from lab.tasks.task import Task
 from lab.toolbox.policy import Policy
 
 GRASP = "grasp at plate"
@@ -15,7 +15,7 @@ GRASP = "grasp at plate"
 
 @pytest.fixture(scope="module")
 def prepared(task: Task) -> Prepared:
-    return prepare(task, 2, 0, GRASP)
+    return prepare(task, ("slice", "slice"), 0, GRASP)
 
 
 def test_it_says_whether_it_worked_and_how_long_it_took(

@@ -63,6 +63,20 @@ def test_a_new_problem_is_learned_kept_and_then_found(teacher: Teacher) -> None:
     assert np.array_equal(again.policy.q, lesson.policy.q)
 
 
+def test_what_another_arm_learned_is_used_but_not_in_silence(teacher: Teacher) -> None:
+    first = teacher.find_or_teach(plan(about=replace(problem(), arm="panda")), known())
+    assert (first.policy.arm, first.other_arm) == ("panda", "")
+    index, _ = teacher.toolbox.index()
+    same = teacher.find_or_teach(plan(HOPELESS, about=replace(problem(), arm="panda")), index)
+    other = teacher.find_or_teach(plan(HOPELESS, about=replace(problem(), arm="xarm6")), index)
+    assert (same.other_arm, same.reason) == ("", "it was learned in exactly this problem")
+    assert other.other_arm == "panda"
+    assert other.reason == "learned with the arm panda; it was learned in exactly this problem"
+    older = replace(first.policy, arm="")  # from before arms had names: there was one
+    told = teacher.find_or_teach(plan(HOPELESS, about=replace(problem(), arm="xarm6")), known(older))
+    assert told.other_arm == "up6"
+
+
 def test_another_scene_is_learned_anew(teacher: Teacher) -> None:
     first = teacher.find_or_teach(plan(), known())
     other = teacher.find_or_teach(plan(about=problem(columns=5)), known(first.policy))

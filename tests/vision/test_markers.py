@@ -295,3 +295,44 @@ def test_a_picture_of_nothing_but_spots_is_refused() -> None:
         cv2.circle(spots, (16 * j + 8, 16 * i + 8), 6, MARKERS["gripper"].rgb, -1)
     with pytest.raises(BadInput, match="more than 10000 round coloured spots"):
         find_markers(spots, plain_view(spots.shape[:2], (100, 100)))
+
+
+# ---- several grids in one picture ----------------------------------------------------------------------------------
+
+TWO = [middle("gripper", 1, 1), middle("toaster", 9, 10), middle("toaster", 2, 8), middle("obstacle", 4, 3)]
+
+
+@pytest.mark.parametrize(("near", "goal"), [((9, 10), (9, 10)), ((8, 9), (9, 10)), ((2, 8), (2, 8)), ((4, 9), (2, 8))])
+def test_of_several_machines_the_nearest_to_where_the_goals_is_counts(near: tuple[int, int], goal: tuple[int, int]) -> None:
+    matrix = camera()
+    image, view = paint(table(), matrix, TWO), overhead(matrix)
+    grid = see(image, view, goal_near_m=view.centre(near))
+    assert (grid.start, grid.goal, grid.obstacles) == ((1, 1), goal, ((4, 3),))
+    assert [m.cell for m in grid.markers if m.kind == "toaster"] == [goal]
+    assert grid.goal_marker.cell == goal
+    with pytest.raises(BadInput, match="2 toaster markers"):  # without a word where it is
+        see(image, view)
+
+
+def test_another_grids_markers_are_left_to_it() -> None:
+    """The picture shows 12 x 12 cells: the first grid has the left 12 x 6 of them, the other the right ones."""
+    matrix = camera()
+    other = [middle("toaster", 5, 2), middle("obstacle", 7, 1)]
+    image = paint(table(), matrix, [*LAYOUT, *other])
+    left = View(matrix, (0.0, 0.0), CELL, (12, 6), HEIGHTS)
+    right = View(matrix, (0.0, 6 * CELL), CELL, (12, 6), HEIGHTS)
+    seen = see(image, left, goal_near_m=left.centre((5, 2)))
+    assert (seen.start, seen.goal, seen.obstacles) == ((1, 1), (5, 2), ((4, 3), (7, 1)))
+    with pytest.raises(BadInput, match="the gripper marker at pixel .* lies outside the grid"):
+        see(image, right, goal_near_m=right.centre((9, 4)))  # the gripper belongs to every grid: it is at the wrong one
+    moved = paint(table(), matrix, [middle("gripper", 1, 7), *LAYOUT[1:], *other])
+    seen = see(moved, right, goal_near_m=right.centre((9, 4)))
+    assert (seen.start, seen.goal, seen.obstacles) == ((1, 1), (9, 4), ((5, 1),))
+
+
+def test_a_grid_whose_machine_is_not_in_it_has_no_goal() -> None:
+    matrix = camera()
+    right = View(matrix, (0.0, 6 * CELL), CELL, (12, 4), HEIGHTS)
+    image = paint(table(), matrix, [middle("gripper", 1, 7), middle("toaster", 9, 10)])
+    with pytest.raises(BadInput, match="no toaster marker: wanted exactly one round cyan spot"):
+        see(image, right, goal_near_m=(0.5, 0.5))

@@ -74,9 +74,17 @@ class Outside:
 
 
 def default_reader(
-    console: Console, stdin: TextIO | None = None, *, plain: bool = False, outside: Outside | None = None
+    console: Console,
+    stdin: TextIO | None = None,
+    *,
+    plain: bool = False,
+    outside: Outside | None = None,
+    moves: bool = True,
 ) -> "Reader":
-    """Reads with arrow keys at a terminal that can do it, else plain lines; `plain`: plain lines in any case."""
+    """Reads with arrow keys at a terminal that can do it, else plain lines; `plain`: plain lines in any case.
+
+    `moves`: an arrow key is an answer, a move; else it only edits.
+    """
     stream = stdin or sys.stdin
     if plain or not stream.isatty():
         return PlainReader(console, stream, outside)
@@ -84,7 +92,7 @@ def default_reader(
 
     if is_dumb_terminal():
         return PlainReader(console, stream, outside)
-    return TerminalReader(console, outside=outside)
+    return TerminalReader(console, outside=outside, moves=moves)
 
 
 class Reader(Protocol):
@@ -156,7 +164,7 @@ def _poke(fd: int) -> None:
 
 
 class TerminalReader:
-    """Line editing with history; an arrow key on an empty line answers at once, and draws an arrow after "path"."""
+    """Line editing with history; with `moves`, an arrow key on an empty line answers at once, after "path" it draws an arrow."""
 
     def __init__(
         self,
@@ -164,6 +172,8 @@ class TerminalReader:
         keys: "Input | None" = None,
         screen: "Output | None" = None,
         outside: Outside | None = None,
+        *,
+        moves: bool = True,
     ) -> None:
         from prompt_toolkit import PromptSession
         from prompt_toolkit.output import create_output
@@ -173,7 +183,9 @@ class TerminalReader:
         output = screen or create_output(stdout=cast(TextIO, console.file))
         if isinstance(output, Vt100_Output):
             output.enable_cpr = False  # one line needs no cursor position, and a slow link would answer too late
-        self._session: PromptSession[str] = PromptSession(input=keys, output=output, key_bindings=_keys())
+        self._session: PromptSession[str] = PromptSession(
+            input=keys, output=output, key_bindings=_keys() if moves else None
+        )
 
     def __call__(self, prompt: str) -> str:
         """One line without its end."""

@@ -7,9 +7,18 @@ import pytest
 
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.studies.findings import those
-from lab.studies.ours import reuse as study
+from lab.studies.ours import changed_scenes_study as study
 from lab.studies.ours.changed_scenes import KINDS, Scene, surveyed
-from lab.studies.ours.reuse import WAYS, Outcome, Tally, in_short, reuse, rows_of, rows_of_scene, tried
+from lab.studies.ours.changed_scenes_study import (
+    WAYS,
+    Outcome,
+    Tally,
+    changed_scenes,
+    in_short,
+    rows_of,
+    rows_of_scene,
+    tried,
+)
 from lab.studies.runner import Job
 from lab.tasks.task_file import load
 
@@ -84,7 +93,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_one_scene_of_few_skills_from_end_to_end(few: None) -> None:
-    found = reuse(Job(2), {})
+    found = changed_scenes(Job(2), {})
     assert {one["kind"] for one in found.rows} == {"all", "cubes moved", "station moved"}
     skills = [one for one in found.rows if one["measure"] == "skills"]
     assert sum(one["value"] for one in skills) == 8
@@ -94,7 +103,7 @@ def test_one_scene_of_few_skills_from_end_to_end(few: None) -> None:
     assert {one["value"] for one in those(found.rows, measure="success_percent")} == {100.0}
     assert "changed scenes" in found.notes[0]
     base, known, learned = study.learned_here()
-    assert base.layout == prepare(load("toast"), 3, 0).layout
+    assert base.layout == prepare(load("toast"), load("toast").order(3), 0).layout
     assert len(known) <= len(learned) == 4
     assert tried(Scene(next(iter(KINDS)), 0, 0)).words in skills[0]["task"]
     study.learned_here.cache_clear()

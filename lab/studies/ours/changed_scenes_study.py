@@ -1,30 +1,23 @@
 """What skills that were learned in one scene are worth in changed ones, beside learning everything anew there."""
 
-import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from lab.learning.problem import Problem
 from lab.mdp import greedy_path
 from lab.skills.prepared_scene import Prepared, prepare
-from lab.skills.trial import trial_of, try_out
 from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, row, share_row, those, varying_row
 from lab.studies.ours.changed_scenes import KINDS, Scene, surveyed
+from lab.studies.ours.skills_taught import Known, distinct, fails, key_of, spent, taught, works
 from lab.studies.runner import Job
 from lab.tasks.task_file import load
-from lab.teaching.lesson_plan import Lesson, LessonPlan
-from lab.teaching.teacher import Teacher
-from lab.toolbox.index import KnownPolicies
+from lab.teaching.lesson_plan import Lesson
 from lab.toolbox.policy import Policy
-from lab.toolbox.registry import Toolbox
 
 TASK, TOASTS = "toast", 3
-Known = Mapping[tuple[str, str], Policy]
 WAYS = ("the same", "used", "adapted", "refused", "learned")  # what becomes of a skill in a changed scene
 
 ABOUT = (
@@ -77,7 +70,7 @@ class Outcome:
     unsolved: tuple[int, int]
 
 
-def reuse(job: Job, reading: Mapping[str, Any]) -> Findings:
+def changed_scenes(job: Job, reading: Mapping[str, Any]) -> Findings:
     """So many changed scenes, as many of each kind; the reading changes nothing here."""
     kinds = [*KINDS]
     scenes = [Scene(kinds[number % len(kinds)], number // len(kinds), job.seed) for number in range(job.sessions)]
@@ -99,55 +92,33 @@ def learned_here() -> tuple[Prepared, Known, Known]:
     """
     task = load(TASK)
     prepared = prepare(task, task.order(TOASTS), 0)
-    problems = _distinct(prepared)
+    problems = distinct(prepared)
     lessons = taught(prepared, {}, problems)
-    anew = {_key(problem): _from_nothing(prepared, problem) for problem in problems}
+    anew = {key_of(problem): _from_nothing(prepared, problem) for problem in problems}
     return prepared, {(one.policy.subtask, one.policy.signature): one.policy for one, _ in lessons}, anew
-
-
-def _key(problem: Problem) -> tuple[str, str]:
-    return problem.subtask, problem.mdp.signature
-
-
-def _distinct(prepared: Prepared) -> list[Problem]:
-    """The problems of a scene, each once, under the skill that meets it first."""
-    return [*reversed({_key(problem): problem for problem in reversed(prepared.problems.values())}.values())]
-
-
-def taught(prepared: Prepared, known: Known, problems: Iterable[Problem]) -> list[tuple[Lesson, float]]:
-    """A lesson of a run for each problem, and how long it took [s]; what one learns the next ones know."""
-    found, so_far = [], KnownPolicies.of(known.values())
-    with TemporaryDirectory() as folder:
-        teacher = Teacher(Toolbox(Path(folder)), trial=trial_of(prepared))
-        for problem in problems:
-            began, how = time.perf_counter(), prepared.task.subtask(problem.subtask)
-            lesson = teacher.find_or_teach(LessonPlan(problem, how.learner, how.gate, prepared.task.name), so_far)
-            so_far[lesson.policy.subtask, lesson.policy.signature] = lesson.policy
-            found.append((lesson, time.perf_counter() - began))
-    return found
 
 
 def tried(scene: Scene) -> Outcome:
     """One changed scene, with what was learned before and from nothing."""
     base, known, learned = learned_here()
     prepared, words, refused = surveyed(scene, base.task, base.layout, base.seed, base.order)
-    problems = _distinct(prepared)
+    problems = distinct(prepared)
     here = taught(prepared, known, problems)
-    anew = [learned.get(_key(problem)) or _from_nothing(prepared, problem) for problem in problems]
+    anew = [learned.get(key_of(problem)) or _from_nothing(prepared, problem) for problem in problems]
     ways = [_way(lesson) for lesson, _ in here]
     tallies = {}
     for way in WAYS:
         own = [n for n, one in enumerate(ways) if one == way]
-        spent = [_spent(here[n][0]) for n in own]
+        costs = [spent(here[n][0]) for n in own]
         tallies[way] = Tally(
             len(own),
-            sum(episodes for episodes, _ in spent),
-            sum(helped for _, helped in spent),
+            sum(episodes for episodes, _ in costs),
+            sum(helped for _, helped in costs),
             sum(here[n][1] for n in own),
             (sum(len(anew[n].curve) for n in own), sum(anew[n].helped_steps for n in own)),
         )
     lessons = [lesson for lesson, _ in here]
-    failing = [_fails(prepared, problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)]
+    failing = [fails(prepared, problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)]
     return Outcome(
         words,
         refused,
@@ -182,18 +153,6 @@ def _way(lesson: Lesson) -> str:
     return "learned" if lesson.fitness is None else "refused"
 
 
-def _spent(lesson: Lesson) -> tuple[int, int]:
-    return (0, 0) if lesson.result is None else (len(lesson.result.steps), lesson.result.helped_steps)
-
-
-def works(problem: Problem, policy: Policy) -> bool:
-    """Whether greedy steps lead to the goal from each start, gone one by one."""
-    mdp = problem.mdp
-    if policy.q.shape != mdp.successor.shape:
-        return False
-    return all(greedy_path(policy.q, mdp, mdp.n_states, start)[2] for start in mdp.starts or (mdp.start,))
-
-
 def _any_works(known: Known, problem: Problem) -> bool:
     return any(works(problem, policy) for (subtask, _), policy in known.items() if subtask == problem.subtask)
 
@@ -201,12 +160,6 @@ def _any_works(known: Known, problem: Problem) -> bool:
 def _moves(problem: Problem, policy: Policy) -> int:
     """Moves of the greedy way from the problem's start."""
     return len(greedy_path(policy.q, problem.mdp, problem.mdp.n_states)[1])
-
-
-def _fails(prepared: Prepared, problem: Problem, policy: Policy) -> bool:
-    """Whether a policy misses the goal step by step, or fails when its skill is carried out in physics."""
-    skill = prepared.skillset.skills[problem.name]
-    return not works(problem, policy) or try_out(prepared, skill, policy) is not None
 
 
 def rows_of(kind: str | None, outcomes: Sequence[Outcome]) -> list[Row]:

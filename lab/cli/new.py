@@ -1,0 +1,63 @@
+"""`lab new`: a task file of one's own."""
+
+from typing import Annotated, Any
+
+import typer
+
+from lab.cli.families import offers
+from lab.cli.options import Json
+from lab.cli.output import console, show
+from lab.errors import counted
+
+
+def new(
+    name: Annotated[str, typer.Argument(help="What the task is called; the file is NAME.toml.")],
+    part: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--part",
+            help="A kind of part, SHAPE:SIZE:COUNT in metres: box:XxYxZ:COUNT or cylinder:DIAMETERxHEIGHT:COUNT, "
+            "with NAME= before it if you like; several times for several kinds.",
+        ),
+    ] = None,
+    machine: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--machine",
+            help="A machine that all parts go to, NAME:SECONDS; several times: in this order. Default: none.",
+        ),
+    ] = None,
+    arm: Annotated[str | None, typer.Option("--arm", help="The robot: {arms}.", autocompletion=offers("arms"))] = None,
+    buffer: Annotated[bool, typer.Option("--buffer", help="A buffer before each machine.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: three boxes, one press.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Write a task file that runs: parts go from an input through machines to an output, laid out around the arm.
+
+    Without options it asks; with any it does not.
+    """
+    from lab.skills.new_cell import new_cell
+    from lab.tasks.new_task import MACHINE, file_of, new_task
+    from lab.tasks.record import write_whole
+
+    path, task_name = file_of(name)
+    if part or machine or arm or buffer:
+        wanted = new_task(task_name, arm or "up6", part or (), machine or (), buffer)
+    elif yes:
+        wanted = new_task(task_name, "up6", (), (MACHINE,), False)
+    else:
+        from lab.seat.terminal.line_reader import default_reader
+        from lab.seat.terminal.new_task_questions import ask
+
+        wanted = ask(task_name, default_reader(console(), moves=False), console())
+    text, task = new_cell(wanted, path)
+    write_whole(path, text)
+
+    def told(d: dict[str, Any]) -> str:
+        there = f"{counted(d['parts'], 'part')} and {counted(d['stations'], 'station')} around the arm {wanted.arm}"
+        return (
+            f"{d['file']}: {there}\nlook at it: lab task check {d['file']} --plot cell.png\nrun it: lab run {d['file']}"
+        )
+
+    document = {"file": str(path), "arm": wanted.arm, "parts": wanted.count, "stations": len(task.stations)}
+    show(document, as_json, told)

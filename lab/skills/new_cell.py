@@ -1,0 +1,62 @@
+"""A new task whose cell is laid out around its arm and checked, before it is a file."""
+
+from itertools import islice
+from pathlib import Path
+
+from lab.errors import BadInput
+from lab.sim.arm import Arm
+from lab.sim.arm_models import arm_of
+from lab.sim.grip import grip_of
+from lab.sim.part_shape import shape_of
+from lab.sim.reach import ring_of
+from lab.skills.prepared_scene import prepare
+from lab.tasks.new_task import FRICTION, Around, NewPart, NewTask, does_not_fit, heights_m, layouts, text_of
+from lab.tasks.part_fields import PartFields
+from lab.tasks.robot_fields import RobotSettings
+from lab.tasks.task import Task
+from lab.tasks.task_file import task_of_text
+
+FINGERS_M = 0.016  # that the fingers open beyond the widest part
+ROOM_M = 0.08  # between parts, where what stations have by themselves is not enough for the gripper
+MOST_TRIES = 4  # layouts of which every sub-task is surveyed
+
+
+def new_cell(new: NewTask, path: Path) -> tuple[str, Task]:
+    """The text of a task file for `path`, and its task, whose every sub-task has a way. BadInput for what cannot be."""
+    arm = arm_of(RobotSettings(model=new.arm, start="input"))
+    widest = max(_grip_width(part, arm, path.parent) for part in new.parts)
+    opening = round(widest + FINGERS_M, 4)  # wide open, fingers would need more room between parts
+    around = _around(new, arm)
+    refused: BadInput = does_not_fit(new, around)
+    closer, wider = (islice(layouts(new, around, between), MOST_TRIES) for between in (None, ROOM_M))
+    for placed in (*closer, *wider):
+        text = text_of(new, placed, opening if opening < arm.gripper.opening_m else None)
+        task = task_of_text(path, text)
+        try:
+            prepare(task, task.order(), 0)
+        except BadInput as error:
+            refused = error
+        else:
+            return text, task
+    raise refused
+
+
+def _grip_width(part: NewPart, arm: Arm, folder: Path) -> float:
+    """How far apart the fingers are that hold a part [m]; BadInput when they cannot."""
+    fields = PartFields(name=part.name, shape=part.shape, size_m=part.size_m, mass_kg=part.mass_kg)  # type: ignore[arg-type]
+    return grip_of(shape_of(fields, folder), arm.gripper, FRICTION).width_m
+
+
+def _around(new: NewTask, arm: Arm) -> Around:
+    """Where the arm reaches both what stands at a station and the way above it."""
+    rings = [ring_of(arm.inverse, height, arm.nearest_m) for height in heights_m(new)]
+    found = [ring for ring in rings if ring is not None]
+    if len(found) < len(rings):
+        raise BadInput(
+            f"parts {heights_m(new)[1]:.2f} m above the table are out of the reach of the arm '{new.arm}': lower ones"
+        )
+    return Around(
+        max(ring.nearest_m for ring in found),
+        min(ring.farthest_m for ring in found),
+        min(min(ring.right_rad, ring.left_rad) for ring in found),
+    )

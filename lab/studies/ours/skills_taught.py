@@ -1,0 +1,63 @@
+"""The skills of a scene found, adapted or learned one after another, as a run does, without its durations and its order."""
+
+import time
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from lab.learning.problem import Problem
+from lab.mdp import greedy_path
+from lab.skills.prepared_scene import Prepared
+from lab.skills.trial import trial_of, try_out
+from lab.teaching.lesson_plan import Lesson, LessonPlan
+from lab.teaching.teacher import Teacher
+from lab.toolbox.index import KnownPolicies
+from lab.toolbox.policy import Policy
+from lab.toolbox.registry import Toolbox
+
+Key = tuple[str, str]  # sub-task, signature
+Known = Mapping[Key, Policy]
+
+
+def key_of(problem: Problem) -> Key:
+    """What a policy of this problem is known by."""
+    return problem.subtask, problem.mdp.signature
+
+
+def distinct(prepared: Prepared) -> list[Problem]:
+    """The problems of a scene, each once, under the skill that meets it first."""
+    return [*reversed({key_of(problem): problem for problem in reversed(prepared.problems.values())}.values())]
+
+
+def taught(
+    prepared: Prepared, known: Known, problems: Iterable[Problem], seed: int = 0
+) -> list[tuple[Lesson, float]]:
+    """A lesson of a run for each problem, and how long it took [s]; what one learns the next ones know."""
+    found, so_far = [], KnownPolicies.of(known.values())
+    with TemporaryDirectory() as folder:
+        teacher = Teacher(Toolbox(Path(folder)), seed=seed, trial=trial_of(prepared))
+        for problem in problems:
+            began, how = time.perf_counter(), prepared.task.subtask(problem.subtask)
+            lesson = teacher.find_or_teach(LessonPlan(problem, how.learner, how.gate, prepared.task.name), so_far)
+            so_far[lesson.policy.subtask, lesson.policy.signature] = lesson.policy
+            found.append((lesson, time.perf_counter() - began))
+    return found
+
+
+def spent(lesson: Lesson) -> tuple[int, int]:
+    """Episodes and helped steps of a lesson; none where the skill was there."""
+    return (0, 0) if lesson.result is None else (len(lesson.result.steps), lesson.result.helped_steps)
+
+
+def works(problem: Problem, policy: Policy) -> bool:
+    """Whether greedy steps lead to the goal from each start, gone one by one."""
+    mdp = problem.mdp
+    if policy.q.shape != mdp.successor.shape:
+        return False
+    return all(greedy_path(policy.q, mdp, mdp.n_states, start)[2] for start in mdp.starts or (mdp.start,))
+
+
+def fails(prepared: Prepared, problem: Problem, policy: Policy) -> bool:
+    """Whether a policy misses the goal step by step, or fails when its skill is carried out in physics."""
+    skill = prepared.skillset.skills[problem.name]
+    return not works(problem, policy) or try_out(prepared, skill, policy) is not None

@@ -1,0 +1,419 @@
+"""A new task file from a few words: an arm, parts, machines. The stations are laid out around the arm."""
+
+import re
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+from math import ceil, cos, floor, hypot, isfinite, pi, radians, sin
+from pathlib import Path
+from typing import NamedTuple
+
+from lab.errors import BadInput, counted, unknown
+from lab.tasks.robot_fields import MODELS
+from lab.tasks.task_fields import MAX_PARTS
+
+PART, MACHINE = "box:0.06x0.03x0.08:3", "press:30"  # where nothing is said
+SIZES = {"box": ("XxYxZ", 3), "cylinder": ("DIAMETERxHEIGHT", 2)}
+PART_WORDS = "SHAPE:SIZE:COUNT, in metres, such as box:0.12x0.015x0.12:2 or cup=cylinder:0.035x0.1:1"
+MACHINE_WORDS = "NAME:SECONDS, such as oven:60"
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,30}")
+LARGEST_M, SMALLEST_M, LONGEST_S = 0.5, 0.005, 86_400
+KG_M3 = 400.0  # of a part: wood, about
+HEAVIEST_KG, LIGHTEST_KG = 3.0, 0.01
+FRICTION, FORCE_N = 0.8, 25.0
+MACHINE_HIGH_M, AROUND_PART_M = 0.05, 0.06  # of a machine's box; its length and width beyond the part's
+COLUMNS, BUFFER_ROOM = 4, 2  # of a storage; parts that a buffer holds
+BETWEEN_M, GRIPPER_M = 0.04, 0.045  # at least: between parts of a station; of the open gripper beside a part
+OVER_M, CELL_M, LEVELS = 0.08, 0.12, 3  # under a carried part; cells of the workspace, and how many above one another
+GAPS_M = (0.15, 0.10, 0.06, 0.03)  # between stations, the widest that fits
+TURNS = (90, 75, 105, 120, 60, 135, 150)  # [degrees] from ahead to the first and to the last station
+SHARES = (
+    0.44,
+    0.52,
+    0.36,
+    0.6,
+    0.68,
+    0.76,
+    0.84,
+    0.92,
+)  # of the way from the nearest to the farthest place that is reached
+EDGE_M = 0.03  # of the reach that is left alone
+COLORS = ((0.62, 0.42, 0.22), (0.25, 0.45, 0.70), (0.35, 0.60, 0.35), (0.80, 0.65, 0.25), (0.65, 0.35, 0.45))
+FINISHES = ((0.70, 0.42, 0.16), (0.85, 0.30, 0.20), (0.20, 0.40, 0.55), (0.45, 0.55, 0.20))
+
+
+@dataclass(frozen=True)
+class NewPart:
+    """A kind of part: a box [x, y, z] or a cylinder [diameter, height] [m], and how many."""
+
+    name: str
+    shape: str
+    size_m: tuple[float, ...]
+    count: int
+
+    @property
+    def foot_m(self) -> tuple[float, float]:
+        """Its extents along x and y."""
+        return (self.size_m[0], self.size_m[1] if self.shape == "box" else self.size_m[0])
+
+    @property
+    def mass_kg(self) -> float:
+        """What it weighs, if it is of wood."""
+        share = 1.0 if self.shape == "box" else pi / 4
+        x, y = self.foot_m
+        return round(min(max(share * x * y * self.size_m[-1] * KG_M3, LIGHTEST_KG), HEAVIEST_KG), 3)
+
+
+@dataclass(frozen=True)
+class NewMachine:
+    """A machine, and how long it works on a part [s]."""
+
+    name: str
+    processing_s: float
+
+
+@dataclass(frozen=True)
+class NewTask:
+    """Parts that an arm brings from an input through all machines, in their order, to an output; buffers before machines."""
+
+    name: str
+    arm: str = "up6"
+    parts: tuple[NewPart, ...] = ()
+    machines: tuple[NewMachine, ...] = ()
+    buffers: bool = False
+
+    @property
+    def count(self) -> int:
+        """How many parts there are."""
+        return sum(part.count for part in self.parts)
+
+    @property
+    def foot_m(self) -> tuple[float, float]:
+        """The largest extents of its parts along x and y."""
+        return max(part.foot_m[0] for part in self.parts), max(part.foot_m[1] for part in self.parts)
+
+
+class Around(NamedTuple):
+    """Where an arm reaches: from nearest to farthest from its axis [m], turned so far from ahead to both sides [rad]."""
+
+    nearest_m: float
+    farthest_m: float
+    turn_rad: float
+
+
+class Placed(NamedTuple):
+    """A station where it is laid out: its middle x, y [m], and its parts' spots off that [m].
+
+    `said`: the file says the spots; else they are the rows that a station has by itself, a little closer to one another.
+    """
+
+    name: str
+    kind: str
+    capacity: int
+    x: float
+    y: float
+    spots: tuple[tuple[float, float], ...]
+    said: bool
+
+    def half_m(self, foot: tuple[float, float]) -> tuple[float, float]:
+        """How far parts with such a foot, and the gripper around them, reach from its middle at most."""
+        along, across = (max(abs(spot[axis]) for spot in self.spots) + foot[axis] / 2 + GRIPPER_M for axis in (0, 1))
+        return along, across
+
+
+# ---- from words ---------------------------------------------------------------------------------------------------
+
+
+def file_of(word: str) -> tuple[Path, str]:
+    """The file to be written and the task's name of NAME, with or without .toml; BadInput when it cannot be, or is there."""
+    path = Path(word if word.endswith(".toml") else f"{word}.toml")
+    if not NAME.fullmatch(path.stem):
+        raise BadInput(
+            f"name '{word}' (NAME): wanted up to 31 letters, digits, '_', '-' and spaces, a letter or digit first"
+        )
+    if path.exists():
+        raise BadInput(f"task file '{path}' (NAME): there is one already: choose another name, or remove it")
+    if not path.parent.is_dir():
+        raise BadInput(f"task file '{path}' (NAME): there is no folder '{path.parent}'")
+    return path, path.stem
+
+
+def arm_of_word(word: str) -> str:
+    """An arm that ships."""
+    if word not in MODELS:
+        raise unknown("arm", word, MODELS, "--arm")
+    return word
+
+
+def part_of_word(word: str, taken: Collection[str] = ()) -> NewPart:
+    """The kind of part that "cup=cylinder:0.035x0.1:1" means; without a name it has its shape's. Raises BadInput."""
+    where = f"part '{word}' (--part)"
+    found = re.fullmatch(r"(?:([^=:]*)=)?([^=:]*):([^=:]*):([^=:]*)", word)
+    if found is None:
+        raise BadInput(f"{where}: wanted {PART_WORDS}")
+    named, shape, size, count = found.groups()
+    if shape not in SIZES:
+        raise unknown("shape", shape, SIZES, where)
+    form, numbers = SIZES[shape]
+    edges = tuple(_number(edge) for edge in size.split("x"))
+    if len(edges) != numbers or not all(SMALLEST_M <= edge <= LARGEST_M for edge in edges):
+        raise BadInput(f"{where}: the size of a {shape} is {form}, each {SMALLEST_M} to {LARGEST_M} m, not '{size}'")
+    if not re.fullmatch(r"[0-9]{1,3}", count) or not 1 <= int(count) <= MAX_PARTS:
+        raise BadInput(f"{where}: how many: '{count}': allowed are 1 to {MAX_PARTS}")
+    own = next(name for n in range(1, MAX_PARTS + 2) if (name := shape if n == 1 else f"{shape}-{n}") not in taken)
+    name = own if named is None else named
+    _check_name(name, where, taken)
+    return NewPart(name, shape, edges, int(count))
+
+
+def machine_of_word(word: str, taken: Collection[str] = ()) -> NewMachine:
+    """The machine that "oven:60" means. Raises BadInput."""
+    where = f"machine '{word}' (--machine)"
+    name, colon, time = word.rpartition(":")
+    if not colon:
+        raise BadInput(f"{where}: wanted {MACHINE_WORDS}")
+    seconds = _number(time)
+    if not 0 <= seconds <= LONGEST_S:
+        raise BadInput(f"{where}: '{time}' seconds: allowed are 0 to {LONGEST_S}")
+    _check_name(name, where, taken)
+    return NewMachine(name, seconds)
+
+
+def new_task(name: str, arm: str, parts: Sequence[str], machines: Sequence[str], buffers: bool) -> NewTask:
+    """What options, or answers, ask for. Raises BadInput."""
+    kinds: list[NewPart] = []
+    for word in parts or (PART,):
+        kinds.append(part_of_word(word, [part.name for part in kinds]))
+    stations: list[NewMachine] = []
+    for word in machines:
+        stations.append(
+            machine_of_word(word, ["input", "output", *(m.name for m in stations), *(p.name for p in kinds)])
+        )
+    found = NewTask(name, arm_of_word(arm), tuple(kinds), tuple(stations), buffers)
+    if found.count > MAX_PARTS:
+        raise BadInput(f"{found.count} parts (--part): allowed are 1 to {MAX_PARTS} in all")
+    return found
+
+
+def _number(text: str) -> float:
+    """A number, -1 for what is none."""
+    try:
+        value = float(text)
+    except ValueError:
+        return -1.0
+    return value if isfinite(value) else -1.0
+
+
+def _check_name(name: str, where: str, taken: Collection[str]) -> None:
+    if not NAME.fullmatch(name):
+        raise BadInput(f"{where}: the name '{name}': wanted letters, digits, '_', '-' and spaces, up to 31")
+    if name in taken:
+        raise BadInput(f"{where}: the name '{name}' is taken: {', '.join(taken)}")
+
+
+# ---- where it stands ----------------------------------------------------------------------------------------------
+
+
+def heights_m(new: NewTask) -> tuple[float, float]:
+    """The lowest height at which the tool takes a part, about, and that at which it carries one from station to station."""
+    tallest = max(part.size_m[-1] for part in new.parts)
+    return SMALLEST_M, round(MACHINE_HIGH_M + 2 * tallest + OVER_M, 3)
+
+
+def layouts(new: NewTask, around: Around, between_m: float | None = None) -> Iterator[tuple[Placed, ...]]:
+    """The stations on an arc around the arm, in the order of the route; the widest apart first, none when they do not fit.
+
+    `between_m` [m]: between the parts of a station, None: as stations have them by themselves.
+    """
+    stations = _stations(new, between_m)
+    for gap, turn, share in product(GAPS_M, TURNS, SHARES):
+        if radians(turn) > around.turn_rad:
+            continue
+        far = around.nearest_m + share * (around.farthest_m - around.nearest_m)
+        angles = [radians(turn) * (1 - 2 * number / (len(stations) - 1)) for number in range(len(stations))]
+        placed = tuple(
+            one._replace(x=round(far * cos(angle), 3), y=round(far * sin(angle), 3))
+            for one, angle in zip(stations, angles, strict=True)
+        )
+        if all(_reached(one, around) for one in placed) and _apart(placed, new.foot_m, gap):
+            yield placed
+
+
+def does_not_fit(new: NewTask, around: Around) -> BadInput:
+    """The error for a task without a layout."""
+    return BadInput(
+        f"{counted(len(_stations(new)), 'station')} for {counted(new.count, 'part')} do not fit around the arm '{new.arm}', "
+        f"which reaches {around.nearest_m:.2f} to {around.farthest_m:.2f} m there: take fewer or smaller parts, or fewer machines"
+    )
+
+
+def _stations(new: NewTask, between_m: float | None = None) -> list[Placed]:
+    """The stations in the order of the route, all at the arm's foot."""
+    pitch = [foot + (between_m or BETWEEN_M) for foot in new.foot_m]
+
+    def placed(name: str, kind: str, capacity: int, columns: int) -> Placed:
+        columns = min(columns, capacity)
+        rows = ceil(capacity / columns)
+        at = product(range(columns), range(rows))
+        spots = [((c - (columns - 1) / 2) * pitch[0], (r - (rows - 1) // 2) * pitch[1]) for c, r in at]
+        spots = sorted(spots, key=lambda spot: (round(hypot(*spot), 6), spot))[:capacity]
+        return Placed(name, kind, capacity, 0.0, 0.0, tuple(spots), between_m is not None and capacity > 1)
+
+    found = [placed("input", "storage", new.count, COLUMNS)]
+    for machine in new.machines:
+        if new.buffers:
+            found.append(placed(f"{machine.name}_buffer", "buffer", BUFFER_ROOM, 1))
+        found.append(placed(machine.name, "machine", 1, 1))
+    return [*found, placed("output", "storage", new.count, COLUMNS)]
+
+
+def _reached(one: Placed, around: Around) -> bool:
+    far = [hypot(one.x + x, one.y + y) for x, y in one.spots]
+    return around.nearest_m + EDGE_M <= min(far) and max(far) <= around.farthest_m - EDGE_M
+
+
+def _apart(placed: Sequence[Placed], foot: tuple[float, float], gap: float) -> bool:
+    for one, other in combinations(placed, 2):
+        (along, across), (length, width) = one.half_m(foot), other.half_m(foot)
+        if abs(one.x - other.x) < along + length + gap and abs(one.y - other.y) < across + width + gap:
+            return False
+    return True
+
+
+# ---- its text -----------------------------------------------------------------------------------------------------
+
+
+def text_of(new: NewTask, placed: Sequence[Placed], opening_m: float | None = None) -> str:
+    """The task file; `opening_m`: the fingers open no farther, None: all the way."""
+    parts = "\n".join(_part(new, part, number) for number, part in enumerate(new.parts))
+    stations = "\n".join(_station(new, one) for one in placed)
+    return "\n".join([_head(new, opening_m), parts, _workspace(new, placed), stations, _OBSTACLES, _LEARNING])
+
+
+def _head(new: NewTask, opening_m: float | None) -> str:
+    way = " -> ".join(["input", *(machine.name for machine in new.machines), "output"])
+    kinds = ", ".join(f"{part.count} x {part.name}" for part in new.parts)
+    opening = "" if opening_m is None else f"\nopening_m = {opening_m:<16}# between the open fingers"
+    return f"""\
+# {kinds}: {way}
+# Change a number, move a station, and look: lab task check {new.name}.toml --plot cell.png    Then: lab run {new.name}.toml
+# Units: metres, radians, seconds, kilograms, newtons. The robot stands at the origin; z = 0 is the table top.
+
+name = "{new.name}"
+title = "{new.name}: {way}"
+
+[robot]
+model = "{new.arm}"               # {", ".join(MODELS)}, or a URDF file beside this one
+start = "input"             # where the arm waits at time 0
+speed_m_s = 0.5             # along the path
+acceleration_m_s2 = 2.0
+grip_force_n = {FORCE_N}{opening}
+"""
+
+
+def _part(new: NewTask, part: NewPart, number: int) -> str:
+    sizes = "x, y, z" if part.shape == "box" else "diameter and height"
+    stages = []
+    for machine in new.machines:
+        buffer = f', buffer = "{machine.name}_buffer"' if new.buffers else ""
+        stages.append(f'{{ station = "{machine.name}"{buffer} }}' if buffer else f'"{machine.name}"')
+    route = "\n".join(f"  {stage}," for stage in ['"input"', *stages, '"output"'])
+    area = (0.004, 0.004, 0.06 if part.shape == "box" else 0.0)
+    return f"""\
+[[parts]]                   # a kind of part
+name = "{part.name}"
+count = {part.count}                   # unless --parts {part.name}=N says otherwise
+shape = "{part.shape}"
+size_m = {_list(part.size_m)}  # {sizes}
+mass_kg = {part.mass_kg}
+friction = {FRICTION}
+color = {_list(COLORS[number % len(COLORS)])}
+area = {_list(area)}  # it stands on its spot at the start within +- x, +- y [m], +- yaw [rad]
+# its way; a buffer is used only when the machine ahead of it is busy
+routes = [[
+{route}
+]]
+"""
+
+
+def _workspace(new: NewTask, placed: Sequence[Placed]) -> str:
+    low = round(heights_m(new)[1] - CELL_M / 2, 3)
+    ahead = max(hypot(one.x, one.y) for one in placed)  # the way from one side to the other leads there
+    lower, shape = [], []
+    for axis, others in ((0, [ahead]), (1, [0.0])):
+        at = [((one.x, one.y)[axis], one.half_m(new.foot_m)[axis] + CELL_M) for one in placed]
+        first = floor(min(x - half for x, half in at) / CELL_M)
+        lower.append(round(CELL_M * first, 3))
+        shape.append(ceil(max(*others, *(x + half for x, half in at)) / CELL_M) - first)
+    return f"""\
+[workspace]                 # the grid in which carrying is learned: where the finger tips may go between stations
+lower_m = {_list((*lower, low))}
+cell_m = {_list((CELL_M,) * 3)}
+shape = [{shape[0]}, {shape[1]}, {LEVELS}]
+
+# ---- stations: pose = [x, y, yaw]; a part stands there with its x axis along the yaw ------------------------------
+"""
+
+
+def _station(new: NewTask, one: Placed) -> str:
+    lines = [
+        "[[stations]]",
+        f'name = "{one.name}"',
+        f'kind = "{one.kind}"',
+        f"pose = {_list((one.x, one.y, 0.0))}",
+        f"capacity = {one.capacity}",
+    ]
+    if one.said:
+        lines.append("spots = [                   # where parts stand: x, y, yaw off the pose")
+        lines += [f"  {_list((*spot, 0.0))}," for spot in one.spots]
+        lines.append("]")
+    order = [machine.name for machine in new.machines]
+    if one.name in order:
+        number = order.index(one.name)
+        size = (*(round(edge + AROUND_PART_M, 3) for edge in new.foot_m), MACHINE_HIGH_M)
+        lines += [
+            f"processing_s = {float(new.machines[number].processing_s)}",
+            'body = "box"                # or a URDF or mesh file beside this one; parts stand on top of a box',
+            f"size_m = {_list(size)}",
+            f"finish = {_list(FINISHES[number % len(FINISHES)])} # the colour of parts that are done here",
+        ]
+    return "\n".join([*lines, ""])
+
+
+def _list(numbers: Sequence[float]) -> str:
+    return f"[{', '.join(str(round(float(number), 4)) for number in numbers)}]"
+
+
+_OBSTACLES = """\
+# ---- what stands in the way: take the # away, and it does ----------------------------------------------------------
+# [[obstacles]]
+# name = "tower"
+# position_m = [0.5, 0.3]
+# cubes = 7                 # stacked, 6 cm each; or size_m = [0.4, 0.02, 0.2] and yaw, for a wall
+# area = [0.04, 0.04]       # it stands within +- x, +- y of its position, drawn from the seed
+"""
+
+_LEARNING = """\
+# ---- how each sub-task is learned ----------------------------------------------------------------------------------
+
+[subtasks.transfer]
+rewards = { goal = 1.5, step = -0.1 }
+learner = { learner = "dyna-q", alpha = 0.95, discount = 0.99, beta = 1.3, episodes = 200, max_steps = 200 }
+gate = { gate = "ccrl", lambda_threshold = 0.05, omega = 7, first_episode = 10, window = 5 }
+
+[subtasks.grasp]
+rewards = { goal = 1.5, step = -0.1 }
+learner = { learner = "dyna-q", alpha = 0.95, discount = 0.99, beta = 1.3, episodes = 1500, max_steps = 200 }
+gate = { gate = "ccrl", lambda_threshold = 0.05, omega = 7, first_episode = 30, window = 5, budget = 1000 }
+
+[subtasks.place]
+rewards = { goal = 1.5, step = -0.1 }
+learner = { learner = "dyna-q", alpha = 0.95, discount = 0.99, beta = 1.3, episodes = 200, max_steps = 200 }
+gate = { gate = "ccrl", lambda_threshold = 0.05, omega = 7, first_episode = 10, window = 5, budget = 500 }
+
+# ---- the order of the robot's transfers ----------------------------------------------------------------------------
+
+[sequencing]
+method = "srl-time"
+episodes = 1000
+"""

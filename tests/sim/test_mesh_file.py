@@ -1,0 +1,29 @@
+"""Vertices of mesh files, both kinds of STL and OBJ."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lab.sim.mesh_file import vertices
+
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.5]])
+
+
+def test_the_same_triangle_from_every_kind(tmp_path: Path) -> None:
+    obj, text, binary = (tmp_path / name for name in ("a.obj", "b.stl", "c.STL"))
+    obj.write_text("vn 0 0 1\n" + "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS) + "f 1 2 3\n")
+    body = "".join(f"vertex {x} {y} {z}\n" for x, y, z in CORNERS)
+    text.write_text(f"solid thing\nfacet normal 0 0 1\nouter loop\n{body}endloop\nendfacet\nendsolid\n")
+    data = np.array([[0, 0, 1], *CORNERS], "<f4").tobytes() + b"\0\0"
+    binary.write_bytes(b"solid".ljust(80, b"\0") + struct.pack("<I", 1) + data)
+    for path in (obj, text, binary):
+        assert vertices(path) == pytest.approx(CORNERS)
+
+
+def test_a_binary_stl_that_is_cut_off_is_no_mesh(tmp_path: Path) -> None:
+    path = tmp_path / "cut.stl"
+    path.write_bytes(b"\xff" * 80 + struct.pack("<I", 2) + b"\0" * 60)
+    with pytest.raises(UnicodeDecodeError):
+        vertices(path)
