@@ -113,8 +113,8 @@ def toml_of(value: Any) -> str:
 
 
 @settings(max_examples=150)
-@given(st.data())
-def test_no_change_of_a_file_is_a_traceback(data: st.DataObject, folder: Path) -> None:
+@given(data=st.data())
+def test_no_change_of_a_file_is_a_traceback(folder: Path, data: st.DataObject) -> None:
     document = copy.deepcopy(CHANGED[data.draw(st.sampled_from(sorted(CHANGED)))])
     for _ in range(data.draw(st.integers(1, 2))):
         *way, last = data.draw(st.sampled_from(places_in(document)))
