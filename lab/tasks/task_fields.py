@@ -118,8 +118,10 @@ class Station(Record):
 
     @model_validator(mode="after")
     def _body_and_spots(self) -> Self:
-        if (self.approach == "camera") == (self.grid is None):
-            raise ValueError(f"station '{self.name}': approach = 'camera' and grid belong together")
+        if self.approach == "camera" and self.grid is None:
+            raise ValueError(f"station '{self.name}': approach = 'camera' needs a grid, through which the camera leads")
+        if self.approach != "camera" and self.grid is not None:
+            raise ValueError(f"station '{self.name}': grid is for approach = 'camera', not '{self.approach}'")
         if self.spots is not None and len(self.spots) != self.capacity:
             raise ValueError(
                 f"station '{self.name}' has {len(self.spots)} spots and the capacity {self.capacity}: wanted as many"
