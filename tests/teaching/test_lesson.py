@@ -293,4 +293,6 @@ def test_as_many_parts_as_both_ends_hold(task: Task) -> None:
         s.model_copy(update={"capacity": 2}) if s.name == "finished_plate" else s for s in task.stations
     )
     small = task.changed(stations=few)
+    breakfast = load("breakfast")  # its tray holds eight, one of them a cup
+    assert breakfast.fitting(9) == (*["slice"] * 7, "cup")
     assert [task.fitting(3), small.fitting(3), small.fitting(1)] == [("slice",) * n for n in (3, 2, 1)]
