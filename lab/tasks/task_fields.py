@@ -179,6 +179,11 @@ class Part(PartFields):
         stages = (stage for route in self.routes for stage in route)
         return tuple(dict.fromkeys(name for stage in stages for name in (stage.buffer, stage.station) if name))
 
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """The stations at which its routes begin and end, each once."""
+        return tuple(dict.fromkeys(route[at].station for route in self.routes for at in (0, -1)))
+
 
 class Obstacle(Record):
     """What stands in the way at `position_m` [m], within +- `area` [m] of it: a stack of cubes, or a box of `size_m`."""
