@@ -54,7 +54,7 @@ class Teacher:
         if found is not None and not _belongs(found, problem.mdp):
             found = None
         if found is not None and found.solved and fits(found.q, problem, plan.learner):
-            return _reused(plan, found, "it was learned in exactly this problem")
+            return _reused(plan, found, f"it was learned in exactly this problem{_elsewhere(found, plan)}")
         fitting = None
         if problem.environment is None:
             fitting = best_fit(self._candidates(known, problem), problem.mdp, plan.learner.discount)
@@ -63,7 +63,7 @@ class Teacher:
             failure = None if self.trial is None else self.trial(problem, policy)
             if failure is None:
                 self._remember(problem, {"policy": reference(policy)})
-                return _reused(plan, policy, f"'{policy.name}': {fitness.reason}", fitness)
+                return _reused(plan, policy, _reason(policy, fitness, plan), fitness)
             fitting = policy, replace(fitness, verdict="refuse", reason=f"in physics, {failure}")
         if found is not None:
             return replace(self.teach(replace(plan, unfinished=found)), reason=f"'{found.name}' was left unfinished")
@@ -73,7 +73,7 @@ class Teacher:
         parent = policy if fitness.verdict == "adapt" else None
         lesson = self.teach(replace(plan, warm=parent))
         saved = (0, 0) if parent is None else _saved(plan, parent, lesson.result)
-        return replace(lesson, reason=f"'{policy.name}': {fitness.reason}", parent=parent, fitness=fitness, saved=saved)
+        return replace(lesson, reason=_reason(policy, fitness, plan), parent=parent, fitness=fitness, saved=saved)
 
     def _candidates(self, known: KnownPolicies, problem: Problem) -> Iterator[Policy]:
         """As `candidates`, but the one that was used for this problem before comes first: the next run does the same."""
@@ -202,6 +202,16 @@ def _record_key(problem: Problem) -> str:
 
 def _reused(plan: LessonPlan, policy: Policy, reason: str, fitness: Fitness | None = None) -> Lesson:
     return Lesson(policy, "reused", reason=reason, fitness=fitness, saved=_saved(plan, policy))
+
+
+def _reason(policy: Policy, fitness: Fitness, plan: LessonPlan) -> str:
+    """Which policy was looked at, of which other task, and what was found of it."""
+    return f"'{policy.name}'{_elsewhere(policy, plan)}: {fitness.reason}"
+
+
+def _elsewhere(policy: Policy, plan: LessonPlan) -> str:
+    """Which task a policy was learned for, where that is another one."""
+    return "" if policy.task == plan.task else f" of task '{policy.task}'"
 
 
 def _saved(plan: LessonPlan, found: Policy, now: SessionResult | None = None) -> tuple[int, int]:
