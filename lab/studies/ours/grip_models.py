@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 PART, MASS_KG, FRICTION = "part", 0.1, 0.8
-GRASPABLE_M, FITTED_M = 0.036, 0.03  # the middle one of three extents: up to this it keeps its size; else it is scaled to that
+GRASPABLE_M, FITTED_M = (
+    0.036,
+    0.03,
+)  # the middle one of three extents: up to this it keeps its size; else it is scaled to that
 SETTLE_STEPS = 480  # of physics, until a part that was dropped is at rest
 TABLE_RGBA = (0.8, 0.8, 0.8, 1.0)
 
