@@ -107,7 +107,8 @@ def _check_reach(arm: Arm, station: Station, at: ToolPose) -> None:
     if arm.inverse(at) is None or hypot(at.x, at.y) < arm.nearest_m:
         raise BadInput(
             f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m, by "
-            f"pose = {list(station.pose)}, is {hypot(at.x, at.y):.2f} m from the robot; the arm '{arm.name}' {arm.reach_in_words(at.z)}"
+            f"pose = {list(station.pose)}, is {hypot(at.x, at.y):.2f} m from the robot; "
+            f"the arm '{arm.name}' {arm.reach_in_words(at.z)}"
         )
 
 
