@@ -46,17 +46,18 @@ def prepare(task: Task, order: Order, seed: int, only: str | None = None) -> Pre
     BadInput for whatever cannot be; writes nothing.
     """
     began = time.perf_counter()
-    check_scene(task)
-    check_apart(task, len(order))
-    skillset = SkillSet.of(task, order)
-    layout = lay_out(task, order, seed)
-    surveys = Surveys(task, order, layout)
-    scene = scene_in_words(task, order, layout)
-    problems = {
-        name: replace(skill.setup(surveys), scene=scene, arm=task.robot.model)
-        for name, skill in skillset.skills.items()
-        if only in (None, name)
-    }
+    with task.in_its_file():
+        check_scene(task)
+        check_apart(task, len(order))
+        skillset = SkillSet.of(task, order)
+        layout = lay_out(task, order, seed)
+        surveys = Surveys(task, order, layout)
+        scene = scene_in_words(task, order, layout)
+        problems = {
+            name: replace(skill.setup(surveys), scene=scene, arm=task.robot.model)
+            for name, skill in skillset.skills.items()
+            if only in (None, name)
+        }
     return Prepared(task, order, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
 
 
@@ -68,9 +69,9 @@ def scene_in_words(task: Task, order: Order, layout: Layout) -> str:
 
 
 def check_task(file: str, toasts: int | None, seed: int) -> tuple[list[str], list[str]]:
-    """What is wrong with a task file, its scene and its problems for so many parts of its first kind, or with a cell or a world; warnings.
+    """What is wrong with a task file, its scene and its problems, or with a cell or a world; and warnings.
 
-    Without a number: a task or a cell for its own order. A warning is of what
+    toasts: how many parts of the first kind; None: a task or a cell for its own order. A warning is of what
     can be learned, but hardly by a learner that nobody helps.
     Raises BadInput for a file that is not there, and for a number that this kind of file never takes.
     """

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from lab.tasks.toml_text import Loc
+
 TOASTER = {"body": "toaster.urdf", "floor_m": 0.015, "approach": "camera", "finish": [0.70, 0.42, 0.16]}
 TOASTER_MARKER = [0.0, 0.03825, 0.1]
 APPLIER = {"body": "applier.urdf", "floor_m": 0.02}
@@ -29,6 +31,25 @@ def renewed(raw: dict[str, Any]) -> dict[str, Any]:
     if isinstance(subtasks, dict) and "butter" in subtasks:
         kept["subtasks"] = {("cover" if name == "butter" else name): table for name, table in subtasks.items()}
     return kept
+
+
+def own_loc(raw: dict[str, Any], loc: Loc) -> Loc:
+    """The way to a value in the file itself, given the way in what `renewed` made of it."""
+    if renewed(raw) is raw or not loc:
+        return loc
+    match loc:
+        case ("parts", 0, "routes", 0, *rest):
+            return ("route", *rest)
+        case ("parts", *rest):
+            return ("slices", *rest[1:]) if "slices" in raw else ("route",)
+        case ("stations", _, "grid", *rest):
+            return ("insert", *rest)
+        case ("processes", name, *rest):
+            number = next(n for n, s in enumerate(raw["stations"]) if isinstance(s, dict) and s.get("process") == name)
+            return ("stations", number, *(was for was, (new, _) in HEAD.items() if rest[:1] == [new]))
+        case ("subtasks", "cover", *rest) if "butter" in raw["subtasks"]:
+            return ("subtasks", "butter", *rest)
+    return loc
 
 
 def _station(station: dict[str, Any], grid: Any) -> dict[str, Any]:

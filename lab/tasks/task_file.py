@@ -1,6 +1,7 @@
 """Task files: tasks/*.toml -> validated frozen models. The only place where raw text is checked."""
 
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, TypeVar, cast, get_args
 
@@ -9,13 +10,16 @@ from pydantic import ValidationError
 from lab.errors import BadInput, unknown
 from lab.files import tasks_folder
 from lab.tasks.cell_file import CellFile
-from lab.tasks.first_form import renewed
+from lab.tasks.first_form import own_loc, renewed
 from lab.tasks.grid_world import RANDOM, GridWorld, from_text, from_words
 from lab.tasks.record import MAX_SHORT_BYTES, Record, read_text
 from lab.tasks.task import Task
-from lab.tasks.toml_text import TomlText, explain
+from lab.tasks.task_faults import fields_at, loc_of, refusal, within
+from lab.tasks.toml_text import TomlText, explain, finding
 
 _SAYS_WORLD = re.compile(r"""^[ \t]*kind[ \t]*=[ \t]*["']world["']""", re.MULTILINE)
+
+_OF_WHOLE = ("value_error", "assertion_error")  # faults that a record finds in more than one of its fields
 
 FileKind = Literal["task", "cell", "world"]  # of what a file holds
 Checked = TypeVar("Checked", bound=Record)
@@ -93,7 +97,7 @@ def load_any(word: str, wanted: FileKind | None = None) -> Task | CellFile | Gri
     _check_wanted(word, kind, wanted)
     if kind == "cell":
         return CellFile.checked(toml)
-    return _task(toml) if kind == "task" else _checked(GridWorld, toml.path, toml.raw)
+    return _task(toml) if kind == "task" else _checked(GridWorld, toml, toml.raw)
 
 
 def describe(word: str) -> tuple[str, dict[str, Any]]:
@@ -120,7 +124,7 @@ def _kind(toml: TomlText) -> FileKind:
     kind = toml.raw.get("kind", "task")
     if kind in get_args(FileKind):
         return cast(FileKind, kind)
-    raise toml.refusal(("kind",), str(unknown("kind", kind, ("cell", "world"), "of task file")))
+    raise toml.refusal(("kind",), str(unknown("kind", kind, get_args(FileKind), "of task file")))
 
 
 def _toml(path: Path) -> TomlText:
@@ -131,15 +135,20 @@ def _toml(path: Path) -> TomlText:
 
 
 def _task(toml: TomlText) -> Task:
-    task = _checked(Task, toml.path, renewed(toml.raw))
-    task._folder = toml.path.resolve().parent
+    task = _checked(Task, toml, renewed(toml.raw))
+    task._folder, task._toml = toml.path.resolve().parent, toml
     return task
 
 
-def _checked(model: type[Checked], path: Path, raw: dict[str, Any]) -> Checked:
+def _checked(model: type[Checked], toml: TomlText, raw: dict[str, Any]) -> Checked:
     try:
         return model.model_validate(raw)
     except ValidationError as error:
-        raise BadInput(f"{path}: {explain(error)}") from None
+        first = finding(error)
+        said = explain(error, partial(fields_at, model), partial(own_loc, toml.raw))
+        at = first["loc"]
+        if first["type"] in _OF_WHOLE:
+            at = at + within(raw, at, first["msg"]) if at else loc_of(raw, first["msg"])
+        raise toml.refusal(own_loc(toml.raw, at), said) from None
     except BadInput as error:
-        raise BadInput(f"{path}: {error}") from None
+        raise refusal(toml, str(error)) from None
