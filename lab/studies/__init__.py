@@ -93,6 +93,12 @@ def _changed_scenes(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return changed_scenes(job, reading)
 
 
+def _grips(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.grips import grips
+
+    return grips(job, reading)
+
+
 def _reuse(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.reuse import reuse
 
@@ -150,6 +156,7 @@ STUDIES: dict[str, Study] = {
     "changed-scenes": Study(
         "Skills in changed scenes: used as they are, adapted or learned, beside learning all anew", _changed_scenes
     ),
+    "grips": Study("Parts that others made: which can be gripped, and whether they arrive", _grips),
     "reuse": Study(
         "Several tasks in one toolbox, one after the other: does a lab that has lived longer learn less?", _reuse
     ),
