@@ -132,9 +132,12 @@ def _check_rider(loaded: Kind, gripper: Gripper) -> None:
     assert loaded.rider is not None
     reach = loaded.shape.height_m + loaded.rider.shape.height_m - loaded.grip.up_m
     across = 2 * replace(loaded, rider=None, shape=loaded.rider.shape).carried_half_m()[1]
-    if reach > gripper.depth_m - PALM_M or across > loaded.grip.width_m:
+    what, room = f"part '{loaded.rider.name}' cannot be carried on '{loaded.part.name}'", gripper.depth_m - PALM_M
+    if across > loaded.grip.width_m:
         raise BadInput(
-            f"part '{loaded.rider.name}' cannot be carried on '{loaded.part.name}': it is {across:.3f} m wide between "
-            f"fingers {loaded.grip.width_m:.3f} m apart, and its top is {reach:.3f} m above the finger tips, at most "
-            f"{gripper.depth_m - PALM_M:.3f} m is room for"
+            f"{what}: it is {across:.3f} m wide where the fingers that hold the pallet are {loaded.grip.width_m:.3f} m apart"
+        )
+    if reach > room:
+        raise BadInput(
+            f"{what}: its top would be {reach:.3f} m above the finger tips, and there is room for {room:.3f} m"
         )

@@ -231,5 +231,5 @@ def _draw_place(
             return x, y
     raise BadInput(
         f"obstacle '{obstacle.name}' stands on station '{hit}' or too near for the gripper: at ({x:.2f}, {y:.2f}) m "
-        f"its {length:g} x {width:g} m meet where parts are set down; move one of them"
+        f"its {length:g} x {width:g} m meet where parts are set down; change position_m or area, or move the station"
     )

@@ -4,13 +4,16 @@ from itertools import combinations
 from math import hypot, sin
 
 from lab.errors import BadInput
+from lab.sim import models, station_bodies
 from lab.sim.arm import Arm
 from lab.sim.arm_models import arm_of
+from lab.sim.camera import Camera
 from lab.sim.kinds import Kind, Spot, comes_as, kinds_of
 from lab.sim.kinematics import ToolPose
 from lab.sim.places import Places, Rectangle
+from lab.sim.scene import in_grid, marker_of
 from lab.tasks.task import Task
-from lab.tasks.task_fields import Station
+from lab.tasks.task_fields import CameraGrid, Station
 
 ACROSS = 0.3  # sine of the angle at most between the fingers and the way in
 OVER_M = 0.01  # [m] between a carried part and what stands below its way
@@ -28,6 +31,9 @@ def check_scene(task: Task) -> None:
     low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
     _check_lowest(places, low)
     for station in task.stations:
+        station_bodies.check(station, task.folder)
+        if station.grid is not None:
+            _check_seen(task, station, station.grid)
         spots, own = places.spots(station), places.kinds_at(station.name)
         for kind in own:
             _check_grid(station, kind, places.floor(station))
@@ -51,6 +57,28 @@ def _check_lowest(places: Places, low: float) -> None:
             raise BadInput(
                 f"workspace.lower_m: the lowest tool height {low:.3f} m would sweep a carried {kind.name} through what "
                 f"stands at '{where}': at least {standing[where] + OVER_M + kind.grip.up_m:.3f} needed"
+            )
+
+
+def _check_seen(task: Task, station: Station, grid: CameraGrid) -> None:
+    """BadInput when a grid does not hold its start and its station's marker, or the camera does not see them."""
+    assert task.camera is not None
+    camera = Camera.overhead(task.camera.position_m, task.camera.field_of_view_rad, task.camera.pixels)
+    marker, start = marker_of(station, grid), grid.start_m
+    gripper = (start[0] + models.MARKER_OUT, start[1], grid.height_m + models.MARKER_UP)
+    ends = [low + count * grid.cell_m for low, count in zip(grid.origin_m, grid.shape, strict=True)]
+    for field, place, shown in (("start_m", start, gripper), ("marker_m", marker[:2], marker)):
+        if not in_grid(grid, place):
+            raise BadInput(
+                f"station '{station.name}': grid.{field}: it is at ({place[0]:.2f}, {place[1]:.2f}) m, outside the grid: "
+                f"({grid.origin_m[0]:.2f}, {grid.origin_m[1]:.2f}) to ({ends[0]:.2f}, {ends[1]:.2f}) m"
+            )
+        across, down, far = camera.pixel_from_world() @ (*shown, 1.0)
+        if far <= 0 or not (0 <= across / far < camera.width and 0 <= down / far < camera.height):
+            raise BadInput(
+                f"camera.position_m = {list(task.camera.position_m)}: the marker at ({shown[0]:.2f}, {shown[1]:.2f}) m, of "
+                f"{field} of the grid of '{station.name}', is out of its picture; "
+                f"field_of_view_rad = {camera.field_of_view_rad:g}"
             )
 
 
@@ -78,8 +106,9 @@ def _check_side(station: Station, kind: Kind) -> None:
 def _check_reach(arm: Arm, station: Station, at: ToolPose) -> None:
     if arm.inverse(at) is None or hypot(at.x, at.y) < arm.nearest_m:
         raise BadInput(
-            f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m is "
-            f"{hypot(at.x, at.y):.2f} m from the robot; the arm '{arm.name}' {arm.reach_in_words(at.z)}"
+            f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m, by "
+            f"pose = {list(station.pose)}, is {hypot(at.x, at.y):.2f} m from the robot; "
+            f"the arm '{arm.name}' {arm.reach_in_words(at.z)}"
         )
 
 
@@ -94,7 +123,7 @@ def check_apart(task: Task, parts: int) -> None:
                     raise BadInput(
                         f"stations '{one}' and '{other}' overlap: at ({a.x:.2f}, {a.y:.2f}) and ({b.x:.2f}, {b.y:.2f}) m "
                         f"parts, machines and the gripper around them need {2 * a.half_along:.2f} x "
-                        f"{2 * a.half_across:.2f} and {2 * b.half_along:.2f} x {2 * b.half_across:.2f} m"
+                        f"{2 * a.half_across:.2f} and {2 * b.half_along:.2f} x {2 * b.half_across:.2f} m: change the pose of one"
                     )
 
 

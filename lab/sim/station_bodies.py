@@ -1,14 +1,17 @@
 """What stands at a station: a slab, a box, or a URDF or mesh file, put into the world and measured."""
 
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.files import beside_or_asset
 from lab.sim import urdf_reader
 from lab.sim.frames import Rgba, Vector
+from lab.sim.mesh_file import MAX_BYTES
 from lab.sim.world import World
 from lab.tasks.task_fields import Station
 
@@ -19,6 +22,9 @@ RGBA: dict[str, Rgba] = {
 }
 FRICTION = {"storage": 0.8, "buffer": 0.8, "machine": 0.5}
 MESHES = (".obj", ".stl")
+SMALLEST_M, LARGEST_M = 0.01, 3.0  # of a body's longest edge: beyond them its unit is not the metre
+HEAD_JOINTS, HEAD_LINK = ("head_x", "head_z"), "head"  # of a machine's own head, across and up
+Array = NDArray[np.float64]
 
 
 def build(world: World, station: Station, slab: tuple[Vector, Vector], folder: Path) -> None:
@@ -37,28 +43,70 @@ def build(world: World, station: Station, slab: tuple[Vector, Vector], folder: P
     world.friction(station.name, FRICTION[station.kind])
 
 
+def check(station: Station, folder: Path) -> None:
+    """BadInput for a body from a file that cannot be read or is in another unit, and for one without the head that it needs."""
+    is_file = station.stands_on not in ("slab", "box")
+    if is_file:
+        low, high = bounds(station, folder)
+        longest = max(b - a for a, b in zip(low, high, strict=True))
+        if not SMALLEST_M <= longest <= LARGEST_M:
+            raise BadInput(
+                f"station '{station.name}': body = '{station.stands_on}': it is {longest:.3g} m long: allowed are "
+                f"{SMALLEST_M} to {LARGEST_M} m; its unit must be the metre"
+            )
+    if station.process is None:
+        return
+    root = urdf_reader.read(_file(station, folder)) if station.stands_on.lower().endswith(".urdf") else None
+    names = {} if root is None else {kind: [one.get("name") for one in root.iter(kind)] for kind in ("joint", "link")}
+    lacking = [f"joint '{name}'" for name in HEAD_JOINTS if name not in names.get("joint", [])]
+    lacking += [f"link '{HEAD_LINK}'"] if HEAD_LINK not in names.get("link", []) else []
+    if lacking:
+        raise BadInput(
+            f"station '{station.name}': process = '{station.process}' is carried out by a head, and its body "
+            f"{station.stands_on} has no {', no '.join(lacking)}: wanted a URDF with them, such as applier.urdf"
+        )
+
+
 def bounds(station: Station, folder: Path) -> tuple[Vector, Vector]:
-    """The lowest and highest corner [m] of a body from a file, in its own axes."""
-    return _bounds(_file(station, folder))
+    """The lowest and highest corner [m] of a body from a file, in its own axes. Raises BadInput."""
+    path = _file(station, folder)
+    try:
+        return _bounds(path)
+    except BadInput as error:
+        said = str(error).removeprefix(f"{path}: ")
+        raise BadInput(f"station '{station.name}': body = '{station.stands_on}': {said}") from None
 
 
 @cache
 def _bounds(path: Path) -> tuple[Vector, Vector]:
-    if path.suffix.lower() in MESHES:
-        import trimesh
-
-        mesh = trimesh.load(path, force="mesh")
-        low, high = np.asarray(mesh.bounds, dtype=float)
-    else:
-        low, high = urdf_reader.bounds(path)
+    low, high = _mesh_bounds(path) if path.suffix.lower() in MESHES else urdf_reader.bounds(path)
     return tuple(map(float, low)), tuple(map(float, high))  # type: ignore[return-value]
 
 
+def _mesh_bounds(path: Path) -> tuple[Array, Array]:
+    import trimesh
+
+    kind = path.suffix.lower().removeprefix(".")
+    if not 0 < path.stat().st_size <= MAX_BYTES:
+        raise BadInput(f"{path.stat().st_size} bytes: wanted 1 to {MAX_BYTES // 1_000_000} MB")
+    try:
+        mesh = trimesh.load(BytesIO(path.read_bytes()), kind, force="mesh", skip_materials=True)  # opens no other file
+        points = np.asarray(mesh.vertices, dtype=float)
+        faces = len(mesh.faces)
+    except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
+        raise BadInput(f"it cannot be read as {kind.upper()}: {type(error).__name__}: {error}") from None
+    if faces < 1 or len(points) < 3 or not np.isfinite(points).all():
+        raise BadInput(
+            f"a mesh of {len(points)} vertices and {faces} faces: wanted finite ones, and faces between them"
+        )
+    return points.min(axis=0), points.max(axis=0)
+
+
 def _file(station: Station, folder: Path) -> Path:
-    path = beside_or_asset(station.stands_on, folder, f"station '{station.name}': body")
+    path = beside_or_asset(station.stands_on, folder, f"station '{station.name}': body =")
     if path.suffix.lower() not in (".urdf", *MESHES):
         raise BadInput(
-            f"station '{station.name}': body '{station.stands_on}': wanted 'slab', 'box', or a .urdf, .obj or .stl file"
+            f"station '{station.name}': body = '{station.stands_on}': wanted 'slab', 'box', or a .urdf, .obj or .stl file"
         )
     if station.floor_m is None:
         raise BadInput(

@@ -140,7 +140,7 @@ def camera_view(task: Task, station: str, pixels: int | None = None, layout: Lay
     heights = [obstacle.size[2] + MARKER_ABOVE for obstacle, at in stand if in_grid(grid, at)]
     if len({round(height, 6) for height in heights}) > 1:
         raise BadInput(
-            f"task '{task.name}': obstacles in the camera's grid must be equally high, got {sorted(set(heights))} m"
+            f"station '{station}': obstacles in the camera's grid must be equally high, got {sorted(set(heights))} m"
         )
     along, across = beside((0.0, 0.0), place.pose[2], grid.marker_m[:2])
     return View(

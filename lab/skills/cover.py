@@ -11,6 +11,7 @@ from lab.sim import models
 from lab.sim.frames import Body, Shape
 from lab.sim.kinds import Kind
 from lab.sim.kinematics import ToolPose
+from lab.sim.station_bodies import HEAD_JOINTS, HEAD_LINK
 from lab.sim.world import TIME_STEP, Array
 from lab.skills.skill import Bench, Skill, SkillFailed, learned_path
 from lab.skills.surveys import Surveys
@@ -20,7 +21,6 @@ from lab.tasks.task_fields import Process, Stage
 if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
 
-JOINTS = ("head_x", "head_z")
 REST = (0.0, 0.0)  # where a machine's head waits, low, out of the gripper's way
 HEAD_BEHIND_M = 0.03  # the head's frame behind the nozzle's plane
 PATCH_M = 0.0024  # thickness of what is seen on the part
@@ -94,7 +94,7 @@ class CoverPart(Cover):
 
     def show(self, bench: Bench, state: int) -> bool:
         """Put the head over the state's cell at once, without physics."""
-        bench.scene.world.set_joints(self.station, JOINTS, self.head(state))
+        bench.scene.world.set_joints(self.station, HEAD_JOINTS, self.head(state))
         return True
 
     def on_part(self, name: str, kind: Kind) -> tuple[Body, ...]:
@@ -140,18 +140,18 @@ class CoverPart(Cover):
 
     def _slide(self, bench: Bench, target: tuple[float, float], speed: float) -> Iterator[None]:
         world = bench.scene.world
-        here = world.joints(self.station, JOINTS)
+        here = world.joints(self.station, HEAD_JOINTS)
         way = np.array(target) - here
         steps = max(1, int(np.ceil(np.linalg.norm(way) / speed / TIME_STEP)))
         for step in range(1, steps + 1):
-            world.drive(self.station, JOINTS, here + way * step / steps, way / steps / TIME_STEP, force=300.0)
+            world.drive(self.station, HEAD_JOINTS, here + way * step / steps, way / steps / TIME_STEP, force=300.0)
             yield
-        world.drive(self.station, JOINTS, target, force=300.0)
+        world.drive(self.station, HEAD_JOINTS, target, force=300.0)
 
     def _met(self, bench: Bench, kind: Kind) -> tuple[int, int] | None:
         """The cell of the part that the nozzle's ray meets, in the part's own frame."""
         world = bench.scene.world
-        nozzle, _ = world.pose(self.station, "head")
+        nozzle, _ = world.pose(self.station, HEAD_LINK)
         yaw = self.surveys.task.station(self.station).pose[2]
         ahead = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
         hit = world.ray(nozzle + 0.035 * ahead, nozzle + _RAY_M * ahead)
@@ -184,7 +184,9 @@ class CoverPlace(Cover):
     def setup(self, surveys: Surveys) -> Problem:
         """As for any surface, where the tool can be over all of its cells."""
         problem = super().setup(surveys)
-        surveys.check_free(self.name, [self.over(cell) for cell in np.ndindex(*self.shape)])
+        area_m, off_m, name = self.process.area_m, self.process.off_m, self.name.partition(" at ")[0]
+        where = f"processes.{name}.area_m = {list(area_m or ())}, off_m = {list(off_m)} at '{self.station}'"
+        surveys.check_free(where, [self.over(cell) for cell in np.ndindex(*self.shape)])
         return problem
 
     def begins_at(self) -> ToolPose:

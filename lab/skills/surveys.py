@@ -7,7 +7,7 @@ from math import hypot
 import numpy as np
 
 from lab.errors import BadInput
-from lab.sim.blocked_cells import Survey, Surveyor
+from lab.sim.blocked_cells import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.kinds import Spot, beside
 from lab.sim.kinematics import ToolPose
 from lab.sim.places import Layout
@@ -104,8 +104,17 @@ class Surveys:
                 way = _between(self.cell_pose(cell), approach)
                 if not survey.blocked[cell] and not any(surveyor.cause(pose) for pose in way):
                     return cell
-        if not cause:
-            cause = ", ".join(survey.names(self._cells_near(survey, approach))) or "the workspace's border"
+        near = self._cells_near(survey, approach)
+        if not near:
+            grid = self.task.workspace
+            high_x, high_y = (
+                low + n * cell for low, n, cell in zip(grid.lower_m, grid.shape[:2], grid.cell_m, strict=False)
+            )
+            raise BadInput(
+                f"workspace.shape = {list(grid.shape)}: it has no cell near '{place}' at ({approach.x:.2f}, {approach.y:.2f}) m: "
+                f"it goes from ({grid.lower_m[0]:.2f}, {grid.lower_m[1]:.2f}) to ({high_x:.2f}, {high_y:.2f}) m"
+            )
+        cause = cause or ", ".join(survey.names(near))
         raise BadInput(
             f"station '{place}' cannot be approached{f' with {carried}' if carried else ''}: in the way: {cause}"
         )
@@ -171,7 +180,8 @@ class Surveys:
             surveyor = Surveyor(Scene(world, self.task, (), self.layout), None, clearance=TOUCH_CLEARANCE[False])
             for pose in poses:
                 if cause := surveyor.cause(pose):
-                    raise BadInput(f"{what}: at ({pose.x:.2f}, {pose.y:.2f}, {pose.z:.2f}) m in the way: {cause}")
+                    why = cause if cause == OUT_OF_REACH else f"in the way: {cause}"
+                    raise BadInput(f"{what}: at ({pose.x:.2f}, {pose.y:.2f}, {pose.z:.2f}) m {why}")
 
     def _stand(self, scene: Scene, name: str, kind: str, spot: Spot) -> None:
         """Stand a part in the scene that nothing may touch."""

@@ -93,6 +93,12 @@ def _changed_scenes(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return changed_scenes(job, reading)
 
 
+def _grips(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.grips import grips
+
+    return grips(job, reading)
+
+
 def _reuse(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.reuse import reuse
 
@@ -150,7 +156,10 @@ STUDIES: dict[str, Study] = {
     "changed-scenes": Study(
         "Skills in changed scenes: used as they are, adapted or learned, beside learning all anew", _changed_scenes
     ),
-    "reuse": Study("Several tasks in one toolbox, one after the other: does a lab that has lived longer learn less?", _reuse),
+    "grips": Study("Parts that others made: which can be gripped, and whether they arrive", _grips),
+    "reuse": Study(
+        "Several tasks in one toolbox, one after the other: does a lab that has lived longer learn less?", _reuse
+    ),
     "sequencing-speed": Study("Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }

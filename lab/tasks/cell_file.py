@@ -1,6 +1,7 @@
 """Cell files: a cell for the sequencer alone, without physics, and the words that ask for an order of its parts."""
 
 from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Self
 
@@ -14,7 +15,8 @@ from lab.sequencing.cell.chance import Chance
 from lab.sequencing.cell.stations import Arrivals
 from lab.tasks.cell_faults import Fault, file_faults, layout_faults, loc_of, missing_times, travel_faults
 from lab.tasks.cell_fields import CellFields, CellStage, Times
-from lab.tasks.toml_text import TomlText, explain
+from lab.tasks.task_faults import fields_at
+from lab.tasks.toml_text import TomlText, explain, finding
 
 TOAST_CASES = {"I": "toast-case-1", "II": "toast-case-2", "III": "toast-case-3"}
 
@@ -30,7 +32,7 @@ class CellFile(CellFields):
         try:
             found = cls.model_validate(toml.raw)
         except ValidationError as error:
-            raise toml.refusal(error.errors()[0]["loc"], explain(error)) from None
+            raise toml.refusal(finding(error)["loc"], explain(error, partial(fields_at, cls))) from None
         found._toml = toml
         found.cell()
         return found

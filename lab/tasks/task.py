@@ -130,9 +130,11 @@ class Task(Record):
                     raise unknown("part", kind, wanted, "--parts")
                 wanted[kind] = count
         found = tuple(kind for kind, count in wanted.items() for _ in range(count))
-        if not 1 <= len(found) <= MAX_PARTS:
-            raise BadInput(f"{len(found)} parts (--parts) for task '{self.name}': allowed are 1 to {MAX_PARTS}")
-        self._check_room(found)
+        if first is None and counts is None:
+            with self.in_its_file():
+                self._check_room(found, "the sum of their counts", f"part '{self.made[0].name}': count: ")
+        else:
+            self._check_room(found, "--toasts, --parts", "")
         return found
 
     def ordered(self, toasts: int | None = None, parts: str | None = None) -> Order:
@@ -143,18 +145,22 @@ class Task(Record):
 
     def fitting(self, first: int) -> Order:
         """An order with so many parts of the first kind, or as many as there is room for."""
-        own = self.made[0]
-        ends = {route[at].station for route in own.routes for at in (0, -1)}
-        return self.order(min(first, *(self.station(end).capacity for end in ends)))
+        own, *others = self.made
+        room = [self.station(end).capacity - sum(p.count for p in others if end in p.ends) for end in own.ends]
+        return self.order(max(1, min(first, *room)))
 
-    def _check_room(self, order: Order) -> None:
-        for end in dict.fromkeys(route[at].station for part in self.made for route in part.routes for at in (0, -1)):
-            ending = [p.name for p in self.made if any(end in (r[0].station, r[-1].station) for r in p.routes)]
+    def _check_room(self, order: Order, asked: str, where: str) -> None:
+        if not 1 <= len(order) <= MAX_PARTS:
+            raise BadInput(f"{where}{len(order)} parts ({asked}) for task '{self.name}': allowed are 1 to {MAX_PARTS}")
+        for end in dict.fromkeys(end for part in self.made for end in part.ends):
+            ending = [part.name for part in self.made if end in part.ends]
             most, room = sum(kind in ending for kind in order), self.station(end).capacity
             if most > room:
+                words = in_words(kind for kind in order if kind in ending)
                 raise BadInput(
-                    f"{in_words(kind for kind in order if kind in ending)} (--toasts, --parts) do not fit on '{end}': "
-                    f"its capacity in the task file is {room}"
+                    f"{words} ({asked}) do not fit on '{end}': its capacity in the task file is {room}"
+                    if not where
+                    else f"station '{end}': capacity = {room}: {words} ({asked}) begin or end there, wanted at least {most}"
                 )
 
     # ---- what must be known, once, and have a time ---------------------------------------------------------------
@@ -162,9 +168,7 @@ class Task(Record):
     @model_validator(mode="after")
     def _names_apart(self) -> Self:
         stations, kinds = [s.name for s in self.stations], [p.name for p in self.parts]
-        patches = [
-            f"{process} on" for process in self.processes
-        ]  # what a process leaves on a part: "butter on slice 1"
+        patches = [f"{process} on" for process in self.processes]  # what is left on a part: "butter on slice 1 00"
         for label, names in (("part", kinds), ("station", stations), ("obstacle", [o.name for o in self.obstacles])):
             twice = {n for n in names if names.count(n) > 1}
             if twice:
@@ -185,14 +189,14 @@ class Task(Record):
         carriers = {part.pallet for part in self.parts}
         for part in self.parts:
             if not part.routes and part.name not in carriers:
-                raise ValueError(f"part '{part.name}' has no routes, and is no other part's pallet")
-            if part.pallet is not None:
-                if part.pallet not in (known := [p.name for p in self.parts if not p.routes]):
-                    raise unknown("pallet", part.pallet, known, f"part '{part.name}'")
+                raise ValueError(f"part '{part.name}' has no routes, and no other part comes on it: it needs routes")
+            known = [other.name for other in self.parts if not other.routes]
+            if part.pallet is not None and part.pallet not in known:
+                raise unknown("pallet", part.pallet, known, f"part '{part.name}'")
             for stage in stages_of(part):
                 for name in filter(None, (stage.station, stage.buffer)):
                     if name not in stations:
-                        raise unknown("station", name, stations, f"routes of part '{part.name}'")
+                        raise unknown("station", name, stations, f"route of part '{part.name}'")
                 if stage.pallet and part.pallet is None:
                     raise ValueError(f"part '{part.name}' has no pallet to be lifted off at '{stage.station}'")
         return self
@@ -201,10 +205,17 @@ class Task(Record):
     def _processes_known(self) -> Self:
         heads = [name for name, process in self.processes.items() if process.by == "head"]
         for station in self.stations:
+            if station.process in self.processes and station.process not in heads:
+                raise BadInput(
+                    f"station '{station.name}': process = '{station.process}': the robot carries it out (by = 'robot'), "
+                    "as the service of a stage of a route; wanted one by = 'head', the machine's own"
+                )
             if station.process is not None and station.process not in heads:
-                raise unknown("process", station.process, heads, f"station '{station.name}' (by = 'head')")
+                raise unknown("process", station.process, heads, f"station '{station.name}'")
             if station.approach == "camera" and self.camera is None:
-                raise ValueError(f"station '{station.name}' is approached by the camera: [camera] is missing")
+                raise BadInput(
+                    f"station '{station.name}': approach = 'camera': the table [camera] is missing, which says where it is"
+                )
         for part in self.made:
             for stage in stages_of(part):
                 self._check_work(part, stage)
@@ -213,8 +224,12 @@ class Task(Record):
     def _check_work(self, part: Part, stage: Stage) -> None:
         robots = [name for name, process in self.processes.items() if process.by == "robot"]
         place, where = self.station(stage.station), f"part '{part.name}' at '{stage.station}'"
+        if stage.service in self.processes and stage.service not in robots:
+            raise BadInput(
+                f"{where}: service = '{stage.service}': a machine's head carries it out; wanted a process by = 'robot'"
+            )
         if stage.service is not None and stage.service not in robots:
-            raise unknown("service", stage.service, robots, f"{where} (processes by = 'robot')")
+            raise unknown("service", stage.service, robots, f"processes for {where}")
         if place.kind != "machine":
             if stage.processing_s is not None:
                 raise ValueError(f"{where}: only a machine has processing_s, it is a {place.kind}")

@@ -11,10 +11,13 @@ from lab.errors import BadInput
 from lab.tasks.first_form import own_loc, renewed
 from lab.tasks.toml_text import Loc, TomlText
 
-MEMBERS = {"part": "parts", "station": "stations", "machine": "stations", "obstacle": "obstacles"}  # table by word
+# the table of the file, by the word in a message
+MEMBERS = {"part": "parts", "product": "parts", "station": "stations", "machine": "stations", "obstacle": "obstacles"}
 _THING = re.compile(rf"\b({'|'.join(MEMBERS)})s? '([^']*)'")
 _DOTTED = re.compile(r"\b(robot|workspace|camera|processes|subtasks|sequencing)((?:\.[\w-]+)+)")
+_STAGE = re.compile(r"(?:stage (\d+) of )?(?:the route|route (\d+))\b(?: of '([^']*)')?(?= has|:| \()")
 _QUOTED = re.compile(r"'([^']*)'")
+_SIZE = ("size_m", "file")  # say how wide and how high something is
 _WORD = re.compile(r"[a-z_]+")
 
 
@@ -28,29 +31,46 @@ def loc_of(raw: dict[str, Any], message: str) -> Loc:
 
     () for a message that names nothing of the file.
     """
+    if (stage := _stage(raw, message)) is not None:
+        return stage
     things = [(found.start(), loc) for found in _THING.finditer(message) if (loc := _member(raw, *found.groups()))]
     dotted = _DOTTED.search(message)
     if dotted is not None and (not things or dotted.start() < things[0][0]):
         return (dotted[1], *dotted[2][1:].split("."))
-    if not things:
-        return _named(raw, message)
-    loc = things[0][1]
-    table = _at(raw, loc)
-    own = table.get("name") if isinstance(table, dict) else None
-    quoted = [word for word in _QUOTED.findall(message) if word != own]
+    if things:
+        return things[0][1] + within(raw, things[0][1], message)
+    return _named(raw, message)
+
+
+def within(raw: dict[str, Any], loc: Loc, message: str) -> Loc:
+    """The rest of the way, from the table to which `loc` leads: to the value that a message quotes, or the field it names."""
+    table = raw
+    for part in loc:
+        table = table[part]
+    if not isinstance(table, dict):
+        return ()
+    quoted = {word for word in _QUOTED.findall(message) if word != table.get("name")}
     for inner, value in _leaves(table):
         if isinstance(value, str) and value in quoted and inner != ("name",):
-            return (*loc, *inner)
+            return inner
     words = _WORD.findall(_QUOTED.sub("", message))
-    field = next((word for word in words if isinstance(table, dict) and word in table), None)
-    return loc if field is None else (*loc, *_deeper(table, field, words))
-
-
-def _deeper(table: dict[str, Any], field: str, words: list[str]) -> Loc:
-    """A field, and of a table the field within it that is also named."""
-    inner = table[field]
-    below = next((word for word in words if isinstance(inner, dict) and word in inner), None)
+    said = [field for word in words for field in (word, *(_SIZE if word in ("wide", "high") else ()))]
+    field = next((word for word in said if word in table and word != "name"), None)
+    if field is None:
+        return ("name",) if "name" in table else ()
+    inside = table[field]
+    below = next((word for word in words if isinstance(inside, dict) and word in inside), None)
     return (field,) if below is None else (field, below)
+
+
+def _stage(raw: dict[str, Any], message: str) -> Loc | None:
+    """The stage that the sequencer complains about; it names the part where there are several kinds in an order."""
+    found = _STAGE.search(message)
+    if found is None:
+        return None
+    parts = [part if isinstance(part, dict) else {} for part in raw["parts"]]
+    kind = next(n for n, part in enumerate(parts) if part.get("routes") and found[3] in (None, part.get("name")))
+    return ("parts", kind, "routes", int(found[2] or 1) - 1, *((int(found[1]) - 1,) if found[1] else ()))
 
 
 def _member(raw: dict[str, Any], word: str, name: str) -> Loc:
@@ -65,6 +85,9 @@ def _member(raw: dict[str, Any], word: str, name: str) -> Loc:
 
 def _named(raw: dict[str, Any], message: str) -> Loc:
     """The station or obstacle whose name is the first that a message says, or the file that it names."""
+    subtasks = raw.get("subtasks")
+    if isinstance(subtasks, dict) and "subtasks" in message:
+        return next((("subtasks", name) for name in _QUOTED.findall(message) if name in subtasks), ("subtasks",))
     found: list[tuple[int, int, Loc]] = []
     for loc, value in _leaves(raw):
         names = loc[-1] == "name" and loc[0] in ("stations", "obstacles")
@@ -74,12 +97,6 @@ def _named(raw: dict[str, Any], message: str) -> Loc:
         if said is not None:
             found.append((said.start(), -len(value), loc))
     return min(found)[2] if found else ()
-
-
-def _at(raw: Any, loc: Loc) -> Any:
-    for part in loc:
-        raw = raw[part]
-    return raw
 
 
 def _leaves(value: Any, loc: Loc = ()) -> Iterator[tuple[Loc, Any]]:

@@ -14,8 +14,8 @@ from lab.tasks.first_form import own_loc, renewed
 from lab.tasks.grid_world import RANDOM, GridWorld, from_text, from_words
 from lab.tasks.record import MAX_SHORT_BYTES, Record, read_text
 from lab.tasks.task import Task
-from lab.tasks.task_faults import fields_at, loc_of, refusal
-from lab.tasks.toml_text import Loc, TomlText, explain
+from lab.tasks.task_faults import fields_at, loc_of, refusal, within
+from lab.tasks.toml_text import TomlText, explain, finding
 
 _SAYS_WORLD = re.compile(r"""^[ \t]*kind[ \t]*=[ \t]*["']world["']""", re.MULTILINE)
 
@@ -124,7 +124,7 @@ def _kind(toml: TomlText) -> FileKind:
     kind = toml.raw.get("kind", "task")
     if kind in get_args(FileKind):
         return cast(FileKind, kind)
-    raise toml.refusal(("kind",), str(unknown("kind", kind, ("cell", "world"), "of task file")))
+    raise toml.refusal(("kind",), str(unknown("kind", kind, get_args(FileKind), "of task file")))
 
 
 def _toml(path: Path) -> TomlText:
@@ -144,15 +144,11 @@ def _checked(model: type[Checked], toml: TomlText, raw: dict[str, Any]) -> Check
     try:
         return model.model_validate(raw)
     except ValidationError as error:
-        first = error.errors()[0]
+        first = finding(error)
         said = explain(error, partial(fields_at, model), partial(own_loc, toml.raw))
-        at = first["loc"] if first["type"] not in _OF_WHOLE else _nearer(raw, first["loc"], first["msg"])
+        at = first["loc"]
+        if first["type"] in _OF_WHOLE:
+            at = at + within(raw, at, first["msg"]) if at else loc_of(raw, first["msg"])
         raise toml.refusal(own_loc(toml.raw, at), said) from None
     except BadInput as error:
         raise refusal(toml, str(error)) from None
-
-
-def _nearer(raw: dict[str, Any], loc: Loc, message: str) -> Loc:
-    """Where a fault of a whole record stands: what its message names, if that is within the record."""
-    found = loc_of(raw, message)
-    return found if found[: len(loc)] == loc else loc

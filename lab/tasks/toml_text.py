@@ -9,15 +9,26 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
 from lab.errors import BadInput
 
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
+
 Loc = tuple[str | int, ...]  # the way to a value: keys of tables, and numbers in arrays from 0
 Fields = Callable[[Loc], Sequence[str]]
 
+_NO_SUCH_KEY = ("extra_forbidden", "unexpected_keyword_argument")
+_WORDS = {
+    "tuple_type": "Input should be a list in brackets",
+    "model_type": "Input should be a table",
+    "dict_type": "Input should be a table",
+    "dataclass_type": "Input should be a table",
+    "string_pattern_mismatch": "wanted 1 to 40 letters, digits, spaces, - and _, a letter or a digit first",
+}
 _MOST_SHOWN = 120  # characters of a bad value
 MOST_PARTS = 100  # of a dotted key: what the TOML reader does with one grows with the square of them
 _LONG_KEY = re.compile(rf"""(?<![\w.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}""")
@@ -174,16 +185,21 @@ class _Scan:
         return bisect_right(self._ends, self.at) + 1
 
 
+def finding(error: ValidationError) -> "ErrorDetails":
+    """The first finding of a validation: a key that there is not before all others, which may lack because of it."""
+    findings = error.errors()
+    return next((one for one in findings if one["type"] in _NO_SUCH_KEY), findings[0])
+
+
 def explain(error: ValidationError, fields: Fields | None = None, own: Callable[[Loc], Loc] = tuple) -> str:
     """The first finding of a validation as one line: the field, the bad value, what is allowed; and how many more there are.
 
     fields: those of the record to which a way leads, to say which one may have been meant; own: the way as the file has it.
     """
-    findings = error.errors()
-    first = findings[0]
+    findings, first = error.errors(), finding(error)
     where = ".".join(str(part) for part in own(first["loc"]))
-    message = first["msg"].removeprefix("Value error, ")
-    if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+    message = _WORDS.get(first["type"], first["msg"].removeprefix("Value error, "))
+    if first["type"] in _NO_SUCH_KEY:
         message = "there is no such key"
         known = fields(first["loc"][:-1]) if fields else []
         if near := get_close_matches(str(first["loc"][-1]), known, n=1):
@@ -192,4 +208,5 @@ def explain(error: ValidationError, fields: Fields | None = None, own: Callable[
     got = got if len(got) <= _MOST_SHOWN else f"{got[:_MOST_SHOWN]} ..."
     shown = "" if isinstance(first["input"], dict) or not where else f" (got {got})"
     more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
-    return f"{where + ': ' if where else ''}{message}{shown}{more}"
+    of_whole = first["type"] == "value_error" and first["loc"][-1:] and isinstance(first["loc"][-1], int)
+    return f"{where + ': ' if where and not of_whole else ''}{message}{shown}{more}"
