@@ -4,11 +4,23 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
+from lab.sim.kinds import Spot
 from lab.sim.kinematics import ToolPose
 from lab.sim.places import Layout
+from lab.skills.grasp import GOAL
 from lab.skills.prepared_scene import prepare
 from lab.skills.skillset import SkillSet
-from lab.skills.surveys import INSERT, NEAR_SHAPE, NEAR_YAWS, Surveys, grid_of, near_pose, way_to
+from lab.skills.surveys import (
+    INSERT,
+    NEAR_SHAPE,
+    NEAR_STEP_M,
+    NEAR_YAW_STEP,
+    NEAR_YAWS,
+    Surveys,
+    grid_of,
+    near_pose,
+    way_to,
+)
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
 
@@ -212,3 +224,13 @@ def test_the_way_out_of_a_station_is_up_or_lifted_out_to_the_side_and_up(task: T
     assert (end.x, end.y) == pytest.approx((x, y - 0.15))
     risen, end = side.way_out("plate", at)
     assert (risen.x, risen.y, risen.z) == (at.x, at.y, end.z)
+
+
+def test_near_poses_are_relative_to_the_slice(surveys: Surveys) -> None:
+    goal = surveys.kinds["slice"].held_at(Spot(0.4, 0.5, 0.012, np.pi / 2))
+    assert near_pose(goal, GOAL) == goal
+    ahead = near_pose(goal, (3, 2, 1, 3))
+    assert (ahead.x, ahead.y) == pytest.approx((0.4, 0.5 + NEAR_STEP_M[0]))
+    assert ahead.z == pytest.approx(goal.z + NEAR_STEP_M[2])
+    assert ahead.yaw == pytest.approx(np.pi / 2 + NEAR_YAW_STEP)
+    assert near_pose(goal, (2, 3, 0)).x == pytest.approx(0.4 - NEAR_STEP_M[1])
