@@ -44,7 +44,7 @@ class TimedMove(NamedTuple):
 
 @dataclass(frozen=True)
 class Durations:
-    """Measured times [s]: the robot's moves, empty and with what it carries; what machines take, and the robot's services there."""
+    """Measured times [s]: the robot's moves, empty and with what it carries; its services, and what machines take."""
 
     empty_s: Mapping[Pair, float]
     loaded_s: Mapping[Carried, float]
@@ -149,7 +149,7 @@ def measure(prepared: Prepared, on_move: Callable[[str, float], None] | None = N
 def _measure_empty(
     prepared: Prepared, tell: Callable[[str, float], None]
 ) -> tuple[dict[Pair, float], dict[Pair, float], int]:
-    """The times [s] of all ways of the empty gripper and of all services, one after the other, and the physics steps that took."""
+    """The times [s] of all ways of the empty gripper and of all services, and the physics steps that took."""
     empty: dict[Pair, float] = {}
     service: dict[Pair, float] = {}
     skillset = prepared.skillset

@@ -13,7 +13,8 @@ from lab.skills.skillset import SkillSet
 from lab.tasks.task import Order, Task
 
 FRAME_EVERY = 24  # physics steps: ten frames a simulated second
-RIM_M, PROUD_M = 0.022, 0.0016  # [m] that the finish of a flat part leaves free around it, and is thicker than it
+RIM_M, PROUD_M = 0.022, 0.0016  # [m] that the finish of a flat part leaves free in all, and is thicker than it
+LEAST = 0.8  # of an edge is covered by it, however short that is
 LARGER = 1.01  # than another part is its finish
 
 
@@ -103,7 +104,7 @@ def finish_on(name: str, kind: Kind, station: str, rgba: Rgba) -> Body:
     """A part's finish: both sides of a flat part within its rim, all of another."""
     fields = kind.part
     if fields.shape == "box" and fields.size_m is not None and min(fields.size_m) < RIM_M:
-        size = tuple(edge + PROUD_M if edge < RIM_M else edge - RIM_M for edge in fields.size_m)
+        size = tuple(edge + PROUD_M if edge < RIM_M else max(edge - RIM_M, LEAST * edge) for edge in fields.size_m)
         return Body(finish_name(name, station), (Shape("box", size, None, rgba),))
     shapes = tuple(
         Shape(look.kind, _larger(look), look.mesh, rgba, look.position, look.quaternion) for look in kind.shape.looks

@@ -15,6 +15,7 @@ from lab.sim.gripper import Gripper
 from lab.sim.urdf_reader import floats, placed
 
 _STROKES = 65  # between all the way one way and all the way the other
+_MIMIC = {"multiplier": "1", "offset": "0"}
 _TIP_M = 0.02  # of a finger, from the tips up: what takes hold of things
 
 Array = NDArray[np.float64]
@@ -117,9 +118,11 @@ class _Ends:
         )
         ranges = self.ranges.copy()
         for k, name in enumerate(self.names):
-            carried = [link for link in self.urdf.below(child(self.urdf.joints[name])) if link in self.solids]
-            low, high = (max(np.abs(self.points(link, s)[:, 1]).max() for link in carried or [""]) for s in (0.0, 1.0))
-            if carried and low > high:
+            carried = self.urdf.below(child(self.urdf.joints[name]))
+            low, high = (
+                max(np.abs(self.points(link, share)[:, 1]).max(initial=0.0) for link in carried) for share in (0.0, 1.0)
+            )
+            if low > high:
                 ranges[k] = ranges[k, ::-1]
         for k, name in enumerate(self.names):
             mimic = self.urdf.joints[name].find("mimic")
@@ -156,6 +159,8 @@ class _Ends:
     def fingers(self, leads: dict[str, str], gaps: Array, strokes: Array, opening_m: float) -> Fingers:
         """What was measured, with what the gripper can take; the first joint of each side is driven, the others geared."""
         sides = {name: self._side(name) for name in leads}
+        if len(set(sides.values())) < 2:
+            raise BadInput(f"{self.urdf.path}: the finger joints {', '.join(leads)} are all on one side of the tool")
         first = {side: next(name for name in leads if sides[name] == side) for side in (True, False)}
         leaders = {name: first[sides[name]] for name in leads if name != first[sides[name]]}
         leaders[first[False]] = first[True]
@@ -186,9 +191,6 @@ def _multiplier(urdf: Urdf, name: str) -> float:
     if mimic is not None and (not np.isfinite(by) or by == 0.0 or offset != 0.0):
         raise BadInput(f"{urdf.path}: joint '{name}' mimics another: wanted a finite multiplier, not 0, and no offset")
     return by
-
-
-_MIMIC = {"multiplier": "1", "offset": "0"}
 
 
 def solid_vertices(link: Xml.Element) -> Array:

@@ -16,11 +16,12 @@ import numpy as np
 from lab.errors import BadInput, unknown
 from lab.files import write_whole
 from lab.sim import mesh_file
-from lab.sim.urdf_reader import check_inertial, check_joint, check_mesh, check_numbers, floats, read
+from lab.sim.urdf_reader import check_inertial, check_joint, check_mesh, check_numbers, finite, floats, read
 
 MOVING = ("revolute", "prismatic")
 _FRAME_KG, _FRAME_KGM2 = 1e-3, 1e-7  # of a link that is only a frame: physics wants all links to weigh something
 _ROOT_KG, _ROOT_KGM2 = 1.0, 0.01  # of a foot that says nothing: it is bolted down, so that it does not matter
+MOST_LINKS = 200
 MOST_SEEN_BYTES = 500_000  # of the meshes of one link
 _GREY = "0.8 0.8 0.8 1"
 _PACKAGE = "package://"
@@ -89,6 +90,8 @@ def settled(path: Path, folder: Path) -> Urdf:
         root.remove(element)  # transmissions, and what other simulators want to know
     check_numbers(path, root)
     links, joints = ([one.get("name", "") for one in root.findall(kind)] for kind in ("link", "joint"))
+    if len(links) > MOST_LINKS:
+        raise BadInput(f"{path}: {len(links)} links: arms have up to {MOST_LINKS}")
     for kind, names in (("link", links), ("joint", joints)):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
@@ -113,19 +116,10 @@ def _check_limits(path: Path, joint: Xml.Element) -> None:
         raise BadInput(f"{path}: joint '{name}' is {kind or 'of no type'}: wanted revolute or prismatic, with limits")
     if limit is None or joint.find("axis") is None:
         raise BadInput(f"{path}: joint '{name}' has no limits or no axis")
-    speed = float(limit.get("velocity", "nan") or "nan") if _is_number(limit.get("velocity")) else float("nan")
-    if not speed > 0 or not np.isfinite(speed):
-        raise BadInput(f"{path}: joint '{name}' has the velocity limit '{limit.get('velocity')}', wanted above 0")
+    if finite(path, f"velocity limit of joint '{name}'", limit.get("velocity")) <= 0:
+        raise BadInput(f"{path}: joint '{name}' has the velocity limit {limit.get('velocity')}, wanted above 0")
     if np.linalg.norm(floats(joint.find("axis"), "xyz", "0 0 0")) < 1e-6:
         raise BadInput(f"{path}: joint '{name}' has an axis of length 0")
-
-
-def _is_number(text: str | None) -> bool:
-    try:
-        float(text or "")
-    except ValueError:
-        return False
-    return True
 
 
 def _tree(path: Path, root: Xml.Element, links: Sequence[str]) -> tuple[dict[str, Xml.Element], str]:
@@ -147,8 +141,8 @@ def _tree(path: Path, root: Xml.Element, links: Sequence[str]) -> tuple[dict[str
 
 def _fill_inertial(path: Path, link: Xml.Element, is_foot: bool, joint: Xml.Element | None) -> None:
     """A frame, and a foot that does not say its mass, get a little; an inertia that no body has becomes one that is near."""
-    mass = link.find("inertial/mass")
-    weightless = mass is None or (_is_number(mass.get("value")) and float(mass.get("value", "0")) == 0.0)
+    name, mass = link.get("name", ""), link.find("inertial/mass")
+    weightless = mass is None or finite(path, f"mass of link '{name}'", mass.get("value")) == 0.0
     is_frame = link.find("collision") is None and joint is not None and joint.get("type") == "fixed"
     if weightless and (is_frame or is_foot):
         old = link.find("inertial")

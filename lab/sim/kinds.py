@@ -138,4 +138,6 @@ def _check_rider(loaded: Kind, gripper: Gripper) -> None:
             f"{what}: it is {across:.3f} m wide where the fingers that hold the pallet are {loaded.grip.width_m:.3f} m apart"
         )
     if reach > room:
-        raise BadInput(f"{what}: its top would be {reach:.3f} m above the finger tips, and there is room for {room:.3f} m")
+        raise BadInput(
+            f"{what}: its top would be {reach:.3f} m above the finger tips, and there is room for {room:.3f} m"
+        )

@@ -126,9 +126,9 @@ class Robot:
         self.world, self.arm, self.grip_force = world, arm, grip_force
         self.speed, self.acceleration = speed, acceleration
         fingers = arm.fingers
-        self.holding = [link for side in fingers.links for link in side]
+        holding = [link for side in fingers.links for link in side]
         world.load(NAME, arm.urdf, (0.0, 0.0, arm.base_up_m), checked=True)
-        world.friction(NAME, 1.0, links=self.holding, spinning=0.002)
+        world.friction(NAME, 1.0, links=holding, spinning=0.002)
         for follower, leader in fingers.leaders.items():
             world.gear(NAME, leader, follower, fingers.ratio(follower))
         if len(fingers.joints) > 2:

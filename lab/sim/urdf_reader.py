@@ -143,7 +143,8 @@ def rotation(quaternion: Sequence[float] | NDArray[np.float64]) -> NDArray[np.fl
     )
 
 
-def _value(path: Path, what: str, text: str | None) -> float:
+def finite(path: Path, what: str, text: str | None) -> float:
+    """A number of a URDF; BadInput names it when it is none."""
     try:
         value = float(text or "")
     except ValueError:
@@ -164,7 +165,7 @@ def check_numbers(path: Path, root: Xml.Element) -> None:
             if text is None:
                 continue
             what = f"{name} of a <{element.tag}>"
-            numbers = [_value(path, what, word) for word in text.split()]
+            numbers = [finite(path, what, word) for word in text.split()]
             if len(numbers) != count:
                 raise BadInput(f"{path}: {what} is '{text}', wanted {counted(count, 'number')}")
             if name in ("size", "radius", "length", "scale") and min(numbers) <= 0:
@@ -177,10 +178,10 @@ def check_inertial(path: Path, link: Xml.Element) -> None:
     mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
     if mass is None or inertia is None:
         raise BadInput(f"{path}: link '{name}' has no mass or no inertia")
-    if _value(path, f"mass of link '{name}'", mass.get("value")) <= 0:
+    if finite(path, f"mass of link '{name}'", mass.get("value")) <= 0:
         raise BadInput(f"{path}: mass of link '{name}' is {mass.get('value')} kg, wanted more than 0")
     xx, xy, xz, yy, yz, zz = (
-        _value(path, f"{key} of link '{name}'", inertia.get(key)) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        finite(path, f"{key} of link '{name}'", inertia.get(key)) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     if np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))[0] <= 0:
         raise BadInput(
@@ -198,7 +199,7 @@ def check_joint(path: Path, joint: Xml.Element, links: list[str]) -> None:
             raise BadInput(f"{path}: {unknown('link', link, links, f'{end} of joint {name!r}')}")
     limit = joint.find("limit")
     if limit is not None:
-        low, high = (_value(path, f"{key} limit of joint '{name}'", limit.get(key)) for key in ("lower", "upper"))
+        low, high = (finite(path, f"{key} limit of joint '{name}'", limit.get(key)) for key in ("lower", "upper"))
         if low > high:
             raise BadInput(f"{path}: joint '{name}' has lower limit {low:g} above upper limit {high:g}")
 

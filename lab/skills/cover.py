@@ -79,10 +79,10 @@ class CoverPart(Cover):
         low, high = (kind or self.own_kind).shape.low, (kind or self.own_kind).shape.high
         return float(high[2] - low[2]) / self.shape[0], float(high[0] - low[0]) / self.shape[1]
 
-    def head(self, state: int) -> tuple[float, float]:
+    def head(self, state: int, kind: Kind | None = None) -> tuple[float, float]:
         """The head's joints in a state [m]: across from the part's middle, and up from the machine's floor."""
         row, column = self.problem.mdp.state_cell(state)
-        high, wide = self.cell_m()
+        high, wide = self.cell_m(kind)
         return ((column - (self.shape[1] - 1) / 2) * wide, (self.shape[0] - 1 - row + 0.5) * high)
 
     def pose(self, state: int) -> ToolPose:
@@ -126,12 +126,13 @@ class CoverPart(Cover):
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Move the head along the learned cells, stay on each, note where its ray meets the part, and go to rest."""
         mdp, process = self.problem.mdp, self.process
+        kind = bench.scene.kind_of.get(self.part, self.own_kind)  # others than the first may come to this machine
         self.covered = []
         for state in learned_path(policy, mdp, mdp.start):
-            yield from self._slide(bench, self.head(state), process.speed_m_s)
+            yield from self._slide(bench, self.head(state, kind), process.speed_m_s)
             for _ in range(round(process.dwell_s / TIME_STEP)):
                 yield
-            met = self._met(bench)
+            met = self._met(bench, kind)
             if met is not None and met not in self.covered:
                 self.covered.append(met)
         yield from self._slide(bench, REST, process.speed_m_s)  # so that every part takes the same time
@@ -147,7 +148,7 @@ class CoverPart(Cover):
             yield
         world.drive(self.station, HEAD_JOINTS, target, force=300.0)
 
-    def _met(self, bench: Bench) -> tuple[int, int] | None:
+    def _met(self, bench: Bench, kind: Kind) -> tuple[int, int] | None:
         """The cell of the part that the nozzle's ray meets, in the part's own frame."""
         world = bench.scene.world
         nozzle, _ = world.pose(self.station, HEAD_LINK)
@@ -157,10 +158,9 @@ class CoverPart(Cover):
         if hit is None or hit[0] != self.part:
             return None
         centre, turn = world.pose(self.part)
-        local, (high, wide) = _unrotated(hit[1] - centre, turn), self.cell_m()
-        shape = self.own_kind.shape
-        row = int((shape.high[2] - local[2]) // high)
-        column = int((local[0] - shape.low[0]) // wide)
+        local, (high, wide) = _unrotated(hit[1] - centre, turn), self.cell_m(kind)
+        row = int((kind.shape.high[2] - local[2]) // high)
+        column = int((local[0] - kind.shape.low[0]) // wide)
         return (row, column) if 0 <= row < self.shape[0] and 0 <= column < self.shape[1] else None
 
 

@@ -30,7 +30,7 @@ def new_cell(new: NewTask, path: Path) -> tuple[str, Task]:
     refused: BadInput = does_not_fit(new, around)
     closer, wider = (islice(layouts(new, around, between), MOST_TRIES) for between in (None, ROOM_M))
     for placed in (*closer, *wider):
-        text = text_of(new, placed, opening if opening < arm.gripper.opening_m else None)
+        text = text_of(new, placed, around, opening if opening < arm.gripper.opening_m else None)
         task = task_of_text(path, text)
         try:
             prepare(task, task.order(), 0)

@@ -54,6 +54,8 @@ class Place(AroundPart):
         yield from let_go(bench, self.surveys.way_out(self.station, goal))
         if not bench.stands(body, spot, NEAR_M):
             raise SkillFailed(f"{body} does not stand on '{self.station}'")
+        if lost := bench.fallen_off(self.part, self.kind):
+            raise SkillFailed(f"{lost} does not stand on {body} at '{self.station}'")
 
 
 def release_pose(bench: Bench, body: str, spot: Spot) -> ToolPose:

@@ -83,6 +83,16 @@ class Bench:
         near = hypot(tool.x - at.x, tool.y - at.y, tool.z - at.z) < LOST_M
         return near and self.scene.robot.touches(body)
 
+    def fallen_off(self, name: str, kind: str) -> str:
+        """Which body of part `name` does not stand on what it is carried on, as when a pallet was jolted; "": none."""
+        below, *riders = self.scene.bodies_of(name, kind)
+        for body in riders:
+            at, under = self.part_pose(body), self.part_pose(below)
+            if self.upright(body) < UPRIGHT or hypot(at.x - under.x, at.y - under.y) > LOST_M or at.z < under.z:
+                return body
+            below = body
+        return ""
+
     def stands(self, body: str, spot: Spot, within: float) -> bool:
         """Whether the part stands upright within `within` [m] of a spot."""
         foot = self.scene.kind_of[body].held_at(spot)

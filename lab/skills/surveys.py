@@ -107,7 +107,9 @@ class Surveys:
         near = self._cells_near(survey, approach)
         if not near:
             grid = self.task.workspace
-            high_x, high_y = (low + n * cell for low, n, cell in zip(grid.lower_m, grid.shape[:2], grid.cell_m, strict=False))
+            high_x, high_y = (
+                low + n * cell for low, n, cell in zip(grid.lower_m, grid.shape[:2], grid.cell_m, strict=False)
+            )
             raise BadInput(
                 f"workspace.shape = {list(grid.shape)}: it has no cell near '{place}' at ({approach.x:.2f}, {approach.y:.2f}) m: "
                 f"it goes from ({grid.lower_m[0]:.2f}, {grid.lower_m[1]:.2f}) to ({high_x:.2f}, {high_y:.2f}) m"

@@ -83,6 +83,8 @@ class Transfer(Skill):
             yield from robot.follow([ToolPose(end.x, end.y, grid.height_m, 0.0)])
         if self.carries and (bench.held is None or not bench.holds(bench.held)):
             raise SkillFailed(f"the part is not in the gripper on the way to '{self.target}'")
+        if self.carries and (lost := bench.fallen_off(self.part, self.kind)):
+            raise SkillFailed(f"{lost} has fallen off {bench.held} on the way to '{self.target}'")
 
 
 def _still(tool: ToolPose, first: ToolPose) -> ToolPose:

@@ -150,7 +150,9 @@ STUDIES: dict[str, Study] = {
     "changed-scenes": Study(
         "Skills in changed scenes: used as they are, adapted or learned, beside learning all anew", _changed_scenes
     ),
-    "reuse": Study("Several tasks in one toolbox, one after the other: does a lab that has lived longer learn less?", _reuse),
+    "reuse": Study(
+        "Several tasks in one toolbox, one after the other: does a lab that has lived longer learn less?", _reuse
+    ),
     "sequencing-speed": Study("Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }

@@ -4,7 +4,7 @@ import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from math import ceil, cos, floor, hypot, isfinite, pi, radians, sin
+from math import ceil, cos, floor, hypot, inf, isfinite, pi, radians, sin
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,7 +26,7 @@ COLUMNS, BUFFER_ROOM = 4, 2  # of a storage; parts that a buffer holds
 BETWEEN_M, GRIPPER_M = 0.04, 0.045  # at least: between parts of a station; of the open gripper beside a part
 OVER_M, CELL_M, LEVELS = 0.08, 0.12, 3  # under a carried part; cells of the workspace, and how many above one another
 GAPS_M = (0.15, 0.10, 0.06, 0.03)  # between stations, the widest that fits
-TURNS = (90, 75, 105, 120, 60, 135, 150)  # [degrees] from ahead to the first and to the last station
+TURNS = (90, 75, 105, 60)  # [degrees] from ahead to the first and to the last station
 SHARES = (
     0.44,
     0.52,
@@ -283,11 +283,11 @@ def _apart(placed: Sequence[Placed], foot: tuple[float, float], gap: float) -> b
 # ---- its text -----------------------------------------------------------------------------------------------------
 
 
-def text_of(new: NewTask, placed: Sequence[Placed], opening_m: float | None = None) -> str:
+def text_of(new: NewTask, placed: Sequence[Placed], around: Around, opening_m: float | None = None) -> str:
     """The task file; `opening_m`: the fingers open no farther, None: all the way."""
     parts = "\n".join(_part(new, part, number) for number, part in enumerate(new.parts))
     stations = "\n".join(_station(new, one) for one in placed)
-    return "\n".join([_head(new, opening_m), parts, _workspace(new, placed), stations, _OBSTACLES, _LEARNING])
+    return "\n".join([_head(new, opening_m), parts, _workspace(new, placed, around), stations, _OBSTACLES, _LEARNING])
 
 
 def _head(new: NewTask, opening_m: float | None) -> str:
@@ -336,13 +336,14 @@ routes = [[
 """
 
 
-def _workspace(new: NewTask, placed: Sequence[Placed]) -> str:
+def _workspace(new: NewTask, placed: Sequence[Placed], around: Around) -> str:
     low = round(heights_m(new)[1] - CELL_M / 2, 3)
     ahead = max(hypot(one.x, one.y) for one in placed)  # the way from one side to the other leads there
     lower, shape = [], []
-    for axis, others in ((0, [ahead]), (1, [0.0])):
+    behind = -floor(around.nearest_m / CELL_M)  # no cell is free right behind the arm, where it cannot turn through
+    for axis, others, least in ((0, [ahead], behind), (1, [0.0], -inf)):
         at = [((one.x, one.y)[axis], one.half_m(new.foot_m)[axis] + CELL_M) for one in placed]
-        first = floor(min(x - half for x, half in at) / CELL_M)
+        first = max(least, floor(min(x - half for x, half in at) / CELL_M))
         lower.append(round(CELL_M * first, 3))
         shape.append(ceil(max(*others, *(x + half for x, half in at)) / CELL_M) - first)
     return f"""\

@@ -145,15 +145,15 @@ class Task(Record):
 
     def fitting(self, first: int) -> Order:
         """An order with so many parts of the first kind, or as many as there is room for."""
-        own = self.made[0]
-        ends = {route[at].station for route in own.routes for at in (0, -1)}
-        return self.order(min(first, *(self.station(end).capacity for end in ends)))
+        own, *others = self.made
+        room = [self.station(end).capacity - sum(p.count for p in others if end in p.ends) for end in own.ends]
+        return self.order(max(1, min(first, *room)))
 
     def _check_room(self, order: Order, asked: str, where: str) -> None:
         if not 1 <= len(order) <= MAX_PARTS:
             raise BadInput(f"{where}{len(order)} parts ({asked}) for task '{self.name}': allowed are 1 to {MAX_PARTS}")
-        for end in dict.fromkeys(route[at].station for part in self.made for route in part.routes for at in (0, -1)):
-            ending = [p.name for p in self.made if any(end in (r[0].station, r[-1].station) for r in p.routes)]
+        for end in dict.fromkeys(end for part in self.made for end in part.ends):
+            ending = [part.name for part in self.made if end in part.ends]
             most, room = sum(kind in ending for kind in order), self.station(end).capacity
             if most > room:
                 words = in_words(kind for kind in order if kind in ending)
@@ -172,7 +172,12 @@ class Task(Record):
             twice = {n for n in names if names.count(n) > 1}
             if twice:
                 raise ValueError(f"{label} '{min(twice)}' stands twice in the file")
-            words = ("robot", "done", *(kinds if label != "part" else ()), *(f"{process} on" for process in self.processes))
+            words = (
+                "robot",
+                "done",
+                *(kinds if label != "part" else ()),
+                *(f"{process} on" for process in self.processes),
+            )
             starts = tuple(f"{word} " for word in words)
             for name in names:
                 reserved = name in RESERVED or name.startswith(starts) or name.endswith(RESERVED_ENDS)
@@ -189,9 +194,9 @@ class Task(Record):
         for part in self.parts:
             if not part.routes and part.name not in carriers:
                 raise ValueError(f"part '{part.name}' has no routes, and no other part comes on it: it needs routes")
-            if part.pallet is not None:
-                if part.pallet not in (known := [p.name for p in self.parts if not p.routes]):
-                    raise unknown("pallet", part.pallet, known, f"part '{part.name}'")
+            known = [other.name for other in self.parts if not other.routes]
+            if part.pallet is not None and part.pallet not in known:
+                raise unknown("pallet", part.pallet, known, f"part '{part.name}'")
             for stage in stages_of(part):
                 for name in filter(None, (stage.station, stage.buffer)):
                     if name not in stations:

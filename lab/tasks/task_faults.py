@@ -11,7 +11,8 @@ from lab.errors import BadInput
 from lab.tasks.first_form import own_loc, renewed
 from lab.tasks.toml_text import Loc, TomlText
 
-MEMBERS = {"part": "parts", "product": "parts", "station": "stations", "machine": "stations", "obstacle": "obstacles"}  # table by word
+# the table of the file, by the word in a message
+MEMBERS = {"part": "parts", "product": "parts", "station": "stations", "machine": "stations", "obstacle": "obstacles"}
 _THING = re.compile(rf"\b({'|'.join(MEMBERS)})s? '([^']*)'")
 _DOTTED = re.compile(r"\b(robot|workspace|camera|processes|subtasks|sequencing)((?:\.[\w-]+)+)")
 _STAGE = re.compile(r"(?:stage (\d+) of )?(?:the route|route (\d+))\b(?: of '([^']*)')?(?= has|:| \()")

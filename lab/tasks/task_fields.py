@@ -87,7 +87,8 @@ class Station(Record):
     """A place where parts stand: pose x, y [m], yaw [rad]; a machine has a processing time [s] or a process to learn.
 
     body: what stands there, "slab", "box" of `size_m`, or a URDF or mesh file; floor_m: how high parts stand on it;
-    spots: where, off the pose along its axes and by yaw, instead of in rows. finish: the colour of parts done here; color: of a slab, box or mesh.
+    spots: where, off the pose along its axes and by yaw, instead of in rows. finish: the colour of parts done here; color:
+    of a slab, box or mesh.
     """
 
     name: Name
@@ -178,6 +179,11 @@ class Part(PartFields):
         """Every station and buffer of its routes, each once, in their order."""
         stages = (stage for route in self.routes for stage in route)
         return tuple(dict.fromkeys(name for stage in stages for name in (stage.buffer, stage.station) if name))
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """The stations at which its routes begin and end, each once."""
+        return tuple(dict.fromkeys(route[at].station for route in self.routes for at in (0, -1)))
 
 
 class Obstacle(Record):

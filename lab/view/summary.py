@@ -18,7 +18,6 @@ SHOWN_MOVES = 60
 def run_summary(report: Mapping[str, Any]) -> RenderableType:
     """The end of `lab run`, from its JSON document."""
     skills = report["skills"]
-    sources = [row["source"] for row in skills]
     helped = sum(row["helped_steps"] for row in skills)
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", justify="right")
@@ -32,11 +31,7 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
         table.add_row("stopped", Text(report["failure"], "red"))
     if report["retries"]:
         table.add_row("retries", Text("\n".join(report["retries"])))
-    learned = sources.count("learned") + sources.count("continued")
-    found = [f"{learned} learned", *([f"{n} adapted"] if (n := sources.count("adapted")) else [])]
-    elsewhere = sum(row["source"] == "reused" and row["fitness"] is not None for row in skills)
-    found += [f"{sources.count('reused')} reused{f' ({elsewhere} of another problem)' if elsewhere else ''}"]
-    table.add_row("skills", ", ".join(found))
+    table.add_row("skills", _found(skills, report["task"]))
     if moves := sum(row["moves"] for row in skills):
         episodes = counted(sum(row["episodes"] for row in skills), "episode")
         table.add_row("learned in", f"{episodes}, {counted(moves, 'move')}, {helped} of them advised")
@@ -85,6 +80,20 @@ def replay_summary(replay: Mapping[str, Any]) -> RenderableType:
     if closed is not None:
         over = f"over after {counted(closed['episodes'], 'episode')}, {'solved' if closed['solved'] else 'not solved'}"
     return Group(*map(Text, [f"{replay['problem']} in {replay['session']}: {over}", *replay["receipt"]["lines"]]))
+
+
+def _found(skills: Sequence[Mapping[str, Any]], task: str) -> str:
+    """How many skills are reused, adapted and learned; of these, how many come from other tasks."""
+    found = []
+    for kind in ("reused", "adapted"):
+        rows = [row for row in skills if row["source"] == kind]
+        from_tasks = Counter(row["from_task"] for row in rows if row["from_task"] != task)
+        notes = [f"{count} from {name}" for name, count in from_tasks.most_common()]
+        elsewhere = sum(kind == "reused" and row["fitness"] is not None for row in rows)
+        notes += [f"{elsewhere} of another problem"] if elsewhere else []
+        found += [f"{len(rows)} {kind}" + (f" ({', '.join(notes)})" if notes else "")] if rows else []
+    learned = sum(row["source"] in ("learned", "continued") for row in skills)
+    return ", ".join([*found, *([f"{learned} learned"] if learned or not found else [])])
 
 
 def _way(lesson: Mapping[str, Any]) -> str:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.stations import Stage, Station
+from lab.sequencing.cell.stations import Product, Stage, Station
+from lab.tasks.task import Order
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
 
@@ -69,19 +70,19 @@ def teacher(folder: Path) -> Teacher:
 
 
 @pytest.fixture
-def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int, int]]:
-    """The oven of the file above as if it had been measured; what was prepared: task, toasts, seed."""
-    prepared: list[tuple[str, int, int]] = []
+def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Order, int]]:
+    """The oven of the file above as if it had been measured; what was prepared: task, order, seed."""
+    prepared: list[tuple[str, Order, int]] = []
 
-    def prepare(task: Any, toasts: int, seed: int) -> int:
-        prepared.append((task.name, toasts, seed))
-        return toasts
+    def prepare(task: Any, order: Order, seed: int) -> Order:
+        prepared.append((task.name, order, seed))
+        return order
 
-    def cell(toasts: int, *_: object) -> SimpleNamespace:
+    def cell(order: Order, *_: object) -> SimpleNamespace:
         stations = (Station("in", "storage", 9), Station("hot", "machine", 1, 10.0), Station("out", "storage", 9))
         step = np.ones((3, 3)) - np.eye(3)
-        route = (Stage("in"), Stage("hot"), Stage("out"))
-        return SimpleNamespace(cell=Cell.alike(stations, route, step, 2 * step, "in", toasts))
+        made = Product("slice", ((Stage("in"), Stage("hot"), Stage("out")),))
+        return SimpleNamespace(cell=Cell(stations, (made,), order, step, 2 * step, "in"))
 
     monkeypatch.setattr("lab.skills.prepared_scene.prepare", prepare)
     monkeypatch.setattr("lab.production.run.teach_all", cell)

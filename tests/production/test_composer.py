@@ -13,15 +13,18 @@ from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Body, Frame
-from lab.sim.scene import Layout, spots
+from lab.sim.places import Layout
+from lab.sim.scene_check import places_of
 from lab.sim.world import World
-from lab.skills import Butter
+from lab.skills import Cover
 from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Status
 from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.skills.trial import trial_of
-from lab.tasks.task_file import Stage, Task, load
+from lab.tasks.task import Order, Task
+from lab.tasks.task_fields import Part, Stage
+from lab.tasks.task_file import load
 from lab.teaching.events import Event, MoveMade, MoveRetried
 from lab.teaching.lesson_plan import LessonPlan
 from lab.teaching.teacher import Teacher
@@ -34,44 +37,51 @@ def task() -> Task:
     """The shipped cell without buffers and with machines that take seconds: three moves bring a toast to the end."""
     shipped = load("toast")
     still = tuple(o.model_copy(update={"area": (0.0, 0.0)}) for o in shipped.obstacles)
-    brisk = {"toaster": {"processing_s": 4.0}, "butter_applier": {"head_speed_m_s": 0.2, "dwell_s": 0.05}}
-    stations = tuple(s.model_copy(update=brisk.get(s.name, {})) for s in shipped.stations)
-    route = tuple(Stage(station=stage.station) for stage in shipped.route)
-    return shipped.model_copy(update={"obstacles": still, "stations": stations, "route": route})
+    stations = tuple(
+        s.model_copy(update={"processing_s": 4.0} if s.name == "toaster" else {}) for s in shipped.stations
+    )
+    brisk = {name: p.model_copy(update={"speed_m_s": 0.2, "dwell_s": 0.05}) for name, p in shipped.processes.items()}
+    route = tuple(Stage(station=stage.station) for stage in shipped.parts[0].routes[0])
+    return shipped.changed(obstacles=still, stations=stations, processes=brisk, parts=(with_route(shipped, route),))
+
+
+def with_route(task: Task, route: tuple[Stage, ...]) -> Part:
+    """The slice of the shipped cell on another way."""
+    return task.parts[0].model_copy(update={"routes": (route,)})
 
 
 @pytest.fixture(scope="module")
 def layout(task: Task) -> Layout:
-    return Layout(tuple(o.position_m for o in task.obstacles), ((0.006, -0.003, 0.04), (-0.006, 0.003, -0.04)))
+    return Layout(tuple(o.position_m for o in task.obstacles), ((0.006, -0.003, 0.04),))
 
 
 @pytest.fixture(scope="module")
 def surveys(task: Task, layout: Layout) -> Surveys:
-    return Surveys(task, layout)
+    return Surveys(task, ("slice",), layout)
 
 
 @pytest.fixture(scope="module")
 def taught(
     layout: Layout, surveys: Surveys, tmp_path_factory: pytest.TempPathFactory
-) -> Callable[[Task, int], Prepared]:
+) -> Callable[[Task, Order], Prepared]:
     """A task with its skills, learned from the expert."""
     teacher = Teacher(Toolbox(tmp_path_factory.mktemp("skills")))
 
-    def teach(task: Task, toasts: int) -> Prepared:
-        skillset = SkillSet.of(task, toasts)
+    def teach(task: Task, order: Order) -> Prepared:
+        skillset = SkillSet.of(task, order)
         problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items()}
         for name, problem in problems.items():
             settings = task.subtask(problem.subtask)
             lesson = LessonPlan(problem, settings.learner, settings.gate, task.name)
             skillset.policies[name] = teacher.find_or_teach(lesson, KnownPolicies.of([])).policy
-        return Prepared(task, toasts, 0, layout, surveys, skillset, problems)
+        return Prepared(task, order, 0, layout, surveys, skillset, problems)
 
     return teach
 
 
 @pytest.fixture(scope="module")
-def prepared(task: Task, taught: Callable[[Task, int], Prepared]) -> Prepared:
-    return taught(task, 1)
+def prepared(task: Task, taught: Callable[[Task, Order], Prepared]) -> Prepared:
+    return taught(task, ("slice",))
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +102,7 @@ def durations(prepared: Prepared, told: list[tuple[str, float]]) -> Durations:
 
 @pytest.fixture(scope="module")
 def cell(task: Task, durations: Durations) -> Cell:
-    return cell_of(task, durations, 1)
+    return cell_of(task, durations, ("slice",))
 
 
 @pytest.fixture
@@ -123,22 +133,24 @@ class Watcher:
 
 def test_every_needed_move_is_measured(skillset: SkillSet, durations: Durations, told: list[tuple[str, float]]) -> None:
     assert set(durations.empty_s) == set(skillset.moves.empty)
-    assert set(durations.loaded_s) == set(skillset.moves.loaded)
+    assert [way[:2] for way in durations.loaded_s] == list(skillset.moves.loaded)
+    assert {way.kind for way in durations.loaded_s} == {"slice"}
     assert set(durations.process_s) == {"butter_applier"}
     times = [*durations.empty_s.values(), *durations.loaded_s.values(), *durations.process_s.values()]
     assert all(1.0 < seconds < 40.0 for seconds in times)
     assert min(durations.loaded_s.values()) > max(durations.empty_s.values())  # grasping and placing included
     assert durations.sim_s > sum(times)
     assert sorted(seconds for _, seconds in told) == sorted(times)
-    assert {"plate > toaster, loaded", "butter at butter_applier", "toaster_buffer > plate, empty"} <= {
+    assert {"plate > toaster with slice, loaded", "butter at butter_applier", "toaster_buffer > plate, empty"} <= {
         n for n, _ in told
     }
 
 
-def test_measuring_again_gives_the_same_to_the_last_bit(task: Task, taught: Callable[[Task, int], Prepared]) -> None:
-    short = taught(task.model_copy(update={"route": (task.route[0], task.route[-1])}), 1)
+def test_measuring_again_gives_the_same_to_the_last_bit(task: Task, taught: Callable[[Task, Order], Prepared]) -> None:
+    first, *_, last = task.parts[0].routes[0]
+    short = taught(task.changed(parts=(with_route(task, (first, last)),)), ("slice",))
     one = measure(short)
-    assert list(one.loaded_s) == [("plate", "finished_plate")]
+    assert list(one.loaded_s) == [("plate", "finished_plate", "slice")]
     assert one == measure(short)
 
 
@@ -166,17 +178,17 @@ def test_one_toast_is_delivered_in_the_time_predicted(prepared: Prepared, skills
     recording.check()
     assert (watcher.bodies, watcher.frames) == (recording.bodies, recording.frames)
     shown = [name for frame in recording.frames for name, visible in frame.visible.items() if visible]
-    assert shown[0] == "toasted 1"
-    assert sorted(shown[1:]) == [f"butter 1 {row}{column}" for row in range(3) for column in range(3)]
+    assert shown[0] == "done slice 1 at toaster"
+    assert sorted(shown[1:]) == [f"butter on slice 1 {row}{column}" for row in range(3) for column in range(3)]
     last = recording.frames[-1].poses["slice 1"]
-    spot = spots(skillset.task.station("finished_plate"))[0]
+    spot = places_of(skillset.task).spots(skillset.task.station("finished_plate"))[0]
     assert (last[0], last[1]) == pytest.approx((spot.x, spot.y), abs=0.005)
     assert outcome.sim_s >= outcome.schedule.makespan_s
 
 
 def failed(outcome: Outcome, where: str, why: str) -> None:
-    """It was tried three times, each noted, and then told which toast, where and why."""
-    assert outcome.failure == f"toast 1 at '{where}': {why} (tried {MAX_TRIES} times)"
+    """It was tried three times, each noted, and then told which part, where and why."""
+    assert outcome.failure == f"slice 1 at '{where}': {why} (tried {MAX_TRIES} times)"
     assert len(outcome.retries) == MAX_TRIES == 3
     assert outcome.delivered == ()
     assert all(f"try {n}: {why}" in text for n, text in enumerate(outcome.retries, start=1))
@@ -191,7 +203,7 @@ def failed(outcome: Outcome, where: str, why: str) -> None:
         ("insert at toaster", "toaster"),
     ],
 )
-def test_a_step_that_goes_on_failing_stops_the_run_with_toast_place_and_reason(
+def test_a_step_that_goes_on_failing_stops_the_run_with_part_place_and_reason(
     skill: str,
     where: str,
     prepared: Prepared,
@@ -206,17 +218,17 @@ def test_a_step_that_goes_on_failing_stops_the_run_with_toast_place_and_reason(
     assert start.startswith(f"policy '{skillset.policies[skill].name}' does not reach its goal from ")
     failed(outcome, where, start)
     assert heard == [MoveRetried(why) for why in outcome.retries]
-    assert all(text.startswith(f"toast 1 at '{where}', '{skill}', try ") for text in outcome.retries)
+    assert all(text.startswith(f"slice 1 at '{where}', '{skill}', try ") for text in outcome.retries)
     assert outcome.schedule.robot == ()
 
 
 def test_slippery_slices_are_not_delivered_and_said_to_be_lost(task: Task, prepared: Prepared, cell: Cell) -> None:
-    oily = task.model_copy(update={"slices": task.slices.model_copy(update={"friction": 0.0})})
+    oily = task.changed(parts=(task.parts[0].model_copy(update={"friction": 0.0}),))
     outcome, recording = carry_out(replace(prepared, skillset=replace(prepared.skillset, task=oily)), cell, (1, 1, 1))
     assert outcome.failure is not None
-    assert outcome.failure.startswith("toast 1 at 'plate': slice 1 is ")
+    assert outcome.failure.startswith("slice 1 at 'plate': slice 1 is ")
     assert outcome.retries[0] == (
-        "toast 1 at 'plate', 'grasp at plate', try 1: slice 1 is not in the gripper after grasping at 'plate'"
+        "slice 1 at 'plate', 'grasp at plate', try 1: slice 1 is not in the gripper after grasping at 'plate'"
     )
     assert outcome.delivered == ()
     assert outcome.dropped == (1,)
@@ -227,7 +239,7 @@ class Ground:
     """A floor with a production on it, begun at the robot's start."""
 
     def __init__(self, world: World, prepared: Prepared, cell: Cell) -> None:
-        self.floor = Floor(world, prepared.skillset, prepared.layout, cell.parts)
+        self.floor = Floor(world, prepared.skillset, prepared.layout, prepared.order)
         self.floor.stand(prepared.surveys.approach(cell.robot_start))
         self.floor.restart_clock()
         self.work = Production(self.floor, cell)
@@ -295,11 +307,11 @@ def test_a_slice_set_down_beside_its_spot_on_the_last_plate_is_taken_up_again_an
     assert failure is None, ground.work.retries
     assert [note for note in ground.work.retries if "does not stand on 'finished_plate'" in note] == ground.work.retries
     assert len(ground.work.retries) == 1
-    assert floor.bench.stands("slice 1", ground.work.spot_of[1].grasp(), 0.012)
+    assert floor.bench.stands("slice 1", ground.work.spot_of["slice 1"], 0.012)
 
 
-def at_butter(ground: Ground, surveys: Surveys) -> Butter:
-    """Toast 1 and the robot are at the butter applier, whose skill is aimed at it."""
+def at_butter(ground: Ground, surveys: Surveys) -> Cover:
+    """Slice 1 and the robot are at the butter applier, whose skill is aimed at it."""
     floor, work = ground.floor, ground.work
     floor.bench.held = None
     for decision in (1, 1):  # plate to toaster, toaster to butter_applier
@@ -308,7 +320,7 @@ def at_butter(ground: Ground, surveys: Surveys) -> Butter:
     floor.stand(surveys.approach("butter_applier"))
     work.place = "butter_applier"
     butter = floor.skillset.skills["butter at butter_applier"]
-    assert isinstance(butter, Butter)
+    assert isinstance(butter, Cover)
     butter.aim("slice 1")
     floor.machines["butter_applier"] = butter
     return butter
@@ -318,15 +330,16 @@ def test_a_machine_that_failed_while_the_robot_was_away_is_noticed_and_tried_aga
     ground: Ground, surveys: Surveys, task: Task
 ) -> None:
     """The butter's failure is over long before the robot asks for the slice; that goes to the first plate that is free."""
-    work, places = ground.work, spots(task.station("finished_plate"))
+    work, places = ground.work, ground.floor.scene.places
+    plates = places.spots(task.station("finished_plate"))
     butter = at_butter(ground, surveys)
     butter.status, butter.reason = Status.FAILURE, "the butter missed 9 of 9 cells"
-    work.spot_of |= {2: places[0], 3: spots(task.station("plate"))[1]}
+    work.spot_of |= {"slice 2": plates[0], "slice 3": places.spots(task.station("plate"))[1]}
     assert work.carry_out((1,)) is None
-    assert work.retries == ["toast 1 at 'butter_applier', try 1: the butter missed 9 of 9 cells"]
+    assert work.retries == ["slice 1 at 'butter_applier', try 1: the butter missed 9 of 9 cells"]
     assert butter.status is Status.SUCCESS
     assert len(butter.covered) == 9
-    assert work.spot_of[1] == places[1]
+    assert work.spot_of["slice 1"] == plates[1]
 
 
 def test_a_machine_that_goes_on_failing_stops_the_run(
@@ -337,14 +350,14 @@ def test_a_machine_that_goes_on_failing_stops_the_run(
     butter.start(ground.floor.bench, ground.floor.skillset.policies[butter.name])
     failure = ground.work.carry_out((1,))
     assert failure is not None
-    assert failure.startswith("toast 1 at 'butter_applier': policy 'butter at butter_applier ")
+    assert failure.startswith("slice 1 at 'butter_applier': policy 'butter at butter_applier ")
     assert failure.endswith(f"(tried {MAX_TRIES} times)")
 
 
-def test_a_toast_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None:
+def test_a_part_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None:
     for decision in (1, 1, 1):
         ground.work.plan.move(decision)
-    assert ground.work.carry_out((1,)) == "toast 1 is already at 'finished_plate'"
+    assert ground.work.carry_out((1,)) == "slice 1 is already at 'finished_plate'"
     assert ground.work.done() == [1]
 
 

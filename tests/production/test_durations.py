@@ -14,26 +14,44 @@ import lab.files
 from lab.errors import BadInput, WorkFailed
 from lab.production.durations import Durations, TimedMove, durations_key
 from lab.sequencing.cell.routes import NeededMoves
-from lab.sim.scene import Layout
-from lab.tasks.task_file import Task, load
+from lab.sim.places import Layout
+from lab.skills import Grasp
+from lab.skills.skillset import Carried, SkillSet
+from lab.tasks.task import Task
+from lab.tasks.task_file import load
 from lab.toolbox.policy import Policy
 
-MOVES = NeededMoves((("b", "a"),), (("a", "b"), ("b", "c")))
-MEASURED = Durations({("b", "a"): 2.0}, {("a", "b"): 20.5, ("b", "c"): 21.0}, {"b": 30.0}, 99.0)
+AB, BC = Carried("a", "b", "nut"), Carried("b", "c", "tray")
+ALONE = (Grasp(load("toast"), "slice", "plate"),)  # a skill, whichever
+SKILLS = SkillSet(
+    load("toast"),
+    NeededMoves((("b", "a"),), (("a", "b"), ("b", "c"))),
+    legs={AB: ALONE, BC: ALONE},
+    travels={("b", "a"): ALONE},
+    processes={"a": (), "b": ALONE},
+    services={("nut", "b"): ALONE, ("nut", "c"): ()},
+)
+MEASURED = Durations({("b", "a"): 2.0}, {AB: 20.5, BC: 21.0}, {"b": 30.0}, {("nut", "b"): 7.5}, 99.0)
 
 
-def test_durations_survive_json() -> None:
-    back = Durations.from_json(json.loads(json.dumps(MEASURED.to_json())), MOVES, ["b"])
-    assert back == replace(MEASURED, sim_s=0.0)  # nothing is simulated when they are read back
+def test_durations_survive_json_with_kinds_and_services() -> None:
+    record = json.loads(json.dumps(MEASURED.to_json()))
+    assert record == {
+        "empty_s": {"b > a": 2.0},
+        "loaded_s": {"a > b with nut": 20.5, "b > c with tray": 21.0},
+        "process_s": {"b": 30.0},
+        "service_s": {"nut at b": 7.5},
+    }
+    assert Durations.from_json(record, SKILLS) == replace(MEASURED, sim_s=0.0)  # nothing is simulated when they are read
 
 
 def test_what_a_run_took_is_believed_from_then_on() -> None:
     """The way back took 3 s and 4 s instead of 2: 3.5; what was not carried out keeps what its trial took."""
-    slower = MEASURED.after([TimedMove(("b", "a"), False, 3.0), TimedMove(("b", "a"), False, 4.0)])
+    slower = MEASURED.after([TimedMove(("b", "a"), 3.0), TimedMove(("b", "a"), 4.0)])
     assert slower.empty_s == {("b", "a"): 3.5}
-    assert slower.loaded_s == MEASURED.loaded_s
-    assert Durations.from_json(json.loads(json.dumps(slower.to_json())), MOVES, ["b"]) == replace(slower, sim_s=0.0)
-    assert slower.after([TimedMove(("b", "a"), False, 5.0)]).empty_s == {("b", "a"): 5.0}
+    assert (slower.loaded_s, slower.service_s) == (MEASURED.loaded_s, MEASURED.service_s)
+    assert Durations.from_json(json.loads(json.dumps(slower.to_json())), SKILLS) == replace(slower, sim_s=0.0)
+    assert slower.after([TimedMove(("b", "a"), 5.0)]).empty_s == {("b", "a"): 5.0}
 
 
 @pytest.mark.parametrize(
@@ -42,18 +60,21 @@ def test_what_a_run_took_is_believed_from_then_on() -> None:
         ("empty_s", [1, 2], "empty_s: it is no table of times"),
         ("empty_s", {}, "empty_s: the time of 'b > a' is missing"),
         ("empty_s", {"b > a": 1.0, "zzz": 1.0}, "unknown move or station 'zzz' (empty_s): known: b > a"),
-        ("loaded_s", {"a > b": 1.0}, "loaded_s: the time of 'b > c' is missing"),
-        ("loaded_s", {"a > b": 1.0, "b > c": -1.0}, "loaded_s 'b > c': -1.0: wanted 0 to 86400 s"),
+        ("loaded_s", {"a > b with nut": 1.0}, "loaded_s: the time of 'b > c with tray' is missing"),
+        ("loaded_s", {"a > b with nut": 1.0, "b > c with tray": -1.0}, "loaded_s 'b > c with tray': -1.0: wanted 0 to 86400 s"),
         ("process_s", {"b": "soon"}, "process_s 'b': 'soon': wanted 0 to 86400 s"),
         ("process_s", {"b": True}, "process_s 'b': True: wanted 0 to 86400 s"),
         ("process_s", {"b": float("inf")}, "process_s 'b': inf: wanted 0 to 86400 s"),
         ("process_s", {"b": 1e300}, "process_s 'b': 1e+300: wanted 0 to 86400 s"),
         ("process_s", {"b": 1.0, "d": 1.0}, "unknown move or station 'd' (process_s): known: b"),
+        ("loaded_s", {"a > b with nuts": 1.0}, "unknown move or station 'a > b with nuts' (loaded_s): did you mean 'a > b with nut'? known: a > b with nut, b > c with tray"),
+        ("service_s", {}, "service_s: the time of 'nut at b' is missing"),
+        ("service_s", {"nut at b": -2}, "service_s 'nut at b': -2: wanted 0 to 86400 s"),
     ],
 )  # fmt: skip
 def test_a_damaged_record_is_refused_in_one_line(table: str, times: Any, says: str) -> None:
     with pytest.raises(BadInput) as caught:
-        Durations.from_json(MEASURED.to_json() | {table: times}, MOVES, ["b"])
+        Durations.from_json(MEASURED.to_json() | {table: times}, SKILLS)
     assert str(caught.value) == says
 
 
@@ -141,7 +162,8 @@ CHANGES: dict[str, Change] = {
     "a robot's speed": edit("task", slower),
     "a station's place": edit("task", shifted),
     "an obstacle's place": edit("layout", lambda layout: replace(layout, obstacles=((0.5, 0.1), (0.6, 0.201)))),
-    "a move": edit("moves", lambda moves: replace(moves, empty=())),
+    "a move": edit("skillset", lambda skills: replace(skills, moves=replace(skills.moves, empty=()))),
+    "what is carried": edit("skillset", lambda skills: replace(skills, legs={AB._replace(kind="bolt"): ALONE, BC: ALONE})),
     "a policy's table": edit("policies", lambda policies: {"grasp": policy(1.5)}),
     "a policy's problem": edit("policies", lambda policies: {"grasp": policy(signature="b" * 16)}),
     "whose policy it is": edit("policies", lambda policies: {"place": policy()}),
@@ -155,7 +177,7 @@ CHANGES: dict[str, Change] = {
 
 @pytest.mark.parametrize("what", CHANGES)
 def test_the_key_changes_with_whatever_decides(task: Task, own_assets: Path, motion: Path, what: str) -> None:
-    given: dict[str, Any] = {"task": task, "layout": LAYOUT, "moves": MOVES, "policies": {"grasp": policy()}}
+    given: dict[str, Any] = {"task": task, "layout": LAYOUT, "skillset": SKILLS, "policies": {"grasp": policy()}}
     given["modules"] = [f"{motion.name}.arm"]
     before = durations_key(**given)
     assert durations_key(**given) == before
@@ -167,18 +189,18 @@ def test_the_key_changes_with_whatever_decides(task: Task, own_assets: Path, mot
 
 def test_what_decides_nothing_leaves_the_key(task: Task) -> None:
     other = task.model_copy(update={"title": "another", "subtasks": {}})
-    moved = replace(LAYOUT, slices=((0.1, 0.0, 0.0),))  # a move is measured with a slice on its spot
-    key = durations_key(task, LAYOUT, MOVES, {"grasp": policy()})
-    assert durations_key(other, moved, MOVES, {"grasp": policy()}) == key
+    moved = replace(LAYOUT, parts=((0.1, 0.0, 0.0),))  # a move is measured with a part on its spot
+    key = durations_key(task, LAYOUT, SKILLS, {"grasp": policy()})
+    assert durations_key(other, moved, SKILLS, {"grasp": policy()}) == key
 
 
 def test_a_key_that_cannot_be_made_is_an_error(task: Task, motion: Path) -> None:
     shutil.rmtree(next(motion.parent.glob("springs-*")))
     with pytest.raises(WorkFailed, match="the version of the library 'springs' cannot be found"):
-        durations_key(task, LAYOUT, MOVES, {}, modules=[f"{motion.name}.arm"])
+        durations_key(task, LAYOUT, SKILLS, {}, modules=[f"{motion.name}.arm"])
     (motion / "physics.py").unlink()
     with pytest.raises(WorkFailed, match="cannot be found"):
-        durations_key(task, LAYOUT, MOVES, {}, modules=[f"{motion.name}.arm", f"{motion.name}.physics"])
+        durations_key(task, LAYOUT, SKILLS, {}, modules=[f"{motion.name}.arm", f"{motion.name}.physics"])
 
 
 def test_all_that_moves_the_arm_is_in_the_key() -> None:
@@ -188,10 +210,9 @@ def test_all_that_moves_the_arm_is_in_the_key() -> None:
     package = Path(lab.__file__).parent
     rooms = [*package.glob("sim/*.py"), *package.glob("skills/*.py")]
     found = sources(MEASURED_BY, DECIDED_BY_RESULT)
+    look_on = ("__init__", "trial", "reach", "ground_plan", "cell_outline")  # the last three draw plans of a cell
     here = {
-        ".".join(path.relative_to(package.parent).with_suffix("").parts)
-        for path in rooms
-        if path.stem not in ("__init__", "trial")
+        ".".join(path.relative_to(package.parent).with_suffix("").parts) for path in rooms if path.stem not in look_on
     }
     assert here <= found.texts.keys()
     assert {

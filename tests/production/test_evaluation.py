@@ -9,9 +9,10 @@ import pytest
 
 from lab.errors import BadInput
 from lab.mdp import optimal_values
-from lab.production.evaluation import TOASTS, Evaluation, SceneResult, evaluate, in_scene, skill_of, task_of
+from lab.production.evaluation import PARTS, Evaluation, SceneResult, evaluate, in_scene, skill_of, task_of
 from lab.skills.prepared_scene import prepare
-from lab.tasks.task_file import Task, load
+from lab.tasks.task import Task
+from lab.tasks.task_file import load
 from lab.toolbox.policy import Policy
 
 PLACE, INSERT, GRASP = "place at toaster_buffer", "insert at toaster", "grasp at plate"
@@ -28,7 +29,7 @@ def known(task: Task) -> Known:
     """The policy that always takes a shortest way of a skill in the scene of seed 0."""
 
     def make(name: str, **changed: Any) -> Policy:
-        problem = prepare(task, TOASTS, 0, name).problems[name]
+        problem = prepare(task, task.fitting(PARTS), 0, name).problems[name]
         mdp = problem.mdp
         q = optimal_values(mdp, 0.99)
         fields: dict[str, Any] = {
@@ -94,7 +95,7 @@ def test_a_policy_that_learned_nothing_goes_round(task: Task, known: Known) -> N
 
 
 def test_what_slips_in_physics_fails_there(task: Task, known: Known) -> None:
-    smooth = task.model_copy(update={"slices": task.slices.model_copy(update={"friction": 0.0})})
+    smooth = task.changed(parts=(task.parts[0].model_copy(update={"friction": 0.0}),))
     scene = in_scene(known(GRASP), smooth, GRASP, 0)
     assert (scene.failed_in, scene.reason) == ("physics", "slice 1 is not in the gripper after grasping at 'plate'")
     assert scene.sim_s > 1.0
@@ -102,7 +103,7 @@ def test_what_slips_in_physics_fails_there(task: Task, known: Known) -> None:
 
 def test_a_slice_is_taken_up_where_it_is_drawn(task: Task, known: Known) -> None:
     """The same table, another motion."""
-    straight = task.model_copy(update={"slices": task.slices.model_copy(update={"area": (0.0, 0.0, 0.0)})})
+    straight = task.changed(parts=(task.parts[0].model_copy(update={"area": (0.0, 0.0, 0.0)}),))
     drawn, still = (in_scene(known(GRASP), given, GRASP, 3) for given in (task, straight))
     assert drawn.failed_in is still.failed_in is None
     assert drawn.sim_s != still.sim_s

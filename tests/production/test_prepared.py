@@ -16,7 +16,7 @@ def check_task(file: str, toasts: int | None, seed: int) -> list[str]:
 
 
 def test_rewards_that_make_crashing_the_better_choice_are_warned_of(tmp_path: Path, root: Path) -> None:
-    """After 11 moves at -0.1 and discount 0.99 walking has cost 1.05; to butter nothing can be run into."""
+    """After 11 moves at -0.1 and discount 0.99 walking has cost 1.05; when a surface is covered nothing can be run into."""
     text = (root / "tasks" / "toast.toml").read_text(encoding="utf-8")
     path = tmp_path / "t.toml"
     path.write_text(text)
@@ -38,9 +38,10 @@ def test_check_finds_what_is_wrong(tmp_path: Path, root: Path) -> None:
     text = (root / "tasks" / "toast.toml").read_text(encoding="utf-8")
     path = tmp_path / "t.toml"
     path.write_text(text.replace("capacity = 50", "capacity = 2"))
-    assert check_task(str(path), None, 0) == []
+    assert check_task(str(path), 2, 0) == []
     (error,) = check_task(str(path), 3, 0)
-    assert error == "3 toasts (--toasts) do not fit on 'plate': its capacity in the task file is 2"
+    assert [error] == check_task(str(path), None, 0)  # its own order
+    assert error == "3 slices (--toasts, --parts) do not fit on 'plate': its capacity in the task file is 2"
     path.write_text("name =")
     (error,) = check_task(str(path), 3, 0)
     assert error.startswith(f"{path}: not valid TOML: Invalid value (at end of document)")
@@ -85,6 +86,6 @@ def test_a_bad_cell_ends_the_command_with_2_and_one_line(tmp_path: Path, root: P
     path.write_text(text.replace("service_s = 240", "service_s = nan"))
     ran = lab("task", "check", str(path))
     assert (ran.code, ran.out) == (2, "")
-    assert ran.err.startswith(f"lab: {path}: line 63: products.1.routes.0.2.service_s: Input should be a finite number")
+    assert ran.err.startswith(f"lab: {path}: line 66: products.1.routes.0.2.service_s: Input should be a finite number")
     assert ran.err.count("\n") == 1
     assert lab("task", "check", "fms").out == "fms is sound\n"

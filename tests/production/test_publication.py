@@ -26,7 +26,7 @@ def make() -> Make:
     def learned(mdp: TabularMDP) -> Policy:
         learner, gate = LearnerSettings(episodes=8, max_steps=20), GateSettings()
         result = run_session(mdp, learner, gate, None, np.random.default_rng(0))
-        return Policy.of(result, mdp, learner, gate, Origin("butter it", "butter", "toast", "none", 0))
+        return Policy.of(result, mdp, learner, gate, Origin("butter it", "cover", "toast", "none", 0))
 
     return learned
 
@@ -41,7 +41,7 @@ def test_a_card_with_its_pictures_and_its_file(tmp_path: Path, make: Make) -> No
     assert files_in(folder) == {"card.md", "learning-curve.png", "value-map.png", "butter-it-987b1649d9.safetensors"}
     assert {Path(path).name for path in files.values()} == files_in(folder)
     text = (folder / "card.md").read_text()
-    assert text.startswith("# butter it\n\nThe applier's head covers a slice with butter, cell by cell.\n")
+    assert text.startswith("# butter it\n\nA surface is covered cell by cell, as with butter or by vacuuming.\n")
     for name in files_in(folder) - {"card.md"}:
         assert name in text
     assert "lab toolbox export 'butter it' --out skill.zip\n" in text

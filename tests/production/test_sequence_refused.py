@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from lab.sequencing import SEQUENCERS
+from lab.tasks.task import Order
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 
@@ -23,7 +24,7 @@ KNOWN = ", ".join(sorted(SEQUENCERS))
     ("words", "line"),
     [
         ("world-1", "world-1: it is a world, there is nothing to sequence: learn it with lab teach world-1"),
-        ("ovn.toml", "no task file 'ovn.toml': give a file that exists, .toml or a .txt grid, or what ships: fms, "),
+        ("ovn.toml", "no task file 'ovn.toml': give a file that exists, .toml or a .txt grid, or what ships: breakfast, fms-arm, fms, "),
         ("fsm", "unknown task 'fsm' (TASK): did you mean 'fms'? known: breakfast, fms, "),
         ("fms --case RSR --toasts 3", "--case RSR and --toasts 3: an order is one or the other"),
         ("oven.toml --case T --toasts 1", "--case T and --toasts 1: an order is one or the other"),
@@ -108,7 +109,7 @@ def test_what_does_not_fit_is_refused(lab: Lab, folder: Path, words: str, line: 
     ],
 )
 def test_bad_names_are_known_before_a_task_is_measured(
-    lab: Lab, measured: list[tuple[str, int, int]], words: str
+    lab: Lab, measured: list[tuple[str, Order, int]], words: str
 ) -> None:
     ran = lab("sequence", "toast", *words.split())
     assert (ran.code, ran.out, len(ran.err.splitlines()), measured) == (2, "", 1, [])

@@ -22,6 +22,7 @@ from lab.sequencing.cell.objectives import OBJECTIVES
 from lab.sequencing.search import Reference
 from lab.sequencing.simulate.run import simulate
 from lab.tasks.sequencing import search_for
+from lab.tasks.task import Order
 from lab.tasks.task_file import load, load_cell
 from lab.teaching.events import Event, PhaseBegan, SequenceFound
 from lab.teaching.teacher import Teacher
@@ -351,13 +352,13 @@ def test_a_deadlock_is_a_mark_in_the_plot(lab: Lab) -> None:
 
 
 @pytest.mark.parametrize("method", [None, "srl", "srl-time", "exact", "fifo", "random"])
-def test_a_task(lab: Lab, measured: list[tuple[str, int, int]], method: str | None) -> None:
+def test_a_task(lab: Lab, measured: list[tuple[str, Order, int]], method: str | None) -> None:
     words = "toast --toasts 2 --episodes 20 --sessions 3 --seed 9 --plot p.png --gantt g.svg"
     document = asked(lab, words + (f" --method {method}" if method else ""))
-    assert measured == [("toast", 2, 9)]
+    assert measured == [("toast", ("slice", "slice"), 9)]
     assert tuple(document) == FIELDS
     assert document["method"] == (method or load("toast").sequencing.method)
-    assert (document["task"], document["order"], document["seed"]) == ("toast", ["toast", "toast"], 9)
+    assert (document["task"], document["order"], document["seed"]) == ("toast", ["slice", "slice"], 9)
     assert (document["makespan_s"], document["optimal_s"], document["mean_best_s"]) == (29.0, 29.0, 29.0)
     assert (document["gap"], document["success_percent"]) == (0.0, 100.0)
     assert document["final_success_percent"] == (100.0 if document["method"] in LEARNERS else None)
@@ -377,12 +378,23 @@ def test_who_listens_hears_every_session(teacher: Teacher) -> None:
     assert found == [(29.0, Reference(29.0, True, "A*"))] * 3
 
 
-def test_a_task_is_for_three_toasts_unless_told(lab: Lab, measured: list[tuple[str, int, int]]) -> None:
-    assert asked(lab, "toast --method fifo")["toasts"] == 3
-    assert measured == [("toast", 3, 0)]
+@pytest.mark.parametrize(
+    ("words", "order"),
+    [
+        ("toast", ("slice",) * 3),
+        ("toast --toasts 1", ("slice",)),
+        ("toast --parts slice=2", ("slice",) * 2),
+    ],
+)
+def test_a_task_is_for_what_its_file_says_unless_told(
+    lab: Lab, measured: list[tuple[str, Order, int]], words: str, order: Order
+) -> None:
+    document = asked(lab, f"{words} --method fifo")
+    assert (document["toasts"], document["order"]) == (len(order), list(order))
+    assert measured == [("toast", order, 0)]
 
 
-def test_a_case_that_a_task_has_not(lab: Lab, folder: Path, root: Path, measured: list[tuple[str, int, int]]) -> None:
+def test_a_case_that_a_task_has_not(lab: Lab, folder: Path, root: Path, measured: list[tuple[str, Order, int]]) -> None:
     (folder / "mine.toml").write_text((root / "tasks" / "toast.toml").read_text(encoding="utf-8"))
     ran = lab("sequence", "mine.toml", "--case", "I")
     line = "lab: case 'I' (--case): task 'mine.toml' has none; toast has I, II and III, a cell its orders\n"

@@ -238,5 +238,5 @@ def test_what_skills_make_keeps_its_names(task: Task) -> None:
     assert len(set(names)) == len(names) == 18
     first, *rest = task.obstacles
     for name in names:
-        with pytest.raises(BadInput, match=rf"obstacle '{name}' has the name of something else in the cell"):
+        with pytest.raises(ValueError, match=rf"obstacle '{name}' has the name of something else in the cell"):
             task.changed(obstacles=(first.model_copy(update={"name": name}), *rest))

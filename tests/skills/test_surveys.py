@@ -4,18 +4,19 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.mdp import greedy_path, optimal_values
-from lab.sim.models import SLICE as SIZE
-from lab.sim.scene import GRASP_DEPTH, Layout, spots
-from lab.skills import Insert
+from lab.sim.kinematics import ToolPose
+from lab.sim.places import Layout
+from lab.skills.prepared_scene import prepare
 from lab.skills.skillset import SkillSet
-from lab.skills.surveys import INSERT_START, NEAR_SHAPE, NEAR_YAWS, Surveys, camera_view, overhead_camera
-from lab.tasks.task_file import Obstacle, Task
-from lab.vision import see
+from lab.skills.surveys import INSERT, NEAR_SHAPE, NEAR_YAWS, Surveys, grid_of, near_pose, way_to
+from lab.tasks.task import Task
+from lab.tasks.task_file import load
+
+ORDER = ("slice", "slice")
 
 
 def signatures(surveys: Surveys) -> dict[str, str]:
-    skillset = SkillSet.of(surveys.task, 1)
+    skillset = SkillSet.of(surveys.task, ("slice",))
     return {name: skill.setup(surveys).mdp.signature for name, skill in skillset.skills.items()}
 
 
@@ -28,7 +29,7 @@ def with_obstacle_moved(surveys: Surveys, name: str, dx: float, dy: float) -> Su
     places = []
     for obstacle, (x, y) in zip(surveys.task.obstacles, surveys.layout.obstacles, strict=True):
         places.append((x + dx, y + dy) if obstacle.name == name else (x, y))
-    return Surveys(surveys.task, Layout(tuple(places), ()))
+    return Surveys(surveys.task, ORDER, Layout(tuple(places), ()))
 
 
 def changed(before: dict[str, str], after: dict[str, str]) -> set[str]:
@@ -45,9 +46,9 @@ def test_a_moved_obstacle_changes_exactly_the_problems_whose_cells_it_changes(
     moved = with_obstacle_moved(surveys, name, dx, dy)
     found = changed(before, signatures(moved))
     expected = set()
-    for loaded in (False, True):
-        if not np.array_equal(surveys.workspace(loaded).blocked, moved.workspace(loaded).blocked):
-            expected |= {n for n in before if n.startswith("transfer") and n.endswith("with slice") is loaded}
+    for carried in ("", "slice"):
+        if not np.array_equal(surveys.workspace(carried).blocked, moved.workspace(carried).blocked):
+            expected |= {n for n in before if n.startswith("transfer") and n.endswith("with slice") is bool(carried)}
     if name == "cubes A":  # the camera sees it; the tower stands outside of its grid
         expected.add("insert at toaster")
     assert found == expected
@@ -63,7 +64,7 @@ def test_a_moved_station_changes_its_own_transfers(task: Task, layout: Layout, b
     stations = tuple(
         s.model_copy(update={"pose": (0.42, -0.68, 0.0)}) if s.name == "butter_buffer" else s for s in task.stations
     )
-    after = signatures(Surveys(task.model_copy(update={"stations": stations}), layout))
+    after = signatures(Surveys(task.changed(stations=stations), ORDER, layout))
     found = changed(before, after)
     assert "insert at toaster" not in found
     assert not any(n.startswith(("grasp", "butter at", "place")) for n in found)
@@ -71,10 +72,10 @@ def test_a_moved_station_changes_its_own_transfers(task: Task, layout: Layout, b
 
 
 def test_every_survey_is_made_once(surveys: Surveys) -> None:
-    assert surveys.workspace(True) is surveys.workspace(True)
-    assert surveys.around("plate", False) is surveys.around("plate", False)
-    assert surveys.picture() is surveys.picture()
-    assert surveys.layout.slices == ()
+    assert surveys.workspace("slice") is surveys.workspace("slice")
+    assert surveys.around("plate", "slice", False) is surveys.around("plate", "slice", False)
+    assert surveys.camera_grid("toaster", "slice") is surveys.camera_grid("toaster", "slice")
+    assert surveys.layout.parts == ()
 
 
 def test_cells_are_tool_poses_in_the_work_space(surveys: Surveys, task: Task) -> None:
@@ -91,132 +92,123 @@ def test_cells_are_tool_poses_in_the_work_space(surveys: Surveys, task: Task) ->
 
 
 def test_a_station_is_docked_at_from_a_free_cell_beside_it(surveys: Surveys, task: Task) -> None:
-    for place in [s.name for s in task.stations] + [INSERT_START]:
-        for loaded in (False, True):
-            cell = surveys.dock(place, loaded)
+    for place in [s.name for s in task.stations] + [INSERT]:
+        for carried in ("", "slice"):
+            cell = surveys.dock(place, carried)
             pose, approach = surveys.cell_pose(cell), surveys.approach(place)
-            assert not surveys.workspace(loaded).blocked[cell]
+            assert not surveys.workspace(carried).blocked[cell]
             assert np.hypot(pose.x - approach.x, pose.y - approach.y) <= 1.6 * max(task.workspace.cell_m[:2])
 
 
 def test_around_a_slice_the_goal_is_free_and_what_stands_beside_blocks(surveys: Surveys) -> None:
-    empty = surveys.around("plate", False)
+    empty = surveys.around("plate", "slice", False)
     assert empty.causes.shape == (*NEAR_SHAPE, NEAR_YAWS)
     assert not empty.blocked[2, 2, 0, NEAR_YAWS // 2]
     assert set(np.unique(empty.causes)) >= {"slice behind", "slice in front"}
-    alone = surveys.around("toaster", False)  # a machine holds one slice
-    assert set(np.unique(alone.causes)) == {"", "the slice"}
+    alone = surveys.around("toaster", "slice", False)  # a machine for one
+    assert set(np.unique(alone.causes)) == {"", "the part"}
     assert all(empty.blocked[:, 0, 0, :].ravel())  # 2.4 cm aside a finger would stand in a slice
-    loaded = surveys.around("plate", True)
+    loaded = surveys.around("plate", "slice", True)
     assert loaded.causes.shape == NEAR_SHAPE
     assert not loaded.blocked[2, 2, 0]
     assert not loaded.blocked[:, :, -1].any()
 
 
-def test_what_the_camera_sees_is_where_it_stands(surveys: Surveys, task: Task) -> None:
-    seen = see(surveys.picture(), camera_view(task))
-    kinds = [m.kind for m in seen.markers]
-    assert kinds.count("obstacle") == 3
-    for marker in seen.markers:
-        if marker.kind == "gripper":
-            at = task.insert.start_m
-        elif marker.kind == "toaster":
-            at = task.station("toaster").pose[:2]
-        else:
-            at = min(surveys.layout.obstacles, key=lambda p: np.hypot(*np.subtract(p, marker.world_m)))
-        assert np.hypot(*np.subtract(at, marker.world_m)) < 2e-3
-    assert surveys.picture().shape == (task.camera.pixels, task.camera.pixels, 3)
-    assert overhead_camera(task, 100).width == 100
-
-
-def test_a_turned_toaster_is_seen_in_its_place_too(task: Task) -> None:
-    stations = tuple(
-        s.model_copy(update={"pose": (0.9, 0.1, 0.7)}) if s.name == "toaster" else s for s in task.stations
-    )
-    bare = task.model_copy(update={"stations": stations, "obstacles": ()})
-    seen = see(Surveys(bare, Layout((), ())).picture(), camera_view(bare))
-    toaster = next(m for m in seen.markers if m.kind == "toaster")
-    assert toaster.world_m == pytest.approx((0.9, 0.1), abs=2e-3)
-
-
-def test_cubes_of_several_heights_in_the_picture_are_refused(task: Task) -> None:
-    made = (
-        Obstacle(name="low", position_m=(0.725, -0.075), cubes=2),
-        Obstacle(name="high", position_m=(0.775, 0.075), cubes=3),
-        Obstacle(name="far", position_m=(0.2, 0.9), cubes=9),
-    )
-    with pytest.raises(
-        BadInput, match=r"obstacles in the camera's grid must be equally high, got \[0\.122, 0\.182\] m"
-    ):
-        camera_view(task.model_copy(update={"obstacles": made}))
-    camera_view(task.model_copy(update={"obstacles": made[1:]}))
-
-
-def test_a_start_out_of_reach_is_refused(task: Task, layout: Layout) -> None:
-    far = task.insert.model_copy(update={"start_m": (1.6, 0.0)})
-    with pytest.raises(BadInput, match=r"insert\.start_m \[1\.6, 0\.0\]: out of the arm's reach"):
-        Surveys(task.model_copy(update={"insert": far}), layout).picture()
-
-
 def test_a_scene_that_cannot_be_is_refused_at_once(task: Task, layout: Layout) -> None:
+    """What is out of reach before anything is surveyed, and what cannot be gripped when the kinds are made."""
     stations = tuple(
         s.model_copy(update={"pose": (1.5, 0.0, 0.0)}) if s.name == "toaster" else s for s in task.stations
     )
     with pytest.raises(BadInput, match="station 'toaster' is out of reach"):
-        Surveys(task.model_copy(update={"stations": stations}), layout)
+        prepare(task.changed(stations=stations), ORDER, 0, "no skill at all")
+    wide = task.parts[0].model_copy(update={"size_m": (0.12, 0.06, 0.12), "look": None})
+    with pytest.raises(BadInput, match="part 'slice'"):
+        Surveys(task.changed(parts=(wide,)), ORDER, layout)
 
 
 def test_the_carried_slice_hangs_above_the_standing_ones(surveys: Surveys) -> None:
-    assert surveys.approach("plate").z + GRASP_DEPTH - SIZE[2] > 0.012 + SIZE[2] + 0.01
+    """A slice is 120 mm high and hangs 90 mm below the tips; what stands has a slab of 12 mm below it."""
+    assert surveys.approach("plate").z - 0.090 > 0.012 + 0.120 + 0.01
 
 
-def test_a_start_with_a_cube_in_the_way_of_the_slice_is_refused(task: Task) -> None:
-    x, y = task.insert.start_m
-    near = Obstacle(name="cube", position_m=(x + 0.08, y), cubes=3)
-    beside = Surveys(task.model_copy(update={"obstacles": (near,)}), Layout((near.position_m,), ()))
-    with pytest.raises(
-        BadInput, match=r"insert\.start_m \[0\.\d+, -0\.\d+\]: cube is in the way of a carried slice there"
-    ):
-        beside.picture()
+def test_a_camera_grid_is_a_place_that_transfers_lead_to(task: Task) -> None:
+    assert (way_to(task, "toaster"), way_to(task, "plate")) == (INSERT, "plate")
+    assert grid_of(task, INSERT) == task.station("toaster").grid
+    assert grid_of(task, "toaster") is grid_of(task, "plate") is None
+    two = load("two-toasters")
+    for name in ("toaster-1", "toaster-2"):
+        assert way_to(two, name) == f"{INSERT} at {name}"
+        assert grid_of(two, f"{INSERT} at {name}") == two.station(name).grid
+    assert grid_of(two, INSERT) is None
 
 
-def with_buffer_at(task: Task, pose: tuple[float, float, float]) -> Task:
-    stations = tuple(s.model_copy(update={"pose": pose}) if s.name == "butter_buffer" else s for s in task.stations)
-    return task.model_copy(update={"stations": stations, "obstacles": ()})
+# ---- pallets -------------------------------------------------------------------------------------------------------
 
 
-def test_waiting_slices_block_the_grid_where_a_carried_one_would_hit_them(task: Task) -> None:
-    """The buffer itself is low; the slices that wait in it reach 7 mm above the foot of a carried one."""
-    surveys = Surveys(with_buffer_at(task, (0.60, -0.02, 0.0)), Layout((), ()))
-    causes = surveys.over_grid(frozenset()).causes
-    for spot in spots(surveys.task.station("butter_buffer")):
-        steps = zip((spot.x, spot.y), task.insert.origin_m, strict=True)
-        cell = tuple(int((at - low) / task.insert.cell_m) for at, low in steps)
-        assert causes[cell].startswith("slice ")
-        assert causes[cell].endswith(" at butter_buffer")
-    problem = Insert("toaster").setup(surveys)
-    crossed = {problem.mdp.state_cell(s) for s in greedy_path(optimal_values(problem.mdp, 0.99), problem.mdp, 99)[0]}
-    assert not any(causes[cell] for cell in crossed)
+@pytest.fixture(scope="module")
+def with_pallets(fms: Task) -> Surveys:
+    return Surveys(fms, ("rook", "sign"), Layout(tuple(o.position_m for o in fms.obstacles), ()))
 
 
-def test_slices_that_wait_far_from_the_grid_change_nothing(task: Task, surveys: Surveys) -> None:
-    """The shipped stations stand clear of it: the nearest block no cell, and the plates are not even looked at."""
-    assert {str(name) for name in np.unique(surveys.over_grid(frozenset()).causes)} <= {
-        "",
-        "out of reach",
-        "cubes A",
-        "cubes B",
-        "cubes C",
-    }
-    assert not any("plate" in name for name in surveys._waiting())
+def test_a_part_is_lifted_off_its_pallet_and_set_down_on_it(with_pallets: Surveys) -> None:
+    """What stands at a place for one is the part and its pallet: nothing beside them is in the way."""
+    lifted = with_pallets.around("mill-in", "sign", False)
+    assert not lifted.blocked[2, 2, 0, NEAR_YAWS // 2]
+    assert set(np.unique(lifted.causes)) <= {"", "the part", "the part's pallet"}
+    assert "the part" in lifted.causes
+    down = with_pallets.around("mill-in", "sign", True)
+    assert not down.blocked[2, 2, 0]
+    assert set(np.unique(down.causes)) <= {"", "the part's pallet"}  # the part itself is in the gripper
 
 
-def test_a_slice_waits_on_every_spot_that_the_toasts_need(task: Task) -> None:
-    roomy = with_buffer_at(task, (0.60, -0.02, 0.0))
-    stations = tuple(s.model_copy(update={"capacity": 6}) if s.name == "butter_buffer" else s for s in roomy.stations)
-    roomy = roomy.model_copy(update={"stations": stations})
-    still = (0.0, 0.0, 0.0)
-    for toasts, waiting in ((0, 4), (5, 5), (9, 6)):
-        names = Surveys(roomy, Layout((), (still,) * toasts))._waiting()
-        assert sum(name.endswith(" at butter_buffer") for name in names) == waiting
-        assert sum(name.endswith(" at butter_applier") for name in names) == 1
+def test_a_loaded_pallet_is_taken_from_among_others(with_pallets: Surveys) -> None:
+    around = with_pallets.around("incoming", "sign on pallet", False)
+    assert not around.blocked[2, 2, 0, NEAR_YAWS // 2]
+    assert not around.blocked[2, 2, :, NEAR_YAWS // 2].any()
+    causes = {str(cause) for cause in np.unique(around.causes)} - {""}
+    assert "the part's pallet" in causes
+    assert causes <= {"the part", "the part's pallet"} | {name for name in causes if " on pallet " in name}
+
+
+def test_in_a_machine_a_part_stands_without_its_pallet(with_pallets: Surveys) -> None:
+    assert not any("pallet" in str(cause) for cause in np.unique(with_pallets.around("mill", "sign", False).causes))
+
+
+def test_poses_that_are_not_free_are_named_with_what_is_in_the_way(with_pallets: Surveys) -> None:
+    """The control cabinet's middle is at (0.36, 0.26) m."""
+    with_pallets.check_free("vacuum", [ToolPose(0.60, 0.0, 0.3)])
+    with pytest.raises(BadInput, match=r"^vacuum: at \(0\.36, 0\.26, 0\.20\) m in the way: control cabinet$"):
+        with_pallets.check_free("vacuum", [ToolPose(0.60, 0.0, 0.3), ToolPose(0.36, 0.26, 0.2)])
+
+
+# ---- from the side -------------------------------------------------------------------------------------------------
+
+
+def test_from_the_side_levels_lead_out_and_the_first_axis_up() -> None:
+    """Brought in along +y, a part comes from -y: two levels out are 6 cm before the goal, one cell along is 12 mm higher."""
+    goal = ToolPose(0.5, 0.4, 0.1, np.pi / 2)
+    out = near_pose(goal, (3, 2, 2), into=np.pi / 2)
+    assert (out.x, out.y, out.z, out.yaw) == pytest.approx((0.5, 0.4 - 0.06, 0.112, np.pi / 2))
+    aside = near_pose(goal, (2, 3, 0, 3), into=np.pi / 2)
+    assert (aside.x, aside.y, aside.z, aside.yaw) == pytest.approx((0.5 - 0.012, 0.4, 0.1, np.pi / 2 + 0.06))
+    assert near_pose(goal, (2, 2, 0), into=np.pi / 2) == near_pose(goal, (2, 2, 0)) == goal
+
+
+def test_the_way_out_of_a_station_is_up_or_lifted_out_to_the_side_and_up(task: Task, layout: Layout) -> None:
+    x, y, _ = task.station("toaster_buffer").pose
+    stations = tuple(
+        s.model_copy(update={"approach": "side", "pose": (x, y, np.pi / 2)}) if s.name == "toaster_buffer" else s
+        for s in task.stations
+    )
+    side = Surveys(task.changed(stations=stations), ORDER, layout)
+    assert side.into("toaster_buffer") == np.pi / 2
+    assert side.into("plate") is None
+    at = ToolPose(x, y, 0.1, np.pi / 2)
+    lifted, out, up, end = side.way_out("toaster_buffer", at)
+    assert (lifted.x, lifted.y, lifted.z) == pytest.approx((x, y, 0.106))
+    assert (out.x, out.y, out.z) == pytest.approx((x, y - 0.15, 0.106))
+    assert (up.x, up.y, up.z) == pytest.approx((out.x, out.y, end.z))
+    assert end == side.approach("toaster_buffer")
+    assert (end.x, end.y) == pytest.approx((x, y - 0.15))
+    risen, end = side.way_out("plate", at)
+    assert (risen.x, risen.y, risen.z) == (at.x, at.y, end.z)

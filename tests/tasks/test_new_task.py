@@ -175,7 +175,7 @@ def test_the_text_is_the_task_that_was_asked_for(
     placed = next(layouts(new, ROOMY, between_m), None)
     assume(placed is not None)
     assert placed is not None
-    text = text_of(new, placed, opening_m)
+    text = text_of(new, placed, ROOMY, opening_m)
     assert max(map(len, text.splitlines())) <= 130
     task = task_of_text(Path("t.toml"), text)
     assert tomllib.loads(text)["name"] == task.name == "t"
@@ -197,8 +197,17 @@ def test_the_text_is_the_task_that_was_asked_for(
     for station, one in zip(task.stations, placed, strict=True):
         assert (station.name, station.kind, station.pose) == (one.name, one.kind, (one.x, one.y, 0.0))
         assert (station.spots is not None) == (between_m is not None and one.capacity > 1)
-        for axis in (0, 1):  # the workspace has the station in it, with the gripper around its parts
+        for axis in (0, 1):  # the workspace has the station's middle in it
             first, size, count = (task.workspace.lower_m[axis], task.workspace.cell_m[axis], task.workspace.shape[axis])
-            half = one.half_m(new.foot_m)[axis]
-            assert first <= station.pose[axis] - half
-            assert station.pose[axis] + half <= first + size * count + 1e-9
+            assert first <= station.pose[axis] <= first + size * (count - 1)
+
+
+@given(st.floats(0.2, 0.6))
+def test_no_cell_right_behind_the_arm_is_reached(nearest_m: float) -> None:
+    """There its first joint would have to turn through its gap, from one side to the other."""
+    around = Around(nearest_m, 1.3, 2.9)
+    new = new_task("t", "up6", (), (MACHINE,), False)
+    grid = task_of_text(Path("t.toml"), text_of(new, next(layouts(new, around)), around)).workspace
+    (x, y), (wide, high) = grid.lower_m[:2], grid.cell_m[:2]
+    middles = [(x + (i + 0.5) * wide, y + (j + 0.5) * high) for i in range(grid.shape[0]) for j in range(grid.shape[1])]
+    assert all(hypot(a, b) < nearest_m for a, b in middles if a < 0 and abs(b) < high)

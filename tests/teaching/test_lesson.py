@@ -11,9 +11,11 @@ from lab.advice.entries import read_journal
 from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.skills import Butter, Grasp, Skill
+from lab.skills import Skill
+from lab.skills.skillset import SkillSet
 from lab.tasks.grid_world import AdvisorView, GridWorld
-from lab.tasks.task_file import Task, fitting, load
+from lab.tasks.task import Task
+from lab.tasks.task_file import load
 from lab.teaching.lesson import one_lesson, teach
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.lesson_plan import Interrupted
@@ -118,10 +120,10 @@ def test_an_interrupted_session_is_gone_on_with(task: Task, tmp_path: Path) -> N
 def test_a_name_of_another_problem_is_refused(task: Task, teacher: Teacher) -> None:
     for _ in range(2):  # its own name may be used again
         teach_skill(task, "butter", teacher, episodes=1, name="mine")
-    with pytest.raises(BadInput, match=r"policy name 'mine' .--save.: it is the name of a policy for 'butter'"):
+    with pytest.raises(BadInput, match=r"policy name 'mine' .--save.: it is the name of a policy for 'cover'"):
         teach_skill(task, "insert", teacher, name="mine")
     (row,) = teacher.toolbox.list()
-    assert (row["subtask"], row["episodes"]) == ("butter", 2)
+    assert (row["subtask"], row["episodes"]) == ("cover", 2)
 
 
 def test_a_grasp_that_lifts_nothing_is_not_kept_as_solved(
@@ -145,7 +147,7 @@ def test_a_grasp_that_lifts_nothing_is_not_kept_as_solved(
 
 def test_a_journal_says_solved_only_after_the_trial_in_physics(task: Task, teacher: Teacher, tmp_path: Path) -> None:
     """The grasp of a slice as slippery as wet ice is learned, and lifts nothing: journal and toolbox say the same."""
-    ice = task.model_copy(update={"slices": task.slices.model_copy(update={"friction": 0.0})})
+    ice = task.changed(parts=(task.parts[0].model_copy(update={"friction": 0.0}),))
     options = LessonOptions("grasp", advisors=("expert",))
     document = teach(SkillSubject.of(options, ice), options, teacher, tmp_path / "lesson")
     assert (document["solved"], document["final_steps"]) == (False, document["optimal_steps"])
@@ -172,7 +174,7 @@ def test_ctrl_c_while_a_grasp_is_tried_keeps_it_unsolved(
 @pytest.mark.parametrize(
     ("subtask", "options", "reason"),
     [
-        ("inser", {}, "unknown sub-task 'inser' .SUBTASK.: did you mean 'insert'. known: butter, grasp, insert, place"),
+        ("inser", {}, "unknown sub-task 'inser' .SUBTASK.: did you mean 'insert'. known: cover, grasp, insert, place"),
         (
             "grasp at plat",
             {},
@@ -262,18 +264,35 @@ def test_a_view_that_is_none(world: GridWorld) -> None:
         WorldSubject(world.model_copy(update={"view": None}), "limited")
 
 
-def test_a_skill_by_its_name_or_the_first_of_a_sub_task() -> None:
-    skills: dict[str, Skill] = {skill.name: skill for skill in (Grasp("plate"), Grasp("toaster"), Butter("applier"))}
-    assert find_skill(skills, "grasp").name == "grasp at plate"
-    assert find_skill(skills, "grasp at toaster").name == "grasp at toaster"
+@pytest.mark.parametrize(
+    ("word", "name"),
+    [
+        ("grasp", "grasp at plate"),
+        ("grasp at toaster", "grasp at toaster"),
+        ("cover", "butter at butter_applier"),
+        ("butter", "butter at butter_applier"),
+        ("butter at butter_applier", "butter at butter_applier"),
+    ],
+)
+def test_a_skill_by_its_name_the_first_of_a_sub_task_or_by_its_process(task: Task, word: str, name: str) -> None:
+    skills: dict[str, Skill] = SkillSet.of(task, ("slice",)).skills
+    assert find_skill(skills, word).name == name
 
 
-def test_as_many_toasts_as_both_ends_hold(task: Task) -> None:
-    small = task.model_copy(
-        update={
-            "stations": tuple(
-                s.model_copy(update={"capacity": 2}) if s.name == "finished_plate" else s for s in task.stations
-            )
-        }
+def test_of_several_kinds_a_skill_is_named_with_its_own() -> None:
+    breakfast = load("breakfast")
+    skills = SkillSet.of(breakfast, breakfast.order()).skills
+    assert find_skill(skills, "grasp").name == "grasp slice at plate"
+    assert find_skill(skills, "grasp cup at shelf").name == "grasp cup at shelf"
+    with pytest.raises(BadInput, match="did you mean 'grasp cup at shelf'"):
+        find_skill(skills, "grasp cup at shef")
+
+
+def test_as_many_parts_as_both_ends_hold(task: Task) -> None:
+    few = tuple(
+        s.model_copy(update={"capacity": 2}) if s.name == "finished_plate" else s for s in task.stations
     )
-    assert [fitting(task, 3), fitting(small, 3), fitting(small, 1)] == [3, 2, 1]
+    small = task.changed(stations=few)
+    breakfast = load("breakfast")  # its tray holds eight, one of them a cup
+    assert breakfast.fitting(9) == (*["slice"] * 7, "cup")
+    assert [task.fitting(3), small.fitting(3), small.fitting(1)] == [("slice",) * n for n in (3, 2, 1)]

@@ -22,11 +22,14 @@ def shown(what: RenderableType, width: int = 100) -> list[str]:
     return [line.rstrip() for line in console.file.getvalue().splitlines()]
 
 
-def skill(source: str, helped_steps: int = 0, *, elsewhere: bool = False, saved: int = 0) -> dict[str, Any]:
-    """A skill's row; saved: episodes, and as many helped steps."""
+def skill(
+    source: str, helped_steps: int = 0, *, elsewhere: bool = False, saved: int = 0, from_task: str = "toast"
+) -> dict[str, Any]:
+    """A skill's row; saved: episodes, and as many helped steps; from_task: whose policy it was made of, if any."""
     fitness = {"verdict": "use"} if elsewhere else None
     return {
         "source": source,
+        "from_task": from_task if source in ("reused", "adapted") else None,
         "helped_steps": helped_steps,
         "episodes": 0 if source == "reused" else 200,
         "moves": 0 if source == "reused" else 3000,
@@ -37,8 +40,10 @@ def skill(source: str, helped_steps: int = 0, *, elsewhere: bool = False, saved:
 
 
 RUN: dict[str, Any] = {
+    "task": "toast",
     "seed": 7,
     "toasts": 2,
+    "parts": {"toast": 2},
     "success": True,
     "delivered": 2,
     "dropped": 0,
@@ -61,15 +66,24 @@ RUN: dict[str, Any] = {
 def test_a_run_says_what_was_found_and_saved() -> None:
     skills = [skill("learned", 3), skill("adapted", saved=171), skill("reused", saved=200)]
     found = shown(run_summary(RUN | {"skills": [*skills, skill("reused", elsewhere=True, saved=200)]}))
-    assert found[1] == "         skills  1 learned, 1 adapted, 2 reused (1 of another problem)"
+    assert found[1] == "         skills  2 reused (1 of another problem), 1 adapted, 1 learned"
     assert found[2] == "     learned in  400 episodes, 6000 moves, 3 of them advised"
     assert found[3] == "          saved  571 episodes, 571 helped steps"
+
+
+def test_a_run_says_which_tasks_its_skills_come_from() -> None:
+    own, butter = skill("reused"), skill("reused", from_task="two-toasters", elsewhere=True)
+    skills = [own, *[skill("reused", from_task="sorting")] * 2, butter, skill("adapted", from_task="sorting")]
+    found = shown(run_summary(RUN | {"skills": skills}), 120)
+    reused = "4 reused (2 from sorting, 1 from two-toasters, 1 of another problem)"
+    assert found[1] == f"         skills  {reused}, 1 adapted (1 from sorting)"
+    assert shown(run_summary(RUN | {"skills": [own]}))[1] == "         skills  1 reused"
 
 
 def test_a_run_that_went_well() -> None:
     assert shown(run_summary(RUN)) == [
         "        outcome  2 of 2 toasts delivered (seed 7)",
-        "         skills  2 learned, 1 reused",
+        "         skills  1 reused, 2 learned",
         "     learned in  400 episodes, 6000 moves, 42 of them advised",
         "       sequence  1 2 1 2",
         "       makespan  100.0 s predicted, 101.0 s measured (+1.00%)",
@@ -88,7 +102,7 @@ def test_a_run_that_failed_says_which_toast_where_and_why() -> None:
     )
     assert lines[:5] == [
         "        outcome  1 of 2 toasts delivered (seed 7)",
-        "        dropped  1 toast",
+        "        dropped  1 part",
         f"        stopped  {why}",
         "        retries  try 1: a",
         "                 try 2: b",

@@ -62,6 +62,12 @@ def test_keys(typed: str, line: str) -> None:
         assert read("?") == line
 
 
+def test_where_a_key_is_no_move_it_edits() -> None:
+    with create_pipe_input() as pipe:
+        pipe.send_text("\x1b[A\x1b[Dab\x1b[Dc\r")
+        assert TerminalReader(console(), pipe, DummyOutput(), moves=False)("?") == "acb"
+
+
 def test_typing_ahead_answers_the_next_question() -> None:
     with keys("\x1b[Aright\r") as read:
         assert [read("?"), read("?")] == ["↑", "right"]
@@ -103,12 +109,13 @@ def test_the_reader_fits_the_input(monkeypatch: pytest.MonkeyPatch) -> None:
         def isatty(self) -> bool:
             return True
 
-    def at_terminal(console: Console, outside: Outside | None) -> Reader:
-        return PlainReader(console, StringIO("with keys\n"), outside)
+    def at_terminal(console: Console, outside: Outside | None, moves: bool) -> Reader:
+        return PlainReader(console, StringIO("with keys\n" if moves else "edited\n"), outside)
 
     monkeypatch.setattr(reader, "TerminalReader", at_terminal)
     monkeypatch.setenv("TERM", "xterm")
     assert default_reader(console(), Tty())("?") == "with keys\n"
+    assert default_reader(console(), Tty(), moves=False)("?") == "edited\n"
     assert default_reader(console(), Tty("typed\n"), plain=True)("?") == "typed\n"
     monkeypatch.setenv("TERM", "dumb")
     assert default_reader(console(), Tty("typed\n"))("?") == "typed\n"
