@@ -1,17 +1,26 @@
 """A task: what it knows of its stations and parts, how many are made, and what must be known, once, and have a time."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
+from lab.files import tasks_folder
 from lab.skills import SKILLS
 from lab.tasks.task import RESERVED, Task, counts_from_word, in_words, part_name
 from lab.tasks.task_fields import MAX_PARTS
 from lab.tasks.task_file import load
-from tests.tasks.toast_file import STATIONS, TEXT, changed, edited, refusal, refused
+
+TEXT = (tasks_folder() / "toast.toml").read_text()
+STATIONS = "butter_applier, butter_buffer, finished_plate, plate, toaster, toaster_buffer"
+Changed = Callable[[tuple[str | int, ...], Any], dict[str, Any]]  # the fixture of conftest.py
+Edited = Callable[[str, str], str]  # the fixture of conftest.py
+Refusal = Callable[[Callable[[], object]], str]  # the fixture of conftest.py
+Refused = Callable[[str], str]  # the fixture of conftest.py
 
 
 def test_the_toast_task_is_the_cell_of_the_thesis() -> None:
@@ -33,7 +42,7 @@ def test_the_toast_task_is_the_cell_of_the_thesis() -> None:
     assert grid.shape == (12, 12)
 
 
-def test_a_task_is_frozen_and_knows_its_stations() -> None:
+def test_a_task_is_frozen_and_knows_its_stations(refusal: Refusal) -> None:
     task = load("toast")
     with pytest.raises(ValueError, match="frozen"):
         task.name = "other"
@@ -42,19 +51,19 @@ def test_a_task_is_frozen_and_knows_its_stations() -> None:
     assert message == f"unknown station 'toster' (task 'toast'): did you mean 'toaster'? known: {STATIONS}"
 
 
-def test_a_sub_task_that_the_file_leaves_out_has_the_thesis_settings() -> None:
+def test_a_sub_task_that_the_file_leaves_out_has_the_thesis_settings(changed: Changed) -> None:
     document = changed(("subtasks",), {})
     assert Task.model_validate(document).subtask("grasp").learner.alpha == 0.95
 
 
 @pytest.mark.parametrize("name", RESERVED)
-def test_reserved_names_are_refused(tmp_path: Path, name: str) -> None:
-    assert f"obstacle '{name}'" in refused(tmp_path, edited('name = "cubes B"', f'name = "{name}"'))
+def test_reserved_names_are_refused(name: str, refused: Refused, edited: Edited) -> None:
+    assert f"obstacle '{name}'" in refused(edited('name = "cubes B"', f'name = "{name}"'))
     document = TEXT.replace('"plate"', f'"{name}"')
-    assert f"station '{name}'" in refused(tmp_path, document)
+    assert f"station '{name}'" in refused(document)
 
 
-def test_a_task_is_checked_again_when_it_is_changed() -> None:
+def test_a_task_is_checked_again_when_it_is_changed(changed: Changed) -> None:
     task = load("toast")
     other = task.changed(obstacles=())
     assert (other.obstacles, other.stations, other.folder) == ((), task.stations, task.folder)
@@ -75,18 +84,18 @@ def test_an_order_is_as_the_file_says_or_as_is_asked() -> None:
     assert [part_name(task.order(), number) for number in (1, 2, 3)] == ["slice 1", "slice 2", "cup 3"]
 
 
-def test_an_order_for_a_lesson_is_as_large_as_there_is_room_for() -> None:
+def test_an_order_for_a_lesson_is_as_large_as_there_is_room_for(changed: Changed) -> None:
     assert len(load("toast").fitting(3)) == 3
     small = Task.model_validate(changed(("stations", 5, "capacity"), 2))
     assert len(small.fitting(3)) == 2
 
 
 @pytest.mark.parametrize("toasts", [0, -1, MAX_PARTS + 1])
-def test_no_or_too_many_toasts_are_refused(toasts: int) -> None:
+def test_no_or_too_many_toasts_are_refused(toasts: int, refusal: Refusal) -> None:
     assert refusal(lambda: load("toast").order(toasts)) == f"{toasts} toasts (--toasts): allowed are 1 to 50"
 
 
-def test_both_ends_of_the_route_must_hold_the_toasts() -> None:
+def test_both_ends_of_the_route_must_hold_the_toasts(refusal: Refusal, changed: Changed) -> None:
     assert len(load("toast").order(50)) == 50
     small = Task.model_validate(changed(("stations", 5, "capacity"), 2))
     assert len(small.order(2)) == 2
@@ -96,7 +105,7 @@ def test_both_ends_of_the_route_must_hold_the_toasts() -> None:
     assert refusal(small.order) == said
 
 
-def test_a_place_that_two_kinds_end_at_must_hold_both() -> None:
+def test_a_place_that_two_kinds_end_at_must_hold_both(refusal: Refusal) -> None:
     task = load("breakfast")
     assert len(task.ordered(parts="slice=5,cup=3")) == 8
     said = "7 slices and 2 cups (--toasts, --parts) do not fit on 'tray': its capacity in the task file is 8"
@@ -115,7 +124,7 @@ def test_a_place_that_two_kinds_end_at_must_hold_both() -> None:
         (None, "slice=-1", "'slice=-1' (--parts): wanted kind=number once each, such as slice=2,cup=1"),
     ],
 )
-def test_an_order_that_cannot_be(toasts: int | None, parts: str | None, said: str) -> None:
+def test_an_order_that_cannot_be(toasts: int | None, parts: str | None, said: str, refusal: Refusal) -> None:
     assert refusal(lambda: load("breakfast").ordered(toasts, parts)) == said
 
 
@@ -132,7 +141,7 @@ def test_any_word_is_counts_or_bad_input(word: str) -> None:
         assert "(--parts): wanted kind=number once each" in str(error)  # noqa: PT017
 
 
-def test_a_fault_within_says_the_file_and_the_line(tmp_path: Path) -> None:
+def test_a_fault_within_says_the_file_and_the_line(tmp_path: Path, refusal: Refusal, changed: Changed) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(TEXT)
     line = TEXT[: TEXT.index('name = "toaster_buffer"')].count("\n") + 1

@@ -1,12 +1,18 @@
 """Where in a file a fault is, and which key was meant."""
 
+import tomllib
+from typing import Any
+
 import pytest
 
+from lab.files import tasks_folder
 from lab.tasks.cell_file import CellFile
 from lab.tasks.task import Task
 from lab.tasks.task_faults import fields_at, loc_of
 from lab.tasks.toml_text import Loc
-from tests.tasks.toast_file import SHIPPED
+
+TEXT = (tasks_folder() / "toast.toml").read_text()
+SHIPPED: dict[str, Any] = tomllib.loads(TEXT)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Task files: what ships loads by name and by path, and what is no task file, or another kind, is said in one line."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,11 @@ from lab.files import tasks_folder
 from lab.skills import SKILLS
 from lab.tasks.record import MAX_FILE_BYTES, MAX_SHORT_BYTES
 from lab.tasks.task_file import describe, find, load, load_any, load_cell, load_world, names_file, names_of, shipped
-from tests.tasks.toast_file import TEXT, edited, refusal, refused
+
+TEXT = (tasks_folder() / "toast.toml").read_text()
+Edited = Callable[[str, str], str]  # the fixture of conftest.py
+Refusal = Callable[[Callable[[], object]], str]  # the fixture of conftest.py
+Refused = Callable[[str], str]  # the fixture of conftest.py
 
 
 @pytest.mark.parametrize("name", names_of("task"))
@@ -22,7 +27,7 @@ def test_what_ships_loads_by_name_and_by_path(name: str) -> None:
     assert set(task.subtasks) <= set(SKILLS)
 
 
-def test_a_copied_task_runs_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_copied_task_runs_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, edited: Edited) -> None:
     (tmp_path / "mine.toml").write_text(edited("[0.42, 0.56, 0.0]", "[0.45, 0.56, 0.1]"))
     monkeypatch.chdir(tmp_path)
     assert load("mine.toml").station("toaster_buffer").pose == (0.45, 0.56, 0.1)
@@ -30,21 +35,21 @@ def test_a_copied_task_runs_from_anywhere(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("task", ["mine.toml", "./toast", "/nowhere/toast.toml"])
-def test_a_file_that_is_not_there_is_said(task: str) -> None:
+def test_a_file_that_is_not_there_is_said(task: str, refusal: Refusal) -> None:
     message = refusal(lambda: load(task))
     assert message.startswith(f"no task file '{task}'")
     assert "toast" in message
 
 
 @pytest.mark.parametrize("task", ["toats", "", "Toast", "x" * 300, "toast\0"])
-def test_an_unknown_task_lists_the_known(task: str) -> None:
+def test_an_unknown_task_lists_the_known(task: str, refusal: Refusal) -> None:
     message = refusal(lambda: load(task))
     assert message.startswith("unknown task '")
     assert message.endswith("known: " + ", ".join(sorted(shipped())))
     assert ("did you mean 'toast'?" in message) == (task in ("toats", "Toast", "toast\0"))
 
 
-def test_a_folder_is_no_task(tmp_path: Path) -> None:
+def test_a_folder_is_no_task(tmp_path: Path, refusal: Refusal) -> None:
     folder = tmp_path / "mine.toml"
     folder.mkdir()
     assert f"no task file '{folder}'" in refusal(lambda: load(str(folder)))
@@ -62,18 +67,20 @@ def test_a_folder_is_no_task(tmp_path: Path) -> None:
         ("title = 3", "name: Field required"),
     ],
 )
-def test_malformed_toml_is_said_with_file_and_line(tmp_path: Path, text: str, said: str) -> None:
-    assert refused(tmp_path, text).startswith(said)
+def test_malformed_toml_is_said_with_file_and_line(text: str, said: str, refused: Refused) -> None:
+    assert refused(text).startswith(said)
 
 
-def test_what_is_no_text_is_said(tmp_path: Path) -> None:
+def test_what_is_no_text_is_said(tmp_path: Path, refusal: Refusal) -> None:
     path = tmp_path / "mine.toml"
     path.write_bytes(b"\xff\xfe\x00")
     assert "cannot be read" in refusal(lambda: load(str(path)))
 
 
-@given(st.binary(max_size=60))
-def test_any_bytes_load_or_are_bad_input(tmp_path_factory: pytest.TempPathFactory, raw: bytes) -> None:
+@given(raw=st.binary(max_size=60))
+def test_any_bytes_load_or_are_bad_input(
+    refusal: Refusal, tmp_path_factory: pytest.TempPathFactory, raw: bytes
+) -> None:
     path = tmp_path_factory.getbasetemp() / "bytes.toml"
     path.write_bytes(raw)
     assert refusal(lambda: load(str(path))).startswith(f"{path}: ")
@@ -101,20 +108,25 @@ def test_what_ships_is_a_task_a_cell_or_a_world() -> None:
 
 
 @pytest.mark.parametrize("word", ["world-1", str(tasks_folder() / "world-1.toml"), "random:3x3:0.1:0"])
-def test_a_world_is_no_task_and_no_cell(word: str) -> None:
+def test_a_world_is_no_task_and_no_cell(word: str, refusal: Refusal) -> None:
     assert refusal(lambda: load(word)) == f"{word}: it is a world, not a task: learn it with lab teach {word}"
     assert refusal(lambda: load_cell(word)) == f"{word}: it is a world, not a cell: learn it with lab teach {word}"
 
 
-@pytest.mark.parametrize("word", ["fms", str(tasks_folder() / "fms.toml")])
-def test_a_cell_is_no_task_and_no_world(word: str) -> None:
-    assert load_cell(word) == load_any(word) == load_cell("fms")
+@pytest.mark.parametrize("word", ["toast-case-1", str(tasks_folder() / "toast-case-1.toml")])
+def test_a_cell_is_no_task_and_no_world(word: str, refusal: Refusal) -> None:
+    assert load_cell(word) == load_any(word) == load_cell("toast-case-1")
     for read, kind in ((load, "task"), (load_world, "world")):
         said = f"{word}: it is a cell, not a {kind}: sequence it with lab sequence {word}"
         assert refusal(lambda read=read: read(word)) == said  # type: ignore[misc]
 
 
-def test_a_task_is_no_world(tmp_path: Path) -> None:
+def test_a_cell_that_says_its_task_in_physics_is_that_task_too() -> None:
+    assert load_cell("fms").in_physics == "fms-arm"
+    assert load("fms") == load("fms-arm")
+
+
+def test_a_task_is_no_world(tmp_path: Path, refusal: Refusal) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(TEXT)
     for word in ("toast", str(path)):
@@ -123,7 +135,7 @@ def test_a_task_is_no_world(tmp_path: Path) -> None:
         assert refusal(lambda word=word: load_cell(word)) == said.replace("not a world", "not a cell")  # type: ignore[misc]
 
 
-def test_a_kind_that_there_is_not(tmp_path: Path) -> None:
+def test_a_kind_that_there_is_not(tmp_path: Path, refusal: Refusal) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(WORLD.replace('"world"', '"wrold"'))
     for read in (load, load_world):
@@ -132,7 +144,7 @@ def test_a_kind_that_there_is_not(tmp_path: Path) -> None:
         )
 
 
-def test_a_text_grid_is_a_world(tmp_path: Path) -> None:
+def test_a_text_grid_is_a_world(tmp_path: Path, refusal: Refusal) -> None:
     path = tmp_path / "my grid.txt"
     path.write_text("S.#\n..G\n")
     world = load_world(str(path))
@@ -178,7 +190,9 @@ def test_a_text_grid_is_a_world(tmp_path: Path) -> None:
         ("title =", "titel =", "titel: there is no such key, did you mean 'title'?"),
     ],
 )
-def test_a_bad_world_is_said_with_what_is_allowed(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_a_bad_world_is_said_with_what_is_allowed(
+    tmp_path: Path, old: str, new: str, said: str, refusal: Refusal
+) -> None:
     path = tmp_path / "mine.toml"
     assert WORLD.count(old) >= 1
     path.write_text(WORLD.replace(old, new, 1))
@@ -187,7 +201,7 @@ def test_a_bad_world_is_said_with_what_is_allowed(tmp_path: Path, old: str, new:
     assert said in message
 
 
-def test_a_file_too_long_to_be_a_task_is_refused_before_it_is_read(tmp_path: Path) -> None:
+def test_a_file_too_long_to_be_a_task_is_refused_before_it_is_read(tmp_path: Path, refusal: Refusal) -> None:
     path = tmp_path / "long.toml"
     path.write_text("".join(f"k{n} = {n}\n" for n in range(100_000)))
     assert refusal(lambda: load_any(str(path))).endswith("characters: a file that holds no world has up to 1000000")
