@@ -54,7 +54,7 @@ def within(raw: dict[str, Any], loc: Loc, message: str) -> Loc:
         if isinstance(value, str) and value in quoted and inner != ("name",):
             return inner
     words = _WORD.findall(_QUOTED.sub("", message))
-    said = [field for word in words for field in (word, *(_SIZE if word in ("wide", "high") else ()))]
+    said = [field for word in words for field in (word, f"{word}s", *(_SIZE if word in ("wide", "high") else ()))]
     field = next((word for word in said if word in table and word != "name"), None)
     if field is None:
         return ("name",) if "name" in table else ()
