@@ -70,7 +70,9 @@ class Job:
             from joblib import Parallel, delayed
 
             ending: dict[str, Any] = {"initializer": _end_with_parent, "initargs": (os.getpid(),)}
-            batch = min(BATCH, max(1, len(items) // (4 * self.workers)))  # few items are long ones: each is shared out alone
+            batch = min(
+                BATCH, max(1, len(items) // (4 * self.workers))
+            )  # few items are long ones: each is shared out alone
             pool = Parallel(self.workers, return_as="generator", batch_size=batch, **ending)
             yield from zip(items, pool(delayed(work)(item) for item in items), strict=True)
 

@@ -29,9 +29,7 @@ def distinct(prepared: Prepared) -> list[Problem]:
     return [*reversed({key_of(problem): problem for problem in reversed(prepared.problems.values())}.values())]
 
 
-def taught(
-    prepared: Prepared, known: Known, problems: Iterable[Problem], seed: int = 0
-) -> list[tuple[Lesson, float]]:
+def taught(prepared: Prepared, known: Known, problems: Iterable[Problem], seed: int = 0) -> list[tuple[Lesson, float]]:
     """A lesson of a run for each problem, and how long it took [s]; what one learns the next ones know."""
     found, so_far = [], KnownPolicies.of(known.values())
     with TemporaryDirectory() as folder:
