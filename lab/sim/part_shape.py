@@ -194,9 +194,8 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     where = f"part '{part.name}': file = '{part.file}'"
     try:
         kind = path.suffix.lower().removeprefix(".")
-        mesh: Any = trimesh.load(
-            BytesIO(path.read_bytes()), kind, force="mesh", skip_materials=True
-        )  # opens no other file
+        raw: dict[str, Any] = {"process": False, "skip_materials": True}  # as it is; and no other file is opened
+        mesh: Any = trimesh.load(BytesIO(path.read_bytes()), kind, force="mesh", **raw)
         points: Array = np.asarray(mesh.vertices, dtype=float)
     except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
         raise BadInput(f"{where}: it cannot be read as {kind.upper()}: {type(error).__name__}: {error}") from None

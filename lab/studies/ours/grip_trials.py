@@ -19,11 +19,11 @@ from lab.sim.places import Layout
 from lab.sim.scene import Scene
 from lab.sim.world import World
 from lab.skills.place import let_go, release_pose
-from lab.skills.skill import SETTLE_STEPS, UPRIGHT, Bench
-from lab.studies.ours.grip_models import MODELS, PART, written
+from lab.skills.skill import NOT_OFF, SETTLE_STEPS, UPRIGHT, Bench
+from lab.studies.ours.grip_models import MODELS, written
 from lab.tasks.part_fields import PartFields
 from lab.tasks.robot_fields import RobotSettings
-from lab.tasks.task import Task
+from lab.tasks.task import Task, part_name
 from lab.tasks.task_file import load
 
 CARRY_M, OVER_M = 0.5, 0.15  # how far a part is carried, and how high above where it is held
@@ -102,7 +102,7 @@ def tried(setting: Setting) -> Outcome:
         edges, widths = measured(part, folder)
         try:
             tasks = [_task(part, folder, rng) for _ in range(setting.poses)]
-            grip = kinds_of(tasks[0], arm_of(ARM).gripper)[PART].grip
+            grip = kinds_of(tasks[0], arm_of(ARM).gripper)[part.name].grip
         except BadInput as error:
             return Outcome(str(error), (), (), edges, widths, None)
         found = [carried(task, model.rolls) for task in tasks]
@@ -142,8 +142,9 @@ def drawn(rng: np.random.Generator) -> tuple[Place, Place]:
 def carried(task: Task, rolls: bool) -> tuple[str, float]:
     """Take the part, carry it, set it down: "" or why that failed, and how far off its place it is at the end [m]."""
     with World() as world:
-        bench = Bench(Scene(world, task, (PART,), Layout((), ((0.0, 0.0, 0.0),))))
-        body = bench.scene.body_of(f"{PART} 1", PART)
+        kind = task.parts[0].name
+        bench = Bench(Scene(world, task, (kind,), Layout((), (NOT_OFF,))))
+        body = bench.scene.body_of(part_name((kind,), 1), kind)
         for _ in range(SETTLE_STEPS):
             world.step()
         try:

@@ -9,7 +9,7 @@ import numpy as np
 from lab.sim.arm_models import arm_of
 from lab.sim.grip import BESIDE_M
 from lab.studies.findings import Findings, Row, row, share_row
-from lab.studies.ours.grip_models import FITTED_M, FRICTION, GRASPABLE_M, MASS_KG, MODELS, PART
+from lab.studies.ours.grip_models import FITTED_M, FRICTION, GRASPABLE_M, MASS_KG, MODELS
 from lab.studies.ours.grip_trials import ARM, CARRY_M, HEADINGS, NEAR_M, ROLLED_M, Outcome, Setting, tried
 from lab.studies.runner import Job
 from lab.view.canvas import BLUE, GREY, INK, PALE_GREY, RED, picture_bytes
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMNS = 5  # of the picture
+CAPTION = "Widths by heading; grey: what the gripper takes; dots: the grips"
 ABOUT = (
     f"{len(MODELS)} models of pybullet_data and trimesh, {MASS_KG} kg each, friction {FRICTION}; each stands as it comes "
     f"to rest in physics. A model keeps its own size where the middle one of its three extents is up to {GRASPABLE_M} m, else "
@@ -39,8 +40,8 @@ def grips(job: Job, reading: Mapping[str, Any]) -> Findings:
     arrived = [not why for outcome in found.values() for why in outcome.failures]
     if arrived:
         rows.append(share_row({"part": "all that can be gripped"}, "arrived_percent", arrived))
-    refusals = [f"Refused, {name}: {outcome.refused}." for name, outcome in found.items() if outcome.refused]
-    figures = {"Widths of the parts by heading, and where they are gripped": _picture(found)}
+    refusals = [f"Refused: {outcome.refused}." for outcome in found.values() if outcome.refused]
+    figures = {CAPTION: _picture(found)}
     return Findings(rows, in_short(found), figures, (ABOUT, POSES.format(job.sessions), *refusals))
 
 
