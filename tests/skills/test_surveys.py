@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
+from lab.sim.arm_models import arm_of
+from lab.sim.blocked_cells import OUT_OF_REACH
 from lab.sim.kinds import Spot
 from lab.sim.kinematics import ToolPose
 from lab.sim.places import Layout
@@ -22,6 +24,7 @@ from lab.skills.surveys import (
     way_to,
 )
 from lab.tasks.task import Task
+from lab.tasks.task_fields import Workspace
 from lab.tasks.task_file import load
 
 ORDER = ("slice", "slice")
@@ -234,3 +237,13 @@ def test_near_poses_are_relative_to_the_slice(surveys: Surveys) -> None:
     assert ahead.z == pytest.approx(goal.z + NEAR_STEP_M[2])
     assert ahead.yaw == pytest.approx(np.pi / 2 + NEAR_YAW_STEP)
     assert near_pose(goal, (2, 3, 0)).x == pytest.approx(0.4 - NEAR_STEP_M[1])
+
+
+def test_no_way_leads_through_behind_the_arm(task: Task) -> None:
+    """The first joint does not turn through there: the two cells are neighbours, and far apart for it."""
+    grid = Workspace(lower_m=(-0.46, -0.18, 0.24), cell_m=(0.12, 0.18, 0.12), shape=(1, 2, 1))
+    layout = Layout(tuple(o.position_m for o in task.obstacles), ())
+    surveys = Surveys(task.changed(workspace=grid), (), layout)
+    arm = arm_of(task.robot, task.folder)
+    assert all(arm.inverse(surveys.cell_pose((0, row, 0))) is not None for row in (0, 1))
+    assert set(surveys.workspace("").causes.ravel()) == {OUT_OF_REACH}
