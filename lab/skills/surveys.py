@@ -93,7 +93,7 @@ class Surveys:
             survey = surveyor.grid(grid.shape, self.cell_pose)
         for cell in np.ndindex(*grid.shape):
             pose = self.cell_pose(cell)
-            if pose.x < 0 and abs(pose.y) <= grid.cell_m[1] / 2 and not survey.causes[cell]:
+            if pose.x < 0 and abs(pose.y) <= grid.cell_m[1] / 2 + 1e-9 and not survey.causes[cell]:
                 survey.causes[cell] = OUT_OF_REACH  # no arm turns through there, from one side of itself to the other
         return survey
 
