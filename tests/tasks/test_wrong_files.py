@@ -68,7 +68,7 @@ def test_a_wrong_file_is_one_line(wrong: dict[str, Any], tmp_path: Path) -> None
 def test_there_are_enough_of_them_and_each_is_of_its_own() -> None:
     assert len(WRONG) >= 45
     assert len({wrong["name"] for wrong in WRONG}) == len(
-        {str(wrong["edits"]) + str(wrong.get("files")) for wrong in WRONG}
+        {wrong["base"] + str(wrong["edits"]) + str(wrong.get("files")) for wrong in WRONG}
     )
 
 
