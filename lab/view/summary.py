@@ -23,6 +23,8 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     table.add_column(style="bold", justify="right")
     table.add_column(overflow="fold")
     made = " and ".join(counted(count, kind) for kind, count in report["parts"].items())
+    if len(report["parts"]) > 1:
+        made = f"{sum(report['parts'].values())} parts ({made})"
     done = f"{report['delivered']} of {made} delivered"
     table.add_row("outcome", Text(f"{done} (seed {report['seed']})", "green" if report["success"] else "red"))
     if report["dropped"]:

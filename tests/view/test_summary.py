@@ -94,6 +94,11 @@ def test_a_run_that_went_well() -> None:
     ]
 
 
+def test_parts_of_several_kinds_are_counted_together() -> None:
+    several = RUN | {"delivered": 3, "parts": {"slice": 2, "cup": 1}}
+    assert shown(run_summary(several))[0] == "        outcome  3 of 3 parts (2 slices and 1 cup) delivered (seed 7)"
+
+
 def test_a_run_that_failed_says_which_toast_where_and_why() -> None:
     why = "toast 2 at 'toaster': slice 2 is not in the slot of 'toaster' (tried 3 times)"
     failed = {"success": False, "delivered": 1, "dropped": 1, "measured_makespan_s": None, "failure": why}
