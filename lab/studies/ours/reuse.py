@@ -24,6 +24,7 @@ SOURCES = ("reused", "adapted", "learned")
 FATES = ("taken", "adapted", "own", "learned")
 COSTS = ("episodes", "helped_steps", "moves", "wall_s")
 LATER = "later"  # all places of an order but the first
+GROWTH = "more_saved_a_place_percent"
 CARRIED, NOT_CARRIED = 50.0, 10.0  # [%] of its skills: from which on a sub-task carries over, up to which it does not
 _LIVES = 12  # that a process remembers: their policies fill up to 100 MB each
 
@@ -38,7 +39,7 @@ COLUMNS = (
     "Taken: the policy of an earlier task is used as it is. Adapted: learned on from it. Own: taken or adapted within the "
     "task. Learned: from nothing. from_earlier: how many skills are taken or adapted from earlier tasks. saved_percent: of "
     "the episodes that the same skills take from nothing. Place 'later': all places but the first. after: the toolbox holds "
-    "that task's skills alone. more_saved_a_place_percent: how much more a task saves for each place that it comes later, "
+    f"that task's skills alone. {GROWTH}: how much more a task saves for each place that it comes later, "
     "from the second on; a task is only held against itself."
 )
 CHECKS = (
@@ -193,7 +194,7 @@ def _growth(lives: Sequence[Sequence[Place]], anew: Mapping[str, Place]) -> list
     off = np.concatenate([np.array(own) - np.mean(own, axis=0) for own in at.values()]) if at else np.zeros((0, 2))
     spread = float((off[:, 0] ** 2).sum())
     slope = float((off[:, 0] * off[:, 1]).sum()) / spread if spread else None
-    return [] if slope is None else [row({"place": LATER}, "more_saved_a_place_percent", slope)]
+    return [] if slope is None else [row({"place": LATER}, GROWTH, slope)]
 
 
 def rows_after(after: Mapping[str, Place], anew: Mapping[str, Place]) -> list[Row]:
@@ -259,9 +260,7 @@ def _sum(outcomes: Iterable[Outcome], what: str) -> float:
 
 
 def _mean(named: Row, measure: str, values: Sequence[float]) -> list[Row]:
-    if len(values) < 2:
-        return [row(named, measure, value) for value in values]
-    return [varying_row(named, measure, values)]
+    return [varying_row(named, measure, values)] if values else []
 
 
 # ---- in words ------------------------------------------------------------------------------------------------------
@@ -272,22 +271,21 @@ def in_short(rows: Sequence[Row], orders: int) -> Row:
     whole = [one for one in rows if one.get("place") is not None and not (one.get("subtask") or one.get("task"))]
     later = {one["measure"]: one for one in those(whole, place=LATER)}
     saved = [one for one in rows if one["measure"] == "saved_episodes_percent"]
-    by_place = [f"{ordinal(one['place'])} {percent(one)}" for one in saved if isinstance(one.get("place"), int)]
-    by_task = [f"{one['task']} {percent(one)}" for one in saved if one.get("place") == LATER and one.get("task")]
+    places = [f"{ordinal(one['place'])} {percent(one)}" for one in saved if isinstance(one.get("place"), int)]
+    tasks = [f"{one['task']} {percent(one)}" for one in saved if one.get("place") == LATER and one.get("task")]
     after = [f"{one['task']} {percent(one)}" for one in saved if one.get("after")]
     shares = _carried(rows)
     says: Row = {
         "orders": orders,
         "answer": _answer(later),
-        "episodes saved by place": ", ".join(by_place),
-        "episodes saved by task": ", ".join(by_task),
+        "episodes saved by place": ", ".join(places),
+        "episodes saved by task": ", ".join(tasks),
         f"episodes saved after {TASKS[0]}": ", ".join(after),
         "carry over": _named(shares, lambda share: share >= CARRIED),
         "carry over in part": _named(shares, lambda share: NOT_CARRIED < share < CARRIED),
         "do not carry over": _named(shares, lambda share: share <= NOT_CARRIED),
     }
-    checks = ("more_saved_a_place_percent", "taken_failing_percent", "unsolved_percent")
-    for measure in (*(f"saved_{what}_percent" for what in COSTS[1:]), *checks):
+    for measure in (*(f"saved_{what}_percent" for what in COSTS[1:]), "taken_failing_percent", "unsolved_percent"):
         if measure in later:
             says[measure] = round(later[measure]["value"], 2)
     return says
@@ -304,7 +302,11 @@ def _answer(later: Mapping[str, Row]) -> str:
         return "one task alone has nothing to take over"
     ends = found["ci95"] or [found["value"]] * 2
     verdict = "yes" if ends[0] > 0 else "no" if ends[1] <= 0 else "not shown"
-    return f"{verdict}: later tasks of an order save {percent(found)} of the episodes that they take from nothing"
+    said = f"{verdict}: later tasks of an order save {percent(found)} of the episodes that they take from nothing"
+    growth = later.get(GROWTH)
+    return (
+        said if growth is None else f"{said}, and {growth['value']:+.1f} points for each place that a task comes later"
+    )
 
 
 def _carried(rows: Sequence[Row]) -> dict[str, float]:
