@@ -67,12 +67,6 @@ class PartShape:
         """From foot to top [m]."""
         return float(self.high[2] - self.low[2])
 
-    @property
-    def footprint(self) -> tuple[float, float]:
-        """The part's extents along its x and y [m]."""
-        x, y = self.high[:2] - self.low[:2]
-        return float(x), float(y)
-
 
 def shape_of(part: PartFields, folder: Path) -> PartShape:
     """The shape that a record describes; its files lie in `folder`, the task file's, or in the lab's assets.

@@ -3,6 +3,7 @@
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +91,9 @@ def _mesh_bounds(path: Path) -> tuple[Array, Array]:
     if not 0 < path.stat().st_size <= MAX_BYTES:
         raise BadInput(f"{path.stat().st_size} bytes: wanted 1 to {MAX_BYTES // 1_000_000} MB")
     try:
-        mesh = trimesh.load(BytesIO(path.read_bytes()), kind, force="mesh", skip_materials=True)  # opens no other file
+        mesh: Any = trimesh.load(
+            BytesIO(path.read_bytes()), kind, force="mesh", skip_materials=True
+        )  # opens no other file
         points = np.asarray(mesh.vertices, dtype=float)
         faces = len(mesh.faces)
     except Exception as error:  # whatever a reader of meshes comes to over a stranger's file

@@ -44,7 +44,7 @@ def loc_of(raw: dict[str, Any], message: str) -> Loc:
 
 def within(raw: dict[str, Any], loc: Loc, message: str) -> Loc:
     """The rest of the way, from the table to which `loc` leads: to the value that a message quotes, or the field it names."""
-    table = raw
+    table: Any = raw
     for part in loc:
         table = table[part]
     if not isinstance(table, dict):
@@ -54,7 +54,7 @@ def within(raw: dict[str, Any], loc: Loc, message: str) -> Loc:
         if isinstance(value, str) and value in quoted and inner != ("name",):
             return inner
     words = _WORD.findall(_QUOTED.sub("", message))
-    said = [field for word in words for field in (word, *(_SIZE if word in ("wide", "high") else ()))]
+    said = [field for word in words for field in (word, f"{word}s", *(_SIZE if word in ("wide", "high") else ()))]
     field = next((word for word in said if word in table and word != "name"), None)
     if field is None:
         return ("name",) if "name" in table else ()

@@ -132,7 +132,9 @@ def test_what_the_palm_would_hit_is_not_carried_on_a_pallet(fms: Task) -> None:
 
 def test_what_is_wider_than_its_pallet_is_not_carried_on_it(fms: Task) -> None:
     kinds_of(with_sign(fms, 0.06, 0.033, 0.05), GRIPPER)
-    with pytest.raises(BadInput, match=r"'sign' cannot be carried on 'pallet': it is 0\.036 m wide between fingers 0\.034 m"):
+    with pytest.raises(
+        BadInput, match=r"'sign' cannot be carried on 'pallet': it is 0\.036 m wide between fingers 0\.034 m"
+    ):
         kinds_of(with_sign(fms, 0.06, 0.036, 0.05), GRIPPER)
 
 

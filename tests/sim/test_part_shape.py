@@ -31,6 +31,12 @@ def mesh_part(**fields: Any) -> PartFields:
     return part(shape="mesh", **{"file": "thing.stl", **fields})
 
 
+def ground(shape: PartShape) -> tuple[float, float]:
+    """The part's extents along its x and y [m]."""
+    x, y = shape.high[:2] - shape.low[:2]
+    return float(x), float(y)
+
+
 def angle() -> trimesh.Trimesh:
     """An L of two bars, 40 x 20 x 10 mm and on its end 10 x 20 x 30 mm: lower corner at the origin."""
     outline = [(0, 0), (0.04, 0), (0.04, 0.01), (0.01, 0.01), (0.01, 0.04), (0, 0.04)]
@@ -69,7 +75,7 @@ def test_a_box(tmp_path: Path) -> None:
     """12 x 1.5 x 12 cm: about x and z (0.12^2 + 0.015^2) / 12, about y 2 x 0.12^2 / 12, for each kilogram."""
     shape = shape_of(part(shape="box", size_m=[0.12, 0.015, 0.12]), tmp_path)
     assert shape.inertia_m2 == pytest.approx((0.00121875, 0.0024, 0.00121875))
-    assert (shape.foot_m, shape.height_m, *shape.footprint) == pytest.approx((0.06, 0.12, 0.12, 0.015))
+    assert (shape.foot_m, shape.height_m, *ground(shape)) == pytest.approx((0.06, 0.12, 0.12, 0.015))
     assert (shape.turn, shape.solid, len(shape.hull)) == ((0, 0, 0, 1), "box", 8)
     assert [(look.kind, look.size) for look in shape.looks] == [("box", (0.12, 0.015, 0.12))]
 
@@ -78,7 +84,7 @@ def test_a_cylinder_on_its_side(tmp_path: Path) -> None:
     """Rolled by a quarter turn its axis, z, lies along y; a disc's 1/2 r^2 about the axis stays the last moment."""
     lying = part(shape="cylinder", size_m=[0.04, 0.10], stands=[QUARTER, 0.0])
     shape = shape_of(lying, tmp_path)
-    assert shape.footprint == pytest.approx((0.04, 0.10))
+    assert ground(shape) == pytest.approx((0.04, 0.10))
     assert shape.height_m == pytest.approx(0.04)
     assert shape.inertia_m2 == pytest.approx((0.02**2 / 4 + 0.1**2 / 12, 0.02**2 / 4 + 0.1**2 / 12, 0.02**2 / 2))
     assert rotation(shape.turn) @ [0, 0, 1] == pytest.approx([0, -1, 0])
@@ -92,7 +98,7 @@ def test_a_box_that_stands_anyhow_has_its_middle_in_the_origin_and_its_foot_belo
     assert shape.low == pytest.approx(-shape.high)
     assert shape.height_m == pytest.approx(2 * shape.foot_m)
     assert np.linalg.norm(shape.hull, axis=1) == pytest.approx(np.hypot(x, np.hypot(y, z)) / 2)
-    assert max(x, y, z) <= np.hypot(shape.height_m, np.hypot(*shape.footprint)) + 1e-9
+    assert max(x, y, z) <= np.hypot(shape.height_m, np.hypot(*ground(shape))) + 1e-9
 
 
 def test_a_slice_has_the_masses_of_its_urdf_and_its_looks() -> None:
@@ -194,7 +200,7 @@ def test_a_mesh_in_millimetres_is_refused_with_the_scale_that_was_meant(write: C
     folder = write(trimesh.creation.box((80, 30, 20)))
     says = refusal(mesh_part(), folder)
     assert "it is 80 m long: allowed are 0.002 to 2.0 m; scale = 0.001 would make it 0.08 m" in says
-    assert shape_of(mesh_part(scale=0.001), folder).footprint == pytest.approx((0.08, 0.03))
+    assert ground(shape_of(mesh_part(scale=0.001), folder)) == pytest.approx((0.08, 0.03))
 
 
 @pytest.mark.parametrize(
