@@ -18,12 +18,14 @@ from lab.errors import BadInput, counted
 from lab.files import assets_folder
 from lab.sim import urdf_reader
 from lab.sim.frames import Quaternion, Shape, ShapeKind, Vector
+from lab.sim.mesh_file import is_binary
 from lab.tasks.part_fields import PartFields
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
 MOST_BYTES = 20_000_000  # of a mesh file
+MOST_TEXT = 40_000  # triangles of an STL in text: PyBullet, which reads none, is handed them one by one
 MOST_HULL = 256  # vertices: more make physics slow and no rounder
 LARGEST_M, SMALLEST_M = 2.0, 0.002  # of a part's longest edge: beyond them its unit is not the metre
 ROUND = 64  # sides of a cylinder's hull
@@ -202,12 +204,17 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     try:
         kind = path.suffix.lower().removeprefix(".")
         raw: dict[str, Any] = {"process": False, "skip_materials": True}  # as it is; and no other file is opened
-        mesh: Any = trimesh.load(BytesIO(path.read_bytes()), kind, force="mesh", **raw)
+        data = path.read_bytes()
+        mesh: Any = trimesh.load(BytesIO(data), kind, force="mesh", **raw)
         points: Array = np.asarray(mesh.vertices, dtype=float)
     except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
         raise BadInput(f"{where}: it cannot be read as {kind.upper()}: {type(error).__name__}: {error}") from None
     if not isinstance(mesh, trimesh.Trimesh) or len(points) < 4 or len(mesh.faces) < 4:
         raise BadInput(f"{where}: a mesh of {len(points)} vertices: wanted a solid, 4 or more and faces between them")
+    if kind == "stl" and not is_binary(data) and len(mesh.faces) > MOST_TEXT:
+        raise BadInput(
+            f"{where}: an STL in text of {len(mesh.faces)} triangles: up to {MOST_TEXT} are read: save it as binary"
+        )
     if not np.isfinite(points).all():
         raise BadInput(f"{where}: vertex {int(np.argmin(np.isfinite(points).all(axis=1)))} is not finite")
     mesh.apply_scale(part.scale)  # type: ignore[no-untyped-call]

@@ -228,6 +228,16 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
     assert "20000001 bytes: wanted 1 to 20 MB" in refusal(mesh_part(), tmp_path)
 
 
+def test_an_stl_in_text_has_not_too_many_triangles(
+    write: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(part_shape, "MOST_TEXT", 11)
+    box = trimesh.creation.box((0.02, 0.03, 0.04))
+    assert shape_of(mesh_part(), write(box)).height_m == pytest.approx(0.04)
+    box.export(tmp_path / "thing.stl", file_type="stl_ascii")
+    assert "an STL in text of 12 triangles: up to 11 are read: save it as binary" in refusal(mesh_part(), tmp_path)
+
+
 def test_a_link_out_of_the_folder_is_not_followed(tmp_path: Path, write: Callable[..., Path]) -> None:
     write(trimesh.creation.box((0.02, 0.03, 0.04)), "outside.stl")
     folder = tmp_path / "inside"
