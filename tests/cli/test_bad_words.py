@@ -61,7 +61,7 @@ ADVISORS, LEARNERS, GATES = (
         ("sequence toast --case IV", "unknown case 'IV' (--case): did you mean 'I'? known: I, II, III"),
         ("sequence world-1", "world-1: it is a world, there is nothing to sequence: learn it with lab teach world-1"),
         ("run toast-case-1", "toast-case-1: it is a cell, not a task: sequence it with lab sequence toast-case-1"),
-        ("view toast-case-1", "toast-case-1: it is a cell, not a task: sequence it with lab sequence toast-case-1"),
+        ("view toast-case-1", "toast-case-1: it is a cell, which has no scene: look at its order with lab sequence"),
         (
             "teach insert --task toast-case-1",
             "toast-case-1: it is a cell, not a task: sequence it with lab sequence toast-case-1",
@@ -80,7 +80,6 @@ ADVISORS, LEARNERS, GATES = (
         ("toolbox show nothing", "unknown policy 'nothing' (toolbox "),
         ("toolbox remove ../x", "unknown policy '../x' (toolbox "),
         ("run world-1", "world-1: it is a world, not a task: learn it with lab teach world-1"),
-        ("view world-1", "world-1: it is a world, not a task: learn it with lab teach world-1"),
         ("teach insert --task world-1", "world-1: it is a world, not a task: learn it with lab teach world-1"),
         ("teach toast", "toast: it is a task, not a world: lab run toast, or lab teach SUBTASK --task toast"),
         ("teach wrld-1", "unknown sub-task 'wrld-1' (SUBTASK): did you mean 'world-1'? known: cover, grasp,"),
@@ -202,7 +201,10 @@ def test_bad_task_files(lab: Lab, folder: Path, toml: str, old: str, new: str, l
         ("sequence toast --toolbox taken", "toolbox taken: 'taken' is a file, a folder is needed"),
         ("toolbox list --toolbox taken", "toolbox taken: it is a file, a folder is needed"),
         ("sequence toast --plot folder.png", "picture 'folder.png': it is a folder, a file is wanted"),
-        ("view folder.png", "'folder.png' holds no replay.html: give the folder of a run (--out of lab run) or a task"),
+        (
+            "view folder.png",
+            "'folder.png' holds no replay.html: give the folder of a run (--out of lab run), a task or a world",
+        ),
         ("see taken", "taken: not a picture that can be read: wanted a PNG or JPEG file"),
     ],
 )
