@@ -128,10 +128,8 @@ def test_around_a_slice_the_goal_is_free_and_what_stands_beside_blocks(surveys: 
 
 def test_a_scene_that_cannot_be_is_refused_at_once(task: Task, layout: Layout) -> None:
     """What is out of reach before anything is surveyed, and what cannot be gripped when the kinds are made."""
-    stations = tuple(
-        s.model_copy(update={"pose": (1.5, 0.0, 0.0)}) if s.name == "toaster" else s for s in task.stations
-    )
-    with pytest.raises(BadInput, match="station 'toaster' is out of reach"):
+    stations = tuple(s.model_copy(update={"pose": (1.5, 0.0, 0.0)}) if s.name == "plate" else s for s in task.stations)
+    with pytest.raises(BadInput, match="station 'plate' is out of reach"):
         prepare(task.changed(stations=stations), ORDER, 0, "no skill at all")
     wide = task.parts[0].model_copy(update={"size_m": (0.12, 0.06, 0.12), "look": None})
     with pytest.raises(BadInput, match="part 'slice'"):
