@@ -87,7 +87,8 @@ def test_a_body_that_is_no_file_of_these_is_refused(tmp_path: Path) -> None:
     (tmp_path / "press.step").write_text("solid")
     station = machine(body="press.step", floor_m=0.1)
     with pytest.raises(
-        BadInput, match=r"^station 'press': body 'press\.step': wanted 'slab', 'box', or a \.urdf, \.obj or \.stl file$"
+        BadInput,
+        match=r"^station 'press': body = 'press\.step': wanted 'slab', 'box', or a \.urdf, \.obj or \.stl file$",
     ):
         bounds(station, tmp_path)
 
@@ -101,7 +102,7 @@ def test_a_body_from_a_file_needs_its_floor(wedge: Path) -> None:
 
 @pytest.mark.parametrize("file", ["press.obj", "../press.obj"])
 def test_a_body_that_is_not_there_or_outside_is_refused(tmp_path: Path, file: str) -> None:
-    with pytest.raises(BadInput, match=rf"^station 'press': body '{file}'"):
+    with pytest.raises(BadInput, match=rf"^station 'press': body = '{file}'"):
         bounds(machine(body=file, floor_m=0.1), tmp_path)
 
 
