@@ -84,7 +84,8 @@ def grip_of(shape: PartShape, gripper: Gripper, friction: float, given: GripFiel
 def _as_given(shape: PartShape, gripper: Gripper, given: GripFields) -> Grip:
     """The grip that a file gives; BadInput when the fingers do not go around the part there."""
     most = gripper.opening_m - 2 * BESIDE_M
-    pads = _Sections(shape, given.at_m).between(given.yaw, given.up_m, gripper.width_m)
+    below = given.up_m < shape.height_m
+    pads = _Sections(shape, given.at_m).between(given.yaw, given.up_m, gripper.width_m) if below else None
     where = f"part '{shape.name}': grip.yaw {given.yaw:g}, up_m {given.up_m:g}"
     if pads is None:
         raise BadInput(f"{where}: between the fingers is nothing; the part is {shape.height_m:.3f} m high")

@@ -39,8 +39,6 @@ def ground(shape: PartShape) -> tuple[float, float]:
 
 def angle() -> trimesh.Trimesh:
     """An L of two bars, 40 x 20 x 10 mm and on its end 10 x 20 x 30 mm: lower corner at the origin."""
-    lying = trimesh.creation.box(bounds=[[0, 0, 0], [0.04, 0.02, 0.01]])
-    upright = trimesh.creation.box(bounds=[[0, 0, 0.01], [0.01, 0.02, 0.04]])
     outline = [(0, 0), (0.04, 0), (0.04, 0.01), (0.01, 0.01), (0.01, 0.04), (0, 0.04)]
     points = [(x, y, z) for y in (0.0, 0.02) for x, z in outline]
     ends = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)]
@@ -49,7 +47,7 @@ def angle() -> trimesh.Trimesh:
         other = (one + 1) % 6
         faces += [(other, one, one + 6), (other, one + 6, other + 6)]
     made = trimesh.Trimesh(points, faces)
-    assert made.volume == pytest.approx(lying.volume + upright.volume)
+    assert made.volume == pytest.approx(8e-6 + 6e-6)
     return made
 
 
@@ -136,11 +134,8 @@ def test_an_angle_of_two_bars(write: Callable[..., Path], name: str) -> None:
     assert len(shape.hull) == 10, "the inner corner is within the hull"
     assert sum(shape.inertia_m2) == pytest.approx(2 * _second_moments(), rel=1e-6)
     (look,) = shape.looks
-    assert (look.kind, look.size, look.position) == (
-        "mesh",
-        (1, 1, 1),
-        pytest.approx((-middle, -0.01, -middle), abs=1e-6),
-    )
+    assert (look.kind, look.size) == ("mesh", (1.0, 1.0, 1.0))
+    assert look.position == pytest.approx((-middle, -0.01, -middle), abs=1e-6)
 
 
 def _second_moments() -> float:
@@ -181,15 +176,12 @@ def test_a_mesh_of_many_corners_has_few_in_physics(write: Callable[..., Path]) -
 def test_faces_that_look_inwards_are_turned_around(write: Callable[..., Path]) -> None:
     box = trimesh.creation.box((0.02, 0.03, 0.04))
     box.invert()
-    assert shape_of(mesh_part(), write(box)).inertia_m2 == pytest.approx(
-        sorted((0.03**2 + 0.04**2, 0.02**2 + 0.04**2, 0.02**2 + 0.03**2) / np.float64(12))
-    )
+    assert shape_of(mesh_part(), write(box)).inertia_m2 == pytest.approx((13e-4 / 12, 20e-4 / 12, 25e-4 / 12))
 
 
 def holed() -> trimesh.Trimesh:
     box = trimesh.creation.box((0.02, 0.03, 0.04))
-    box.update_faces(np.arange(len(box.faces)) != 0)
-    return box
+    return trimesh.Trimesh(box.vertices, box.faces[1:])
 
 
 def test_a_mesh_with_a_hole_is_refused_unless_its_hull_is_taken(write: Callable[..., Path]) -> None:

@@ -30,7 +30,10 @@ def test_a_part_of_each_shape() -> None:
 @pytest.mark.parametrize(
     ("fields", "says"),
     [
-        ({**BOX, "shape": "boxx"}, "shape: unknown shape 'boxx' (of a part): did you mean 'box'? known: box, cylinder, mesh (got 'boxx')"),
+        (
+            {**BOX, "shape": "boxx"},
+            "shape: unknown shape 'boxx' (of a part): did you mean 'box'? known: box, cylinder, mesh (got 'boxx')",
+        ),
         ({**BOX, "size_m": [0.03, 0.02]}, "part 'brick' is a box: it needs size_m = [x, y, z] [m], 3 numbers: not [0.03, 0.02]"),
         (
             {**BOX, "shape": "cylinder"},
