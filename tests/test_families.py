@@ -30,7 +30,7 @@ from lab.skills import SKILLS, Transfer
 from lab.studies import STUDIES, Study
 from lab.studies.findings import Findings, row
 from lab.studies.runner import Job
-from lab.tasks.task_file import Task
+from lab.tasks.task import Task
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
 Tables = tuple[tuple[dict[str, Any], str, Any], ...]
@@ -65,7 +65,7 @@ class Return(Transfer):
     subtask: ClassVar[str] = "dummy-skill"
 
     def __init__(self, origin: str, target: str) -> None:
-        super().__init__(origin, target, loaded=False)
+        super().__init__(origin, target)
         self.name = f"dummy-skill {origin} to {target}"
 
     @classmethod
@@ -73,7 +73,7 @@ class Return(Transfer):
         return cls(target, origin)
 
     @classmethod
-    def on_carry(cls, task: Task, origin: str, target: str) -> Any:
+    def on_carry(cls, task: Task, kind: str, origin: str, target: str) -> Any:
         return None
 
 

@@ -35,12 +35,16 @@ class Spot:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of part, or a pallet with its part on it: then the gripper holds the pallet, and `rider` stands on that."""
+    """A kind of part, or a pallet with its part on it: then the gripper holds the pallet, and `rider` stands on that.
+
+    finger_m: how far an open finger reaches beyond the part's side [m].
+    """
 
     name: str
     part: Part
     shape: PartShape
     grip: Grip
+    finger_m: float
     rider: "Kind | None" = None
 
     @property
@@ -124,7 +128,8 @@ def kinds_of(task: Task, gripper: Gripper) -> dict[str, Kind]:
 @cache
 def _kind(part: Part, folder: Path, gripper: Gripper) -> Kind:
     shape = shape_of(part, folder)
-    return Kind(part.name, part, shape, grip_of(shape, gripper, part.friction, part.grip))
+    grip = grip_of(shape, gripper, part.friction, part.grip)
+    return Kind(part.name, part, shape, grip, (gripper.opening_m - grip.width_m) / 2 + gripper.thick_m)
 
 
 def _check_rider(loaded: Kind, gripper: Gripper) -> None:

@@ -90,7 +90,12 @@ class Surveys:
         with World() as world:
             scene = Scene(world, self.task, (), self.layout)
             surveyor = Surveyor(scene, carried or None, clearance=max(grid.cell_m) / 2 + _TRAVEL_MARGIN)
-            return surveyor.grid(grid.shape, self.cell_pose)
+            survey = surveyor.grid(grid.shape, self.cell_pose)
+        for cell in np.ndindex(*grid.shape):
+            pose = self.cell_pose(cell)
+            if pose.x < 0 and abs(pose.y) <= grid.cell_m[1] / 2 + 1e-9 and not survey.causes[cell]:
+                survey.causes[cell] = OUT_OF_REACH  # no arm turns through there, from one side of itself to the other
+        return survey
 
     def _dock(self, place: str, carried: str) -> Cell:
         """The workspace cell from which the tool goes straight to the approach of `place`; BadInput names what blocks it."""

@@ -168,16 +168,12 @@ class Task(Record):
     @model_validator(mode="after")
     def _names_apart(self) -> Self:
         stations, kinds = [s.name for s in self.stations], [p.name for p in self.parts]
+        patches = [f"{process} on" for process in self.processes]  # what is left on a part: "butter on slice 1 00"
         for label, names in (("part", kinds), ("station", stations), ("obstacle", [o.name for o in self.obstacles])):
             twice = {n for n in names if names.count(n) > 1}
             if twice:
                 raise ValueError(f"{label} '{min(twice)}' stands twice in the file")
-            words = (
-                "robot",
-                "done",
-                *(kinds if label != "part" else ()),
-                *(f"{process} on" for process in self.processes),
-            )
+            words = ["robot", "done", *patches, *(kinds if label != "part" else ())]
             starts = tuple(f"{word} " for word in words)
             for name in names:
                 reserved = name in RESERVED or name.startswith(starts) or name.endswith(RESERVED_ENDS)

@@ -22,8 +22,7 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", justify="right")
     table.add_column(overflow="fold")
-    made = " and ".join(counted(count, kind) for kind, count in report["parts"].items())
-    done = f"{report['delivered']} of {made} delivered"
+    done = delivered_in_words(report["delivered"], report["parts"])
     table.add_row("outcome", Text(f"{done} (seed {report['seed']})", "green" if report["success"] else "red"))
     if report["dropped"]:
         table.add_row("dropped", counted(report["dropped"], "part"))
@@ -53,6 +52,15 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     for name, path in report["files"].items():
         table.add_row(name.replace("_", " "), Text(path))
     return table
+
+
+def delivered_in_words(delivered: int, parts: Mapping[str, int]) -> str:
+    """How many parts of an order arrived: "2 of 3 slices delivered", "2 of 3 parts delivered (2 slices, 1 cup)"."""
+    if len(parts) == 1:
+        (kind, count), *_ = parts.items()
+        return f"{delivered} of {counted(count, kind)} delivered"
+    words = ", ".join(counted(count, kind) for kind, count in parts.items())
+    return f"{delivered} of {sum(parts.values())} parts delivered ({words})"
 
 
 def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
@@ -205,7 +213,9 @@ def study_summary(study: Mapping[str, Any]) -> RenderableType:
     """What `lab study run` shows, from its JSON document: up to 30 rows; the report has all."""
     shown = ("measure", "value", "ci95", "thesis", "within", "lab_version")
     settings = list(dict.fromkeys(key for row in study["rows"] for key in row if key not in shown))
+    first = study["rows"][:_STUDY_ROWS]
     varied = [key for key in settings if len({str(row.get(key)) for row in study["rows"]}) > 1]
+    varied = [key for key in varied if any(row.get(key) is not None for row in first)]
     rows = [
         {key: "" if row.get(key) is None else row[key] for key in varied}
         | {
@@ -215,7 +225,7 @@ def study_summary(study: Mapping[str, Any]) -> RenderableType:
             "printed": "" if row["thesis"] is None else f"{row['thesis']:g}",
             "inside": {True: "yes", False: "no", None: ""}[row["within"]],
         }
-        for row in study["rows"][:_STUDY_ROWS]
+        for row in first
     ]
     more = len(study["rows"]) - len(rows)
     lines = [f"... and {counted(more, 'more row')}"] * (more > 0) + [""]

@@ -197,7 +197,7 @@ def test_an_episode_in_a_world_has_as_many_moves_as_a_session_gives_it() -> None
 def test_insert_is_the_lessons_problem() -> None:
     env = gymnasium.make("TeachingLab/Insert-v0", layout_seed=4).unwrapped
     assert isinstance(env, TableEnv)
-    prepared = prepare(load("toast"), 2, 4, "insert at toaster")
+    prepared = prepare(load("toast"), ("slice",) * 2, 4, "insert at toaster")
     assert env.mdp.signature == prepared.problems["insert at toaster"].mdp.signature
 
 

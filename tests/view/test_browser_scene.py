@@ -10,8 +10,9 @@ import pytest
 
 from lab.production.recorder import Recorder
 from lab.sim.kinematics import ToolPose
-from lab.sim.scene import Scene, draw_layout
+from lab.sim.scene import Scene
 from lab.sim.world import World
+from lab.skills.prepared_scene import lay_out
 from lab.tasks import task_file as taskfile
 from lab.view.meshcat import LiveView, replay_html
 
@@ -28,7 +29,7 @@ SEEN = ("robot tool", "robot forearm", "slice 1", "slice 2")
 def scene() -> Iterator[Scene]:
     task = taskfile.load("toast")
     with World() as world:
-        yield Scene(world, task, 2, draw_layout(task, 2, np.random.default_rng(3)))
+        yield Scene(world, task, task.order(2), lay_out(task, task.order(2), 3))
 
 
 def move(scene: Scene, pose: ToolPose, recorder: Recorder) -> list[list[float]]:
@@ -50,7 +51,7 @@ def on_page(page: "Page", expected: list[list[float]]) -> bool:
 
 def test_the_live_page_shows_the_arm_and_the_slices(browser_page: "Page", scene: Scene, until: Until) -> None:
     with LiveView() as live:
-        recorder = Recorder(scene.world, 2, live)
+        recorder = Recorder(scene.world, viewer=live)
         browser_page.goto(live.url)
         assert live.wait_for_page(20)
         for pose in ABOVE_THE_PLATE:
@@ -64,7 +65,7 @@ def test_the_live_page_shows_the_arm_and_the_slices(browser_page: "Page", scene:
 def test_the_replay_shows_the_arm_and_the_slices_offline(
     browser_page: "Page", scene: Scene, tmp_path: Path, until: Until
 ) -> None:
-    recorder = Recorder(scene.world, 2)
+    recorder = Recorder(scene.world)
     first = move(scene, ABOVE_THE_PLATE[0], recorder)
     scene.world.steps += 240
     last = move(scene, ABOVE_THE_PLATE[1], recorder)

@@ -11,6 +11,7 @@ from lab.view.summary import (
     lesson_summary,
     run_summary,
     sequence_summary,
+    study_summary,
     table_of,
 )
 
@@ -42,10 +43,10 @@ def skill(
 RUN: dict[str, Any] = {
     "task": "toast",
     "seed": 7,
-    "toasts": 2,
-    "parts": {"toast": 2},
+    "toasts": 3,
+    "parts": {"slice": 2, "cup": 1},
     "success": True,
-    "delivered": 2,
+    "delivered": 3,
     "dropped": 0,
     "failure": None,
     "retries": [],
@@ -82,7 +83,7 @@ def test_a_run_says_which_tasks_its_skills_come_from() -> None:
 
 def test_a_run_that_went_well() -> None:
     assert shown(run_summary(RUN)) == [
-        "        outcome  2 of 2 toasts delivered (seed 7)",
+        "        outcome  3 of 3 parts delivered (2 slices, 1 cup) (seed 7)",
         "         skills  1 reused, 2 learned",
         "     learned in  400 episodes, 6000 moves, 42 of them advised",
         "       sequence  1 2 1 2",
@@ -94,14 +95,14 @@ def test_a_run_that_went_well() -> None:
     ]
 
 
-def test_a_run_that_failed_says_which_toast_where_and_why() -> None:
-    why = "toast 2 at 'toaster': slice 2 is not in the slot of 'toaster' (tried 3 times)"
+def test_a_run_that_failed_says_which_part_where_and_why() -> None:
+    why = "slice 2 at 'toaster': slice 2 is not in the slot of 'toaster' (tried 3 times)"
     failed = {"success": False, "delivered": 1, "dropped": 1, "measured_makespan_s": None, "failure": why}
     lines = shown(
         run_summary(RUN | failed | {"retries": ["try 1: a", "try 2: b"], "optimum_proven": False, "bound_s": 75.0})
     )
     assert lines[:5] == [
-        "        outcome  1 of 2 toasts delivered (seed 7)",
+        "        outcome  1 of 3 parts delivered (2 slices, 1 cup) (seed 7)",
         "        dropped  1 part",
         f"        stopped  {why}",
         "        retries  try 1: a",
@@ -294,3 +295,14 @@ def test_a_grid_is_seen_from_above() -> None:
         "S  █  ·",
         "start (0, 0), goal (2, 1), 1 cell with obstacles, 3 markers",
     ]
+
+
+def test_a_study_shows_the_settings_that_vary_in_the_rows_shown() -> None:
+    """Thirty rows have a place, those after them an order, too."""
+    measured = {"measure": "saved_percent", "ci95": None, "thesis": None, "within": None, "seed": 0}
+    rows = [{"place": n, "value": 0.5 * n} | measured for n in range(30)]
+    rows += [{"place": n, "order": n, "value": 1.0} | measured for n in range(2)]
+    lines = shown(study_summary({"rows": rows, "summary": {"answer": "yes"}, "files": {}, "notes": ["why"]}))
+    assert lines[0].split() == ["place", "measure", "value", "95", "%", "printed", "inside"]
+    assert lines[3].split() == ["2", "saved_percent", "1"]
+    assert lines[31:] == ["... and 2 more rows", "", "answer: yes", "", "why"]

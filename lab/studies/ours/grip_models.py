@@ -1,16 +1,17 @@
 """Twenty parts that nobody here designed: models that pybullet_data ships, and trimesh's primitives, as parts of a task."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from math import asin, atan2
 from pathlib import Path
-from typing import TYPE_CHECKING
+from shutil import copyfile
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import WorkFailed
-from lab.files import write_whole
 from lab.sim.part_shape import shape_of
 from lab.sim.urdf_reader import rotation
 from lab.sim.world import World
@@ -19,7 +20,7 @@ from lab.tasks.part_fields import PartFields
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-PART, MASS_KG, FRICTION = "part", 0.1, 0.8
+MASS_KG, FRICTION = 0.1, 0.8
 GRASPABLE_M, FITTED_M = (
     0.036,
     0.03,
@@ -69,27 +70,35 @@ MODELS = (
 
 
 def primitive(name: str) -> "Trimesh":
-    """One of trimesh's own, in the proportions that its makers chose as defaults, or that a name asks for; unscaled."""
+    """One of trimesh's own, as large as its numbers say."""
     from trimesh import creation
 
-    mesh: Trimesh = {
+    made: dict[str, Callable[[], Any]] = {
         "capsule": lambda: creation.capsule(height=1.0, radius=0.5),
         "cone": lambda: creation.cone(radius=0.5, height=1.0),
         "icosahedron": creation.icosahedron,
         "annulus": lambda: creation.annulus(r_min=0.5, r_max=1.0, height=1.0),
         "torus": lambda: creation.torus(major_radius=1.0, minor_radius=0.25),
-    }[name]()
-    return mesh
+    }
+    return cast("Trimesh", made[name]())
 
 
 def written(model: Model, folder: Path) -> PartFields:
     """The model's file in `folder`, and the fields of a part of it that stands as it comes to rest in physics."""
     if model.file is None:
-        name, content = f"{model.name}.stl", primitive(model.name).export(file_type="stl")
+        name = f"{model.name}.stl"
+        primitive(model.name).export(folder / name)
     else:
-        name, content = Path(model.file).name, (_models() / model.file).read_bytes()
-    write_whole(folder / name, content)
-    fields = {"name": PART, "shape": "mesh", "file": name, "hull": model.hull, "mass_kg": MASS_KG, "friction": FRICTION}
+        name = Path(model.file).name
+        copyfile(_models() / model.file, folder / name)
+    fields = {
+        "name": model.name,
+        "shape": "mesh",
+        "file": name,
+        "hull": model.hull,
+        "mass_kg": MASS_KG,
+        "friction": FRICTION,
+    }
     first = PartFields.model_validate({**fields, "scale": _fitting(folder / name, model.scale)})
     stands = at_rest(first.model_copy(update={"stands": _stable(first, folder)}), folder)
     return first.model_copy(update={"stands": stands})
@@ -124,10 +133,10 @@ def at_rest(part: PartFields, folder: Path) -> tuple[float, float]:
     shape = shape_of(part, folder)
     with World() as world:
         world.box("floor", (1, 1, 0.02), (0, 0, -0.01), TABLE_RGBA)
-        world.part(PART, shape, part.mass_kg, part.friction, (0, 0, shape.foot_m + 0.0005))
+        world.part(part.name, shape, part.mass_kg, part.friction, (0, 0, shape.foot_m + 0.0005))
         for _ in range(SETTLE_STEPS):
             world.step()
-        turned = rotation(world.pose(PART)[1])
+        turned = rotation(world.pose(part.name)[1])
     before = rotation(shape.looks[0].quaternion)  # from the file's axes to those of the part
     return roll_and_pitch(turned @ before)
 

@@ -12,16 +12,18 @@ from lab.errors import BadInput, WorkFailed
 from lab.files import write_whole
 from lab.sim.arm_models import arm_of
 from lab.sim.grip import Grip
-from lab.sim.kinds import kinds_of
+from lab.sim.kinds import Spot, kinds_of
 from lab.sim.kinematics import ToolPose
+from lab.sim.part_shape import shape_of
 from lab.sim.places import Layout
 from lab.sim.scene import Scene
 from lab.sim.world import World
 from lab.skills.place import let_go, release_pose
-from lab.skills.skill import SETTLE_STEPS, UPRIGHT, Bench
-from lab.studies.ours.grip_models import MODELS, PART, written
+from lab.skills.skill import NOT_OFF, SETTLE_STEPS, UPRIGHT, Bench
+from lab.studies.ours.grip_models import MODELS, written
 from lab.tasks.part_fields import PartFields
-from lab.tasks.task import Task
+from lab.tasks.robot_fields import RobotSettings
+from lab.tasks.task import Task, part_name
 from lab.tasks.task_file import load
 
 CARRY_M, OVER_M = 0.5, 0.15  # how far a part is carried, and how high above where it is held
@@ -30,10 +32,11 @@ REST_STEPS = 240  # of physics after the fingers opened
 SLOW = 0.6  # of the speed, near a part: as skills have it
 HEADINGS = 72  # of the widths that a picture shows, over half a turn
 
+ARM = RobotSettings(model="up6", start="to")
 TASK = """
 name = "grips"
 [robot]
-model = "up6"
+model = "{arm}"
 start = "to"
 [workspace]
 lower_m = [0.0, -0.8, 0.24]
@@ -99,7 +102,7 @@ def tried(setting: Setting) -> Outcome:
         edges, widths = measured(part, folder)
         try:
             tasks = [_task(part, folder, rng) for _ in range(setting.poses)]
-            grip = kinds_of(tasks[0], arm_of(tasks[0].robot).gripper)[PART].grip
+            grip = kinds_of(tasks[0], arm_of(ARM).gripper)[part.name].grip
         except BadInput as error:
             return Outcome(str(error), (), (), edges, widths, None)
         found = [carried(task, model.rolls) for task in tasks]
@@ -108,8 +111,6 @@ def tried(setting: Setting) -> Outcome:
 
 def measured(part: PartFields, folder: Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """A part's extents as it stands (3,), and its widths across HEADINGS headings [m]."""
-    from lab.sim.part_shape import shape_of
-
     shape = shape_of(part, folder)
     yaws = np.arange(HEADINGS) * pi / HEADINGS
     across = shape.hull[:, :2] @ np.stack([-np.sin(yaws), np.cos(yaws)])
@@ -125,7 +126,7 @@ def _task(part: PartFields, folder: Path, rng: np.random.Generator) -> Task:
 
 def _text(part: PartFields, begin: Place, end: Place) -> str:
     fields = part.model_dump() | {"hull": str(part.hull).lower()}
-    return TASK.format(**fields, begin=begin, end=end)
+    return TASK.format(**fields, arm=ARM.model, begin=begin, end=end)
 
 
 def drawn(rng: np.random.Generator) -> tuple[Place, Place]:
@@ -141,8 +142,9 @@ def drawn(rng: np.random.Generator) -> tuple[Place, Place]:
 def carried(task: Task, rolls: bool) -> tuple[str, float]:
     """Take the part, carry it, set it down: "" or why that failed, and how far off its place it is at the end [m]."""
     with World() as world:
-        bench = Bench(Scene(world, task, (PART,), Layout((), ((0.0, 0.0, 0.0),))))
-        body = bench.scene.body_of(f"{PART} 1", PART)
+        kind = task.parts[0].name
+        bench = Bench(Scene(world, task, (kind,), Layout((), (NOT_OFF,))))
+        body = bench.scene.body_of(part_name((kind,), 1), kind)
         for _ in range(SETTLE_STEPS):
             world.step()
         try:
@@ -150,16 +152,16 @@ def carried(task: Task, rolls: bool) -> tuple[str, float]:
                 world.step()
         except WorkFailed as error:
             return str(error), float("nan")
-        wanted = bench.scene.kind_of[body].held_at(_spot(bench, "to"))
+        wanted = bench.scene.kind_of[body].held_at(_goal(bench))
         at = bench.part_pose(body, wanted.yaw)
         off = hypot(at.x - wanted.x, at.y - wanted.y)
-        if off > (ROLLED_M if rolls else NEAR_M) or abs(at.z - wanted.z) > NEAR_M:
-            return f"it is {off:.3f} m off its place", off
-        return ("" if rolls or bench.upright(body) > UPRIGHT else "it fell over"), off
+        if not rolls and bench.upright(body) <= UPRIGHT:
+            return "it fell over", off
+        return ("" if off <= (ROLLED_M if rolls else NEAR_M) else f"it is {off:.3f} m off its place"), off
 
 
-def _spot(bench: Bench, station: str):  # type: ignore[no-untyped-def]
-    return bench.scene.places.spots(bench.scene.task.station(station))[0]
+def _goal(bench: Bench) -> Spot:
+    return bench.scene.places.spots(bench.scene.task.station("to"))[0]
 
 
 def _motion(bench: Bench, body: str) -> Iterator[None]:
@@ -173,7 +175,7 @@ def _motion(bench: Bench, body: str) -> Iterator[None]:
     bench.held = body
     if not bench.holds(body):
         raise WorkFailed("it is not in the gripper when that has risen")
-    spot = _spot(bench, "to")
+    spot = _goal(bench)
     above = bench.scene.kind_of[body].held_at(spot)
     yield from robot.follow([ToolPose(above.x, above.y, high, above.yaw)])
     if not bench.holds(body):

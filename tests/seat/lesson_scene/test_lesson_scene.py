@@ -14,11 +14,9 @@ from lab.learning.problem import Problem
 from lab.mdp import FloatArray, TabularMDP, grid
 from lab.seat.lesson_scene import LessonScene, SkillScene, WorldScene, lesson_scene_of
 from lab.seat.lesson_scene.episode_trail import TRAIL
-from lab.sim import models
 from lab.sim.arm_models import arm_named
 from lab.sim.frames import Frame, Recording, Viewpoint
 from lab.sim.kinematics import TOOL, ToolPose
-from lab.sim.scene import GRASP_DEPTH
 from lab.skills.prepared_scene import prepare
 from lab.skills.skill import Skill
 from lab.tasks.grid_world import GridWorld, random_world
@@ -35,6 +33,7 @@ SKILLS = (
     "place at butter_buffer",
 )
 every_skill = pytest.mark.parametrize("name", SKILLS)
+TWO = ("slice", "slice")
 SMALL = GridWorld(name="small", shape=(2, 3), start=(0, 0), goal=(1, 2), obstacles=((0, 1),))
 # S # .
 # . . G
@@ -43,7 +42,7 @@ SMALL = GridWorld(name="small", shape=(2, 3), start=(0, 0), goal=(1, 2), obstacl
 @cache
 def lesson(name: str) -> tuple[LessonScene, Skill, TabularMDP]:
     """A skill's scene as `lab teach` has it, and its skill and problem."""
-    prepared = prepare(load("toast"), 2, 0, name)
+    prepared = prepare(load("toast"), TWO, 0, name)
     made = lesson_scene_of(prepared, prepared.problems[name])
     assert isinstance(made, SkillScene)
     return made, prepared.skillset.skills[name], prepared.problems[name].mdp
@@ -217,7 +216,7 @@ def test_in_every_free_state_the_tool_is_at_the_pose_of_the_skill(name: str, dat
         return
     assert tool_of(frame) == pytest.approx(at(pose), abs=1e-6)
     if skill.carries:
-        middle = pose.shifted(dz=GRASP_DEPTH - models.SLICE[2] / 2)
+        middle = pose.shifted(dz=0.12 / 2 - skill.own_kind.grip.up_m)  # a slice is 12 cm high
         assert place(frame, "slice 1") == pytest.approx(at(middle))
 
 
@@ -273,7 +272,7 @@ def test_a_state_out_of_reach_leaves_the_arm_and_marks_where_it_was_to_go() -> N
 
 def test_butter_is_where_the_state_has_it() -> None:
     scene, _, mdp = lesson("butter at butter_applier")
-    cells = [f"butter 1 {row}{column}" for row, column in np.ndindex(3, 3)]
+    cells = [f"butter on slice 1 {row}{column}" for row, column in np.ndindex(3, 3)]
     some = scene.frame(4 << 9 | 0b000010011)
     assert shown(some) == {cells[0], cells[1], cells[4]}
     assert set(some.visible) == set(cells)
@@ -282,8 +281,8 @@ def test_butter_is_where_the_state_has_it() -> None:
 
 
 def test_slices_that_may_stand_beside_the_one_are_ghosts_and_real_ones_are_not() -> None:
-    prepared = prepare(load("toast"), 2, 0, "grasp at plate")
-    with closing(SkillScene(prepared.task, 2, prepared.layout, prepared.skillset.skills["grasp at plate"])) as scene:
+    prepared = prepare(load("toast"), TWO, 0, "grasp at plate")
+    with closing(SkillScene(prepared.task, TWO, prepared.layout, prepared.skillset.skills["grasp at plate"])) as scene:
         first, second = scene.frame(0), scene.frame(1)
         ghosts = {name for name in first.poses if name.startswith("slice ") and not name[6:].isdigit()}
         assert len(ghosts) == 3  # the second toast is where the fourth would be
@@ -309,5 +308,5 @@ def test_where_a_slice_is_to_be_set_down_its_ghost_stands() -> None:
 def test_a_problem_without_a_scene_has_no_scene() -> None:
     mdp = grid((2, 2), np.zeros((2, 2), bool), (0, 0), (1, 1))
     assert lesson_scene_of(None, Problem("FrozenLake-v1", "gym", mdp)) is None
-    prepared = prepare(load("toast"), 2, 0, "place at butter_buffer")
+    prepared = prepare(load("toast"), TWO, 0, "place at butter_buffer")
     assert lesson_scene_of(prepared, Problem("FrozenLake-v1", "gym", mdp)) is None
