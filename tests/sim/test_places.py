@@ -34,9 +34,6 @@ def at(spot: Spot) -> tuple[float, float, float, float]:
     return (spot.x, spot.y, spot.z, spot.yaw)
 
 
-# ---- spots -------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["task", "fms", "breakfast"])
 def test_every_station_has_as_many_spots_as_it_holds(name: str, request: pytest.FixtureRequest) -> None:
     task = request.getfixturevalue(name)
@@ -130,9 +127,6 @@ def test_at_machines_there_are_no_pallets(fms: Task) -> None:
     assert [kind.name for kind in places.kinds_at("outgoing")] == ["rook on pallet", "sign on pallet"]
 
 
-# ---- neighbours --------------------------------------------------------------------------------------------------
-
-
 def test_in_rows_there_are_neighbours_on_all_sides_of_a_storage_and_on_two_of_a_buffer(task: Task) -> None:
     places, here = places_of(task), Spot(0.5, 0.2, 0.012, QUARTER)
     found = places.neighbours(task.station("plate"), here)
@@ -167,9 +161,6 @@ def test_neighbours_on_turned_spots_are_turned_so(fms: Task, moved: Moved) -> No
         pytest.approx((0.0, 0.2, 0.012, -QUARTER)),
         pytest.approx((0.2, 0.0, 0.012, QUARTER)),
     ]
-
-
-# ---- slabs and bodies --------------------------------------------------------------------------------------------
 
 
 def test_a_slab_is_under_all_spots_in_use(task: Task, moved: Moved) -> None:
@@ -208,9 +199,6 @@ def test_a_body_from_a_file_is_measured_and_turned(task: Task, moved: Moved) -> 
     assert (body.x, body.y, body.half_along, body.yaw) == pytest.approx((x + 0.07, y, 0.09, QUARTER))
     toaster = places_of(task).body(task.station("toaster"), 1)
     assert (2 * toaster.half_along, 2 * toaster.half_across) == pytest.approx(models.TOASTER[:2])
-
-
-# ---- layouts -----------------------------------------------------------------------------------------------------
 
 
 @given(seeds, st.integers(0, 50))
@@ -325,9 +313,6 @@ def test_an_obstacle_drawn_onto_a_station_is_drawn_again(task: Task) -> None:
     ys = [drawn(wide, 1, seed).obstacles[0][1] for seed in range(50)]
     assert min(ys) >= 0.56 + 0.11 + 0.05 + 0.03
     assert max(ys) > 0.84
-
-
-# ---- rectangles --------------------------------------------------------------------------------------------------
 
 
 def test_rectangles_meet_by_hand() -> None:
