@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import lab.files
@@ -42,7 +41,9 @@ def test_durations_survive_json_with_kinds_and_services() -> None:
         "process_s": {"b": 30.0},
         "service_s": {"nut at b": 7.5},
     }
-    assert Durations.from_json(record, SKILLS) == replace(MEASURED, sim_s=0.0)  # nothing is simulated when they are read
+    assert Durations.from_json(record, SKILLS) == replace(
+        MEASURED, sim_s=0.0
+    )  # nothing is simulated when they are read
 
 
 def test_what_a_run_took_is_believed_from_then_on() -> None:
@@ -80,19 +81,8 @@ def test_a_damaged_record_is_refused_in_one_line(table: str, times: Any, says: s
 
 # ---- the key ---------------------------------------------------------------------------------------------------------
 
+MakePolicy = Callable[..., Policy]
 LAYOUT = Layout(((0.5, 0.1), (0.6, 0.2)), ((0.0, 0.0, 0.0),))
-
-
-def policy(value: float = 1.0, signature: str = "a" * 16) -> Policy:
-    """A policy of two states and two actions."""
-    known: dict[str, Any] = dict.fromkeys(("subtask", "task", "advisor"), "x") | {
-        "name": "grasp",
-        "signature": signature,
-    }
-    known |= dict.fromkeys(("start", "helped_steps", "requests", "seed"), 0) | {"optimal_steps": 1, "final_steps": 1}
-    known |= {"solved": True, "created": "2026-01-01T00:00:00+00:00", "versions": {}, "learner": {}, "gate": {}}
-    known |= {"action_labels": ("a", "b"), "shape": (2,), "curve": [], "guided": []}
-    return Policy(q=np.full((2, 2), value), visits=np.zeros((2, 2), np.int64), **known)
 
 
 @pytest.fixture(scope="module")
@@ -163,10 +153,12 @@ CHANGES: dict[str, Change] = {
     "a station's place": edit("task", shifted),
     "an obstacle's place": edit("layout", lambda layout: replace(layout, obstacles=((0.5, 0.1), (0.6, 0.201)))),
     "a move": edit("skillset", lambda skills: replace(skills, moves=replace(skills.moves, empty=()))),
-    "what is carried": edit("skillset", lambda skills: replace(skills, legs={AB._replace(kind="bolt"): ALONE, BC: ALONE})),
-    "a policy's table": edit("policies", lambda policies: {"grasp": policy(1.5)}),
-    "a policy's problem": edit("policies", lambda policies: {"grasp": policy(signature="b" * 16)}),
-    "whose policy it is": edit("policies", lambda policies: {"place": policy()}),
+    "what is carried": edit(
+        "skillset", lambda skills: replace(skills, legs={AB._replace(kind="bolt"): ALONE, BC: ALONE})
+    ),
+    "a policy's table": edit("policies", lambda known: {"grasp": replace(known["grasp"], q=known["grasp"].q + 0.5)}),
+    "a policy's problem": edit("policies", lambda known: {"grasp": replace(known["grasp"], signature="b" * 16)}),
+    "whose policy it is": edit("policies", lambda known: {"place": known["grasp"]}),
     "a URDF": write('name="robot"', 'name="arm"', "assets", "robot.urdf"),
     "a mesh": write("v ", "v  ", "assets", "robot_tool_0.obj"),
     "a module that measures": write("physics", "physics  # changed", "motion_*", "arm.py"),
@@ -176,8 +168,10 @@ CHANGES: dict[str, Change] = {
 
 
 @pytest.mark.parametrize("what", CHANGES)
-def test_the_key_changes_with_whatever_decides(task: Task, own_assets: Path, motion: Path, what: str) -> None:
-    given: dict[str, Any] = {"task": task, "layout": LAYOUT, "skillset": SKILLS, "policies": {"grasp": policy()}}
+def test_the_key_changes_with_whatever_decides(
+    make_policy: MakePolicy, task: Task, own_assets: Path, motion: Path, what: str
+) -> None:
+    given: dict[str, Any] = {"task": task, "layout": LAYOUT, "skillset": SKILLS, "policies": {"grasp": make_policy()}}
     given["modules"] = [f"{motion.name}.arm"]
     before = durations_key(**given)
     assert durations_key(**given) == before
@@ -187,11 +181,11 @@ def test_the_key_changes_with_whatever_decides(task: Task, own_assets: Path, mot
     assert durations_key(**changed) != before
 
 
-def test_what_decides_nothing_leaves_the_key(task: Task) -> None:
+def test_what_decides_nothing_leaves_the_key(make_policy: MakePolicy, task: Task) -> None:
     other = task.model_copy(update={"title": "another", "subtasks": {}})
     moved = replace(LAYOUT, parts=((0.1, 0.0, 0.0),))  # a move is measured with a part on its spot
-    key = durations_key(task, LAYOUT, SKILLS, {"grasp": policy()})
-    assert durations_key(other, moved, SKILLS, {"grasp": policy()}) == key
+    key = durations_key(task, LAYOUT, SKILLS, {"grasp": make_policy()})
+    assert durations_key(other, moved, SKILLS, {"grasp": make_policy()}) == key
 
 
 def test_a_key_that_cannot_be_made_is_an_error(task: Task, motion: Path) -> None:

@@ -338,7 +338,9 @@ def test_damaged_durations_are_measured_again(
 
 
 def test_only_one_skill_can_be_prepared() -> None:
-    assert list(prepare(load("toast"), ("slice",), 0, "butter at butter_applier").problems) == ["butter at butter_applier"]
+    assert list(prepare(load("toast"), ("slice",), 0, "butter at butter_applier").problems) == [
+        "butter at butter_applier"
+    ]
 
 
 @pytest.mark.parametrize("method", [name for name in SEQUENCERS if name != "earliest-due"])

@@ -24,7 +24,10 @@ KNOWN = ", ".join(sorted(SEQUENCERS))
     ("words", "line"),
     [
         ("world-1", "world-1: it is a world, there is nothing to sequence: learn it with lab teach world-1"),
-        ("ovn.toml", "no task file 'ovn.toml': give a file that exists, .toml or a .txt grid, or what ships: breakfast, fms-arm, fms, "),
+        (
+            "ovn.toml",
+            "no task file 'ovn.toml': give a file that exists, .toml or a .txt grid, or what ships: breakfast, fms-arm, fms, ",
+        ),
         ("fsm", "unknown task 'fsm' (TASK): did you mean 'fms'? known: breakfast, fms, "),
         ("fms --case RSR --toasts 3", "--case RSR and --toasts 3: an order is one or the other"),
         ("oven.toml --case T --toasts 1", "--case T and --toasts 1: an order is one or the other"),
@@ -99,6 +102,36 @@ def test_what_does_not_fit_is_refused(lab: Lab, folder: Path, words: str, line: 
         assert ran.err.startswith(f"lab: {line}")
         assert len(ran.err.splitlines()) == 1
     assert listed(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ("--parts slise=1", "unknown part 'slise' (--parts): did you mean 'slice'? known: cup, slice"),
+        ("--parts slice=0,cup=0", "0 parts (--toasts, --parts) for task 'breakfast': allowed are 1 to 50"),
+        ("--parts slice=50,cup=1", "51 parts (--toasts, --parts) for task 'breakfast': allowed are 1 to 50"),
+        ("--parts cup=1,cup=1", "'cup=1,cup=1' (--parts): wanted kind=number once each, such as slice=2,cup=1"),
+        ("--parts two", "'two' (--parts): wanted kind=number once each, such as slice=2,cup=1"),
+        ("--parts cup=4", "4 cups (--toasts, --parts) do not fit on 'shelf': its capacity in the task file is 3"),
+        ("--toasts 1 --parts cup=1", "--toasts 1 and --parts cup=1: an order is one or the other"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "sequence", "view"])
+def test_parts_that_cannot_be(lab: Lab, folder: Path, command: str, words: str, line: str) -> None:
+    before = listed(folder)
+    ran = lab(command, "breakfast", *words.split())
+    assert (ran.code, ran.out, ran.err) == (2, "", f"lab: {line}\n")
+    assert listed(folder) == before
+
+
+def test_a_cell_has_no_parts_to_name(lab: Lab) -> None:
+    ran = lab("sequence", "fms", "--parts", "rook=1")
+    assert ran.err == "lab: --parts rook=1: 'fms' is a cell: give its order with --case or --toasts\n"
+
+
+def test_run_leads_from_the_cell_to_its_task_in_physics(lab: Lab) -> None:
+    ran = lab("run", "fms", "--parts", "rok=1")
+    assert (ran.code, ran.err) == (2, "lab: unknown part 'rok' (--parts): did you mean 'rook'? known: rook, sign\n")
 
 
 @pytest.mark.parametrize(

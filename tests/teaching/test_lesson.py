@@ -289,9 +289,7 @@ def test_of_several_kinds_a_skill_is_named_with_its_own() -> None:
 
 
 def test_as_many_parts_as_both_ends_hold(task: Task) -> None:
-    few = tuple(
-        s.model_copy(update={"capacity": 2}) if s.name == "finished_plate" else s for s in task.stations
-    )
+    few = tuple(s.model_copy(update={"capacity": 2}) if s.name == "finished_plate" else s for s in task.stations)
     small = task.changed(stations=few)
     breakfast = load("breakfast")  # its tray holds eight, one of them a cup
     assert breakfast.fitting(9) == (*["slice"] * 7, "cup")
