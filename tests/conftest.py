@@ -116,17 +116,17 @@ def in_picture() -> "Callable[[Viewpoint, FloatArray], bool]":
 
 @pytest.fixture(scope="session")
 def make_policy() -> "Callable[..., Policy]":
-    """Makes a small policy: make_policy(name="insert", solved=False); `fill` is the first value of its table."""
+    """Makes a small policy: make_policy(name="insert", solved=False); `fill`: all that its table holds."""
     import numpy as np
 
     from lab.toolbox.policy import Policy
 
-    def made(fill: float = 0.0, **changed: Any) -> Policy:
+    def made(fill: float | None = None, **changed: Any) -> Policy:
         base = Policy(
             name="insert",
             subtask="insert",
             task="toast",
-            q=fill + np.arange(8.0).reshape(4, 2),
+            q=np.arange(8.0).reshape(4, 2) if fill is None else np.full((4, 2), float(fill)),
             visits=np.arange(8, dtype=np.int64).reshape(4, 2),
             action_labels=("left", "right"),
             shape=(4,),

@@ -1,16 +1,19 @@
 """Parts of several kinds, on pallets and with services: the cell that their times make, and a run in physics."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 from lab.production.composer import Outcome, carry_out
 from lab.production.durations import Durations, cell_of, measure
+from lab.sequencing.cell.schedule import Move
 from lab.sequencing.methods.exact import optimum
 from lab.sim.frames import Recording
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.skillset import Carried, SkillSet
 from lab.tasks.task_file import load
+from lab.teaching.events import Event, MoveMade
 from lab.teaching.lesson_plan import LessonPlan
 from lab.teaching.teacher import Teacher
 from lab.toolbox.index import KnownPolicies
@@ -68,20 +71,35 @@ def prepared(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Prepared:
     return prepared
 
 
+class Done(NamedTuple):
+    """A run, with what it was planned by, and its moves."""
+
+    durations: Durations
+    outcome: Outcome
+    recording: Recording
+    moves: list[Move]
+
+
 @pytest.fixture(scope="module")
-def run(prepared: Prepared) -> tuple[Durations, Outcome, Recording]:
+def run(prepared: Prepared) -> Done:
     """The sign brought from the first station to the last, as predicted by its durations."""
-    durations = measure(prepared)
+    durations, moves = measure(prepared), list[Move]()
+
+    def hear(event: Event) -> None:
+        if isinstance(event, MoveMade):
+            assert event.part == "sign 1"
+            moves.append(event.move)
+
     cell = cell_of(prepared.task, durations, prepared.order)
-    outcome, recording = carry_out(prepared, cell, optimum(cell).sequence)
-    return durations, outcome, recording
+    outcome, recording = carry_out(prepared, cell, optimum(cell).sequence, tell=hear)
+    return Done(durations, outcome, recording, moves)
 
 
-def test_a_part_and_its_pallet_are_carried_in_their_order(run: tuple[Durations, Outcome, Recording]) -> None:
-    _, outcome, recording = run
+def test_a_part_and_its_pallet_are_carried_in_their_order(run: Done) -> None:
+    _, outcome, recording, moves = run
     assert (outcome.failure, outcome.retries) == (None, ())
     assert (outcome.delivered, outcome.dropped) == ((1,), ())
-    assert [(move.origin, move.target, move.carries) for move in outcome.schedule.robot] == [
+    assert [(move.origin, move.target, move.carries) for move in moves] == [
         ("incoming", "mill-in", "part"),
         ("mill-in", "mill", "part"),
         ("mill-in", "mill-out", "pallet"),
@@ -96,10 +114,10 @@ def test_a_part_and_its_pallet_are_carried_in_their_order(run: tuple[Durations, 
     }
 
 
-def test_the_robot_vacuums_before_it_takes_the_part_out(run: tuple[Durations, Outcome, Recording]) -> None:
-    durations, outcome, _ = run
+def test_the_robot_vacuums_before_it_takes_the_part_out(run: Done) -> None:
+    durations, moves = run.durations, run.moves
     assert durations.service_s.keys() == {("sign", "mill")}
-    served = {move.target: move.service_s for move in outcome.schedule.robot if move.service_s > 0}
+    served = {move.target: move.service_s for move in moves if move.service_s > 0}
     assert served == {"mill-out": pytest.approx(durations.service_s["sign", "mill"], rel=0.05)}
     kinds = {way.kind for way in durations.loaded_s}
     assert kinds == {"sign", "pallet", "sign on pallet"}

@@ -128,5 +128,5 @@ class Life(RuleBasedStateMachine):
 
 
 def test_any_order(make_policy: MakePolicy) -> None:
-    Life.make = staticmethod(make_policy)
+    Life.make_policy = staticmethod(make_policy)
     run_state_machine_as_test(Life, settings=settings(max_examples=25, stateful_step_count=25, deadline=None))
