@@ -53,5 +53,6 @@ def unknown(kind: str, value: object, known: Iterable[str], where: str) -> BadIn
 
 
 def counted(number: float, what: str) -> str:
-    """How many of something: "1 step", "2 steps"."""
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+    """How many of something: "1 step", "2 steps", "2 boxes"."""
+    ending = "es" if what.endswith(("s", "x", "z", "ch", "sh")) else "s"
+    return f"{number} {what}" if number == 1 else f"{number} {what}{ending}"

@@ -42,7 +42,7 @@ def run(
     from lab.tasks import task_file as taskfile
     from lab.teaching.kept_session import kept_by
     from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
-    from lab.view.summary import run_summary
+    from lab.view.summary import delivered_in_words, run_summary
 
     loaded = taskfile.load(task)
     folder = out or Path(f"{loaded.name}-run")
@@ -62,6 +62,7 @@ def run(
                 report = run_task(prepared, teacher, folder, override=override / 100, viewer=seat.page)
         except KeyboardInterrupt as stopped:
             raise KeyboardInterrupt(str(stopped) or "stopped by Ctrl-C; what was learned is kept") from None
-    show(report.to_json(), as_json, run_summary)
+    document = report.to_json()
+    show(document, as_json, run_summary)
     if not report.success:
-        end(report.outcome.failure or f"{len(report.outcome.delivered)} of {prepared.words} delivered", 1)
+        end(report.outcome.failure or delivered_in_words(document["delivered"], document["parts"]), 1)

@@ -22,8 +22,14 @@ def study_list(as_json: Json = False) -> None:
 def study_run(
     name: Annotated[str, typer.Argument(help="A study; lab study list names them.", autocompletion=offers("studies"))],
     sessions: Annotated[
-        int, typer.Option("--sessions", min=10, max=1_000_000, help="Learning sessions for each cell of a table.")
-    ] = 500,
+        int | None,
+        typer.Option(
+            "--sessions",
+            min=1,
+            max=1_000_000,
+            help="Learning sessions for each cell of a table, or orders of the tasks; default: 500 for most studies.",
+        ),
+    ] = None,
     workers: Annotated[int, typer.Option("--workers", min=1, max=256, help="Processes; the rows are the same.")] = 1,
     dask: Annotated[str | None, typer.Option("--dask", help="The address of a Dask scheduler to work on.")] = None,
     advisor_table: Annotated[
@@ -36,12 +42,12 @@ def study_run(
     as_json: Json = False,
 ) -> None:
     """Run a study and write its report; sessions of chapter 9 that a folder already holds are not run again."""
-    from lab.studies import run_study
+    from lab.studies import run_study, study_of
     from lab.studies.runner import Job
     from lab.view.progress import counting
     from lab.view.summary import study_summary
 
     with counting(console(), f"cells of {name}") as progress:
-        job = Job(sessions, seed, workers, dask, progress=progress)
+        job = Job(sessions or study_of(name).sessions, seed, workers, dask, progress=progress)
         document = run_study(name, job, out or Path(f"{name}-study"), advisor_table)
     show(document, as_json, study_summary)

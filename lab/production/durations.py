@@ -16,6 +16,7 @@ from lab.files import assets_folder
 from lab.learning.sources import sources
 from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
+from lab.sim import urdf_reader
 from lab.sim.places import Layout
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
@@ -29,7 +30,6 @@ from lab.toolbox.registry import Toolbox
 RECORDS = "durations"  # the kind of record in the toolbox
 LONGEST_S = 86_400.0  # of a move or a process
 MEASURED_BY = (__name__,)  # the modules that carry moves out, with all that they import
-MODELS = (".urdf", ".obj", ".stl")
 DECIDED_BY_RESULT = ("lab.sequencing", "lab.learning", "lab.advice", "lab.view")  # moves and policies hold it
 
 Way = Pair | Carried
@@ -44,7 +44,7 @@ class TimedMove(NamedTuple):
 
 @dataclass(frozen=True)
 class Durations:
-    """Measured times [s]: the robot's moves, empty and with what it carries; what machines take, and the robot's services there."""
+    """Measured times [s]: the robot's moves, empty and with what it carries; its services, and what machines take."""
 
     empty_s: Mapping[Pair, float]
     loaded_s: Mapping[Carried, float]
@@ -149,7 +149,7 @@ def measure(prepared: Prepared, on_move: Callable[[str, float], None] | None = N
 def _measure_empty(
     prepared: Prepared, tell: Callable[[str, float], None]
 ) -> tuple[dict[Pair, float], dict[Pair, float], int]:
-    """The times [s] of all ways of the empty gripper and of all services, one after the other, and the physics steps that took."""
+    """The times [s] of all ways of the empty gripper and of all services, and the physics steps that took."""
     empty: dict[Pair, float] = {}
     service: dict[Pair, float] = {}
     skillset = prepared.skillset
@@ -225,9 +225,12 @@ def durations_key(
 
 
 def files_of(task: Task) -> list[Path]:
-    """The lab's assets, and the meshes and URDFs beside the task file."""
-    own = [path for path in task.folder.iterdir() if path.suffix.lower() in MODELS]
-    return sorted({path for path in (*assets_folder().iterdir(), *own) if path.is_file()})
+    """The lab's assets, and the meshes and URDFs that the task file names, with the meshes of these."""
+    named = [station.stands_on for station in task.stations] + [task.robot.model]
+    named += [name for part in task.parts for name in (part.file, part.look) if name is not None]
+    own = [path for path in (task.folder / name for name in named) if path.is_file()]
+    meshes = [path.parent / mesh for path in own if path.suffix == ".urdf" for mesh in urdf_reader.meshes(path)]
+    return sorted({path for path in (*assets_folder().iterdir(), *own, *meshes) if path.is_file()})
 
 
 def _hash(content: bytes) -> str:

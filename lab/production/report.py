@@ -102,6 +102,7 @@ def _skill_row(name: str, lesson: Lesson) -> dict[str, Any]:
         "name": name,
         "subtask": policy.subtask,
         "source": lesson.source,
+        "from_task": lesson.from_task or None,
         "reason": lesson.reason,
         "policy": policy.name,
         "parent": policy.parent,

@@ -56,7 +56,7 @@ def grip_of(shape: PartShape, gripper: Gripper, friction: float, given: GripFiel
     sections = _Sections(shape)
     if shape.height_m < OVER_FLOOR_M + HOLD_M:
         raise BadInput(
-            f"part '{shape.name}' is {shape.height_m:.3f} m high as it stands, too flat for the fingers: at least "
+            f"part '{shape.name}' is {shape.height_m:.4f} m high as it stands, too flat for the fingers: at least "
             f"{OVER_FLOOR_M + HOLD_M:.3f} m needed"
         )
     slopes: list[float] = []
@@ -84,7 +84,8 @@ def grip_of(shape: PartShape, gripper: Gripper, friction: float, given: GripFiel
 def _as_given(shape: PartShape, gripper: Gripper, given: GripFields) -> Grip:
     """The grip that a file gives; BadInput when the fingers do not go around the part there."""
     most = gripper.opening_m - 2 * BESIDE_M
-    pads = _Sections(shape, given.at_m).between(given.yaw, given.up_m, gripper.width_m)
+    below = given.up_m < shape.height_m
+    pads = _Sections(shape, given.at_m).between(given.yaw, given.up_m, gripper.width_m) if below else None
     where = f"part '{shape.name}': grip.yaw {given.yaw:g}, up_m {given.up_m:g}"
     if pads is None:
         raise BadInput(f"{where}: between the fingers is nothing; the part is {shape.height_m:.3f} m high")
@@ -122,22 +123,20 @@ def _period(shape: PartShape) -> float:
 
 
 def _refusal(sections: "_Sections", gripper: Gripper, friction: float, slopes: list[float]) -> str:
-    shape, what = sections.shape, f"part '{sections.shape.name}' cannot be gripped"
-    if slopes:
-        holds = degrees(atan(SHARE * friction))
-        return f"{what}: its sides slope by {degrees(min(slopes)):.0f} degrees; friction {friction:g} holds up to {holds:.0f}"
+    shape, most = sections.shape, gripper.opening_m - 2 * BESIDE_M
     widths = {pi * n / HEADINGS: sections.wide(pi * n / HEADINGS) for n in range(HEADINGS)}
     narrow, wide = min(widths, key=lambda yaw: widths[yaw]), max(widths, key=lambda yaw: widths[yaw])
-    most = gripper.opening_m - 2 * BESIDE_M
-    if widths[narrow] <= most:
-        return (
-            f"{what}: it is {shape.height_m:.3f} m high, and too wide at its foot: between palm and finger tips the gripper "
-            f"has {gripper.depth_m - PALM_M:.3f} m"
-        )
-    return (
-        f"{what}: it is {widths[narrow]:.3f} m wide where it is narrowest (at yaw {narrow:.2f}) and {widths[wide]:.3f} m where "
-        f"it is widest; the gripper takes up to {most:.3f} m"
+    what = (
+        f"part '{shape.name}' cannot be gripped: it is {widths[narrow]:.3f} m wide where it is narrowest (at yaw {narrow:.2f}) "
+        f"and {widths[wide]:.3f} m where it is widest; the gripper takes up to {most:.3f} m"
     )
+    if slopes:
+        least, holds = degrees(min(slopes)), degrees(atan(SHARE * friction))
+        return f"{what}, and where it is no wider its sides slope by {least:.0f} degrees: friction {friction:g} holds {holds:.0f}"
+    if widths[narrow] <= most:
+        room = gripper.depth_m - PALM_M
+        return f"{what}; it is {shape.height_m:.3f} m high, too wide below {room:.3f} m under its top, where palm and fingers end"
+    return what
 
 
 @dataclass(frozen=True)
@@ -266,7 +265,7 @@ def _slope(side: Array, step: tuple[float, float]) -> float:
         if places[0] == 0 and places[-1] == last:
             continue  # flat
         inner = places[-1] + 1 if places[0] == 0 else places[0] - 1
-        line = np.nanmax(np.where(np.isfinite(touching), touching, np.nan), axis=1 - axis)
+        line = touching.max(axis=1 - axis)
         if np.isfinite(line[inner]):
             edge = 0 if places[0] == 0 else last
             steepest = max(steepest, atan2(float(line[edge] - line[inner]), own * abs(inner - edge)))

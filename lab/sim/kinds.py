@@ -35,12 +35,16 @@ class Spot:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of part, or a pallet with its part on it: then the gripper holds the pallet, and `rider` stands on that."""
+    """A kind of part, or a pallet with its part on it: then the gripper holds the pallet, and `rider` stands on that.
+
+    finger_m: how far an open finger reaches beyond the part's side [m].
+    """
 
     name: str
     part: Part
     shape: PartShape
     grip: Grip
+    finger_m: float
     rider: "Kind | None" = None
 
     @property
@@ -124,7 +128,8 @@ def kinds_of(task: Task, gripper: Gripper) -> dict[str, Kind]:
 @cache
 def _kind(part: Part, folder: Path, gripper: Gripper) -> Kind:
     shape = shape_of(part, folder)
-    return Kind(part.name, part, shape, grip_of(shape, gripper, part.friction, part.grip))
+    grip = grip_of(shape, gripper, part.friction, part.grip)
+    return Kind(part.name, part, shape, grip, (gripper.opening_m - grip.width_m) / 2 + gripper.thick_m)
 
 
 def _check_rider(loaded: Kind, gripper: Gripper) -> None:
@@ -138,4 +143,6 @@ def _check_rider(loaded: Kind, gripper: Gripper) -> None:
             f"{what}: it is {across:.3f} m wide where the fingers that hold the pallet are {loaded.grip.width_m:.3f} m apart"
         )
     if reach > room:
-        raise BadInput(f"{what}: its top would be {reach:.3f} m above the finger tips, and there is room for {room:.3f} m")
+        raise BadInput(
+            f"{what}: its top would be {reach:.3f} m above the finger tips, and there is room for {room:.3f} m"
+        )

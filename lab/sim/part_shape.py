@@ -67,12 +67,6 @@ class PartShape:
         """From foot to top [m]."""
         return float(self.high[2] - self.low[2])
 
-    @property
-    def footprint(self) -> tuple[float, float]:
-        """The part's extents along its x and y [m]."""
-        x, y = self.high[:2] - self.low[:2]
-        return float(x), float(y)
-
 
 def shape_of(part: PartFields, folder: Path) -> PartShape:
     """The shape that a record describes; its files lie in `folder`, the task file's, or in the lab's assets.
@@ -194,9 +188,8 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     where = f"part '{part.name}': file = '{part.file}'"
     try:
         kind = path.suffix.lower().removeprefix(".")
-        mesh: Any = trimesh.load(
-            BytesIO(path.read_bytes()), kind, force="mesh", skip_materials=True
-        )  # opens no other file
+        raw: dict[str, Any] = {"process": False, "skip_materials": True}  # as it is; and no other file is opened
+        mesh: Any = trimesh.load(BytesIO(path.read_bytes()), kind, force="mesh", **raw)
         points: Array = np.asarray(mesh.vertices, dtype=float)
     except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
         raise BadInput(f"{where}: it cannot be read as {kind.upper()}: {type(error).__name__}: {error}") from None

@@ -1,6 +1,6 @@
 """Where things stand in a task's cell: the spots for parts at each station, what room they take, what a seed lays out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import ceil, cos, hypot, pi, sin
@@ -18,7 +18,11 @@ SLAB = 0.012  # [m] plates and buffers are slabs this thick, where the file says
 COLUMNS = 4  # of a storage
 BETWEEN_M, FINGERS_M = 0.02, 0.02  # [m] between parts at a station, and as much more where a finger comes between them
 AROUND_M, OPEN_M = 0.01, 0.0325  # [m] kept free around a part, and as much more where the fingers are open beside it
-SLAB_M = (0.06, 0.025)  # [m] that a slab is larger than what stands on it, and as much more where the fingers close
+SLAB_M, CLOSING_M = (
+    0.06,
+    0.025,
+)  # [m] that a slab is larger than what stands on it, and as much more where fingers close
+FREE_M = 0.0125  # [m] beyond an open finger to what stands beside, at least
 MAX_DRAWS = 100  # of an obstacle's place
 SPARE_SPOTS = 4  # so many spots of a station are reckoned with, however few parts there are
 
@@ -110,16 +114,19 @@ class Places:
 
     def pitch(self, station: Station) -> tuple[float, float]:
         """From one spot to the next, along and across [m]."""
-        return self._largest(station, BETWEEN_M, FINGERS_M, 2.0)
+        return self._largest(station, BETWEEN_M, lambda kind: max(FINGERS_M, kind.finger_m - BETWEEN_M + FREE_M), 2.0)
 
     def room(self, station: Station) -> tuple[float, float]:
         """How far a part and the gripper around it reach from a spot, along and across [m]."""
-        return self._largest(station, AROUND_M, OPEN_M, 1.0)
+        return self._largest(station, AROUND_M, lambda kind: max(OPEN_M, kind.finger_m - AROUND_M + FREE_M), 1.0)
 
-    def _largest(self, station: Station, beside_m: float, closing_m: float, times: float) -> tuple[float, float]:
+    def _largest(
+        self, station: Station, beside_m: float, closing_m: Callable[[Kind], float], times: float
+    ) -> tuple[float, float]:
+        """So many times what the kinds at a station reach, and so much beside them, more where their fingers close [m]."""
         sizes = []
         for kind in self.kinds_at(station.name):
-            reach, margins = kind.footprint_m(), kind.margins_m(beside_m, closing_m)
+            reach, margins = kind.footprint_m(), kind.margins_m(beside_m, closing_m(kind))
             sizes.append([times * reach[0] + margins[0], times * reach[1] + margins[1]])
         x, y = np.max(sizes, axis=0) if sizes else (BETWEEN_M, BETWEEN_M)
         return float(x), float(y)
@@ -135,7 +142,7 @@ class Places:
             return station.size_m, (x, y, station.size_m[2] / 2)
         feet = [beside((0.0, 0.0), -yaw, (f.x - x, f.y - y)) for f in self.used_spots(station, parts)]
         low, high = np.min(feet, axis=0), np.max(feet, axis=0)  # (2,) [m] along and across
-        reach = self._largest(station, *SLAB_M, 2.0)
+        reach = self._largest(station, SLAB_M, lambda kind: CLOSING_M, 2.0)
         middle = beside((x, y), yaw, ((high + low) / 2).tolist())
         length, width = (high - low + np.array(reach)).tolist()
         return (length, width, self.floor(station)), (*middle, self.floor(station) / 2)

@@ -20,6 +20,7 @@ YAW_ARM = 0.15  # [m/rad] a turn of the tool counts as this much way
 _SAMPLE = 0.004  # [m] between points of a path before it is timed
 _SETTLE_STEPS = 12  # after a path ends
 _GRIP_STEPS = 72  # 0.3 s to close or open
+_PEDESTAL_M, _PEDESTAL_RGBA = 0.09, (0.22, 0.23, 0.26, 1.0)  # radius
 _LINKAGE_ITERATIONS = 200  # of the solver: with 60 a slice creeps 2 mm a second in fingers that a linkage moves
 
 Array = NDArray[np.float64]
@@ -128,6 +129,8 @@ class Robot:
         fingers = arm.fingers
         holding = [link for side in fingers.links for link in side]
         world.load(NAME, arm.urdf, (0.0, 0.0, arm.base_up_m), checked=True)
+        if arm.base_up_m > 0.0:
+            world.disc(f"{NAME} pedestal", _PEDESTAL_M, arm.base_up_m, (0.0, 0.0, arm.base_up_m / 2), _PEDESTAL_RGBA)
         world.friction(NAME, 1.0, links=holding, spinning=0.002)
         for follower, leader in fingers.leaders.items():
             world.gear(NAME, leader, follower, fingers.ratio(follower))

@@ -21,7 +21,7 @@ ABOVE_FOOT_M = 0.0005  # [m] a part is put so high above its spot
 
 
 class Scene:
-    """The cell of `task` with the parts of an order, laid out as `layout` says. Parts are named 'slice 1'..., obstacles by name."""
+    """The cell of `task` with the parts of an order, laid out as `layout` says; the first part is called 'slice 1'."""
 
     def __init__(self, world: World, task: Task, order: Order, layout: Layout) -> None:
         self.world, self.task, self.order, self.layout = world, task, order, layout

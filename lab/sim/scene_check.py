@@ -77,7 +77,8 @@ def _check_seen(task: Task, station: Station, grid: CameraGrid) -> None:
         if far <= 0 or not (0 <= across / far < camera.width and 0 <= down / far < camera.height):
             raise BadInput(
                 f"camera.position_m = {list(task.camera.position_m)}: the marker at ({shown[0]:.2f}, {shown[1]:.2f}) m, of "
-                f"{field} of the grid of '{station.name}', is out of its picture; field_of_view_rad = {camera.field_of_view_rad:g}"
+                f"{field} of the grid of '{station.name}', is out of its picture; "
+                f"field_of_view_rad = {camera.field_of_view_rad:g}"
             )
 
 
@@ -105,8 +106,9 @@ def _check_side(station: Station, kind: Kind) -> None:
 def _check_reach(arm: Arm, station: Station, at: ToolPose) -> None:
     if arm.inverse(at) is None or hypot(at.x, at.y) < arm.nearest_m:
         raise BadInput(
-            f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m, by pose = {list(station.pose)}, is "
-            f"{hypot(at.x, at.y):.2f} m from the robot; the arm '{arm.name}' {arm.reach_in_words(at.z)}"
+            f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m, by "
+            f"pose = {list(station.pose)}, is {hypot(at.x, at.y):.2f} m from the robot; "
+            f"the arm '{arm.name}' {arm.reach_in_words(at.z)}"
         )
 
 

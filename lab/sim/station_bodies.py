@@ -3,6 +3,7 @@
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,13 +91,17 @@ def _mesh_bounds(path: Path) -> tuple[Array, Array]:
     if not 0 < path.stat().st_size <= MAX_BYTES:
         raise BadInput(f"{path.stat().st_size} bytes: wanted 1 to {MAX_BYTES // 1_000_000} MB")
     try:
-        mesh = trimesh.load(BytesIO(path.read_bytes()), kind, force="mesh", skip_materials=True)  # opens no other file
+        mesh: Any = trimesh.load(
+            BytesIO(path.read_bytes()), kind, force="mesh", skip_materials=True
+        )  # opens no other file
         points = np.asarray(mesh.vertices, dtype=float)
         faces = len(mesh.faces)
     except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
         raise BadInput(f"it cannot be read as {kind.upper()}: {type(error).__name__}: {error}") from None
     if faces < 1 or len(points) < 3 or not np.isfinite(points).all():
-        raise BadInput(f"a mesh of {len(points)} vertices and {faces} faces: wanted finite ones, and faces between them")
+        raise BadInput(
+            f"a mesh of {len(points)} vertices and {faces} faces: wanted finite ones, and faces between them"
+        )
     return points.min(axis=0), points.max(axis=0)
 
 

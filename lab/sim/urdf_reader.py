@@ -74,6 +74,11 @@ def _shape(path: Path, visual: Xml.Element) -> Shape | None:
     return Shape("mesh", floats(mesh, "scale", ""), path.parent / mesh.get("filename", ""), rgba, at, turn)
 
 
+def meshes(path: Path) -> list[str]:
+    """The files that a URDF names as meshes, as it names them."""
+    return [mesh.get("filename", "") for mesh in read(path).iter("mesh")]
+
+
 def bounds(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The lowest and the highest corner (3,) [m] of what is solid in the root link of a valid URDF, in its frame."""
     validate(path)

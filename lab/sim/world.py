@@ -16,6 +16,7 @@ from lab.sim.silence import silence
 
 TIME_STEP = 1.0 / 240.0  # [s]
 PART_SPINNING = 0.001  # [m] what resists a part's turning about a contact
+PART_ROLLING = 0.0005  # [m] and its rolling, unless it is a box: without, a ball that was set down never rests
 
 Array = NDArray[np.float64]
 Position = Sequence[float] | Array
@@ -155,8 +156,8 @@ class World:
         entry.number = self._call(
             "createMultiBody", mass_kg, self._solid(shape), self._seen(shape), list(position), list(body)
         )
-        inertia = [moment * mass_kg for moment in shape.inertia_m2]
-        self._call("changeDynamics", entry.number, -1, localInertiaDiagonal=inertia)
+        moments, rolling = [one * mass_kg for one in shape.inertia_m2], PART_ROLLING * (shape.solid != "box")
+        self._call("changeDynamics", entry.number, -1, localInertiaDiagonal=moments, rollingFriction=rolling)
         self._add(name, entry)
         self.friction(name, friction, spinning=PART_SPINNING)
 

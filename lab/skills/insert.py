@@ -71,7 +71,7 @@ class Insert(Skill):
         return self.problem
 
     def _blocked(self, task: Task) -> tuple[NDArray[np.bool_], dict[tuple[int, ...], str]]:
-        """Cells in which the carried part would touch an obstacle that the camera sees, or cannot be for another reason; and why."""
+        """Cells in which the part would touch an obstacle that the camera sees, or cannot be for another reason; and why."""
         shape = self.grid.settings.shape
         causes: dict[tuple[int, ...], list[str]] = {cell: [] for cell in np.ndindex(*shape)}
         seen = {self._named(task, marker): marker.world_m for marker in self.seen.markers if marker.kind == "obstacle"}

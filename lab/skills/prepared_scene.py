@@ -69,9 +69,9 @@ def scene_in_words(task: Task, order: Order, layout: Layout) -> str:
 
 
 def check_task(file: str, toasts: int | None, seed: int) -> tuple[list[str], list[str]]:
-    """What is wrong with a task file, its scene and its problems for so many parts of its first kind, or with a cell or a world; warnings.
+    """What is wrong with a task file, its scene and its problems, or with a cell or a world; and warnings.
 
-    Without a number: a task or a cell for its own order. A warning is of what
+    toasts: how many parts of the first kind; None: a task or a cell for its own order. A warning is of what
     can be learned, but hardly by a learner that nobody helps.
     Raises BadInput for a file that is not there, and for a number that this kind of file never takes.
     """

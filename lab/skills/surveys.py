@@ -90,7 +90,12 @@ class Surveys:
         with World() as world:
             scene = Scene(world, self.task, (), self.layout)
             surveyor = Surveyor(scene, carried or None, clearance=max(grid.cell_m) / 2 + _TRAVEL_MARGIN)
-            return surveyor.grid(grid.shape, self.cell_pose)
+            survey = surveyor.grid(grid.shape, self.cell_pose)
+        for cell in np.ndindex(*grid.shape):
+            pose = self.cell_pose(cell)
+            if pose.x < 0 and abs(pose.y) <= grid.cell_m[1] / 2 + 1e-9 and not survey.causes[cell]:
+                survey.causes[cell] = OUT_OF_REACH  # no arm turns through there, from one side of itself to the other
+        return survey
 
     def _dock(self, place: str, carried: str) -> Cell:
         """The workspace cell from which the tool goes straight to the approach of `place`; BadInput names what blocks it."""
@@ -107,7 +112,9 @@ class Surveys:
         near = self._cells_near(survey, approach)
         if not near:
             grid = self.task.workspace
-            high_x, high_y = (low + n * cell for low, n, cell in zip(grid.lower_m, grid.shape[:2], grid.cell_m, strict=False))
+            high_x, high_y = (
+                low + n * cell for low, n, cell in zip(grid.lower_m, grid.shape[:2], grid.cell_m, strict=False)
+            )
             raise BadInput(
                 f"workspace.shape = {list(grid.shape)}: it has no cell near '{place}' at ({approach.x:.2f}, {approach.y:.2f}) m: "
                 f"it goes from ({grid.lower_m[0]:.2f}, {grid.lower_m[1]:.2f}) to ({high_x:.2f}, {high_y:.2f}) m"

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lab.errors import BadInput, unknown
+from lab.errors import BadInput, counted, unknown
 
 if TYPE_CHECKING:
     from lab.studies.findings import Findings
@@ -21,11 +21,16 @@ TABLES = ("learned", "exact")  # what advisors know: see `thesis.chapter_9_sessi
 
 @dataclass(frozen=True)
 class Study:
-    """A study: its title, what runs it with a job and a reading, and whether it has advisors who know one of TABLES."""
+    """A study: its title, what runs it with a job and a reading, and whether it has advisors who know one of TABLES.
+
+    sessions: as many as it has unless --sessions says otherwise; least: fewer are refused.
+    """
 
     title: str
     run: "Run"
     has_advisors: bool = False
+    sessions: int = 500
+    least: int = 10
 
 
 Run = Callable[["Job", Mapping[str, Any]], "Findings"]
@@ -93,6 +98,12 @@ def _changed_scenes(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return changed_scenes(job, reading)
 
 
+def _grips(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.grips import grips
+
+    return grips(job, reading)
+
+
 def _reuse(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.reuse import reuse
 
@@ -150,32 +161,44 @@ STUDIES: dict[str, Study] = {
     "changed-scenes": Study(
         "Skills in changed scenes: used as they are, adapted or learned, beside learning all anew", _changed_scenes
     ),
-    "reuse": Study("Several tasks in one toolbox, one after the other: does a lab that has lived longer learn less?", _reuse),
+    "grips": Study("Parts that others made: which can be gripped, and whether they arrive", _grips),
+    "reuse": Study(
+        "Tasks in several orders, all in one toolbox: does a lab that has lived longer learn less?",
+        _reuse,
+        sessions=10,
+        least=1,
+    ),
     "sequencing-speed": Study("Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }
 
 
+def study_of(name: str) -> Study:
+    """The study called `name`; BadInput lists the known ones."""
+    if name not in STUDIES:
+        raise unknown("study", name, STUDIES, "STUDY")
+    return STUDIES[name]
+
+
 def run_study(name: str, job: "Job", out: Path, advisor_table: str | None = None) -> dict[str, Any]:
     """Run a study and write its report, rows and sessions to `out`; the document of `lab study run --json`.
 
-    advisor_table: one of TABLES. BadInput for an unknown study or advisor table and for a folder that cannot be;
-    WorkFailed when it cannot be written.
+    advisor_table: one of TABLES. BadInput for an unknown study or advisor table, too few sessions and a folder that cannot
+    be; WorkFailed when it cannot be written.
     """
     from lab.files import check_out
     from lab.studies.runner import STORE
 
-    if name not in STUDIES:
-        raise unknown("study", name, STUDIES, "STUDY")
+    study = study_of(name)
+    if job.sessions < study.least:
+        raise BadInput(f"{counted(job.sessions, 'session')} (--sessions): '{name}' takes {study.least} at the least")
     if advisor_table is not None and advisor_table not in TABLES:
         raise unknown("advisor table", advisor_table, TABLES, "--advisor-table")
-    if advisor_table is not None and not STUDIES[name].has_advisors:
+    if advisor_table is not None and not study.has_advisors:
         raise BadInput(f"advisor table '{advisor_table}' (--advisor-table): the study '{name}' has none to choose")
     check_out(out)
     try:
-        found = STUDIES[name].run(
-            replace(job, folder=out), {} if advisor_table is None else {"advisor_table": advisor_table}
-        )
+        found = study.run(replace(job, folder=out), {} if advisor_table is None else {"advisor_table": advisor_table})
     except KeyboardInterrupt:
         goes_on = f"'{out}' keeps what is done, and the same command goes on"
         kept = goes_on if (out / STORE).is_file() else "nothing is kept"

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from lab.errors import BadInput, LabError, WorkFailed
 
 STORE = "sessions.jsonl"
+BATCH = 4  # items that a worker is given at once, where there are many
 PARENT_LOOK_S = 0.2  # how often a worker looks whether its parent is still there
 Progress = Callable[[int, int], None]  # settings done, of how many
 Item = TypeVar("Item")
@@ -69,7 +70,10 @@ class Job:
             from joblib import Parallel, delayed
 
             ending: dict[str, Any] = {"initializer": _end_with_parent, "initargs": (os.getpid(),)}
-            pool = Parallel(self.workers, return_as="generator", batch_size=4, **ending)
+            batch = min(
+                BATCH, max(1, len(items) // (4 * self.workers))
+            )  # few items are long ones: each is shared out alone
+            pool = Parallel(self.workers, return_as="generator", batch_size=batch, **ending)
             yield from zip(items, pool(delayed(work)(item) for item in items), strict=True)
 
     def kept(self) -> Iterator[Any]:

@@ -168,11 +168,12 @@ class Task(Record):
     @model_validator(mode="after")
     def _names_apart(self) -> Self:
         stations, kinds = [s.name for s in self.stations], [p.name for p in self.parts]
+        patches = [f"{process} on" for process in self.processes]  # what is left on a part: "butter on slice 1 00"
         for label, names in (("part", kinds), ("station", stations), ("obstacle", [o.name for o in self.obstacles])):
             twice = {n for n in names if names.count(n) > 1}
             if twice:
                 raise ValueError(f"{label} '{min(twice)}' stands twice in the file")
-            words = ("robot", "done", *(kinds if label != "part" else ()), *(f"{process} on" for process in self.processes))
+            words = ["robot", "done", *patches, *(kinds if label != "part" else ())]
             starts = tuple(f"{word} " for word in words)
             for name in names:
                 reserved = name in RESERVED or name.startswith(starts) or name.endswith(RESERVED_ENDS)
@@ -189,9 +190,9 @@ class Task(Record):
         for part in self.parts:
             if not part.routes and part.name not in carriers:
                 raise ValueError(f"part '{part.name}' has no routes, and no other part comes on it: it needs routes")
-            if part.pallet is not None:
-                if part.pallet not in (known := [p.name for p in self.parts if not p.routes]):
-                    raise unknown("pallet", part.pallet, known, f"part '{part.name}'")
+            known = [other.name for other in self.parts if not other.routes]
+            if part.pallet is not None and part.pallet not in known:
+                raise unknown("pallet", part.pallet, known, f"part '{part.name}'")
             for stage in stages_of(part):
                 for name in filter(None, (stage.station, stage.buffer)):
                     if name not in stations:

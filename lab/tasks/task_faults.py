@@ -11,7 +11,8 @@ from lab.errors import BadInput
 from lab.tasks.first_form import own_loc, renewed
 from lab.tasks.toml_text import Loc, TomlText
 
-MEMBERS = {"part": "parts", "product": "parts", "station": "stations", "machine": "stations", "obstacle": "obstacles"}  # table by word
+# the table of the file, by the word in a message
+MEMBERS = {"part": "parts", "product": "parts", "station": "stations", "machine": "stations", "obstacle": "obstacles"}
 _THING = re.compile(rf"\b({'|'.join(MEMBERS)})s? '([^']*)'")
 _DOTTED = re.compile(r"\b(robot|workspace|camera|processes|subtasks|sequencing)((?:\.[\w-]+)+)")
 _STAGE = re.compile(r"(?:stage (\d+) of )?(?:the route|route (\d+))\b(?: of '([^']*)')?(?= has|:| \()")
@@ -43,7 +44,7 @@ def loc_of(raw: dict[str, Any], message: str) -> Loc:
 
 def within(raw: dict[str, Any], loc: Loc, message: str) -> Loc:
     """The rest of the way, from the table to which `loc` leads: to the value that a message quotes, or the field it names."""
-    table = raw
+    table: Any = raw
     for part in loc:
         table = table[part]
     if not isinstance(table, dict):
@@ -53,7 +54,7 @@ def within(raw: dict[str, Any], loc: Loc, message: str) -> Loc:
         if isinstance(value, str) and value in quoted and inner != ("name",):
             return inner
     words = _WORD.findall(_QUOTED.sub("", message))
-    said = [field for word in words for field in (word, *(_SIZE if word in ("wide", "high") else ()))]
+    said = [field for word in words for field in (word, f"{word}s", *(_SIZE if word in ("wide", "high") else ()))]
     field = next((word for word in said if word in table and word != "name"), None)
     if field is None:
         return ("name",) if "name" in table else ()

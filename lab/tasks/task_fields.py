@@ -87,7 +87,8 @@ class Station(Record):
     """A place where parts stand: pose x, y [m], yaw [rad]; a machine has a processing time [s] or a process to learn.
 
     body: what stands there, "slab", "box" of `size_m`, or a URDF or mesh file; floor_m: how high parts stand on it;
-    spots: where, off the pose along its axes and by yaw, instead of in rows. finish: the colour of parts done here; color: of a slab, box or mesh.
+    spots: where, off the pose along its axes and by yaw, instead of in rows. finish: the colour of parts done here; color:
+    of a slab, box or mesh.
     """
 
     name: Name

@@ -152,5 +152,3 @@ def _checked(model: type[Checked], toml: TomlText, raw: dict[str, Any]) -> Check
         raise toml.refusal(own_loc(toml.raw, at), said) from None
     except BadInput as error:
         raise refusal(toml, str(error)) from None
-
-

@@ -66,6 +66,13 @@ class Lesson:
             return self.fitness.moves, self.fitness.fewest
         return self.policy.final_steps, self.policy.optimal_steps
 
+    @property
+    def from_task(self) -> str:
+        """The task whose policy is reused, or was adapted; "" where it was learned from nothing, or here before."""
+        if self.source == "reused":
+            return self.policy.task
+        return "" if self.parent is None else self.parent.task
+
 
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C: what was learned so far has been kept, and the text says so."""

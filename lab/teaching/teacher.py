@@ -55,7 +55,7 @@ class Teacher:
         if found is not None and not _belongs(found, problem.mdp):
             found = None
         if found is not None and found.solved and fits(found.q, problem, plan.learner):
-            return _reused(plan, found, "it was learned in exactly this problem")
+            return _reused(plan, found, f"it was learned in exactly this problem{_elsewhere(found, plan)}")
         fitting = None
         if problem.environment is None:
             fitting = best_fit(self._candidates(known, problem), problem.mdp, plan.learner.discount)
@@ -64,7 +64,7 @@ class Teacher:
             failure = None if self.trial is None else self.trial(problem, policy)
             if failure is None:
                 self._remember(problem, {"policy": reference(policy)})
-                return _reused(plan, policy, f"'{policy.name}': {fitness.reason}", fitness)
+                return _reused(plan, policy, _reason(policy, fitness, plan), fitness)
             fitting = policy, replace(fitness, verdict="refuse", reason=f"in physics, {failure}")
         if found is not None:
             lesson = self.teach(replace(plan, unfinished=found))
@@ -76,7 +76,7 @@ class Teacher:
         lesson = self.teach(replace(plan, warm=parent))
         saved = (0, 0) if parent is None else _saved(plan, parent, lesson.result)
         lesson = replace(lesson, parent=parent, fitness=fitness, saved=saved)
-        return _told(lesson, f"'{policy.name}': {fitness.reason}", policy, problem)
+        return _told(lesson, _reason(policy, fitness, plan), policy, problem)
 
     def _candidates(self, known: KnownPolicies, problem: Problem) -> Iterator[Policy]:
         """As `candidates`, but the one that was used for this problem before comes first: the next run does the same."""
@@ -214,6 +214,16 @@ def _told(lesson: Lesson, reason: str, found: Policy, problem: Problem) -> Lesso
 def _reused(plan: LessonPlan, policy: Policy, reason: str, fitness: Fitness | None = None) -> Lesson:
     lesson = Lesson(policy, "reused", fitness=fitness, saved=_saved(plan, policy))
     return _told(lesson, reason, policy, plan.problem)
+
+
+def _reason(policy: Policy, fitness: Fitness, plan: LessonPlan) -> str:
+    """Which policy was looked at, of which other task, and what was found of it."""
+    return f"'{policy.name}'{_elsewhere(policy, plan)}: {fitness.reason}"
+
+
+def _elsewhere(policy: Policy, plan: LessonPlan) -> str:
+    """Which task a policy was learned for, where that is another one."""
+    return "" if policy.task == plan.task else f" of task '{policy.task}'"
 
 
 def _saved(plan: LessonPlan, found: Policy, now: SessionResult | None = None) -> tuple[int, int]:

@@ -18,13 +18,11 @@ SHOWN_MOVES = 60
 def run_summary(report: Mapping[str, Any]) -> RenderableType:
     """The end of `lab run`, from its JSON document."""
     skills = report["skills"]
-    sources = [row["source"] for row in skills]
     helped = sum(row["helped_steps"] for row in skills)
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", justify="right")
     table.add_column(overflow="fold")
-    made = " and ".join(counted(count, kind) for kind, count in report["parts"].items())
-    done = f"{report['delivered']} of {made} delivered"
+    done = delivered_in_words(report["delivered"], report["parts"])
     table.add_row("outcome", Text(f"{done} (seed {report['seed']})", "green" if report["success"] else "red"))
     if report["dropped"]:
         table.add_row("dropped", counted(report["dropped"], "part"))
@@ -32,11 +30,7 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
         table.add_row("stopped", Text(report["failure"], "red"))
     if report["retries"]:
         table.add_row("retries", Text("\n".join(report["retries"])))
-    learned = sources.count("learned") + sources.count("continued")
-    found = [f"{learned} learned", *([f"{n} adapted"] if (n := sources.count("adapted")) else [])]
-    elsewhere = sum(row["source"] == "reused" and row["fitness"] is not None for row in skills)
-    found += [f"{sources.count('reused')} reused{f' ({elsewhere} of another problem)' if elsewhere else ''}"]
-    table.add_row("skills", ", ".join(found))
+    table.add_row("skills", _found(skills, report["task"]))
     if moves := sum(row["moves"] for row in skills):
         episodes = counted(sum(row["episodes"] for row in skills), "episode")
         table.add_row("learned in", f"{episodes}, {counted(moves, 'move')}, {helped} of them advised")
@@ -58,6 +52,15 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     for name, path in report["files"].items():
         table.add_row(name.replace("_", " "), Text(path))
     return table
+
+
+def delivered_in_words(delivered: int, parts: Mapping[str, int]) -> str:
+    """How many parts of an order arrived: "2 of 3 slices delivered", "2 of 3 parts delivered (2 slices, 1 cup)"."""
+    if len(parts) == 1:
+        (kind, count), *_ = parts.items()
+        return f"{delivered} of {counted(count, kind)} delivered"
+    words = ", ".join(counted(count, kind) for kind, count in parts.items())
+    return f"{delivered} of {sum(parts.values())} parts delivered ({words})"
 
 
 def lesson_summary(lesson: Mapping[str, Any]) -> RenderableType:
@@ -85,6 +88,20 @@ def replay_summary(replay: Mapping[str, Any]) -> RenderableType:
     if closed is not None:
         over = f"over after {counted(closed['episodes'], 'episode')}, {'solved' if closed['solved'] else 'not solved'}"
     return Group(*map(Text, [f"{replay['problem']} in {replay['session']}: {over}", *replay["receipt"]["lines"]]))
+
+
+def _found(skills: Sequence[Mapping[str, Any]], task: str) -> str:
+    """How many skills are reused, adapted and learned; of these, how many come from other tasks."""
+    found = []
+    for kind in ("reused", "adapted"):
+        rows = [row for row in skills if row["source"] == kind]
+        from_tasks = Counter(row["from_task"] for row in rows if row["from_task"] != task)
+        notes = [f"{count} from {name}" for name, count in from_tasks.most_common()]
+        elsewhere = sum(kind == "reused" and row["fitness"] is not None for row in rows)
+        notes += [f"{elsewhere} of another problem"] if elsewhere else []
+        found += [f"{len(rows)} {kind}" + (f" ({', '.join(notes)})" if notes else "")] if rows else []
+    learned = sum(row["source"] in ("learned", "continued") for row in skills)
+    return ", ".join([*found, *([f"{learned} learned"] if learned or not found else [])])
 
 
 def _way(lesson: Mapping[str, Any]) -> str:
@@ -196,7 +213,9 @@ def study_summary(study: Mapping[str, Any]) -> RenderableType:
     """What `lab study run` shows, from its JSON document: up to 30 rows; the report has all."""
     shown = ("measure", "value", "ci95", "thesis", "within", "lab_version")
     settings = list(dict.fromkeys(key for row in study["rows"] for key in row if key not in shown))
+    first = study["rows"][:_STUDY_ROWS]
     varied = [key for key in settings if len({str(row.get(key)) for row in study["rows"]}) > 1]
+    varied = [key for key in varied if any(row.get(key) is not None for row in first)]
     rows = [
         {key: "" if row.get(key) is None else row[key] for key in varied}
         | {
@@ -206,7 +225,7 @@ def study_summary(study: Mapping[str, Any]) -> RenderableType:
             "printed": "" if row["thesis"] is None else f"{row['thesis']:g}",
             "inside": {True: "yes", False: "no", None: ""}[row["within"]],
         }
-        for row in study["rows"][:_STUDY_ROWS]
+        for row in first
     ]
     more = len(study["rows"]) - len(rows)
     lines = [f"... and {counted(more, 'more row')}"] * (more > 0) + [""]

@@ -48,7 +48,7 @@ ADVISORS, LEARNERS, GATES = (
         ("teach insert --gate cclr", f"unknown gate 'cclr' (--gate): did you mean 'ccrl'? {GATES}"),
         (
             "teach inser",
-            "unknown sub-task 'inser' (SUBTASK): did you mean 'insert'? known: butter, grasp, insert, place,",
+            "unknown sub-task 'inser' (SUBTASK): did you mean 'insert'? known: cover, grasp, insert, place,",
         ),
         ("teach insert --save ", "policy name '' (--save): wanted 1 to 100 printable characters"),
         ("teach insert --episodes 0", "invalid value for '--episodes'"),
@@ -60,9 +60,12 @@ ADVISORS, LEARNERS, GATES = (
         ("sequence fms --case RSR --toasts 3", "--case RSR and --toasts 3: an order is one or the other"),
         ("sequence toast --case IV", "unknown case 'IV' (--case): did you mean 'I'? known: I, II, III"),
         ("sequence world-1", "world-1: it is a world, there is nothing to sequence: learn it with lab teach world-1"),
-        ("run fms", "fms: it is a cell, not a task: sequence it with lab sequence fms"),
-        ("view fms", "fms: it is a cell, not a task: sequence it with lab sequence fms"),
-        ("teach insert --task fms", "fms: it is a cell, not a task: sequence it with lab sequence fms"),
+        ("run toast-case-1", "toast-case-1: it is a cell, not a task: sequence it with lab sequence toast-case-1"),
+        ("view toast-case-1", "toast-case-1: it is a cell, not a task: sequence it with lab sequence toast-case-1"),
+        (
+            "teach insert --task toast-case-1",
+            "toast-case-1: it is a cell, not a task: sequence it with lab sequence toast-case-1",
+        ),
         ("teach fms", "fms: it is a cell, not a world: sequence it with lab sequence fms"),
         ("run --toasts 0", "0 toasts (--toasts): allowed are 1 to 50"),
         ("run --toasts 51", "51 toasts (--toasts): allowed are 1 to 50"),
@@ -80,7 +83,7 @@ ADVISORS, LEARNERS, GATES = (
         ("view world-1", "world-1: it is a world, not a task: learn it with lab teach world-1"),
         ("teach insert --task world-1", "world-1: it is a world, not a task: learn it with lab teach world-1"),
         ("teach toast", "toast: it is a task, not a world: lab run toast, or lab teach SUBTASK --task toast"),
-        ("teach wrld-1", "unknown sub-task 'wrld-1' (SUBTASK): did you mean 'world-1'? known: butter, grasp,"),
+        ("teach wrld-1", "unknown sub-task 'wrld-1' (SUBTASK): did you mean 'world-1'? known: cover, grasp,"),
         (
             "teach no.txt",
             f"no task file 'no.txt': give a file that exists, .toml or a .txt grid, or what ships: {SHIPPED}",
@@ -123,7 +126,6 @@ def changed(toml: str, old: str, new: str) -> str:
 
 
 PLATE, BUFFER = "pose = [0.0, 0.80, 0.0]", "pose = [0.42, 0.56, 0.0]"
-TOASTER = '[[route]]\nstation = "toaster"'
 
 
 @pytest.mark.parametrize(
@@ -134,35 +136,47 @@ TOASTER = '[[route]]\nstation = "toaster"'
             "[robot",
             "t.toml: not valid TOML: Expected ']' at the end of a table declaration (at line 8, column 7)",
         ),
-        (PLATE, "pose = [0.0, 2.80, 0.0]", "station 'plate' is out of reach: its spot at "),
-        (BUFFER, "pose = [0.0, 0.85, 0.0]", "t.toml: stations 'plate' and 'toaster_buffer' overlap: 0.050 m apart"),
-        (BUFFER, "pose = [0.20, 0.80, 0.0]", "stations 'plate' and 'toaster_buffer' overlap: with 3 toasts, slices"),
-        ("capacity = 4", "capacity = 0", "t.toml: stations.1.capacity: Input should be greater than or equal to 1"),
+        (PLATE, "pose = [0.0, 2.80, 0.0]", "t.toml: line 46: station 'plate' is out of reach: its spot at "),
+        (BUFFER, "pose = [0.0, 0.85, 0.0]", "t.toml: line 46: stations 'plate' and 'toaster_buffer' overlap: at "),
+        (BUFFER, "pose = [0.20, 0.80, 0.0]", "t.toml: line 46: stations 'plate' and 'toaster_buffer' overlap: at "),
+        (
+            "capacity = 4",
+            "capacity = 0",
+            "t.toml: line 53: stations.1.capacity: Input should be greater than or equal to 1",
+        ),
         (
             "capacity = 50",
             "capacity = 2",
-            "3 toasts (--toasts) do not fit on 'plate': its capacity in the task file is 2",
+            "t.toml: line 47: station 'plate': capacity = 2: 3 slices (the sum of their counts) begin or end there, wanted",
         ),
-        ("processing_s = 60.0", "processing_s = -1.0", "t.toml: stations.2.processing_s: "),
+        ("processing_s = 60.0", "processing_s = -1.0", "t.toml: line 60: stations.2.processing_s: "),
         (
-            TOASTER,
-            TOASTER.replace("toaster", "toster"),
-            "t.toml: unknown station 'toster' (route): did you mean 'toaster'?",
+            'station = "toaster"',
+            'station = "toster"',
+            "t.toml: line 26: unknown station 'toster' (route of part 'slice'): did you mean 'toaster'?",
         ),
-        ('learner = "dyna-q"', 'learner = "qq"', "t.toml: unknown learner 'qq' (subtasks.transfer.learner): "),
-        ('gate = "ccrl"', 'gate = "cc"', "t.toml: unknown gate 'cc' (subtasks.transfer.gate): "),
+        (
+            'learner = "dyna-q"',
+            'learner = "qq"',
+            "t.toml: line 141: unknown learner 'qq' (subtasks.transfer.learner): ",
+        ),
+        ('gate = "ccrl"', 'gate = "cc"', "t.toml: line 142: unknown gate 'cc' (subtasks.transfer.gate): "),
         (
             'process = "butter" ',
-            "processing_s = 9.0 #",
-            "machines 'toaster' and 'butter_applier' both have processing_s",
+            "processing_s = 9.0\nprocess = 'butter' #",
+            "t.toml: line 85: machine 'butter_applier' needs either processing_s or process, a sub-task to learn, not both",
         ),
         (
             "position_m = [0.68, 0.45]",
             "position_m = [0.42, 0.56]",
-            "obstacle 'tower left' stands on station 'toaster_buffer'",
+            "t.toml: line 123: obstacle 'tower left' stands on station 'toaster_buffer'",
         ),
-        ("height_m = 0.215", "height_m = 0.1", "insert.height_m 0.1: a carried slice would hit the toaster"),
-        ("mass_kg", "weight", "t.toml: slices.weight: there is no such key"),
+        (
+            "height_m = 0.215",
+            "height_m = 0.1",
+            "t.toml: line 71: station 'toaster': grid.height_m 0.1: a carried slice would hit it",
+        ),
+        ("mass_kg", "weight", "t.toml: line 20: parts.0.weight: there is no such key"),
     ],
 )
 def test_bad_task_files(lab: Lab, folder: Path, toml: str, old: str, new: str, line: str, tree: Tree) -> None:

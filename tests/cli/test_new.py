@@ -56,7 +56,7 @@ def test_yes_takes_the_defaults(lab: Lab, folder: Path) -> None:
         ),
         ("new x --arm pnda", "unknown arm 'pnda' (--arm): did you mean 'panda'? known: iiwa, panda, up6, xarm6"),
         ("new x --machine oven:-3", "machine 'oven:-3' (--machine): '-3' seconds: allowed are 0 to 86400"),
-        ("new x --part box:0.06x0.05x0.1:2", "part 'box': "),
+        ("new x --part box:0.06x0.05x0.1:2", "part 'box' cannot be gripped: "),
         ("new no/x --yes", "task file 'no/x.toml' (NAME): there is no folder 'no'"),
     ],
 )

@@ -44,7 +44,7 @@ RUN_FIELDS = (
     *("camera_deviation_m", "sim_s", "skipped_s", "wall_s", "files"),
 )
 SKILL_FIELDS = {"name", "subtask", "source", "policy", "episodes", "requests", "helped_steps", "solved"} | {
-    *("reason", "parent", "saved_episodes", "saved_helped_steps", "fitness")
+    *("reason", "from_task", "parent", "saved_episodes", "saved_helped_steps", "fitness")
 }
 
 

@@ -22,7 +22,7 @@ def test_a_station_out_of_reach_is_refused_by_name(
     task: Task, moved: Moved, name: str, pose: tuple[float, float, float]
 ) -> None:
     with pytest.raises(BadInput, match=rf"station '{name}' is out of reach: its spot at \(.*m from the robot; the arm"):
-        check_scene(moved(task, name, pose=pose))
+        check_scene(moved(task, name, pose=pose, approach="above", grid=None))
 
 
 def test_one_given_spot_out_of_reach_is_enough(fms: Task, moved: Moved) -> None:
@@ -54,7 +54,7 @@ def test_the_second_spot_of_a_machine_must_be_in_reach_too(task: Task, moved: Mo
 
     def passes(x: float, capacity: int) -> bool:
         try:
-            check_scene(moved(task, "toaster", pose=(x, 0.0, -pi / 2), capacity=capacity))
+            check_scene(moved(task, "toaster", pose=(x, 0.0, -pi / 2), capacity=capacity, approach="above", grid=None))
         except BadInput as error:
             assert "station 'toaster' is out of reach: its spot at" in str(error)  # noqa: PT017
             return False
@@ -97,6 +97,15 @@ def test_a_way_so_low_that_the_slice_would_hit_the_toaster_is_refused(task: Task
     ):
         check_scene(moved(task, "toaster", grid=grid.model_copy(update={"height_m": 0.19})))
     check_scene(moved(task, "toaster", grid=grid.model_copy(update={"height_m": 0.196})))
+
+
+def test_a_machine_outside_its_own_grid_is_refused(task: Task, moved: Moved) -> None:
+    """Its marker lies 38 mm across its axis, as it is turned: at y = 0.27 + 0.03825 m, and the grid ends at 0.30 m."""
+    _, _, yaw = task.station("toaster").pose
+    with pytest.raises(
+        BadInput, match=r"station 'toaster': grid\.marker_m: it is at \(0\.97, 0\.31\) m, outside the grid"
+    ):
+        check_scene(moved(task, "toaster", pose=(0.97, 0.27, yaw)))
 
 
 def test_slices_of_neighbouring_stations_must_not_meet(task: Task, moved: Moved) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -70,13 +71,43 @@ def surveyed() -> Callable[..., Surveys]:
     return survey
 
 
-@pytest.fixture(scope="session")
-def make(task: Task) -> Callable[[str], Skill]:
-    """A fresh skill of a kind: the first that the shipped task needs, told about its first slice."""
+class Cell(NamedTuple):
+    """A cell in which skills are tried: its surveys, and the parts that are made there."""
 
-    def example(subtask: str) -> Skill:
-        skills = SkillSet.of(task, ORDER).skills.values()
-        return next(skill for skill in skills if skill.subtask == subtask).aim(SLICE)
+    surveys: Surveys
+    order: Order
+
+    def skills(self) -> dict[str, Skill]:
+        """All skills that it needs, fresh ones."""
+        return SkillSet.of(self.surveys.task, self.order).skills
+
+
+@pytest.fixture(scope="session")
+def cells(surveys: Surveys, surveyed: Callable[..., Surveys], fms: Task, breakfast: Task) -> dict[str, Cell]:
+    """The cells of shipped tasks: of toast, with pallets, and with two kinds of parts."""
+    others = {"fms-arm": (fms, ("rook", "sign")), "breakfast": (breakfast, ("slice", "cup"))}
+    made = {name: Cell(surveyed(task, order), order) for name, (task, order) in others.items()}
+    return {"toast": Cell(surveys, ORDER)} | made
+
+
+@pytest.fixture(scope="session")
+def cell_of(cells: dict[str, Cell]) -> Callable[[str], Cell]:
+    """Where a skill is: 'fms-arm: vacuum at mill', or in toast's cell where no task is named."""
+
+    def where(name: str) -> Cell:
+        return cells[name.partition(": ")[0] if ": " in name else "toast"]
+
+    return where
+
+
+@pytest.fixture(scope="session")
+def make(cell_of: Callable[[str], Cell]) -> Callable[[str], Skill]:
+    """A fresh skill by its full name, or the first of a sub-task, told about the first part of its kind."""
+
+    def example(name: str) -> Skill:
+        cell, wanted = cell_of(name), name.rpartition(": ")[2]
+        skill = next(skill for skill in cell.skills().values() if wanted in (skill.name, skill.subtask))
+        return skill.aim(f"{cell.surveys.task.made_as(skill.kind).name} 1" if skill.kind else SLICE)
 
     return example
 
@@ -131,18 +162,15 @@ def _policy(problem: Problem, q: np.ndarray[tuple[int, ...], np.dtype[np.float64
 
 
 @pytest.fixture
-def stage(surveys: Surveys, layout: Layout) -> Iterator[Callable[..., Bench]]:
-    """A bench on which a set-up skill can begin: `stage(skill, layout=..., task=..., off=...)`."""
+def stage(surveys: Surveys) -> Iterator[Callable[..., Bench]]:
+    """A bench in its own cell on which a set-up skill can begin: `stage(skill, layout=..., off=...)`."""
     with ExitStack() as worlds:
 
         def make_bench(
-            skill: Skill,
-            layout: Layout = layout,
-            task: Task = surveys.task,
-            off: tuple[float, float, float] = (0.0, 0.0, 0.0),
+            skill: Skill, layout: Layout | None = None, off: tuple[float, float, float] = (0.0, 0.0, 0.0)
         ) -> Bench:
-            bench = Bench(Scene(worlds.enter_context(World()), task, (), layout))
-            vars(skill).setdefault("surveys", surveys)
+            own = vars(skill).setdefault("surveys", surveys)
+            bench = Bench(Scene(worlds.enter_context(World()), own.task, (), layout or own.layout))
             spot = skill.spot
             skill.begin(bench, off)
             skill.spot = spot

@@ -27,6 +27,7 @@ def with_start_at(task: Task, start_m: tuple[float, float]) -> Task:
 
 
 def test_what_the_camera_sees_is_where_it_stands(surveys: Surveys, task: Task) -> None:
+    assert task.camera is not None
     grid = surveys.camera_grid("toaster", "slice")
     seen = see(grid.picture(), grid.view())
     kinds = [m.kind for m in seen.markers]

@@ -198,5 +198,7 @@ def test_a_cube_over_the_toaster_or_the_start_is_named(task: Task) -> None:
     with pytest.raises(BadInput, match=r"insert at toaster: the machine's cell is blocked by cube 1$"):
         Insert(task, "slice", "toaster").setup(surveyed(with_cubes(task, (x - 0.09, y))))
     x, y = grid_of_toaster(task).start_m
-    with pytest.raises(BadInput, match=r"station 'toaster': grid\.start_m \[.*\]: cube 1 is in the way of a carried slice there$"):
+    with pytest.raises(
+        BadInput, match=r"'toaster': grid\.start_m \[.*\]: cube 1 is in the way of a carried slice there$"
+    ):
         Insert(task, "slice", "toaster").setup(surveyed(with_cubes(task, (x + 0.08, y))))

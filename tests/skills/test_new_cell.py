@@ -37,8 +37,8 @@ def test_parts_that_the_fingers_open_wide_for_have_more_room(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("part", "machines", "line"),
     [
-        ("box:0.06x0.05x0.1:1", 1, "part 'box': .*too wide for the gripper"),
-        ("cylinder:0.05x0.1:1", 1, "part 'cylinder': .*too wide for the gripper"),
+        ("box:0.06x0.05x0.1:1", 1, "part 'box' cannot be gripped: .*the gripper takes up to 0\\.036 m"),
+        ("cylinder:0.05x0.1:1", 1, "part 'cylinder' cannot be gripped: .*the gripper takes up to 0\\.036 m"),
         (
             "box:0.5x0.03x0.1:50",
             1,

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from math import hypot
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,17 +24,18 @@ FLAT = (np.sin(np.pi / 4), 0.0, 0.0, np.cos(np.pi / 4))
 
 
 @pytest.fixture(scope="module")
-def surveys(fms: Task, surveyed: Callable[..., Surveys]) -> Surveys:
-    return surveyed(fms, ("rook", "sign"))
+def cell(cells: dict[str, Any]) -> Surveys:
+    found: Surveys = cells["fms-arm"].surveys
+    return found
 
 
 @pytest.fixture
-def ready(surveys: Surveys, stage: Stage, optimal: PolicyOf) -> Callable[..., tuple[Bench, Policy]]:
+def ready(cell: Surveys, stage: Stage, optimal: PolicyOf) -> Callable[..., tuple[Bench, Policy]]:
     """A skill set up and put where it begins: ready(skill, off=...)."""
 
     def make_ready(skill: Skill, **more: object) -> tuple[Bench, Policy]:
-        policy = optimal(skill.setup(surveys))
-        return stage(skill, layout=surveys.layout, task=surveys.task, **more), policy
+        policy = optimal(skill.setup(cell))
+        return stage(skill, **more), policy
 
     return make_ready
 
@@ -63,25 +65,25 @@ def test_a_pallet_is_lifted_with_its_part_on_it(
     assert bench.fallen_off(ROOK, ON) == ""
 
 
-def test_a_part_is_lifted_off_and_its_pallet_stays(fms: Task, surveys: Surveys, ready: Ready, run: Run) -> None:
+def test_a_part_is_lifted_off_and_its_pallet_stays(fms: Task, cell: Surveys, ready: Ready, run: Run) -> None:
     grasp = Grasp(fms, "rook", "lathe-1-in")
     bench, policy = ready(grasp, off=(0.008, -0.003, 0.4))
     assert run(grasp, bench, policy) is Status.SUCCESS, grasp.reason
     assert bench.held == ROOK
-    spot = surveys.places.spots(fms.station("lathe-1-in"))[0]
+    spot = cell.places.spots(fms.station("lathe-1-in"))[0]
     assert bench.stands(PALLET, spot, 0.002)
     assert bench.scene.world.pose(ROOK)[0][2] > 0.15
 
 
 @pytest.mark.parametrize(("kind", "station"), [("rook", "lathe-1-out"), ("sign", "mill-out")])
 def test_a_part_is_set_down_on_its_pallet(
-    kind: str, station: str, fms: Task, surveys: Surveys, ready: Ready, run: Run
+    kind: str, station: str, fms: Task, cell: Surveys, ready: Ready, run: Run
 ) -> None:
     place = Place(fms, kind, station)
     bench, policy = ready(place)
     assert run(place, bench, policy) is Status.SUCCESS, place.reason
     name = f"{kind} 1"
-    spot = surveys.places.spots(fms.station(station))[0]
+    spot = cell.places.spots(fms.station(station))[0]
     assert bench.stands(pallet_of(name), spot, 0.002)
     assert bench.stands(name, spot.raised(0.020), 0.003)
     assert bench.scene.world.touching(name, pallet_of(name))
@@ -89,36 +91,36 @@ def test_a_part_is_set_down_on_its_pallet(
 
 
 def test_a_pallet_that_stands_elsewhere_is_where_its_part_is_set_down(
-    fms: Task, surveys: Surveys, ready: Ready, run: Run
+    fms: Task, cell: Surveys, ready: Ready, run: Run
 ) -> None:
     """Within what setting it down leaves, 8 mm aside: the rook stands in the pallet's middle, not in the spot's."""
     place = Place(fms, "rook", "lathe-1-out")
     bench, policy = ready(place)
-    spot = surveys.places.spots(fms.station("lathe-1-out"))[0]
+    spot = cell.places.spots(fms.station("lathe-1-out"))[0]
     bench.scene.world.put(PALLET, (spot.x + 0.008, spot.y, spot.z + 0.010))
     assert run(place, bench, policy) is Status.SUCCESS, place.reason
     assert above(bench, ROOK, PALLET)[0] < 0.003
 
 
-def test_a_pallet_is_set_down_with_its_part_and_goes_on_empty(fms: Task, surveys: Surveys, ready: Ready, run: Run) -> None:
+def test_a_pallet_is_set_down_with_its_part_and_goes_on_empty(fms: Task, cell: Surveys, ready: Ready, run: Run) -> None:
     for kind, station in ((ON, "lathe-1-in"), ("pallet", "lathe-1-out")):
         place = Place(fms, kind, station)
         bench, policy = ready(place)
         assert run(place, bench, policy) is Status.SUCCESS, place.reason
-        assert bench.stands(PALLET, surveys.places.spots(fms.station(station))[0], 0.003)
+        assert bench.stands(PALLET, cell.places.spots(fms.station(station))[0], 0.003)
         assert (ROOK in bench.scene.kind_of) is (kind == ON)
         assert bench.fallen_off(ROOK, kind) == ""
 
 
-def test_a_part_stands_in_a_machine_without_its_pallet(fms: Task, surveys: Surveys, ready: Ready, run: Run) -> None:
+def test_a_part_stands_in_a_machine_without_its_pallet(fms: Task, cell: Surveys, ready: Ready, run: Run) -> None:
     place = Place(fms, "sign", "mill")
     bench, policy = ready(place)
     assert "sign 1's pallet" not in bench.scene.kind_of
     assert run(place, bench, policy) is Status.SUCCESS, place.reason
-    assert bench.stands("sign 1", surveys.places.spots(fms.station("mill"))[0], 0.003)
+    assert bench.stands("sign 1", cell.places.spots(fms.station("mill"))[0], 0.003)
 
 
-def test_carried_at_the_files_speed_a_part_stays_on_its_pallet(fms: Task, ready: Ready, run: Run) -> None:
+def test_carried_at_the_files_speed_a_part_stays_on_its_pallet(ready: Ready, run: Run) -> None:
     transfer = Transfer("incoming", "lathe-1-in", ON)
     bench, policy = ready(transfer)
     before = above(bench, ROOK, PALLET)[0]
@@ -128,7 +130,7 @@ def test_carried_at_the_files_speed_a_part_stays_on_its_pallet(fms: Task, ready:
     assert bench.upright(ROOK) > 0.999
 
 
-def test_a_part_that_falls_off_on_the_way_is_missed(fms: Task, ready: Ready, optimal: PolicyOf) -> None:
+def test_a_part_that_falls_off_on_the_way_is_missed(ready: Ready) -> None:
     transfer = Transfer("incoming", "lathe-1-in", ON)
     bench, policy = ready(transfer)
     transfer.start(bench, policy)

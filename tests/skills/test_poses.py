@@ -1,6 +1,7 @@
 """Where a state of a skill's problem is in the cell: one truth for the motion and for whoever shows the lesson."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,10 +18,20 @@ from lab.toolbox.policy import Policy
 
 Make = Callable[[str], Skill]
 Stage = Callable[..., Bench]
+CellOf = Callable[[str], Any]
 PolicyOf = Callable[[Problem], Policy]
 SLICE = "slice 1"
 WITHIN = {"transfer": 0.06, "grasp": 0.008, "insert": 0.003, "cover": 0.002, "place": 0.008}  # [m] corners are rounded
-every_skill = pytest.mark.parametrize("name", SKILLS)
+every_skill = pytest.mark.parametrize(
+    "name",
+    [
+        *SKILLS,
+        "fms-arm: grasp sign on pallet at incoming",
+        "fms-arm: place sign at mill-out",
+        "fms-arm: vacuum at mill",
+        "breakfast: place cup at tray",
+    ],
+)
 
 
 def free_states(problem: Problem) -> list[int]:
@@ -40,9 +51,9 @@ def apart(one: ToolPose, other: ToolPose) -> float:
 
 
 @every_skill
-def test_shown_in_any_free_state_the_tool_is_at_its_pose(name: str, make: Make, surveys: Surveys, stage: Stage) -> None:
+def test_shown_in_any_free_state_the_tool_is_at_its_pose(name: str, make: Make, cell_of: CellOf, stage: Stage) -> None:
     skill = make(name)
-    problem = skill.setup(surveys)
+    problem = skill.setup(cell_of(name).surveys)
     bench = stage(skill)
     for state in free_states(problem):
         assert skill.show(bench, state)
@@ -50,16 +61,16 @@ def test_shown_in_any_free_state_the_tool_is_at_its_pose(name: str, make: Make, 
         assert apart(at, pose) < 1e-6
         assert at.yaw == pytest.approx(pose.yaw, abs=1e-6)
         if skill.carries:
-            held = bench.part_pose(SLICE)
+            held = bench.part_pose(str(bench.held), pose.yaw)
             assert (held.x, held.y, held.z, held.yaw) == pytest.approx((pose.x, pose.y, pose.z, pose.yaw), abs=1e-6)
 
 
 @every_skill
 def test_the_motion_goes_through_the_poses_of_the_learned_states(
-    name: str, make: Make, surveys: Surveys, stage: Stage, optimal: PolicyOf
+    name: str, make: Make, cell_of: CellOf, stage: Stage, optimal: PolicyOf
 ) -> None:
     skill = make(name)
-    problem = skill.setup(surveys)
+    problem = skill.setup(cell_of(name).surveys)
     bench = stage(skill)
     policy = optimal(problem)
     skill.start(bench, policy)
@@ -70,7 +81,7 @@ def test_the_motion_goes_through_the_poses_of_the_learned_states(
     assert skill.status is Status.SUCCESS, skill.reason
     states, _, _ = greedy_path(policy.q, problem.mdp, 500)
     for state in states if not problem.mdp.starts else states[-3:]:  # from above it begins where the tool is
-        assert min(apart(skill.pose(state), at) for at in way) < WITHIN[name]
+        assert min(apart(skill.pose(state), at) for at in way) < WITHIN[skill.subtask]
 
 
 def test_out_of_reach_nothing_moves(surveys: Surveys, stage: Stage) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -13,8 +13,8 @@ from lab.learning.problem import Problem
 from lab.mdp import NoPath, greedy_path, grid, shortest_steps
 from lab.production.durations import measure
 from lab.seat.lesson_scene import SkillScene
-from lab.sim.kinematics import ToolPose
 from lab.sim.kinds import Spot
+from lab.sim.kinematics import ToolPose
 from lab.sim.places import Layout
 from lab.skills import SKILLS, Skill
 from lab.skills.prepared_scene import Prepared
@@ -31,6 +31,8 @@ from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
 
 Make = Callable[[str], Skill]
+
+CellOf = Callable[[str], Any]
 PolicyOf = Callable[[Problem], Policy]
 Run = Callable[[Skill, Bench, Policy], Status]
 ORDER = ("slice", "slice")
@@ -67,7 +69,16 @@ class Hover(Skill):
         yield from bench.scene.robot.follow([self.pose(state) for state in path])
 
 
-every_skill = pytest.mark.parametrize("name", [*SKILLS, Hover.subtask])
+ELSEWHERE = (
+    "fms-arm: grasp rook on pallet at lathe-1-out",
+    "fms-arm: transfer incoming to lathe-1-in with rook on pallet",
+    "fms-arm: place rook at lathe-1-out",
+    "fms-arm: vacuum at mill",
+    "breakfast: grasp cup at shelf",
+    "breakfast: place cup at coffee_machine",
+)
+every_subtask = pytest.mark.parametrize("name", [*SKILLS, Hover.subtask])
+every_skill = pytest.mark.parametrize("name", [*SKILLS, Hover.subtask, *ELSEWHERE])
 
 
 @pytest.fixture(autouse=True)
@@ -85,7 +96,7 @@ def poses(bench: Bench) -> dict[str, tuple[float, ...]]:
     return dict(bench.scene.world.frame().poses)
 
 
-@every_skill
+@every_subtask
 def test_it_stands_in_the_table_under_its_own_name_and_the_shipped_task_needs_it(name: str, make: Make) -> None:
     assert SKILLS[name].subtask == make(name).subtask == name
     assert SKILLS[name].help
@@ -93,31 +104,37 @@ def test_it_stands_in_the_table_under_its_own_name_and_the_shipped_task_needs_it
     assert f" {make(name).station}" in f" {make(name).name}"
 
 
-@every_skill
-def test_the_problem_has_a_solution_from_every_start(
-    name: str, make: Make, surveys: Surveys, optimal: PolicyOf
+@pytest.mark.parametrize("cell", ["toast", "fms-arm", "breakfast"])
+def test_every_skill_of_a_cell_has_a_problem_with_a_solution_from_every_start(
+    cell: str, cells: dict[str, Any], optimal: PolicyOf
 ) -> None:
-    skill = make(name)
-    problem = skill.setup(surveys)
-    assert (problem.name, problem.subtask) == (skill.name, name)
-    assert shortest_steps(problem.mdp) > 0
-    q = optimal(problem).q
-    for start in (problem.mdp.start, *problem.mdp.starts):
-        assert greedy_path(q, problem.mdp, problem.mdp.n_states, start)[2]
+    surveys, solved = cells[cell].surveys, set()
+    for name, skill in cells[cell].skills().items():
+        problem = skill.setup(surveys)
+        assert (problem.name, problem.subtask) == (skill.name, skill.subtask) == (name, skill.subtask)
+        assert skill.problem is problem
+        assert shortest_steps(problem.mdp) > 0
+        if problem.mdp.signature not in solved:
+            q = optimal(problem).q
+            for start in (problem.mdp.start, *problem.mdp.starts):
+                assert greedy_path(q, problem.mdp, problem.mdp.n_states, start)[2]
+            solved.add(problem.mdp.signature)
+    assert {skill.subtask for skill in cells[cell].skills().values()} >= {Hover.subtask, "grasp", "transfer", "place"}
 
 
 @every_skill
-def test_the_same_scene_gives_the_same_problem(name: str, make: Make, surveys: Surveys) -> None:
-    again = Surveys(surveys.task, ORDER, surveys.layout) if name != "transfer" else surveys
-    assert make(name).setup(surveys).mdp.signature == make(name).setup(again).mdp.signature
+def test_the_same_scene_gives_the_same_problem(name: str, make: Make, cell_of: CellOf) -> None:
+    cell = cell_of(name)
+    again = Surveys(cell.surveys.task, cell.order, cell.surveys.layout) if "transfer" not in name else cell.surveys
+    assert make(name).setup(cell.surveys).mdp.signature == make(name).setup(again).mdp.signature
 
 
 @every_skill
-def test_idle_it_moves_nothing(name: str, make: Make, surveys: Surveys, stage: Callable[..., Bench]) -> None:
+def test_idle_it_moves_nothing(name: str, make: Make, cell_of: CellOf, stage: Callable[..., Bench]) -> None:
     skill = make(name)
     assert skill.status is Status.IDLE
     assert skill.step() is Status.IDLE  # even before it knows its problem
-    skill.setup(surveys)
+    skill.setup(cell_of(name).surveys)
     bench = stage(skill)
     before = poses(bench)
     assert [skill.step() for _ in range(3)] == [Status.IDLE] * 3
@@ -127,10 +144,10 @@ def test_idle_it_moves_nothing(name: str, make: Make, surveys: Surveys, stage: C
 
 @every_skill
 def test_it_runs_succeeds_and_then_stays_done(
-    name: str, make: Make, surveys: Surveys, stage: Callable[..., Bench], optimal: PolicyOf, run: Run
+    name: str, make: Make, cell_of: CellOf, stage: Callable[..., Bench], optimal: PolicyOf, run: Run
 ) -> None:
     skill = make(name)
-    policy = optimal(skill.setup(surveys))
+    policy = optimal(skill.setup(cell_of(name).surveys))
     bench = stage(skill)
     skill.start(bench, policy)
     life = [skill.status]
@@ -153,14 +170,14 @@ def test_it_runs_succeeds_and_then_stays_done(
 def test_a_policy_that_knows_nothing_fails_with_a_reason_and_touches_nothing(
     name: str,
     make: Make,
-    surveys: Surveys,
+    cell_of: CellOf,
     stage: Callable[..., Bench],
     clueless: PolicyOf,
     optimal: PolicyOf,
     run: Run,
 ) -> None:
     skill = make(name)
-    problem = skill.setup(surveys)
+    problem = skill.setup(cell_of(name).surveys)
     bench = stage(skill)
     before = bench.scene.robot.tool()
     assert run(skill, bench, clueless(problem)) is Status.FAILURE
@@ -247,7 +264,9 @@ def test_a_new_skill_is_a_class_and_a_row_and_all_else_knows_it(
     assert all(way[0] in hovers for way in skillset.travels.values())
     problems = {name: skill.setup(surveys) for name, skill in skillset.skills.items()}
     skillset.policies = {name: optimal(problem) for name, problem in problems.items()}
-    with closing(SkillScene(task, ("slice",), Layout(surveys.layout.obstacles, ((0.0, 0.0, 0.0),)), hovers[0])) as stage:
+    with closing(
+        SkillScene(task, ("slice",), Layout(surveys.layout.obstacles, ((0.0, 0.0, 0.0),)), hovers[0])
+    ) as stage:
         assert stage.frame(2).poses["robot tool"][2] == pytest.approx(stage.frame(0).poses["robot tool"][2] + 0.06)
     durations = measure(Prepared(short, ("slice",), 0, surveys.layout, surveys, skillset, problems))
     assert set(durations.empty_s) == set(skillset.moves.empty)

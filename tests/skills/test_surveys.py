@@ -4,12 +4,27 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
+from lab.sim.arm_models import arm_of
+from lab.sim.blocked_cells import OUT_OF_REACH
+from lab.sim.kinds import Spot
 from lab.sim.kinematics import ToolPose
 from lab.sim.places import Layout
+from lab.skills.grasp import GOAL
 from lab.skills.prepared_scene import prepare
 from lab.skills.skillset import SkillSet
-from lab.skills.surveys import INSERT, NEAR_SHAPE, NEAR_YAWS, Surveys, grid_of, near_pose, way_to
+from lab.skills.surveys import (
+    INSERT,
+    NEAR_SHAPE,
+    NEAR_STEP_M,
+    NEAR_YAW_STEP,
+    NEAR_YAWS,
+    Surveys,
+    grid_of,
+    near_pose,
+    way_to,
+)
 from lab.tasks.task import Task
+from lab.tasks.task_fields import Workspace
 from lab.tasks.task_file import load
 
 ORDER = ("slice", "slice")
@@ -116,10 +131,8 @@ def test_around_a_slice_the_goal_is_free_and_what_stands_beside_blocks(surveys: 
 
 def test_a_scene_that_cannot_be_is_refused_at_once(task: Task, layout: Layout) -> None:
     """What is out of reach before anything is surveyed, and what cannot be gripped when the kinds are made."""
-    stations = tuple(
-        s.model_copy(update={"pose": (1.5, 0.0, 0.0)}) if s.name == "toaster" else s for s in task.stations
-    )
-    with pytest.raises(BadInput, match="station 'toaster' is out of reach"):
+    stations = tuple(s.model_copy(update={"pose": (1.5, 0.0, 0.0)}) if s.name == "plate" else s for s in task.stations)
+    with pytest.raises(BadInput, match="station 'plate' is out of reach"):
         prepare(task.changed(stations=stations), ORDER, 0, "no skill at all")
     wide = task.parts[0].model_copy(update={"size_m": (0.12, 0.06, 0.12), "look": None})
     with pytest.raises(BadInput, match="part 'slice'"):
@@ -212,3 +225,23 @@ def test_the_way_out_of_a_station_is_up_or_lifted_out_to_the_side_and_up(task: T
     assert (end.x, end.y) == pytest.approx((x, y - 0.15))
     risen, end = side.way_out("plate", at)
     assert (risen.x, risen.y, risen.z) == (at.x, at.y, end.z)
+
+
+def test_near_poses_are_relative_to_the_slice(surveys: Surveys) -> None:
+    goal = surveys.kinds["slice"].held_at(Spot(0.4, 0.5, 0.012, np.pi / 2))
+    assert near_pose(goal, GOAL) == goal
+    ahead = near_pose(goal, (3, 2, 1, 3))
+    assert (ahead.x, ahead.y) == pytest.approx((0.4, 0.5 + NEAR_STEP_M[0]))
+    assert ahead.z == pytest.approx(goal.z + NEAR_STEP_M[2])
+    assert ahead.yaw == pytest.approx(np.pi / 2 + NEAR_YAW_STEP)
+    assert near_pose(goal, (2, 3, 0)).x == pytest.approx(0.4 - NEAR_STEP_M[1])
+
+
+def test_no_way_leads_through_behind_the_arm(task: Task) -> None:
+    """The first joint does not turn through there: the two cells are neighbours, and far apart for it."""
+    grid = Workspace(lower_m=(-0.46, -0.18, 0.24), cell_m=(0.12, 0.18, 0.12), shape=(1, 2, 1))
+    layout = Layout(tuple(o.position_m for o in task.obstacles), ())
+    surveys = Surveys(task.changed(workspace=grid), (), layout)
+    arm = arm_of(task.robot, task.folder)
+    assert all(arm.inverse(surveys.cell_pose((0, row, 0))) is not None for row in (0, 1))
+    assert set(surveys.workspace("").causes.ravel()) == {OUT_OF_REACH}

@@ -100,7 +100,7 @@ def test_a_tower_on_the_straight_way_is_gone_round(task: Task, optimal: PolicyOf
     policy = optimal(transfer.setup(surveys))
     free = Transfer("toaster_buffer", "plate")
     assert (policy.optimal_steps or 0) > (optimal(free.setup(towers(task))).optimal_steps or 0) > 0
-    bench = stage(transfer, task=surveys.task, layout=surveys.layout)
+    bench = stage(transfer)
     assert run(transfer, bench, policy) is Status.SUCCESS, transfer.reason
 
 
@@ -123,9 +123,7 @@ def test_a_tower_on_a_station_is_bad_input_that_names_both(task: Task) -> None:
     surveys = towers(task, (x, y + 0.02))
     with pytest.raises(BadInput, match="station 'butter_buffer' cannot be approached: in the way: tower 1"):
         Transfer("plate", "butter_buffer").setup(surveys)
-    with pytest.raises(
-        BadInput, match="station 'butter_buffer' cannot be approached with slice: in the way: tower 1"
-    ):
+    with pytest.raises(BadInput, match="station 'butter_buffer' cannot be approached with slice: in the way: tower 1"):
         Transfer("plate", "butter_buffer", "slice").setup(surveys)
 
 

@@ -210,8 +210,9 @@ def test_a_study_to_read(lab: Lab, folder: Path) -> None:
     ("words", "line"),
     [
         ("study run figure-94", f"unknown study 'figure-94' (STUDY): did you mean 'figure-9.4'? known: {KNOWN}, "),
-        ("study run figure-9.4 --sessions 1", "invalid value for '--sessions'"),
-        ("study run figure-9.4 --sessions 9", "invalid value for '--sessions'"),
+        ("study run figure-9.4 --sessions 0", "invalid value for '--sessions'"),
+        ("study run figure-9.4 --sessions 9", "9 sessions (--sessions): 'figure-9.4' takes 10 at the least"),
+        ("study run reuse --sessions 121", "121 orders (--sessions) of 5 tasks: allowed are 1 to 120"),
         ("study run figure-9.4 --workers 0", "invalid value for '--workers'"),
         ("study run figure-9.4 --seed -1", "invalid value for '--seed'"),
         (

@@ -2,6 +2,7 @@
 
 import copy
 import json
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -66,7 +67,9 @@ def test_a_wrong_file_is_one_line(wrong: dict[str, Any], tmp_path: Path) -> None
 
 def test_there_are_enough_of_them_and_each_is_of_its_own() -> None:
     assert len(WRONG) >= 45
-    assert len({wrong["name"] for wrong in WRONG}) == len({str(wrong["edits"]) + str(wrong.get("files")) for wrong in WRONG})
+    assert len({wrong["name"] for wrong in WRONG}) == len(
+        {wrong["base"] + str(wrong["edits"]) + str(wrong.get("files")) for wrong in WRONG}
+    )
 
 
 @pytest.mark.parametrize("command", ["task check", "run"])
@@ -93,8 +96,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 CHANGED = {name: tomllib.loads(shipped(name)) for name in ("breakfast", "fms-arm", "two-toasters", "first_form")}
 VALUES = st.sampled_from(
     [None, True, -1, 0, 1, 2, 100, 1e9, -0.5, 0.01, 0.3, 3.0, "", "plate", "slice", "pallet", "box", "toaster.urdf"]
-    + [[], [0.0, 0.0], [0.1, 0.1, 0.1], {}, {"station": "tray"}, [["plate", "tray"]]]
 )
+TABLES = st.sampled_from([[], [0.0, 0.0], [0.1, 0.1, 0.1], {}, {"station": "tray"}, [["plate", "tray"]]])
 
 
 def places_in(value: Any, loc: Loc = ()) -> list[Loc]:
@@ -121,7 +124,7 @@ def test_no_change_of_a_file_is_a_traceback(folder: Path, data: st.DataObject) -
         inner: Any = document
         for part in way:
             inner = inner[part]
-        if (value := data.draw(VALUES)) is None:
+        if (value := data.draw(VALUES | TABLES)) is None:
             del inner[last]
         else:
             inner[last] = copy.deepcopy(value)
@@ -134,5 +137,4 @@ def test_no_change_of_a_file_is_a_traceback(folder: Path, data: st.DataObject) -
             check_scene(task)
             check_apart(task, len(order))
     except BadInput as error:
-        assert str(error).startswith(f"{path}: ")  # noqa: PT017
-        assert "\n" not in str(error)
+        assert re.fullmatch(rf"{re.escape(str(path))}: .+", str(error))  # noqa: PT017 (it is one line)

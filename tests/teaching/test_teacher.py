@@ -1,6 +1,7 @@
 """Teaching a skill: found, learned, continued; what was learned is kept whatever happens."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -196,6 +197,26 @@ def test_what_fails_in_physics_is_refused_and_learned(teacher: Teacher) -> None:
     assert tried == [first.name, lesson.policy.name]
     assert (lesson.source, lesson.failure) == ("learned", None)
     assert lesson.reason == f"'{first.name}': in physics, it slipped"
+
+
+def test_what_another_task_left_is_named_by_it(teacher: Teacher) -> None:
+    """Learned for toast; found for breakfast in the same board, with an obstacle beside its way, and with one on it."""
+    first = teacher.find_or_teach(plan(), known())
+    assert first.from_task == ""
+    for_breakfast, found = partial(replace, task="breakfast"), known(first.policy)
+    beside = next((r, c) for r in range(3) for c in range(4) if (r, c) not in {*way(first.policy), (1, 1)})
+    lessons = [
+        teacher.find_or_teach(for_breakfast(plan(about=about)), found)
+        for about in (problem(), elsewhere(beside), elsewhere(way(first.policy)[3]))
+    ]
+    assert [(one.source, one.from_task) for one in lessons] == [
+        ("reused", "toast"),
+        ("reused", "toast"),
+        ("adapted", "toast"),
+    ]
+    assert lessons[0].reason == "it was learned in exactly this problem of task 'toast'"
+    assert all(one.reason.startswith(f"'{first.policy.name}' of task 'toast': its way ") for one in lessons[1:])
+    assert lessons[2].policy.task == "breakfast"
 
 
 def test_candidates_are_solved_and_those_of_the_same_skill_come_first(teacher: Teacher) -> None:

@@ -11,6 +11,7 @@ from lab.view.summary import (
     lesson_summary,
     run_summary,
     sequence_summary,
+    study_summary,
     table_of,
 )
 
@@ -22,11 +23,14 @@ def shown(what: RenderableType, width: int = 100) -> list[str]:
     return [line.rstrip() for line in console.file.getvalue().splitlines()]
 
 
-def skill(source: str, helped_steps: int = 0, *, elsewhere: bool = False, saved: int = 0) -> dict[str, Any]:
-    """A skill's row; saved: episodes, and as many helped steps."""
+def skill(
+    source: str, helped_steps: int = 0, *, elsewhere: bool = False, saved: int = 0, from_task: str = "toast"
+) -> dict[str, Any]:
+    """A skill's row; saved: episodes, and as many helped steps; from_task: whose policy it was made of, if any."""
     fitness = {"verdict": "use"} if elsewhere else None
     return {
         "source": source,
+        "from_task": from_task if source in ("reused", "adapted") else None,
         "helped_steps": helped_steps,
         "episodes": 0 if source == "reused" else 200,
         "moves": 0 if source == "reused" else 3000,
@@ -37,6 +41,7 @@ def skill(source: str, helped_steps: int = 0, *, elsewhere: bool = False, saved:
 
 
 RUN: dict[str, Any] = {
+    "task": "toast",
     "seed": 7,
     "toasts": 3,
     "parts": {"slice": 2, "cup": 1},
@@ -62,15 +67,24 @@ RUN: dict[str, Any] = {
 def test_a_run_says_what_was_found_and_saved() -> None:
     skills = [skill("learned", 3), skill("adapted", saved=171), skill("reused", saved=200)]
     found = shown(run_summary(RUN | {"skills": [*skills, skill("reused", elsewhere=True, saved=200)]}))
-    assert found[1] == "         skills  1 learned, 1 adapted, 2 reused (1 of another problem)"
+    assert found[1] == "         skills  2 reused (1 of another problem), 1 adapted, 1 learned"
     assert found[2] == "     learned in  400 episodes, 6000 moves, 3 of them advised"
     assert found[3] == "          saved  571 episodes, 571 helped steps"
 
 
+def test_a_run_says_which_tasks_its_skills_come_from() -> None:
+    own, butter = skill("reused"), skill("reused", from_task="two-toasters", elsewhere=True)
+    skills = [own, *[skill("reused", from_task="sorting")] * 2, butter, skill("adapted", from_task="sorting")]
+    found = shown(run_summary(RUN | {"skills": skills}), 120)
+    reused = "4 reused (2 from sorting, 1 from two-toasters, 1 of another problem)"
+    assert found[1] == f"         skills  {reused}, 1 adapted (1 from sorting)"
+    assert shown(run_summary(RUN | {"skills": [own]}))[1] == "         skills  1 reused"
+
+
 def test_a_run_that_went_well() -> None:
     assert shown(run_summary(RUN)) == [
-        "        outcome  3 of 2 slices and 1 cup delivered (seed 7)",
-        "         skills  2 learned, 1 reused",
+        "        outcome  3 of 3 parts delivered (2 slices, 1 cup) (seed 7)",
+        "         skills  1 reused, 2 learned",
         "     learned in  400 episodes, 6000 moves, 42 of them advised",
         "       sequence  1 2 1 2",
         "       makespan  100.0 s predicted, 101.0 s measured (+1.00%)",
@@ -88,7 +102,7 @@ def test_a_run_that_failed_says_which_part_where_and_why() -> None:
         run_summary(RUN | failed | {"retries": ["try 1: a", "try 2: b"], "optimum_proven": False, "bound_s": 75.0})
     )
     assert lines[:5] == [
-        "        outcome  1 of 2 slices and 1 cup delivered (seed 7)",
+        "        outcome  1 of 3 parts delivered (2 slices, 1 cup) (seed 7)",
         "        dropped  1 part",
         f"        stopped  {why}",
         "        retries  try 1: a",
@@ -281,3 +295,14 @@ def test_a_grid_is_seen_from_above() -> None:
         "S  █  ·",
         "start (0, 0), goal (2, 1), 1 cell with obstacles, 3 markers",
     ]
+
+
+def test_a_study_shows_the_settings_that_vary_in_the_rows_shown() -> None:
+    """Thirty rows have a place, those after them an order, too."""
+    measured = {"measure": "saved_percent", "ci95": None, "thesis": None, "within": None, "seed": 0}
+    rows = [{"place": n, "value": 0.5 * n} | measured for n in range(30)]
+    rows += [{"place": n, "order": n, "value": 1.0} | measured for n in range(2)]
+    lines = shown(study_summary({"rows": rows, "summary": {"answer": "yes"}, "files": {}, "notes": ["why"]}))
+    assert lines[0].split() == ["place", "measure", "value", "95", "%", "printed", "inside"]
+    assert lines[3].split() == ["2", "saved_percent", "1"]
+    assert lines[31:] == ["... and 2 more rows", "", "answer: yes", "", "why"]

@@ -303,7 +303,9 @@ TWO = [middle("gripper", 1, 1), middle("toaster", 9, 10), middle("toaster", 2, 8
 
 
 @pytest.mark.parametrize(("near", "goal"), [((9, 10), (9, 10)), ((8, 9), (9, 10)), ((2, 8), (2, 8)), ((4, 9), (2, 8))])
-def test_of_several_machines_the_nearest_to_where_the_goals_is_counts(near: tuple[int, int], goal: tuple[int, int]) -> None:
+def test_of_several_machines_the_nearest_to_where_the_goals_is_counts(
+    near: tuple[int, int], goal: tuple[int, int]
+) -> None:
     matrix = camera()
     image, view = paint(table(), matrix, TWO), overhead(matrix)
     grid = see(image, view, goal_near_m=view.centre(near))
@@ -323,7 +325,7 @@ def test_another_grids_markers_are_left_to_it() -> None:
     right = View(matrix, (0.0, 6 * CELL), CELL, (12, 6), HEIGHTS)
     seen = see(image, left, goal_near_m=left.centre((5, 2)))
     assert (seen.start, seen.goal, seen.obstacles) == ((1, 1), (5, 2), ((4, 3), (7, 1)))
-    with pytest.raises(BadInput, match="the gripper marker at pixel .* lies outside the grid"):
+    with pytest.raises(BadInput, match=r"the gripper marker at pixel .* lies outside the grid"):
         see(image, right, goal_near_m=right.centre((9, 4)))  # the gripper belongs to every grid: it is at the wrong one
     moved = paint(table(), matrix, [middle("gripper", 1, 7), *LAYOUT[1:], *other])
     seen = see(moved, right, goal_near_m=right.centre((9, 4)))
