@@ -1,4 +1,4 @@
-"""What a run looked like: frames of the world, and what a viewer shows beside the bodies, such as toasted sides."""
+"""What a run looked like: frames of the world, and what a viewer shows beside the bodies: what machines have left on parts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -111,14 +111,14 @@ class SkillScene:
         return float(lengths[lengths > 0].min())
 
     def _goal(self) -> tuple[Body, ...]:
-        """A ball where the tool is to go through the cell; at a station the slice says so."""
+        """A ball where the tool is to go through the cell; at a station the part says so."""
         if self._skill.near:
             return ()
         at = self._place(int(np.flatnonzero(self._mdp.goal)[0]))
         return (Body("goal", (Shape("sphere", (0.35 * self._size(),), None, GREEN, at),)),)
 
     def _camera(self) -> Viewpoint:
-        """From the front, of the slice or of the whole cell; a little from the right, so that nothing hides the rest."""
+        """From the front, of the part or of the whole cell; a little from the right, so that nothing hides the rest."""
         free = np.flatnonzero(~self._mdp.terminal | self._mdp.goal)
         places = np.array([self._place(int(state)) for state in free])
         azimuth, elevation = (radians(angle) for angle in self._skill.looks_from)
