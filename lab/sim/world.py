@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lab.errors import WorkFailed
 from lab.sim import urdf_reader
 from lab.sim.frames import Body, Frame, Pose, Rgba, Shape
-from lab.sim.part_shape import PartShape
+from lab.sim.parts.part_shape import PartShape
 from lab.sim.silence import silence
 
 TIME_STEP = 1.0 / 240.0  # [s]

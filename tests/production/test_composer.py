@@ -13,8 +13,8 @@ from lab.production.floor import AT_REST_STEPS, Floor
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Body, Frame
-from lab.sim.places import Layout
-from lab.sim.scene_check import places_of
+from lab.sim.scene.places import Layout
+from lab.sim.scene.scene_check import places_of
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Cover
 from lab.skills.prepared_scene import Prepared

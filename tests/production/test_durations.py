@@ -13,7 +13,7 @@ import lab.files
 from lab.errors import BadInput, WorkFailed
 from lab.production.durations import Durations, TimedMove, durations_key
 from lab.sequencing.cell.routes import NeededMoves
-from lab.sim.places import Layout
+from lab.sim.scene.places import Layout
 from lab.skills import Grasp
 from lab.skills.skillset import Carried, SkillSet
 from lab.tasks.task import Task
@@ -202,7 +202,7 @@ def test_all_that_moves_the_arm_is_in_the_key() -> None:
     from lab.production.durations import DECIDED_BY_RESULT, MEASURED_BY
 
     package = Path(lab.__file__).parent
-    rooms = [*package.glob("sim/*.py"), *package.glob("skills/*.py")]
+    rooms = [*package.glob("sim/**/*.py"), *package.glob("skills/*.py")]
     found = sources(MEASURED_BY, DECIDED_BY_RESULT)
     look_on = ("__init__", "trial", "reach", "ground_plan", "cell_outline", "new_cell")  # they draw and write files
     here = {

@@ -5,8 +5,8 @@ import pytest
 
 from lab.errors import BadInput
 from lab.production.durations import Durations, cell_of
-from lab.sim.arm_models import arm_named
-from lab.sim.kinds import kinds_of
+from lab.sim.arms.arm_models import arm_named
+from lab.sim.parts.kinds import kinds_of
 from lab.skills import SKILLS, Insert, Place, Transfer
 from lab.skills.cover import CoverPlace
 from lab.skills.skillset import Carried, SkillSet, products, stations, ways_of

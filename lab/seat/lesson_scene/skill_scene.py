@@ -6,11 +6,11 @@ from math import hypot, radians
 import numpy as np
 
 from lab.seat.lesson_scene.episode_trail import STEP_S, Changes, EpisodeTrail
-from lab.sim.blocked_cells import FINGERS_OFF_M
 from lab.sim.frames import Body, Frame, Rgba, Shape, Vector, Viewpoint
-from lab.sim.kinds import Spot
-from lab.sim.places import Layout
-from lab.sim.scene import Scene
+from lab.sim.parts.kinds import Spot
+from lab.sim.scene.blocked_cells import FINGERS_OFF_M
+from lab.sim.scene.places import Layout
+from lab.sim.scene.scene import Scene
 from lab.sim.world import World
 from lab.skills import Skill
 from lab.skills.skill import Bench

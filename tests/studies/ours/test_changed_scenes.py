@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.sim.scene import Layout
+from lab.sim.scene.scene import Layout
 from lab.studies.ours import changed_scenes
 from lab.studies.ours.changed_scenes import FARTHEST_M, KINDS, NEAREST_M, Changed, Scene, still, surveyed
 from lab.tasks.task_file import Task, load
