@@ -14,12 +14,24 @@ _HEAD, _FACE = 84, 50  # [bytes] of a binary STL: header and count, and each tri
 def vertices(path: Path) -> Array:
     """The vertices (n, 3) of an OBJ or STL file, in its own unit. ValueError when they cannot be read as numbers."""
     data = path.read_bytes()
-    if path.suffix.lower() == ".stl" and len(data) >= _HEAD and len(data) == _HEAD + _FACE * _count(data):
+    if path.suffix.lower() == ".stl" and is_binary(data):
         faces = np.frombuffer(data, np.uint8, offset=_HEAD).reshape(-1, _FACE)[:, 12:48]
         return np.ascontiguousarray(faces).view("<f4").reshape(-1, 3).astype(float)
     word = "vertex" if path.suffix.lower() == ".stl" else "v"
     lines = (line.split() for line in data.decode("utf-8").splitlines())
     return np.array([parts[1:4] for parts in lines if parts[:1] == [word]], dtype=float)
+
+
+def text_corners(path: Path | None) -> Array | None:
+    """The corners (3 n, 3) of the triangles of an STL file in text, one after the other; None: it is no such file."""
+    if path is None or path.suffix.lower() != ".stl" or is_binary(path.read_bytes()):
+        return None
+    return vertices(path)
+
+
+def is_binary(data: bytes) -> bool:
+    """Whether the bytes of an STL file are a binary one: its length is that of as many triangles as it says."""
+    return len(data) >= _HEAD and len(data) == _HEAD + _FACE * _count(data)
 
 
 def _count(data: bytes) -> int:

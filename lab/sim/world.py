@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from lab.errors import WorkFailed
 from lab.sim import urdf_reader
 from lab.sim.frames import Body, Frame, Pose, Rgba, Shape
-from lab.sim.parts.part_shape import PartShape
+from lab.sim.mesh_file import text_corners
+from lab.sim.parts.part_shape import PartShape, visual_arrays
 from lab.sim.silence import silence
 
 TIME_STEP = 1.0 / 240.0  # [s]
@@ -153,9 +154,9 @@ class World:
         turn = tuple(self._p.getQuaternionFromEuler([0, 0, yaw]))
         entry = _Entry(-1, True, (tuple(position), turn), looks={"": shape.looks}, turn=shape.turn)
         body = self._turned(turn, shape.turn)
-        entry.number = self._call(
-            "createMultiBody", mass_kg, self._solid(shape), self._seen(shape), list(position), list(body)
-        )
+        with silence():
+            solid, seen = self._solid(shape), self._seen(shape)
+            entry.number = self._call("createMultiBody", mass_kg, solid, seen, list(position), list(body))
         moments, rolling = [one * mass_kg for one in shape.inertia_m2], PART_ROLLING * (shape.solid != "box")
         self._call("changeDynamics", entry.number, -1, localInertiaDiagonal=moments, rollingFriction=rolling)
         self._add(name, entry)
@@ -172,30 +173,22 @@ class World:
         return int(self._call("createCollisionShape", self._p.GEOM_MESH, vertices=corners.tolist()))
 
     def _seen(self, shape: PartShape) -> int:
-        """What cameras see of a part: the first of its looks."""
-        look = shape.looks[0]
+        """What cameras see of a part, in its principal axes; of meshes in text, which PyBullet cannot read, the first."""
         back = self._p.invertTransform([0, 0, 0], list(shape.turn))[1]
-        at, turn = self._p.multiplyTransforms([0, 0, 0], back, list(look.position), list(look.quaternion))
-        size: dict[str, Any] = {}
-        if look.kind == "box":
-            kind, size = self._p.GEOM_BOX, {"halfExtents": [s / 2 for s in look.size]}
-        elif look.kind == "cylinder":
-            kind, size = self._p.GEOM_CYLINDER, {"radius": look.size[0], "length": look.size[1]}
-        elif look.kind == "sphere":
-            kind, size = self._p.GEOM_SPHERE, {"radius": look.size[0]}
-        else:
-            kind, size = self._p.GEOM_MESH, {"fileName": str(look.mesh), "meshScale": list(look.size or (1, 1, 1))}
-        with silence():
-            return int(
-                self._call(
-                    "createVisualShape",
-                    kind,
-                    **size,
-                    rgbaColor=list(look.rgba),
-                    visualFramePosition=list(at),
-                    visualFrameOrientation=list(turn),
-                )
+        places = [self._p.multiplyTransforms([0, 0, 0], back, look.position, look.quaternion) for look in shape.looks]
+        if (corners := text_corners(shape.looks[0].mesh)) is not None:
+            look, place = (
+                shape.looks[0],
+                dict(zip(("visualFramePosition", "visualFrameOrientation"), places[0], strict=True)),
             )
+            corners, faces = corners * (look.size or (1.0, 1.0, 1.0)), list(range(len(corners)))
+            place |= {"vertices": corners.tolist(), "indices": faces, "rgbaColor": look.rgba}
+            return int(self._call("createVisualShape", self._p.GEOM_MESH, **place))
+        arrays = visual_arrays(shape.looks)
+        kinds = [getattr(self._p, f"GEOM_{look.kind.upper()}") for look in shape.looks]
+        at, turns = ([list(one) for one in ways] for ways in zip(*places, strict=True))  # PyBullet crashes over tuples
+        arrays |= {"shapeTypes": kinds, "visualFramePositions": at, "visualFrameOrientations": turns}
+        return int(self._call("createVisualShapeArray", **arrays))
 
     def _turned(self, turn: Position, by: Position) -> Position:
         """The turn `by` followed by `turn`, quaternions xyzw."""

@@ -3,15 +3,22 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
+from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed
 from lab.files import assets_folder
+from lab.sim.camera import Camera
 from lab.sim.frames import Frame
+from lab.sim.part_shape import PartShape, shape_of
 from lab.sim.world import TIME_STEP, World
+from lab.tasks.part_fields import PartFields
 
 SLICE = assets_folder() / "slice.urdf"
 TOASTER = assets_folder() / "toaster.urdf"
@@ -173,3 +180,62 @@ def test_the_viewer_sees_every_visible_link_where_it_is(world: World) -> None:
     assert list(poses["slice"][:3]) == world.pose("slice")[0].tolist()
     assert list(poses["applier head"][:3]) == world.pose("applier", "head")[0].tolist()
     assert world.frame().time_s == pytest.approx(3 * TIME_STEP)
+
+
+# ---- parts ----------------------------------------------------------------------------------------------------------
+
+
+def part(folder: Path, **fields: Any) -> PartShape:
+    return shape_of(PartFields.model_validate({"name": "thing", "mass_kg": 0.1, **fields}), folder)
+
+
+def seen(build: Callable[[World], None]) -> NDArray[np.uint8]:
+    """What a camera half a metre above the origin sees of it, (160, 160, 3)."""
+    with World() as world:
+        build(world)
+        return Camera.overhead((0.0, 0.0, 0.5), 0.5, 160).picture(world)
+
+
+def test_a_part_looks_as_the_urdf_whose_looks_it_has(tmp_path: Path) -> None:
+    bread = part(tmp_path, shape="box", size_m=[0.12, 0.015, 0.12], look="slice.urdf")
+    turned = (0.5, 0.5, 0.5, 0.5)  # its crumb faces the camera
+
+    def as_part(world: World) -> None:
+        world.part("slice", bread, 0.04, 0.8, (0, 0, 0))
+        world.put("slice", (0, 0, 0), turned)
+
+    def as_urdf(world: World) -> None:
+        world.load("slice", SLICE, fixed=False)
+        world.put("slice", (0, 0, 0), turned)
+
+    assert (seen(as_part) == seen(as_urdf)).all()
+    assert (seen(as_part) != 255).any()
+
+
+@pytest.mark.parametrize("form", ["stl", "stl_ascii", "obj"])
+def test_a_mesh_in_any_form_is_seen_and_nothing_is_said(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], form: str
+) -> None:
+    name = f"thing.{form.removesuffix('_ascii')}"
+    trimesh.creation.box((0.06, 0.04, 0.02)).export(tmp_path / name, file_type=form)
+    shape = part(tmp_path, shape="mesh", file=name)
+    picture = seen(lambda world: world.part("thing", shape, 0.1, 0.8, (0, 0, 0)))
+    brown = (picture != 255).any(axis=2)
+    across, along = brown.any(axis=0).sum(), brown.any(axis=1).sum()
+    assert sorted((across, along)) == pytest.approx([0.04 / 0.06 * max(across, along), max(across, along)], abs=2)
+    assert max(across, along) > 30
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_ball_that_is_pushed_comes_to_rest(tmp_path: Path) -> None:
+    trimesh.creation.icosphere(radius=0.02).export(tmp_path / "ball.stl")
+    ball = part(tmp_path, shape="mesh", file="ball.stl")
+    with World() as world:
+        world.box("floor", (1, 1, 0.02), (0, 0, -0.01), WOOD)
+        world.part("ball", ball, 0.1, 0.8, (0, 0, ball.foot_m))
+        places = []
+        for _ in range(3):
+            for _ in range(240):
+                world.step()
+            places.append(world.pose("ball")[0])
+    assert places[2] == pytest.approx(places[1], abs=1e-4)

@@ -3,6 +3,7 @@
 Physics knows a part as a box, a cylinder or a convex hull: hollows of a mesh are seen and weighed, not felt.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from io import BytesIO
@@ -98,6 +99,18 @@ def shape_of(part: PartFields, folder: Path) -> PartShape:
         (x, y, z),
         tuple(_placed(one, tilt, middle) for one in looks),
     )
+
+
+def visual_arrays(looks: Sequence[Shape]) -> dict[str, Any]:
+    """What PyBullet's createVisualShapeArray takes for these, beside their kinds and places; unused entries are blank."""
+    return {
+        "halfExtents": [[edge / 2 for edge in one.size] if one.kind == "box" else [0.0] * 3 for one in looks],
+        "radii": [one.size[0] if one.kind in ("cylinder", "sphere") else 0.0 for one in looks],
+        "lengths": [one.size[1] if one.kind == "cylinder" else 0.0 for one in looks],
+        "fileNames": [str(one.mesh or "") for one in looks],
+        "meshScales": [list(one.size or (1, 1, 1)) if one.kind == "mesh" else [1, 1, 1] for one in looks],
+        "rgbaColors": [list(one.rgba) for one in looks],
+    }
 
 
 def _tilt(roll: float, pitch: float) -> Array:
