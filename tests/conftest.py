@@ -6,7 +6,7 @@ import shutil
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, redirect_stderr, redirect_stdout
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import StringIO
 from math import radians, tan
 from pathlib import Path
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from lab.mdp import FloatArray
     from lab.sim.frames import Viewpoint
+    from lab.toolbox.policy import Policy
     from lab.view.meshcat import LiveView
 
 settings.register_profile("lab", deadline=None, derandomize=bool(os.environ.get("CI")), max_examples=50)
@@ -111,6 +112,43 @@ def in_picture() -> "Callable[[Viewpoint, FloatArray], bool]":
         return bool(np.all(far > 0) and np.all(abs(up) <= reach) and np.all(abs(aside) <= 1.2 * reach))
 
     return seen
+
+
+@pytest.fixture(scope="session")
+def make_policy() -> "Callable[..., Policy]":
+    """Makes a small policy: make_policy(name="insert", solved=False); `fill`: all that its table holds."""
+    import numpy as np
+
+    from lab.toolbox.policy import Policy
+
+    def made(fill: float | None = None, **changed: Any) -> Policy:
+        base = Policy(
+            name="insert",
+            subtask="insert",
+            task="toast",
+            q=np.arange(8.0).reshape(4, 2) if fill is None else np.full((4, 2), float(fill)),
+            visits=np.arange(8, dtype=np.int64).reshape(4, 2),
+            action_labels=("left", "right"),
+            shape=(4,),
+            start=0,
+            signature="0123456789abcdef",
+            learner={"learner": "q", "alpha": 0.95},
+            gate={"gate": "ccrl"},
+            advisor="expert",
+            seed=0,
+            curve=[21, 3],
+            guided=[False, True],
+            helped_steps=3,
+            requests=1,
+            optimal_steps=3,
+            final_steps=3,
+            solved=True,
+            created="2026-05-01T12:00:00+00:00",
+            versions={"numpy": "2.0"},
+        )
+        return replace(base, **changed)
+
+    return made
 
 
 @pytest.fixture(scope="session")

@@ -245,8 +245,8 @@ def faults(module: str, source: str) -> list[str]:
 @pytest.mark.parametrize(
     ("module", "source", "fault"),
     [
-        ("lab.sim.robot", "import pybullet", "allowed in ['lab.sim.world']"),
-        ("lab.sim.robot", "def f():\n    import pybullet as p", "lab.sim.robot:2 imports pybullet"),
+        ("lab.sim.arms.robot", "import pybullet", "allowed in ['lab.sim.world']"),
+        ("lab.sim.arms.robot", "def f():\n    import pybullet as p", "lab.sim.arms.robot:2 imports pybullet"),
         ("lab.view.plots", "from meshcat.geometry import Box", "allowed in ['lab.view.meshcat']"),
         ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.sim.camera', 'lab.vision.markers', "),
         ("lab.view.plots", "from PIL import Image", "allowed in no module"),
@@ -265,7 +265,7 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.learning.session", "from lab.advice.trust import x", "runs back up"),
         ("lab.sequencing.methods.srl", "def f():\n    import lab.advice.advisors", "runs back up"),
         ("lab.sequencing.methods.srl", "from lab.seat.terminal.prompt import ReadLine", "lab.sequencing never does"),
-        ("lab.sim.robot", "from ..learning import session", "imports lab.learning.session: lab.sim never does"),
+        ("lab.sim.arms.robot", "from ..learning import session", "imports lab.learning.session: lab.sim never does"),
         ("lab.sim.world", "from lab.sequencing.cell.cell import Cell", "lab.sim never does"),
         ("lab.production.composer", "from ..cli import main", "runs back up"),
         ("lab.vision.pictures", "from lab.sim.world import World", "runs back up"),

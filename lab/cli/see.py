@@ -26,7 +26,7 @@ def see(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Picture to grid: find the gripper (magenta), the toaster (cyan) and the obstacles (green)."""
+    """Picture to grid: find the gripper (magenta), the machine's marker (cyan) and the obstacles (green)."""
     from lab.view.summary import grid_summary
 
     seen = see_picture(image, grid, task, out)

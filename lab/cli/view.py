@@ -97,7 +97,7 @@ def seen(what: str, asked: Asked) -> "Iterator[tuple[str, Recording]]":
     """What a page calls a task or a world, and one frame of it; a large world's mesh is there as long as the block lasts."""
     from lab.mdp import shortest_way
     from lab.production.recorder import show_scene
-    from lab.sim.scene_check import check_scene
+    from lab.sim.scene.scene_check import check_scene
     from lab.skills.prepared_scene import lay_out
     from lab.tasks.grid_world import GridWorld
     from lab.tasks.task import Task

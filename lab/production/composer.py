@@ -12,8 +12,8 @@ from lab.sequencing.cell.routes import Option, part_of
 from lab.sequencing.cell.schedule import Move, Schedule
 from lab.sequencing.simulate.run import Run
 from lab.sim.frames import Recording
-from lab.sim.kinds import Kind, Spot, comes_as, on_its_pallet
-from lab.sim.scene import pallet_of
+from lab.sim.parts.kinds import Kind, Spot, comes_as, on_its_pallet
+from lab.sim.scene.scene import pallet_of
 from lab.sim.world import World
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared

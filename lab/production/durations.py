@@ -17,7 +17,7 @@ from lab.learning.sources import sources
 from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
 from lab.sim import urdf_reader
-from lab.sim.places import Layout
+from lab.sim.scene.places import Layout
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from math import ceil
 
 from lab.production.recorder import Recorder, Viewer, extras_of
-from lab.sim.kinematics import ToolPose
-from lab.sim.places import Layout
-from lab.sim.scene import Scene
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.scene.places import Layout
+from lab.sim.scene.scene import Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
 from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, Status

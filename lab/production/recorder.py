@@ -1,13 +1,13 @@
-"""What a run looked like: frames of the world, and what a viewer shows beside the bodies, such as toasted sides."""
+"""What a run looked like: frames of the world, and what a viewer shows beside the bodies: what machines have left on parts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
 from lab.sim.frames import Body, Frame, Recording, Rgba, Shape
-from lab.sim.kinds import Kind
-from lab.sim.places import Layout
-from lab.sim.scene import Scene
+from lab.sim.parts.kinds import Kind
+from lab.sim.scene.places import Layout
+from lab.sim.scene.scene import Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills.skillset import SkillSet
 from lab.tasks.task import Order, Task

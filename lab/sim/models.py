@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lab.sim import kinematics as arm
+from lab.sim.arms import kinematics as arm
 from lab.sim.frames import Vector
 from lab.sim.urdf_writer import Joint, Link, Model, Part, box, cylinder, hull, join, urdf
 

@@ -12,7 +12,7 @@ from lab.errors import WorkFailed
 from lab.sim import urdf_reader
 from lab.sim.frames import Body, Frame, Pose, Rgba, Shape
 from lab.sim.mesh_file import text_corners
-from lab.sim.part_shape import PartShape, visual_arrays
+from lab.sim.parts.part_shape import PartShape, visual_arrays
 from lab.sim.silence import silence
 
 TIME_STEP = 1.0 / 240.0  # [s]

@@ -9,8 +9,8 @@ import numpy as np
 from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import NoPath, TabularMDP, grid
-from lab.sim.blocked_cells import Survey
-from lab.sim.kinematics import ToolPose
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.scene.blocked_cells import Survey
 from lab.skills.skill import Bench, Skill, learned_path, no_way
 from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
 from lab.tasks.task import Task

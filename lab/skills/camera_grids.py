@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.sim import models
-from lab.sim.blocked_cells import OUT_OF_REACH, Survey, Surveyor
+from lab.sim.arms.kinematics import ToolPose
 from lab.sim.camera import Camera
-from lab.sim.kinds import Spot, beside
-from lab.sim.kinematics import ToolPose
-from lab.sim.places import Layout, Places
-from lab.sim.scene import MARKER_ABOVE, Scene, in_grid
+from lab.sim.parts.kinds import Spot, beside
+from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor
+from lab.sim.scene.places import Layout, Places
+from lab.sim.scene.scene import MARKER_ABOVE, Scene, in_grid
 from lab.sim.world import World
 from lab.tasks.task import Task
 from lab.tasks.task_fields import CameraGrid, Station

@@ -8,9 +8,11 @@ from math import hypot
 import numpy as np
 
 from lab.errors import BadInput
-from lab.sim.arm import Arm
-from lab.sim.arm_models import arm_of
-from lab.sim.ground_plan import (
+from lab.sim.arms.arm import Arm
+from lab.sim.arms.arm_models import arm_of
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.parts.kinds import comes_as
+from lab.sim.scene.ground_plan import (
     Approach,
     Block,
     BlockedCells,
@@ -20,12 +22,10 @@ from lab.sim.ground_plan import (
     PlannedSpot,
     PlannedStation,
 )
-from lab.sim.kinds import comes_as
-from lab.sim.kinematics import ToolPose
-from lab.sim.places import Layout, Places
-from lab.sim.reach import ring_of
-from lab.sim.scene import TABLE_M, TABLE_MIDDLE_M
-from lab.sim.scene_check import places_of
+from lab.sim.scene.places import Layout, Places
+from lab.sim.scene.reach import ring_of
+from lab.sim.scene.scene import TABLE_M, TABLE_MIDDLE_M
+from lab.sim.scene.scene_check import places_of
 from lab.skills.prepared_scene import lay_out
 from lab.skills.surveys import Surveys, way_to
 from lab.tasks.task import Order, Task

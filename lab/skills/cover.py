@@ -8,10 +8,10 @@ import numpy as np
 from lab.learning.problem import Problem
 from lab.mdp import coverage
 from lab.sim import models
+from lab.sim.arms.kinematics import ToolPose
 from lab.sim.frames import Body, Shape
-from lab.sim.kinds import Kind
-from lab.sim.kinematics import ToolPose
-from lab.sim.station_bodies import HEAD_JOINTS, HEAD_LINK
+from lab.sim.parts.kinds import Kind
+from lab.sim.scene.station_bodies import HEAD_JOINTS, HEAD_LINK
 from lab.sim.world import TIME_STEP, Array
 from lab.skills.skill import Bench, Skill, SkillFailed, learned_path
 from lab.skills.surveys import Surveys

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import NoPath, grid
-from lab.sim.kinds import Spot
-from lab.sim.kinematics import ToolPose
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.parts.kinds import Spot
 from lab.skills.place import let_go, release_pose
 from lab.skills.skill import Bench, Photo, Skill, SkillFailed, learned_path, no_way, over_everything
 from lab.skills.surveys import Surveys

@@ -4,11 +4,11 @@ from itertools import islice
 from pathlib import Path
 
 from lab.errors import BadInput
-from lab.sim.arm import Arm
-from lab.sim.arm_models import arm_of
-from lab.sim.grip import grip_of
-from lab.sim.part_shape import shape_of
-from lab.sim.reach import ring_of
+from lab.sim.arms.arm import Arm
+from lab.sim.arms.arm_models import arm_of
+from lab.sim.parts.grip import grip_of
+from lab.sim.parts.part_shape import shape_of
+from lab.sim.scene.reach import ring_of
 from lab.skills.prepared_scene import prepare
 from lab.tasks.new_task import FRICTION, Around, NewPart, NewTask, does_not_fit, heights_m, layouts, text_of
 from lab.tasks.part_fields import PartFields

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from lab.sim.kinds import Spot, on_its_pallet
-from lab.sim.kinematics import ToolPose
-from lab.sim.scene import pallet_of
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.parts.kinds import Spot, on_its_pallet
+from lab.sim.scene.scene import pallet_of
 from lab.skills.around_part import SLOW, AroundPart
 from lab.skills.camera_grids import RELEASE_ABOVE
 from lab.skills.skill import Bench, SkillFailed

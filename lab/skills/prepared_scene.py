@@ -7,8 +7,8 @@ import numpy as np
 
 from lab.errors import LabError
 from lab.learning.problem import Problem
-from lab.sim.places import Layout
-from lab.sim.scene_check import check_apart, check_scene, places_of
+from lab.sim.scene.places import Layout
+from lab.sim.scene.scene_check import check_apart, check_scene, places_of
 from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.grid_world import RANDOM, GridWorld

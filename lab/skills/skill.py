@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from lab.errors import BadInput, WorkFailed
 from lab.learning.problem import Problem
 from lab.mdp import NoPath, TabularMDP, greedy_path
-from lab.sim.blocked_cells import FINGERS_OFF_M
+from lab.sim.arms.kinematics import ToolPose
 from lab.sim.frames import Body
-from lab.sim.kinds import Kind, Spot, on_its_pallet
-from lab.sim.kinematics import ToolPose
-from lab.sim.scene import Scene, pallet_of
+from lab.sim.parts.kinds import Kind, Spot, on_its_pallet
+from lab.sim.scene.blocked_cells import FINGERS_OFF_M
+from lab.sim.scene.scene import Scene, pallet_of
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Stage
 from lab.vision import GridView

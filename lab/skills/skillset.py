@@ -8,7 +8,7 @@ from lab.errors import unknown
 from lab.sequencing.cell.cell import needed_moves
 from lab.sequencing.cell.routes import NeededMoves
 from lab.sequencing.cell.stations import Product, Route, Stage, Station
-from lab.sim.kinds import comes_as
+from lab.sim.parts.kinds import comes_as
 from lab.skills import SKILLS, Skill
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Part

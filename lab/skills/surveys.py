@@ -7,12 +7,12 @@ from math import hypot
 import numpy as np
 
 from lab.errors import BadInput
-from lab.sim.blocked_cells import OUT_OF_REACH, Survey, Surveyor
-from lab.sim.kinds import Spot, beside
-from lab.sim.kinematics import ToolPose
-from lab.sim.places import Layout
-from lab.sim.scene import Scene
-from lab.sim.scene_check import places_of
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.parts.kinds import Spot, beside
+from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor
+from lab.sim.scene.places import Layout
+from lab.sim.scene.scene import Scene
+from lab.sim.scene.scene_check import places_of
 from lab.sim.world import World
 from lab.skills.camera_grids import RELEASE_ABOVE, TOUCH_CLEARANCE, SurveyedGrid
 from lab.tasks.task import Order, Task

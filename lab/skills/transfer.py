@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import NoPath, grid
-from lab.sim.kinematics import ToolPose
+from lab.sim.arms.kinematics import ToolPose
 from lab.skills.skill import Bench, Skill, SkillFailed, learned_path, no_way
 from lab.skills.surveys import Surveys, grid_of, way_to
 from lab.tasks.task import Task

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from lab.learning.problem import Problem
-from lab.sim.scene import Scene
+from lab.sim.scene.scene import Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import NOT_OFF, SETTLE_STEPS, Bench, Skill, Status

@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 from lab.errors import unknown
 from lab.tasks.record import Name, Record, as_tuple
 
-MODELS = ("up6", "panda", "iiwa", "xarm6")  # the arms that ship, by name: rows of `lab.sim.arm_models.ARMS`
+MODELS = ("up6", "panda", "iiwa", "xarm6")  # the arms that ship, by name: rows of `lab.sim.arms.arm_models.ARMS`
 Part = Annotated[str, Field(min_length=1, max_length=100)]
 
 

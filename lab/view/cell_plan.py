@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lab.sim.ground_plan import Block, BlockedCells, CameraCells, GroundPlan, PlannedObstacle, PlannedStation, Ring
+from lab.sim.scene.ground_plan import (
+    Block,
+    BlockedCells,
+    CameraCells,
+    GroundPlan,
+    PlannedObstacle,
+    PlannedStation,
+    Ring,
+)
 from lab.view.canvas import BLUE, GREEN, GREY, INK, ORANGE, PALE_GREY, PURPLE, RED, SKY, YELLOW, picture_file, tip
 
 if TYPE_CHECKING:

@@ -213,7 +213,9 @@ def study_summary(study: Mapping[str, Any]) -> RenderableType:
     """What `lab study run` shows, from its JSON document: up to 30 rows; the report has all."""
     shown = ("measure", "value", "ci95", "thesis", "within", "lab_version")
     settings = list(dict.fromkeys(key for row in study["rows"] for key in row if key not in shown))
+    first = study["rows"][:_STUDY_ROWS]
     varied = [key for key in settings if len({str(row.get(key)) for row in study["rows"]}) > 1]
+    varied = [key for key in varied if any(row.get(key) is not None for row in first)]
     rows = [
         {key: "" if row.get(key) is None else row[key] for key in varied}
         | {
@@ -223,7 +225,7 @@ def study_summary(study: Mapping[str, Any]) -> RenderableType:
             "printed": "" if row["thesis"] is None else f"{row['thesis']:g}",
             "inside": {True: "yes", False: "no", None: ""}[row["within"]],
         }
-        for row in study["rows"][:_STUDY_ROWS]
+        for row in first
     ]
     more = len(study["rows"]) - len(rows)
     lines = [f"... and {counted(more, 'more row')}"] * (more > 0) + [""]

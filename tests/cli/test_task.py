@@ -1,5 +1,6 @@
 """`lab task`: lists, shows, draws and checks task files."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,8 @@ def test_a_goal_that_no_way_reaches_names_what_encloses_it(lab: Lab, folder: Pat
     assert ran.json["valid"] is False
     (error,) = ran.json["errors"]
     assert ran.err == f"lab: {error}\n"
-    assert error.startswith("insert at toaster: no path reaches the goal; the goal is enclosed by: wall ")
+    said = "insert at toaster: no path reaches the goal; the goal is enclosed by: wall "
+    assert re.match(rf"t\.toml: line \d+: {said}", error)
 
 
 def test_task_list_show_and_check(lab: Lab, folder: Path, toml: str) -> None:
@@ -86,9 +88,13 @@ def test_a_world_without_a_way_is_not_sound(lab: Lab, folder: Path) -> None:
         assert ran.err == "lab: world 'w': no path from (0, 0) to (1, 2): the start is enclosed by (0, 1), (1, 0)\n"
 
 
-def test_a_task_with_room_for_one_toast_is_sound(lab: Lab, folder: Path, toml: str) -> None:
-    (folder / "one.toml").write_text(toml.replace("capacity = 50", "capacity = 1"))
+def test_a_task_with_room_for_one_part_is_sound_when_it_makes_one(lab: Lab, folder: Path, toml: str) -> None:
+    small = toml.replace("capacity = 50", "capacity = 1")
+    (folder / "one.toml").write_text(small.replace("count = 3", "count = 1"))
     assert lab("task", "check", "one.toml").code == 0
+    (folder / "three.toml").write_text(small)
+    ran = lab("task", "check", "three.toml")
+    assert (ran.code, "station 'plate': capacity = 1: 3 slices" in ran.err) == (2, True)
 
 
 def test_a_damaged_task_file_is_reported_by_check(lab: Lab, folder: Path) -> None:

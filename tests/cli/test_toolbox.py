@@ -87,7 +87,7 @@ def test_a_list_is_filtered(lab: Lab, folder: Path, policy: MakePolicy) -> None:
     assert names("--subtask", "grasp") == ["three", "two"]
     assert names("--task", "mine") == names("--advisor", "expert") == names("--subtask", "grasp", "--solved") == ["two"]
     assert "three" in names("--unsolved")
-    assert names("--subtask", "butter") == names("--advisor", "tau=0.2") == names("--task", "fms") == []
+    assert names("--subtask", "cover") == names("--advisor", "tau=0.2") == names("--task", "fms") == []
     for option, word, hint in (("subtask", "gras", "grasp"), ("advisor", "exprt", "expert"), ("task", "mne", "mine")):
         ran = lab("toolbox", "list", f"--{option}", word)
         assert ran.code == 2

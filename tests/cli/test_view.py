@@ -101,3 +101,11 @@ def test_a_page_that_cannot_be_written(tmp_path: Path, lab: Lab) -> None:
     assert (ran.code, ran.out) == (2, "")
     assert ran.err == "lab: world 'w': no path from (0, 0) to (0, 2): the goal is enclosed by (0, 1)\n"
     assert {path.name for path in tmp_path.iterdir()} == {"w.txt"}
+
+
+def test_the_scene_of_a_task_holds_the_parts_that_are_asked_for() -> None:
+    from lab.cli.view import Asked, seen
+
+    with seen("breakfast", Asked(None, "slice=1,cup=1", 0)) as (title, recording):
+        parts = {body.name for body in recording.bodies if body.name.startswith(("slice", "cup"))}
+    assert (title, parts) == ("Two toasts and a cup of coffee to a tray", {"slice 1", "cup 2"})

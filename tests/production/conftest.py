@@ -81,8 +81,9 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Order, int]]:
     def cell(order: Order, *_: object) -> SimpleNamespace:
         stations = (Station("in", "storage", 9), Station("hot", "machine", 1, 10.0), Station("out", "storage", 9))
         step = np.ones((3, 3)) - np.eye(3)
-        made = Product("slice", ((Stage("in"), Stage("hot"), Stage("out")),))
-        return SimpleNamespace(cell=Cell(stations, (made,), order, step, 2 * step, "in"))
+        route = (Stage("in"), Stage("hot"), Stage("out"))
+        made = tuple(Product(kind, (route,)) for kind in dict.fromkeys(order))
+        return SimpleNamespace(cell=Cell(stations, made, order, step, 2 * step, "in"))
 
     monkeypatch.setattr("lab.skills.prepared_scene.prepare", prepare)
     monkeypatch.setattr("lab.production.run.teach_all", cell)

@@ -9,13 +9,13 @@ import pytest
 from lab.errors import WorkFailed
 from lab.production.composer import MAX_TRIES, Outcome, Production, carry_out
 from lab.production.durations import Durations, cell_of, measure
-from lab.production.floor import Floor
+from lab.production.floor import AT_REST_STEPS, Floor
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.simulate.run import simulate
 from lab.sim.frames import Body, Frame
-from lab.sim.places import Layout
-from lab.sim.scene_check import places_of
-from lab.sim.world import World
+from lab.sim.scene.places import Layout
+from lab.sim.scene.scene_check import places_of
+from lab.sim.world import TIME_STEP, World
 from lab.skills import Cover
 from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Status
@@ -367,3 +367,23 @@ def test_a_grasp_can_be_tried_alone(prepared: Prepared, clueless: Callable[[str]
     assert trial(grasp.problem, prepared.skillset.policies[grasp.name]) is None
     clueless(grasp.name)
     assert "does not reach its goal" in (trial(grasp.problem, prepared.skillset.policies[grasp.name]) or "")
+
+
+def test_time_is_skipped_only_while_nothing_moves(ground: Ground) -> None:
+    """Ten seconds: all but the last quarter; while a machine's head moves, or for a short time: one step."""
+    floor = ground.floor
+    before = floor.now_s
+    floor.wait(before + 0.2)
+    assert floor.now_s == pytest.approx(before + TIME_STEP)
+    assert floor.skipped_s == 0.0
+    butter = floor.skillset.skills["butter at butter_applier"]
+    floor.machines["butter_applier"], butter.status = butter, Status.RUNNING
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(butter, "step", lambda: Status.RUNNING)
+        floor.wait(before + 10.0)
+    assert floor.now_s == pytest.approx(before + 2 * TIME_STEP)
+    assert floor.skipped_s == 0.0
+    butter.status = Status.SUCCESS
+    floor.wait(before + 10.0)
+    assert floor.skipped_s == pytest.approx(10.0 - (AT_REST_STEPS + 2) * TIME_STEP)
+    assert floor.now_s == pytest.approx(before + 10.0 - (AT_REST_STEPS - 1) * TIME_STEP)

@@ -25,7 +25,7 @@ def task() -> Task:
 
 
 @pytest.fixture(scope="module")
-def known(task: Task) -> Known:
+def known(task: Task, make_policy: Known) -> Known:
     """The policy that always takes a shortest way of a skill in the scene of seed 0."""
 
     def make(name: str, **changed: Any) -> Policy:
@@ -35,28 +35,14 @@ def known(task: Task) -> Known:
         fields: dict[str, Any] = {
             "name": f"{name} {mdp.signature[:8]}",
             "subtask": problem.subtask,
-            "task": "toast",
             "q": q,
             "visits": np.zeros(q.shape, np.int64),
             "action_labels": mdp.action_labels,
             "shape": mdp.shape,
             "start": mdp.start,
             "signature": mdp.signature,
-            "learner": {},
-            "gate": {},
-            "advisor": "none",
-            "seed": 0,
-            "curve": [],
-            "guided": [],
-            "helped_steps": 0,
-            "requests": 0,
-            "optimal_steps": None,
-            "final_steps": None,
-            "solved": True,
-            "created": "2026-05-01T12:00:00+00:00",
-            "versions": {},
         }
-        return Policy(**(fields | changed))
+        return make_policy(**(fields | changed))
 
     return make
 

@@ -8,11 +8,11 @@ import pytest
 
 from lab.files import assets_folder
 from lab.production.recorder import FRAME_EVERY, Recorder, extras_of, finish_on
-from lab.sim.arm_models import arm_of
+from lab.sim.arms.arm_models import arm_of
 from lab.sim.frames import Body, Frame, Vector
-from lab.sim.kinds import Kind, kinds_of
-from lab.sim.part_shape import shape_of
-from lab.sim.scene import Scene
+from lab.sim.parts.kinds import Kind, kinds_of
+from lab.sim.parts.part_shape import shape_of
+from lab.sim.scene.scene import Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills.prepared_scene import lay_out
 from lab.skills.skillset import SkillSet

@@ -105,6 +105,36 @@ def test_what_does_not_fit_is_refused(lab: Lab, folder: Path, words: str, line: 
 
 
 @pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ("--parts slise=1", "unknown part 'slise' (--parts): did you mean 'slice'? known: cup, slice"),
+        ("--parts slice=0,cup=0", "0 parts (--toasts, --parts) for task 'breakfast': allowed are 1 to 50"),
+        ("--parts slice=50,cup=1", "51 parts (--toasts, --parts) for task 'breakfast': allowed are 1 to 50"),
+        ("--parts cup=1,cup=1", "'cup=1,cup=1' (--parts): wanted kind=number once each, such as slice=2,cup=1"),
+        ("--parts two", "'two' (--parts): wanted kind=number once each, such as slice=2,cup=1"),
+        ("--parts cup=4", "4 cups (--toasts, --parts) do not fit on 'shelf': its capacity in the task file is 3"),
+        ("--toasts 1 --parts cup=1", "--toasts 1 and --parts cup=1: an order is one or the other"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "sequence", "view"])
+def test_parts_that_cannot_be(lab: Lab, folder: Path, command: str, words: str, line: str) -> None:
+    before = listed(folder)
+    ran = lab(command, "breakfast", *words.split())
+    assert (ran.code, ran.out, ran.err) == (2, "", f"lab: {line}\n")
+    assert listed(folder) == before
+
+
+def test_a_cell_has_no_parts_to_name(lab: Lab) -> None:
+    ran = lab("sequence", "fms", "--parts", "rook=1")
+    assert ran.err == "lab: --parts rook=1: 'fms' is a cell: give its order with --case or --toasts\n"
+
+
+def test_run_leads_from_the_cell_to_its_task_in_physics(lab: Lab) -> None:
+    ran = lab("run", "fms", "--parts", "rok=1")
+    assert (ran.code, ran.err) == (2, "lab: unknown part 'rok' (--parts): did you mean 'rook'? known: rook, sign\n")
+
+
+@pytest.mark.parametrize(
     "words",
     [
         *("--method x", "--objective x", "--objective mean-tardiness", "--gate x", "--method srl --advisor x"),

@@ -394,6 +394,15 @@ def test_a_task_is_for_what_its_file_says_unless_told(
     assert measured == [("toast", order, 0)]
 
 
+@pytest.mark.usefixtures("measured")
+def test_the_parts_of_several_kinds_are_called_by_them(lab: Lab) -> None:
+    document = asked(lab, "breakfast --parts slice=1,cup=1 --method fifo --gantt g.svg")
+    assert document["order"] == ["slice", "cup"]
+    assert {move.partition(":")[0] for move in document["moves"]} == {"slice 1", "cup 2"}
+    chart = " ".join(ElementTree.parse("g.svg").getroot().itertext())
+    assert all(name in chart for name in ("slice 1", "cup 2"))
+
+
 def test_a_case_that_a_task_has_not(lab: Lab, folder: Path, root: Path, measured: list[tuple[str, Order, int]]) -> None:
     (folder / "mine.toml").write_text((root / "tasks" / "toast.toml").read_text(encoding="utf-8"))
     ran = lab("sequence", "mine.toml", "--case", "I")

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from lab.sim.arm_models import arm_named
-from lab.sim.robot import Robot
+from lab.sim.arms.arm_models import arm_named
+from lab.sim.arms.robot import Robot
 from lab.sim.world import World
 from lab.tasks.task import Task
 from lab.tasks.task_file import load

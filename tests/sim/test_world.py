@@ -16,7 +16,7 @@ from lab.errors import BadInput, WorkFailed
 from lab.files import assets_folder
 from lab.sim.camera import Camera
 from lab.sim.frames import Frame
-from lab.sim.part_shape import PartShape, shape_of
+from lab.sim.parts.part_shape import PartShape, shape_of
 from lab.sim.world import TIME_STEP, World
 from lab.tasks.part_fields import PartFields
 

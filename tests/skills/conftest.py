@@ -9,8 +9,8 @@ import pytest
 
 from lab.learning.problem import Problem
 from lab.mdp import optimal_values, shortest_steps
-from lab.sim.places import Layout
-from lab.sim.scene import Scene
+from lab.sim.scene.places import Layout
+from lab.sim.scene.scene import Scene
 from lab.sim.world import World
 from lab.skills import Skill
 from lab.skills.skill import Bench, Status

@@ -5,8 +5,8 @@ import pytest
 
 from lab.errors import BadInput
 from lab.mdp import grid
-from lab.sim.kinematics import ToolPose
-from lab.sim.places import Layout
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.scene.places import Layout
 from lab.skills import Grasp, Place
 from lab.skills.around_part import SIDEWAYS, entry_cell, from_above
 from lab.skills.grasp import ACTIONS

@@ -7,7 +7,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.mdp import greedy_path, optimal_values
-from lab.sim.places import Layout
+from lab.sim.scene.places import Layout
 from lab.skills import Insert
 from lab.skills.camera_grids import OUT_OF_SIGHT, camera_view, overhead_camera, settings_of
 from lab.skills.surveys import Surveys

@@ -8,7 +8,7 @@ import pytest
 from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import greedy_path
-from lab.sim.places import Layout
+from lab.sim.scene.places import Layout
 from lab.skills import Insert, Place
 from lab.skills.insert import ACTIONS, IN_SLOT_M, SEEN_WITHIN_M
 from lab.skills.skill import Bench, Skill, Status

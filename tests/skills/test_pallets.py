@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lab.learning.problem import Problem
-from lab.sim.scene import pallet_of
+from lab.sim.scene.scene import pallet_of
 from lab.skills import Grasp, Place, Transfer
 from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import Surveys

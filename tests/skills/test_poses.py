@@ -8,9 +8,9 @@ import pytest
 
 from lab.learning.problem import Problem
 from lab.mdp import greedy_path
-from lab.sim.arm_models import arm_named
-from lab.sim.kinematics import ToolPose
-from lab.sim.robot import NAME as ROBOT
+from lab.sim.arms.arm_models import arm_named
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.arms.robot import NAME as ROBOT
 from lab.skills import SKILLS, Skill, Transfer
 from lab.skills.skill import Bench, Status
 from lab.skills.surveys import Surveys

@@ -13,9 +13,9 @@ from lab.learning.problem import Problem
 from lab.mdp import NoPath, greedy_path, grid, shortest_steps
 from lab.production.durations import measure
 from lab.seat.lesson_scene import SkillScene
-from lab.sim.kinds import Spot
-from lab.sim.kinematics import ToolPose
-from lab.sim.places import Layout
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.parts.kinds import Spot
+from lab.sim.scene.places import Layout
 from lab.skills import SKILLS, Skill
 from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Bench, SkillFailed, Status, learned_path, no_way

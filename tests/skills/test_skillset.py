@@ -5,8 +5,8 @@ import pytest
 
 from lab.errors import BadInput
 from lab.production.durations import Durations, cell_of
-from lab.sim.arm_models import arm_named
-from lab.sim.kinds import kinds_of
+from lab.sim.arms.arm_models import arm_named
+from lab.sim.parts.kinds import kinds_of
 from lab.skills import SKILLS, Insert, Place, Transfer
 from lab.skills.cover import CoverPlace
 from lab.skills.skillset import Carried, SkillSet, products, stations, ways_of
@@ -226,7 +226,7 @@ def test_an_unknown_sub_task_is_refused(task: Task) -> None:
 
 def test_a_machine_whose_process_nobody_knows_is_refused(task: Task) -> None:
     jam = tuple(s.model_copy(update={"process": "jam"}) if s.process else s for s in task.stations)
-    with pytest.raises(BadInput, match=r"unknown process 'jam' .station 'butter_applier' .*: known: butter"):
+    with pytest.raises(BadInput, match=r"unknown process 'jam' \(station 'butter_applier'.*\): known: butter"):
         task.changed(stations=jam)
 
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.sim.arm_models import arm_of
-from lab.sim.blocked_cells import OUT_OF_REACH
-from lab.sim.kinds import Spot
-from lab.sim.kinematics import ToolPose
-from lab.sim.places import Layout
+from lab.sim.arms.arm_models import arm_of
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.parts.kinds import Spot
+from lab.sim.scene.blocked_cells import OUT_OF_REACH
+from lab.sim.scene.places import Layout
 from lab.skills.grasp import GOAL
 from lab.skills.prepared_scene import prepare
 from lab.skills.skillset import SkillSet

@@ -7,7 +7,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.learning.problem import Problem
-from lab.sim.places import Layout
+from lab.sim.scene.places import Layout
 from lab.skills import Transfer
 from lab.skills.skill import Bench, Skill, Status
 from lab.skills.surveys import INSERT, Surveys

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.files import tasks_folder
-from lab.sim.scene_check import check_apart, check_scene
+from lab.sim.scene.scene_check import check_apart, check_scene
 from lab.skills.prepared_scene import check_task
 from lab.tasks.task_file import load
 from lab.tasks.toml_text import Loc

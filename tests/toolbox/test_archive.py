@@ -79,9 +79,9 @@ def named(name: str, content: bytes = b"x", **attributes: Any) -> tuple[ZipInfo,
 # ---- what is packed comes out ---------------------------------------------------------------------------------------
 
 
-def test_an_archive_is_the_same_each_time_and_plain(make: Make) -> None:
-    content, manifest = pack([make(name="b"), make(name="A side/2 ü")])
-    assert content == pack([make(name="A side/2 ü"), make(name="b")])[0]
+def test_an_archive_is_the_same_each_time_and_plain(make_policy: Make) -> None:
+    content, manifest = pack([make_policy(name="b"), make_policy(name="A side/2 ü")])
+    assert content == pack([make_policy(name="A side/2 ü"), make_policy(name="b")])[0]
     with ZipFile(BytesIO(content)) as opened:
         assert [entry.filename for entry in opened.infolist()] == [
             MANIFEST,
@@ -93,7 +93,7 @@ def test_an_archive_is_the_same_each_time_and_plain(make: Make) -> None:
         }
         head = json.loads(opened.read(MANIFEST))
         whole = opened.read("b.safetensors")
-    assert whole == encode(make(name="b"))
+    assert whole == encode(make_policy(name="b"))
     assert head == manifest.model_dump()
     row = {"file": "b.safetensors", "name": "b", "bytes": len(whole), "sha256": hashlib.sha256(whole).hexdigest()}
     assert (head["format"], head["files"][1]) == ("teaching-lab-archive-1", row)
@@ -109,22 +109,24 @@ def test_an_archive_is_the_same_each_time_and_plain(make: Make) -> None:
     ),
     st.integers(0, 31),
 )
-def test_any_policies_come_through(tmp_path: Path, make: Make, names: list[str], some: int) -> None:
-    policies = [make(name=name, seed=n) for n, name in enumerate(names) if some >> n & 1] or [make(name=names[0])]
+def test_any_policies_come_through(tmp_path: Path, make_policy: Make, names: list[str], some: int) -> None:
+    policies = [make_policy(name=name, seed=n) for n, name in enumerate(names) if some >> n & 1] or [
+        make_policy(name=names[0])
+    ]
     path = tmp_path / "given.zip"
     path.write_bytes(pack(policies)[0])
     came = {policy.name: encode(policy) for policy in unpack(path)}
     assert came == {policy.name: encode(policy) for policy in policies}
 
 
-def test_nothing_and_twins_and_too_much_are_not_packed(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_and_twins_and_too_much_are_not_packed(make_policy: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(BadInput, match="there is no policy to export"):
         pack([])
     with pytest.raises(BadInput, match="two policies are called 'a'"):
-        pack([make(name="a"), make(name="a", seed=9)])
+        pack([make_policy(name="a"), make_policy(name="a", seed=9)])
     monkeypatch.setattr(archive, "MAX_BYTES", 1000)
     with pytest.raises(BadInput, match=r"1 policy file with \d+ bytes, allowed 10000 with 1000: name fewer policies"):
-        pack([make(name="a")])
+        pack([make_policy(name="a")])
 
 
 # ---- what is refused ------------------------------------------------------------------------------------------------
@@ -155,15 +157,15 @@ def test_nothing_and_twins_and_too_much_are_not_packed(make: Make, monkeypatch: 
 )
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_what_no_archive_of_the_lab_holds(
-    refused: Callable[..., str], make: Make, extra: tuple[ZipInfo, bytes], said: str
+    refused: Callable[..., str], make_policy: Make, extra: tuple[ZipInfo, bytes], said: str
 ) -> None:
-    assert said in refused([*entries_of(make(name="a")), extra])
+    assert said in refused([*entries_of(make_policy(name="a")), extra])
 
 
-def test_what_is_no_archive_of_the_lab(refused: Callable[..., str], make: Make, tmp_path: Path) -> None:
+def test_what_is_no_archive_of_the_lab(refused: Callable[..., str], make_policy: Make, tmp_path: Path) -> None:
     assert "it is no zip file, or a damaged one" in refused(b"")
-    assert "it is no zip file, or a damaged one" in refused(encode(make(name="a")))
-    assert "it holds no manifest.json: it is no archive of the lab" in refused(entries_of(make(name="a"))[1:])
+    assert "it is no zip file, or a damaged one" in refused(encode(make_policy(name="a")))
+    assert "it holds no manifest.json: it is no archive of the lab" in refused(entries_of(make_policy(name="a"))[1:])
     for path, said in (("nowhere.zip", "there is no such file"), ("", "it is no regular file")):
         with pytest.raises(BadInput, match=said):
             unpack(tmp_path / path)
@@ -185,36 +187,36 @@ def test_what_is_no_archive_of_the_lab(refused: Callable[..., str], make: Make, 
     ],
 )
 def test_a_manifest_that_lies(
-    refused: Callable[..., str], make: Make, change: Callable[[Any], None], said: str
+    refused: Callable[..., str], make_policy: Make, change: Callable[[Any], None], said: str
 ) -> None:
-    assert said in refused(manifest_changed(entries_of(make(name="a")), change))
+    assert said in refused(manifest_changed(entries_of(make_policy(name="a")), change))
 
 
-def test_a_manifest_that_cannot_be_read(refused: Callable[..., str], make: Make) -> None:
-    (manifest, _), *rest = entries_of(make(name="a"))
+def test_a_manifest_that_cannot_be_read(refused: Callable[..., str], make_policy: Make) -> None:
+    (manifest, _), *rest = entries_of(make_policy(name="a"))
     for text in (b"{", b"\xff", b"[" * 100_000):
         assert "manifest.json is not valid JSON" in refused([(manifest, text), *rest])
     assert "has the format '[]'" in refused([(manifest, b"[]"), *rest])
 
 
-def test_a_file_that_is_no_sound_policy(refused: Callable[..., str], make: Make) -> None:
-    bad = encode(make(name="a")).replace(b'"shape":[4,2]', b'"shape":[2,4]', 1)
+def test_a_file_that_is_no_sound_policy(refused: Callable[..., str], make_policy: Make) -> None:
+    bad = encode(make_policy(name="a")).replace(b'"shape":[4,2]', b'"shape":[2,4]', 1)
     row = {"file": "a.safetensors", "name": "a", "bytes": len(bad), "sha256": hashlib.sha256(bad).hexdigest()}
     head = {"format": archive.FORMAT, "files": [row]}
     said = refused([named(MANIFEST, json.dumps(head).encode()), named("a.safetensors", bad)])
     assert said.endswith("policy file a.safetensors: policy 'a': visits have shape (4, 2), q has (2, 4)")
 
 
-def test_an_encrypted_file(refused: Callable[..., str], make: Make) -> None:
-    content = bytearray(pack([make(name="a")])[0])
+def test_an_encrypted_file(refused: Callable[..., str], make_policy: Make) -> None:
+    content = bytearray(pack([make_policy(name="a")])[0])
     for mark, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
         content[content.rindex(mark) + flags] |= 1
     assert "'a.safetensors' is encrypted" in refused(bytes(content))
 
 
-def test_files_that_share_their_bytes(refused: Callable[..., str], make: Make) -> None:
+def test_files_that_share_their_bytes(refused: Callable[..., str], make_policy: Make) -> None:
     """A bomb that needs no compression: every entry of the directory points at the same large file."""
-    content = pack([make(name="a", curve=[3] * 9000, guided=[False] * 9000)])[0]
+    content = pack([make_policy(name="a", curve=[3] * 9000, guided=[False] * 9000)])[0]
     at = content.rindex(b"PK\x01\x02")
     end = content.rindex(b"PK\x05\x06")
     one = content[at:end]
@@ -226,8 +228,10 @@ def test_files_that_share_their_bytes(refused: Callable[..., str], make: Make) -
     assert "they overlap" in said
 
 
-def test_too_much(refused: Callable[..., str], make: Make, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    content = pack([make(name="a"), make(name="b"), make(name="c")])[0]
+def test_too_much(
+    refused: Callable[..., str], make_policy: Make, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    content = pack([make_policy(name="a"), make_policy(name="b"), make_policy(name="c")])[0]
     monkeypatch.setattr(archive, "MAX_FILES", 2)
     assert "it holds more than 3 files" in refused(content)
     monkeypatch.setattr(archive, "MAX_BYTES", 100)
@@ -237,8 +241,8 @@ def test_too_much(refused: Callable[..., str], make: Make, monkeypatch: pytest.M
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300)
 @given(st.data())
-def test_any_flipped_byte_is_refused_or_harmless(tmp_path: Path, make: Make, data: st.DataObject) -> None:
-    policies = [make(name="a"), make(name="b", seed=5)]
+def test_any_flipped_byte_is_refused_or_harmless(tmp_path: Path, make_policy: Make, data: st.DataObject) -> None:
+    policies = [make_policy(name="a"), make_policy(name="b", seed=5)]
     content = bytearray(pack(policies)[0])
     at = data.draw(st.integers(0, len(content) - 1))
     content[at] ^= data.draw(st.integers(1, 255))
@@ -253,8 +257,10 @@ def test_any_flipped_byte_is_refused_or_harmless(tmp_path: Path, make: Make, dat
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100)
 @given(st.data())
-def test_any_cut_or_padded_archive_is_refused_or_harmless(tmp_path: Path, make: Make, data: st.DataObject) -> None:
-    content = pack([make(name="a")])[0]
+def test_any_cut_or_padded_archive_is_refused_or_harmless(
+    tmp_path: Path, make_policy: Make, data: st.DataObject
+) -> None:
+    content = pack([make_policy(name="a")])[0]
     cut = content[data.draw(st.integers(0, len(content))) :] if data.draw(st.booleans()) else content
     path = tmp_path / "given.zip"
     path.write_bytes(data.draw(st.binary(max_size=30)) + cut[: data.draw(st.integers(0, len(cut)))])
@@ -262,7 +268,7 @@ def test_any_cut_or_padded_archive_is_refused_or_harmless(tmp_path: Path, make: 
         (came,) = unpack(path)
     except BadInput:
         return
-    assert encode(came) == encode(make(name="a"))
+    assert encode(came) == encode(make_policy(name="a"))
 
 
 # ---- into a toolbox -------------------------------------------------------------------------------------------------
@@ -272,15 +278,15 @@ def names_in(toolbox: Toolbox) -> dict[str, int]:
     return {row["name"]: row["seed"] for row in toolbox.list()}
 
 
-def test_new_ones_are_kept_and_the_same_ones_stay(toolbox: Toolbox, make: Make) -> None:
-    assert take_in(toolbox, [make(name="a"), make(name="b")], replace=False) == (["a", "b"], [], [])
-    assert take_in(toolbox, [make(name="c"), make(name="a")], replace=False) == (["c"], [], ["a"])
+def test_new_ones_are_kept_and_the_same_ones_stay(toolbox: Toolbox, make_policy: Make) -> None:
+    assert take_in(toolbox, [make_policy(name="a"), make_policy(name="b")], replace=False) == (["a", "b"], [], [])
+    assert take_in(toolbox, [make_policy(name="c"), make_policy(name="a")], replace=False) == (["c"], [], ["a"])
     assert names_in(toolbox) == {"a": 0, "b": 0, "c": 0}
 
 
-def test_another_policy_of_that_name_is_replaced_only_when_asked(toolbox: Toolbox, make: Make) -> None:
-    take_in(toolbox, [make(name="a"), make(name="b")], replace=False)
-    new = [replace(make(name=name, seed=5), created="2025-01-01T00:00:00+00:00") for name in ("c", "b", "a")]
+def test_another_policy_of_that_name_is_replaced_only_when_asked(toolbox: Toolbox, make_policy: Make) -> None:
+    take_in(toolbox, [make_policy(name="a"), make_policy(name="b")], replace=False)
+    new = [replace(make_policy(name=name, seed=5), created="2025-01-01T00:00:00+00:00") for name in ("c", "b", "a")]
     with pytest.raises(BadInput, match=r"'b' and 1 more are there already with other content: --replace"):
         take_in(toolbox, new, replace=False)
     assert names_in(toolbox) == {"a": 0, "b": 0}
@@ -288,16 +294,18 @@ def test_another_policy_of_that_name_is_replaced_only_when_asked(toolbox: Toolbo
     assert names_in(toolbox) == {"a": 5, "b": 5, "c": 5}
 
 
-def test_what_is_replaced_is_in_use_even_if_it_does_worse_and_the_other_is_kept(toolbox: Toolbox, make: Make) -> None:
-    take_in(toolbox, [make(name="a")], replace=False)
-    take_in(toolbox, [make(name="a", seed=5, solved=False)], replace=True)
+def test_what_is_replaced_is_in_use_even_if_it_does_worse_and_the_other_is_kept(
+    toolbox: Toolbox, make_policy: Make
+) -> None:
+    take_in(toolbox, [make_policy(name="a")], replace=False)
+    take_in(toolbox, [make_policy(name="a", seed=5, solved=False)], replace=True)
     assert names_in(toolbox) == {"a": 5}
     toolbox.rollback("a")
     assert names_in(toolbox) == {"a": 0}
 
 
-def test_all_or_none_are_kept(toolbox: Toolbox, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    take_in(toolbox, [make(name="b")], replace=False)
+def test_all_or_none_are_kept(toolbox: Toolbox, make_policy: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    take_in(toolbox, [make_policy(name="b")], replace=False)
 
     def put(self: Toolbox, policy: Policy, whole: Callable[..., Saved] = Toolbox.put) -> Saved:
         if policy.name == "c":
@@ -307,14 +315,14 @@ def test_all_or_none_are_kept(toolbox: Toolbox, make: Make, monkeypatch: pytest.
 
     monkeypatch.setattr(Toolbox, "put", put)
     with pytest.raises(KeyboardInterrupt):
-        take_in(toolbox, [make(name="a"), make(name="b", seed=5), make(name="c")], replace=True)
+        take_in(toolbox, [make_policy(name="a"), make_policy(name="b", seed=5), make_policy(name="c")], replace=True)
     assert names_in(toolbox) == {"b": 0}
     found = toolbox.find("insert", "0123456789abcdef")
     assert found is not None
-    np.testing.assert_array_equal(found.q, make(name="b").q)
+    np.testing.assert_array_equal(found.q, make_policy(name="b").q)
 
 
-def test_a_toolbox_that_cannot_be_written(tmp_path: Path, make: Make) -> None:
+def test_a_toolbox_that_cannot_be_written(tmp_path: Path, make_policy: Make) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(BadInput, match="is a file, a folder is needed"):
-        take_in(Toolbox(tmp_path / "file" / "box"), [make(name="a")], replace=False)
+        take_in(Toolbox(tmp_path / "file" / "box"), [make_policy(name="a")], replace=False)

@@ -33,11 +33,11 @@ LEARNED = {"time": "2026-05-01T12:00:00.000+00:00", "what": "learned", "version"
 
 
 @pytest.fixture
-def learned(make: Callable[..., Policy]) -> Policy:
+def learned(make_policy: Callable[..., Policy]) -> Policy:
     """In a row of three cells the right end is the goal: two steps."""
     table = np.array([[0.1, 0.8], [0.2, 1.5], [0.0, 0.0]])
     visits = np.array([[2, 5], [1, 4], [0, 0]], dtype=np.int64)
-    return make(
+    return make_policy(
         name="insert_it",
         q=table,
         visits=visits,
@@ -86,8 +86,8 @@ def test_it_tells_what_was_learned_where_and_how(learned: Policy) -> None:
     assert "It has visited 2 of 3 states." in text
 
 
-def test_it_tells_of_one_that_came_from_another_and_reaches_nothing(make: Callable[..., Policy]) -> None:
-    lost = make(
+def test_it_tells_of_one_that_came_from_another_and_reaches_nothing(make_policy: Callable[..., Policy]) -> None:
+    lost = make_policy(
         shape=(),
         solved=False,
         final_steps=None,

@@ -53,10 +53,10 @@ def test_a_stamp_changes_with_the_file_and_is_not_trusted_when_fresh(place: Fold
     assert second != first
 
 
-def test_links_are_not_followed_out_of_it(tmp_path: Path, make: MakePolicy) -> None:
+def test_links_are_not_followed_out_of_it(tmp_path: Path, make_policy: MakePolicy) -> None:
     box, other = Toolbox(tmp_path / "box"), Toolbox(tmp_path / "other")
-    box.save(make(1.0))
-    path = other.save(make(2.0, name="foreign"))
+    box.save(make_policy(1.0))
+    path = other.save(make_policy(2.0, name="foreign"))
     (box.folder / "foreign.safetensors").symlink_to(path)
     assert [row["name"] for row in box.list()] == ["insert"]
     ((_, _, reason),) = [row for row in box.verify() if not row[1]]
@@ -64,7 +64,7 @@ def test_links_are_not_followed_out_of_it(tmp_path: Path, make: MakePolicy) -> N
     (box.folder / "versions" / "grasp").symlink_to(tmp_path / "other")
     (box.folder / "records").symlink_to(tmp_path / "other")
     before = {file: file.read_bytes() for file in other.folder.rglob("*") if file.is_file()}
-    uses = (partial(box.save, make(name="grasp")), partial(box.save_record, "durations", "1 > 2", {}))
+    uses = (partial(box.save, make_policy(name="grasp")), partial(box.save_record, "durations", "1 > 2", {}))
     for use in uses:
         with pytest.raises(BadInput, match="it leads out of the toolbox"):
             use()
@@ -72,15 +72,15 @@ def test_links_are_not_followed_out_of_it(tmp_path: Path, make: MakePolicy) -> N
     log = box.folder / "log" / "butter.jsonl"
     log.symlink_to(tmp_path / "log of another")
     with pytest.raises(BadInput, match="cannot write"):
-        box.save(make(name="butter"))
+        box.save(make_policy(name="butter"))
     assert not (tmp_path / "log of another").exists()
 
 
-def test_a_toolbox_that_is_a_link_itself_is_one(tmp_path: Path, make: MakePolicy) -> None:
+def test_a_toolbox_that_is_a_link_itself_is_one(tmp_path: Path, make_policy: MakePolicy) -> None:
     (tmp_path / "real").mkdir()
     (tmp_path / "box").symlink_to(tmp_path / "real")
     box = Toolbox(tmp_path / "box")
-    assert box.load(box.save(make(1.0))).q[0, 0] == 1.0
+    assert box.load(box.save(make_policy(1.0))).q[0, 0] == 1.0
     assert (tmp_path / "real" / "insert.safetensors").is_file()
 
 

@@ -29,8 +29,8 @@ Make = Callable[..., Policy]
 
 
 @pytest.fixture
-def folder(tmp_path: Path, make: Make) -> Path:
-    for name, content in hub_files(make(name="insert it")).items():
+def folder(tmp_path: Path, make_policy: Make) -> Path:
+    for name, content in hub_files(make_policy(name="insert it")).items():
         (tmp_path / name).write_bytes(content)
     return tmp_path
 
@@ -42,8 +42,8 @@ def read(text: str) -> Any:
     return yaml.safe_load(text[4:-4])
 
 
-def test_the_header_is_of_the_documented_form(make: Make) -> None:
-    policy = make(name='say: "hi" # now')
+def test_the_header_is_of_the_documented_form(make_policy: Make) -> None:
+    policy = make_policy(name='say: "hi" # now')
     plain = {
         "license": "mit",
         "library_name": "teaching-lab",
@@ -65,8 +65,8 @@ def test_the_header_is_of_the_documented_form(make: Make) -> None:
 
 
 @given(st.text(min_size=1, max_size=40).filter(is_name))
-def test_any_name_stands_in_the_header(make: Make, name: str) -> None:
-    (entry,) = read(header(make(name=name), "mit", [EVALUATED]))["model-index"]
+def test_any_name_stands_in_the_header(make_policy: Make, name: str) -> None:
+    (entry,) = read(header(make_policy(name=name), "mit", [EVALUATED]))["model-index"]
     assert entry["name"] == name
 
 
@@ -76,8 +76,8 @@ def test_a_licence_that_is_no_name(name: str) -> None:
         check_license(name)
 
 
-def test_what_is_written_is_read_again(folder: Path, make: Make) -> None:
-    assert encode(read_folder(folder)) == encode(make(name="insert it"))
+def test_what_is_written_is_read_again(folder: Path, make_policy: Make) -> None:
+    assert encode(read_folder(folder)) == encode(make_policy(name="insert it"))
     config = json.loads((folder / "config.json").read_text())
     assert config["sha256"] == sha256((folder / "model.safetensors").read_bytes())
     assert (config["name"], config["states"], config["action_labels"]) == ("insert it", 4, ["left", "right"])

@@ -23,12 +23,12 @@ SETTLED_S = 0.06  # after which a file's times tell whether it changed
 
 
 @pytest.fixture
-def box(tmp_path: Path, make: MakePolicy) -> Toolbox:
+def box(tmp_path: Path, make_policy: MakePolicy) -> Toolbox:
     """Fifty policies of a toolbox from before versions, and their index."""
     made = Toolbox(tmp_path / "box")
     made.folder.mkdir()
     for number in range(COUNT):
-        held = make(number, name=f"skill-{number}", subtask=("insert", "grasp")[number % 2])
+        held = make_policy(number, name=f"skill-{number}", subtask=("insert", "grasp")[number % 2])
         (made.folder / f"skill-{number}.safetensors").write_bytes(encode(held))
     time.sleep(SETTLED_S)
     made.list()
@@ -50,11 +50,11 @@ def reads(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return found
 
 
-def test_only_what_changed_is_read(box: Toolbox, reads: list[str], make: MakePolicy) -> None:
+def test_only_what_changed_is_read(box: Toolbox, reads: list[str], make_policy: MakePolicy) -> None:
     again = Toolbox(box.folder)
     assert len(again.list()) == COUNT
     assert reads == []
-    box.save(make(77.0, name="skill-3"))
+    box.save(make_policy(77.0, name="skill-3"))
     reads.clear()
     assert {row["name"]: row["version"] for row in again.list()}["skill-3"] == 2
     assert reads == ["skill-3.safetensors"]
@@ -101,10 +101,10 @@ def test_a_toolbox_that_may_only_be_read_is_listed(box: Toolbox, monkeypatch: py
     assert len(Toolbox(box.folder).list()) == COUNT
 
 
-def test_few_policies_need_none(tmp_path: Path, make: MakePolicy) -> None:
+def test_few_policies_need_none(tmp_path: Path, make_policy: MakePolicy) -> None:
     """Nothing is written into a folder that was only looked at."""
     few = Toolbox(tmp_path / "few")
-    few.save(make())
+    few.save(make_policy())
     before = sorted(few.folder.rglob("*"))
     time.sleep(SETTLED_S)
     assert len(few.list()) == 1
@@ -124,23 +124,23 @@ def test_listing_loads_no_numerical_library(box: Toolbox, root: Path) -> None:
 
 
 def test_those_alike_are_solved_have_the_tables_size_and_come_newest_first(
-    box: Toolbox, reads: list[str], make: MakePolicy
+    box: Toolbox, reads: list[str], make_policy: MakePolicy
 ) -> None:
     six = {"q": np.zeros((6, 2)), "visits": np.zeros((6, 2), np.int64), "shape": (6,)}
-    box.save(make(name="newer", created="2026-07-01T00:00:00+00:00", signature="1" * 16))
-    box.save(make(name="unsolved", solved=False, signature="2" * 16))
-    box.save(make(name="larger", signature="3" * 16, **six))
+    box.save(make_policy(name="newer", created="2026-07-01T00:00:00+00:00", signature="1" * 16))
+    box.save(make_policy(name="unsolved", solved=False, signature="2" * 16))
+    box.save(make_policy(name="larger", signature="3" * 16, **six))
     known, _ = box.index()
     reads.clear()
     names = [name for _, name in known.alike("insert", 4, 2)]
     assert (names[0], len(names), reads) == ("newer", 2, [])
     assert known.alike("insert", 6, 2) == [(("insert", "3" * 16), "larger")]
     assert known.alike("butter", 4, 2) == []
-    known["butter", SIGNATURE] = make(name="mine", subtask="butter")
+    known["butter", SIGNATURE] = make_policy(name="mine", subtask="butter")
     assert known.alike("butter", 4, 2) == [(("butter", SIGNATURE), "mine")]
 
 
-def test_what_is_known_is_read_when_it_is_asked_for(box: Toolbox, reads: list[str], make: MakePolicy) -> None:
+def test_what_is_known_is_read_when_it_is_asked_for(box: Toolbox, reads: list[str], make_policy: MakePolicy) -> None:
     known, damaged = box.index()
     assert (damaged, set(known), len(known)) == ([], {("insert", SIGNATURE), ("grasp", SIGNATURE)}, 2)
     assert reads == []
@@ -148,7 +148,7 @@ def test_what_is_known_is_read_when_it_is_asked_for(box: Toolbox, reads: list[st
     assert known["insert", SIGNATURE] is known["insert", SIGNATURE]
     assert len(reads) == 1
     assert known.get(("insert", "f" * 16)) is None
-    own = make(9.0)
+    own = make_policy(9.0)
     known["butter", SIGNATURE] = known["insert", SIGNATURE] = own
     assert (len(known), known["insert", SIGNATURE] is own) == (3, True)
     del known["butter", SIGNATURE]

@@ -5,7 +5,7 @@ import json
 import os
 import struct
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -20,35 +20,8 @@ from lab.toolbox.names import FORMAT
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
 
-SIGNATURE = "0123456789abcdef"
-
-
-def policy(**changed: Any) -> Policy:
-    base = Policy(
-        name="insert",
-        subtask="insert",
-        task="toast",
-        q=np.arange(8.0).reshape(4, 2),
-        visits=np.arange(8, dtype=np.int64).reshape(4, 2),
-        action_labels=("left", "right"),
-        shape=(4,),
-        start=0,
-        signature=SIGNATURE,
-        learner={"learner": "q", "alpha": 0.95},
-        gate={"gate": "ccrl"},
-        advisor="expert",
-        seed=0,
-        curve=[21, 3],
-        guided=[False, True],
-        helped_steps=3,
-        requests=1,
-        optimal_steps=3,
-        final_steps=3,
-        solved=True,
-        created="2024-05-01T12:00:00+00:00",
-        versions={"numpy": "2.0"},
-    )
-    return replace(base, **changed)
+MakePolicy = Callable[..., Policy]
+SIGNATURE = "0123456789abcdef"  # of the policies of `make_policy`
 
 
 @pytest.fixture
@@ -61,8 +34,8 @@ def assert_same(one: Policy, other: Policy) -> None:
         np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
 
 
-def test_what_is_saved_is_loaded(toolbox: Toolbox) -> None:
-    for saved in (policy(), policy(name="Butter: side/2 ü", shape=(), final_steps=None, solved=False)):
+def test_what_is_saved_is_loaded(make_policy: MakePolicy, toolbox: Toolbox) -> None:
+    for saved in (make_policy(), make_policy(name="Butter: side/2 ü", shape=(), final_steps=None, solved=False)):
         path = toolbox.save(saved)
         loaded = toolbox.load(path)
         assert_same(loaded, saved)
@@ -72,20 +45,20 @@ def test_what_is_saved_is_loaded(toolbox: Toolbox) -> None:
     assert len(list(toolbox.folder.glob("*.safetensors"))) == 2
 
 
-def test_saving_again_replaces(toolbox: Toolbox) -> None:
-    assert toolbox.save(policy()) == toolbox.save(policy(q=np.ones((4, 2))))
+def test_saving_again_replaces(make_policy: MakePolicy, toolbox: Toolbox) -> None:
+    assert toolbox.save(make_policy()) == toolbox.save(make_policy(q=np.ones((4, 2))))
     found = toolbox.find("insert", SIGNATURE)
     assert found is not None
     assert found.q.tolist() == [[1.0, 1.0]] * 4
 
 
-def test_find_takes_what_fits_solved_first_then_the_newest(toolbox: Toolbox) -> None:
+def test_find_takes_what_fits_solved_first_then_the_newest(make_policy: MakePolicy, toolbox: Toolbox) -> None:
     assert toolbox.find("insert", SIGNATURE) is None
-    toolbox.save(policy(name="old", created="2024-01-01T00:00:00+00:00"))
-    toolbox.save(policy(name="new", created="2024-06-01T00:00:00+00:00"))
-    toolbox.save(policy(name="newest", created="2024-07-01T00:00:00+00:00", solved=False))
-    toolbox.save(policy(name="elsewhere", signature="f" * 16))
-    toolbox.save(policy(name="other", subtask="grasp"))
+    toolbox.save(make_policy(name="old", created="2024-01-01T00:00:00+00:00"))
+    toolbox.save(make_policy(name="new", created="2024-06-01T00:00:00+00:00"))
+    toolbox.save(make_policy(name="newest", created="2024-07-01T00:00:00+00:00", solved=False))
+    toolbox.save(make_policy(name="elsewhere", signature="f" * 16))
+    toolbox.save(make_policy(name="other", subtask="grasp"))
     found = [
         toolbox.find("insert", SIGNATURE),
         toolbox.find("insert", SIGNATURE, "old"),
@@ -94,10 +67,10 @@ def test_find_takes_what_fits_solved_first_then_the_newest(toolbox: Toolbox) -> 
     assert [one and one.name for one in found] == ["new", "old", None]
 
 
-def test_list_show_and_remove(toolbox: Toolbox) -> None:
+def test_list_show_and_remove(make_policy: MakePolicy, toolbox: Toolbox) -> None:
     assert toolbox.list() == []
-    toolbox.save(policy(name="Second one"))
-    path = toolbox.save(policy())
+    toolbox.save(make_policy(name="Second one"))
+    path = toolbox.save(make_policy())
     listed = {one["name"]: one for one in toolbox.list()}
     assert set(listed) == {"insert", "Second one"}
     assert listed["insert"] | {"states": 4, "actions": 2, "episodes": 2, "file": str(path)} == listed["insert"]
@@ -136,10 +109,9 @@ def with_tensor(name: str, **changed: Any) -> Callable[[bytes], bytes]:
 
 def resaved(**changed: Any) -> Callable[[bytes], bytes]:
     def save(content: bytes) -> bytes:
-        from safetensors.numpy import save
+        from safetensors.numpy import load, save
 
-        tensors = {"q": policy().q, "visits": policy().visits} | changed
-        return save(tensors, header(content)[0]["__metadata__"])
+        return save(load(content) | changed, header(content)[0]["__metadata__"])
 
     return save
 
@@ -197,25 +169,25 @@ def assert_refused(toolbox: Toolbox, path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_file_is_named_skipped_and_reported(toolbox: Toolbox, damage: str) -> None:
-    toolbox.save(policy(name="sound", created="2023-01-01T00:00:00+00:00"))
-    path = toolbox.save(policy())
+def test_a_damaged_file_is_named_skipped_and_reported(make_policy: MakePolicy, toolbox: Toolbox, damage: str) -> None:
+    toolbox.save(make_policy(name="sound", created="2023-01-01T00:00:00+00:00"))
+    path = toolbox.save(make_policy())
     path.write_bytes(DAMAGES[damage](path.read_bytes()))
     assert_refused(toolbox, path)
     assert toolbox.remove("insert") == path
 
 
-def test_the_undamaged_forgery_loads(toolbox: Toolbox) -> None:
-    path = toolbox.save(policy())
+def test_the_undamaged_forgery_loads(make_policy: MakePolicy, toolbox: Toolbox) -> None:
+    path = toolbox.save(make_policy())
     path.write_bytes(with_field("format", FORMAT)(path.read_bytes()))
-    assert_same(toolbox.load(path), policy())
+    assert_same(toolbox.load(path), make_policy())
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
-def test_any_cut_or_padding_is_refused(toolbox: Toolbox, data: st.DataObject) -> None:
-    toolbox.save(policy(name="sound"))
-    path = toolbox.save(policy(name="insert"))
+def test_any_cut_or_padding_is_refused(make_policy: MakePolicy, toolbox: Toolbox, data: st.DataObject) -> None:
+    toolbox.save(make_policy(name="sound"))
+    path = toolbox.save(make_policy(name="insert"))
     whole = path.read_bytes()
     cut = data.draw(st.integers(0, len(whole) - 1), label="cut")
     padding = data.draw(st.binary(min_size=1, max_size=40), label="padding")
@@ -226,8 +198,10 @@ def test_any_cut_or_padding_is_refused(toolbox: Toolbox, data: st.DataObject) ->
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(at=st.integers(0), value=st.integers(0, 255))
-def test_any_changed_byte_is_refused_or_still_a_sound_policy(toolbox: Toolbox, at: int, value: int) -> None:
-    path = toolbox.save(policy())
+def test_any_changed_byte_is_refused_or_still_a_sound_policy(
+    make_policy: MakePolicy, toolbox: Toolbox, at: int, value: int
+) -> None:
+    path = toolbox.save(make_policy())
     content = bytearray(path.read_bytes())
     content[at % len(content)] = value
     path.write_bytes(content)
@@ -240,8 +214,8 @@ def test_any_changed_byte_is_refused_or_still_a_sound_policy(toolbox: Toolbox, a
         assert loaded.q.shape == (4, 2)
 
 
-def test_things_that_are_no_files(toolbox: Toolbox, tmp_path: Path) -> None:
-    toolbox.save(policy(name="sound"))
+def test_things_that_are_no_files(make_policy: MakePolicy, toolbox: Toolbox, tmp_path: Path) -> None:
+    toolbox.save(make_policy(name="sound"))
     folder = toolbox.folder / "folder.safetensors"
     folder.mkdir()
     assert_refused(toolbox, folder)
@@ -252,13 +226,15 @@ def test_things_that_are_no_files(toolbox: Toolbox, tmp_path: Path) -> None:
         toolbox.load(tmp_path / "missing.safetensors")
 
 
-def test_a_folder_may_be_named_in_any_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_may_be_named_in_any_way(
+    make_policy: MakePolicy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
-    other = Toolbox(tmp_path / "other").save(policy(name="other"))
+    other = Toolbox(tmp_path / "other").save(make_policy(name="other"))
     for where in (".", "box", tmp_path / "box", f"file://{tmp_path}/box", "./box/"):
         box = Toolbox(where)
-        assert_same(box.load(box.save(policy())), policy())
-        assert_same(box.load(box.list()[0]["file"]), policy())
+        assert_same(box.load(box.save(make_policy())), make_policy())
+        assert_same(box.load(box.list()[0]["file"]), make_policy())
         assert box.load(other).name == "other"
         assert box.where(box.remove("insert")) == str(box.folder / "insert.safetensors")
 
@@ -266,30 +242,30 @@ def test_a_folder_may_be_named_in_any_way(tmp_path: Path, monkeypatch: pytest.Mo
 @pytest.mark.parametrize("fault", [KeyboardInterrupt(), OSError(errno.ENOSPC, "No space left on device")])
 @pytest.mark.parametrize("where", ["fsync", "replace"])
 def test_an_interrupted_write_leaves_the_old_file_and_no_other(
-    toolbox: Toolbox, monkeypatch: pytest.MonkeyPatch, where: str, fault: BaseException
+    make_policy: MakePolicy, toolbox: Toolbox, monkeypatch: pytest.MonkeyPatch, where: str, fault: BaseException
 ) -> None:
     def fail(*args: object) -> None:
         raise fault
 
-    path = toolbox.save(policy())
+    path = toolbox.save(make_policy())
     toolbox.save_record("transfer", "a b", {"duration_s": 2.0})
     before = {file: file.read_bytes() for file in toolbox.folder.rglob("*") if file.is_file()}
     assert path in before
     with monkeypatch.context() as patch:
         patch.setattr(os, where, fail)
         with pytest.raises((KeyboardInterrupt, WorkFailed)):
-            toolbox.save(policy(solved=False))
+            toolbox.save(make_policy(solved=False))
         with pytest.raises((KeyboardInterrupt, WorkFailed)):
             toolbox.save_record("transfer", "a b", {"duration_s": 3.0})
     assert {file: file.read_bytes() for file in toolbox.folder.rglob("*") if file.is_file()} == before
 
 
-def test_a_folder_that_is_a_file(tmp_path: Path) -> None:
+def test_a_folder_that_is_a_file(make_policy: MakePolicy, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
     for folder in (tmp_path / "file", tmp_path / "file" / "below"):
         toolbox = Toolbox(folder)
         with pytest.raises(BadInput, match="cannot write"):
-            toolbox.save(policy())
+            toolbox.save(make_policy())
         with pytest.raises(BadInput, match="cannot write"):
             toolbox.save_record("kind", "key", {})
     blocked = Toolbox(tmp_path / "file")
@@ -300,16 +276,16 @@ def test_a_folder_that_is_a_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("number", [errno.EACCES, errno.EROFS])
 def test_a_folder_that_may_not_be_read_or_written(
-    toolbox: Toolbox, monkeypatch: pytest.MonkeyPatch, number: int
+    make_policy: MakePolicy, toolbox: Toolbox, monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:
     def refuse(*args: object, **named: object) -> None:
         raise OSError(number, os.strerror(number))
 
-    toolbox.save(policy())
+    toolbox.save(make_policy())
     with monkeypatch.context() as patch:
         patch.setattr(files, "write_whole", refuse)
         with pytest.raises(BadInput, match=f"cannot write .*: {os.strerror(number)}"):
-            toolbox.save(policy(solved=False))
+            toolbox.save(make_policy(solved=False))
     monkeypatch.setattr(os, "scandir", refuse)
     for read in (toolbox.list, toolbox.verify, lambda: toolbox.find("insert", SIGNATURE)):
         with pytest.raises(BadInput, match=f"cannot read .*: {os.strerror(number)}"):

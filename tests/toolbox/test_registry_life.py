@@ -37,7 +37,7 @@ class Name:
 
 
 class Life(RuleBasedStateMachine):
-    make: MakePolicy
+    make_policy: MakePolicy
 
     def __init__(self) -> None:
         super().__init__()
@@ -52,7 +52,7 @@ class Life(RuleBasedStateMachine):
     @rule(name=NAMES, fill=st.integers(0, 3), solved=st.booleans(), steps=st.integers(3, 5))
     def save(self, name: str, fill: int, solved: bool, steps: int) -> None:
         held = self.names[name]
-        saved = self.box.put(self.make(fill, name=name, solved=solved, final_steps=steps))
+        saved = self.box.put(self.make_policy(fill, name=name, solved=solved, final_steps=steps))
         held.worth[saved.hash] = (solved, -steps)
         if saved.hash not in held.kept:
             held.kept.append(saved.hash)
@@ -127,6 +127,6 @@ class Life(RuleBasedStateMachine):
                     assert (found.solved, -(found.final_steps or 0)) == held.worth[held.in_use]
 
 
-def test_any_order(make: MakePolicy) -> None:
-    Life.make = staticmethod(make)
+def test_any_order(make_policy: MakePolicy) -> None:
+    Life.make_policy = staticmethod(make_policy)
     run_state_machine_as_test(Life, settings=settings(max_examples=25, stateful_step_count=25, deadline=None))

@@ -35,18 +35,18 @@ def address(request: pytest.FixtureRequest) -> str:
     return found
 
 
-def test_all_goes_as_in_a_folder(address: str, make: MakePolicy) -> None:
+def test_all_goes_as_in_a_folder(address: str, make_policy: MakePolicy) -> None:
     box = Toolbox(address)
     box.check()
     assert (box.list(), box.verify(), box.find("insert", SIGNATURE)) == ([], [], None)
-    first = box.put(make(1.0, final_steps=5))
-    beside = box.put(make(2.0, final_steps=7))
+    first = box.put(make_policy(1.0, final_steps=5))
+    beside = box.put(make_policy(2.0, final_steps=7))
     assert (first.in_use, beside.in_use, beside.version) == (True, False, 2)
     assert beside.why_not == "the one in use takes 5 steps, it takes 7 steps"
     (row,) = Toolbox(address).list()
     assert (row["file"], row["version"], row["hash"]) == (f"{address}/insert.safetensors", 1, first.hash)
     assert box.load(row["file"]).q[0, 0] == 1.0
-    assert box.load(box.save(make(3.0, name="Other one"))).q[0, 0] == 3.0
+    assert box.load(box.save(make_policy(3.0, name="Other one"))).q[0, 0] == 3.0
     box.promote("insert", "2")
     found = Toolbox(address).find("insert", SIGNATURE, "insert")
     assert found is not None
@@ -64,9 +64,9 @@ def test_all_goes_as_in_a_folder(address: str, make: MakePolicy) -> None:
 
 
 def test_what_was_read_once_is_not_read_again(
-    address: str, make: MakePolicy, own_cache: Path, monkeypatch: pytest.MonkeyPatch
+    address: str, make_policy: MakePolicy, own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    Toolbox(address).save(make(1.0))
+    Toolbox(address).save(make_policy(1.0))
     rmtree(own_cache)  # it may be deleted at any time
     reads: list[str] = []
     plain = remote_place.RemotePlace._call
@@ -85,12 +85,12 @@ def test_what_was_read_once_is_not_read_again(
     cached.write_bytes(cached.read_bytes()[:-8])  # a damaged cache is read past
     assert Toolbox(address).load(f"{address}/insert.safetensors").q[0, 0] == 1.0
     assert len(reads) == 2
-    Toolbox(address).save(make(2.0))
+    Toolbox(address).save(make_policy(2.0))
     assert Toolbox(address).load(f"{address}/insert.safetensors").q[0, 0] == 2.0
 
 
 def test_of_two_that_write_at_once_the_better_one_is_in_use(
-    memory: str, make: MakePolicy, monkeypatch: pytest.MonkeyPatch
+    memory: str, make_policy: MakePolicy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The other one saves between this one's decision and its writing."""
     box, other = Toolbox(memory), Toolbox(memory)
@@ -99,11 +99,11 @@ def test_of_two_that_write_at_once_the_better_one_is_in_use(
     def late(self: Any, name: str, content: bytes, drafts: str = "") -> None:
         if name == "insert.safetensors" and self is box.place:
             monkeypatch.setattr(remote_place.RemotePlace, "write", plain)
-            other.save(make(2.0, final_steps=3))
+            other.save(make_policy(2.0, final_steps=3))
         plain(self, name, content, drafts)
 
     monkeypatch.setattr(remote_place.RemotePlace, "write", late)
-    box.save(make(1.0, final_steps=9))
+    box.save(make_policy(1.0, final_steps=9))
     found = Toolbox(memory).find("insert", SIGNATURE)
     assert found is not None
     assert found.final_steps == 3
@@ -117,18 +117,18 @@ def test_a_session_is_kept_in_a_local_folder_that_is_no_cache(address: str, own_
     assert Toolbox(f"{address}/other").folder != box.folder
 
 
-def test_the_root_of_a_place_will_do(memory: str, make: MakePolicy) -> None:
+def test_the_root_of_a_place_will_do(memory: str, make_policy: MakePolicy) -> None:
     box = Toolbox("memory://")
-    names = {box.load(box.save(make(1.0, name=f"skill-{number}"))).name for number in range(50)}
+    names = {box.load(box.save(make_policy(1.0, name=f"skill-{number}"))).name for number in range(50)}
     rows = Toolbox("memory://").list()
     assert {row["name"]: row["version"] for row in rows} == dict.fromkeys(names, 1)
     assert rows[0]["file"] == "memory://skill-0.safetensors"
 
 
-def test_many_are_read_at_once(address: str, make: MakePolicy, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_are_read_at_once(address: str, make_policy: MakePolicy, monkeypatch: pytest.MonkeyPatch) -> None:
     box, names = Toolbox(address), {f"skill-{number:02}" for number in range(50)}
     for name in names:
-        box.save(make(1.0, name=name))
+        box.save(make_policy(1.0, name=name))
     box.place.write("skill-07.safetensors", b"cut off")
     rmtree(box.place.cache)
     calls: list[str] = []
@@ -152,15 +152,15 @@ def one_line(error: pytest.ExceptionInfo[Exception]) -> str:
     return str(error.value)
 
 
-def test_a_bucket_that_is_not_there(bucket: str, make: MakePolicy) -> None:
+def test_a_bucket_that_is_not_there(bucket: str, make_policy: MakePolicy) -> None:
     with pytest.raises(BadInput) as error:
         Toolbox("s3://nowhere/box").check()
     assert one_line(error) == "toolbox s3://nowhere/box: there is no bucket 'nowhere'"
     with pytest.raises(WorkFailed, match=r"toolbox s3://nowhere/box: .* cannot be written"):
-        Toolbox("s3://nowhere/box").save(make())
+        Toolbox("s3://nowhere/box").save(make_policy())
 
 
-def test_who_cannot_be_reached_is_named(bucket: str, make: MakePolicy, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_cannot_be_reached_is_named(bucket: str, make_policy: MakePolicy, monkeypatch: pytest.MonkeyPatch) -> None:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -174,7 +174,7 @@ def test_who_cannot_be_reached_is_named(bucket: str, make: MakePolicy, monkeypat
         assert str(port) in one_line(error)
     assert time.monotonic() - began < remote_place.LIMIT_S
     with pytest.raises(WorkFailed, match="it is kept in ") as error:
-        box.save(make(4.0))
+        box.save(make_policy(4.0))
     kept = Path(one_line(error).partition("it is kept in ")[2])
     assert box.load(kept).q[0, 0] == 4.0
 
@@ -202,8 +202,8 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         Toolbox("s3://lab/box")
 
 
-def test_names_stay_in_the_place(memory: str, make: MakePolicy) -> None:
+def test_names_stay_in_the_place(memory: str, make_policy: MakePolicy) -> None:
     box = Toolbox(memory)
-    box.save(replace(make(), name="../../out"))
+    box.save(replace(make_policy(), name="../../out"))
     with pytest.raises(BadInput, match="it leads out of the toolbox"):
         box.load(f"{memory}/../out.safetensors")

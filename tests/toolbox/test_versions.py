@@ -49,64 +49,64 @@ def in_use(box: Toolbox, name: str = "insert") -> float:
     ],
 )
 def test_what_does_worse(
-    make: MakePolicy,
+    make_policy: MakePolicy,
     new: dict[str, object],
     old: dict[str, object],
     percents: tuple[float | None, float | None],
     why: str,
 ) -> None:
-    assert does_worse(make(**new), make(**old), *percents) == why
+    assert does_worse(make_policy(**new), make_policy(**old), *percents) == why
 
 
-def test_what_does_worse_is_kept_beside_and_said(box: Toolbox, make: MakePolicy) -> None:
-    first = box.put(make(1.0, final_steps=5))
-    worse = box.put(make(2.0, final_steps=7))
+def test_what_does_worse_is_kept_beside_and_said(box: Toolbox, make_policy: MakePolicy) -> None:
+    first = box.put(make_policy(1.0, final_steps=5))
+    worse = box.put(make_policy(2.0, final_steps=7))
     assert (first.file, first.version, first.in_use) == ("insert.safetensors", 1, True)
     assert (worse.file, worse.version, worse.in_use) == (f"versions/insert/0002-{worse.hash}.safetensors", 2, False)
     assert worse.why_not == "the one in use takes 5 steps, it takes 7 steps"
     assert (
-        box.save(make(3.0, final_steps=7))
-        == box.folder / f"versions/insert/0003-{hash_of(encode(make(3.0, final_steps=7)))}.safetensors"
+        box.save(make_policy(3.0, final_steps=7))
+        == box.folder / f"versions/insert/0003-{hash_of(encode(make_policy(3.0, final_steps=7)))}.safetensors"
     )
     assert in_use(box) == 1.0
-    better = box.put(make(4.0, final_steps=4))
+    better = box.put(make_policy(4.0, final_steps=4))
     assert (better.in_use, in_use(box)) == (True, 4.0)
     told = [(event["what"], event["version"], event["in_use"]) for event in box.log("insert")]
     assert told == [("learned", 1, True), ("learned", 2, False), ("learned", 3, False), ("learned", 4, True)]
     assert box.log("insert")[1]["why_not"] == worse.why_not
 
 
-def test_what_was_evaluated_is_compared_by_that(box: Toolbox, make: MakePolicy) -> None:
-    shaky, steady = box.put(make(1.0, final_steps=3)), box.put(make(2.0, final_steps=9))
+def test_what_was_evaluated_is_compared_by_that(box: Toolbox, make_policy: MakePolicy) -> None:
+    shaky, steady = box.put(make_policy(1.0, final_steps=3)), box.put(make_policy(2.0, final_steps=9))
     box.note("insert", "evaluated", hash=shaky.hash, success_percent=40)
     box.note("insert", "evaluated", hash=steady.hash, success_percent=100)
     assert in_use(box) == 1.0
-    assert box.put(make(2.0, final_steps=9)).in_use
-    assert (in_use(box), box.put(make(1.0, final_steps=3)).why_not) == (
+    assert box.put(make_policy(2.0, final_steps=9)).in_use
+    assert (in_use(box), box.put(make_policy(1.0, final_steps=3)).why_not) == (
         2.0,
         "the one in use succeeds in 100 %, it in 40 %",
     )
 
 
-def test_the_same_is_not_kept_twice(box: Toolbox, make: MakePolicy) -> None:
+def test_the_same_is_not_kept_twice(box: Toolbox, make_policy: MakePolicy) -> None:
     for _ in range(3):
-        assert box.put(make(1.0)).version == 1
+        assert box.put(make_policy(1.0)).version == 1
     assert len(box.log("insert")) == 1
     assert [row["version"] for row in box.show("insert")["kept_versions"]] == [1]
 
 
-def test_how_it_was_learned_is_told(box: Toolbox, make: MakePolicy) -> None:
-    box.save(make(1.0, curve=[9, 5], guided=[False, True]))
-    box.save(make(2.0, curve=[9, 5, 4], guided=[False, True, True]))
-    box.save(make(3.0, curve=[8], guided=[True]))
-    box.save(make(4.0, parent="grasp@0123456789ab", scene="toast, cubes A moved"))
+def test_how_it_was_learned_is_told(box: Toolbox, make_policy: MakePolicy) -> None:
+    box.save(make_policy(1.0, curve=[9, 5], guided=[False, True]))
+    box.save(make_policy(2.0, curve=[9, 5, 4], guided=[False, True, True]))
+    box.save(make_policy(3.0, curve=[8], guided=[True]))
+    box.save(make_policy(4.0, parent="grasp@0123456789ab", scene="toast, cubes A moved"))
     told = [(event["what"], event.get("parent"), event.get("scene")) for event in box.log("insert")]
     warm = ("warm-started", "grasp@0123456789ab", "toast, cubes A moved")
     assert told == [("learned", None, None), ("continued", None, None), ("learned", None, None), warm]
 
 
-def test_promote_and_rollback(box: Toolbox, make: MakePolicy) -> None:
-    saved = [box.put(make(number, final_steps=10 - number)) for number in range(3)]
+def test_promote_and_rollback(box: Toolbox, make_policy: MakePolicy) -> None:
+    saved = [box.put(make_policy(number, final_steps=10 - number)) for number in range(3)]
     with pytest.raises(BadInput, match=r"no version '9'; there are: 1 \("):
         box.promote("insert", "9")
     with pytest.raises(BadInput, match="no version ''"):
@@ -125,57 +125,57 @@ def test_promote_and_rollback(box: Toolbox, make: MakePolicy) -> None:
     }
 
 
-def test_a_damaged_version_is_never_put_in_use(box: Toolbox, make: MakePolicy) -> None:
-    first = box.put(make(1.0))
-    box.save(make(2.0))
+def test_a_damaged_version_is_never_put_in_use(box: Toolbox, make_policy: MakePolicy) -> None:
+    first = box.put(make_policy(1.0))
+    box.save(make_policy(2.0))
     path = box.folder / f"versions/insert/0001-{first.hash}.safetensors"
     whole = path.read_bytes()
-    path.write_bytes(encode(make(5.0)))  # sound, but another one
+    path.write_bytes(encode(make_policy(5.0)))  # sound, but another one
     uses: tuple[Callable[[], object], ...] = (lambda: box.promote("insert", "1"), lambda: box.rollback("insert"))
     for use in uses:
         with pytest.raises(BadInput, match=r"0001-.*its hash is .*: damaged"):
             use()
     assert in_use(box) == 2.0
     assert [(where, ok) for where, ok, _ in box.verify()] == [(box.folder / "insert.safetensors", True), (path, False)]
-    box.save(make(1.0))  # learned again, it is whole again
+    box.save(make_policy(1.0))  # learned again, it is whole again
     assert path.read_bytes() == whole
     assert all(ok for _, ok, _ in box.verify())
 
 
 def test_other_bytes_of_the_same_hash_are_refused(
-    box: Toolbox, make: MakePolicy, monkeypatch: pytest.MonkeyPatch
+    box: Toolbox, make_policy: MakePolicy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("lab.toolbox.versions.hash_of", lambda content: "0" * 12)
-    box.save(make(1.0))
+    box.save(make_policy(1.0))
     with pytest.raises(WorkFailed, match="it has the same hash and other bytes"):
-        box.save(make(2.0))
+        box.save(make_policy(2.0))
     assert in_use(box) == 1.0
 
 
-def test_a_toolbox_from_before_versions_goes_on(box: Toolbox, make: MakePolicy) -> None:
+def test_a_toolbox_from_before_versions_goes_on(box: Toolbox, make_policy: MakePolicy) -> None:
     box.folder.mkdir()
-    (box.folder / "insert.safetensors").write_bytes(encode(make(1.0)))
+    (box.folder / "insert.safetensors").write_bytes(encode(make_policy(1.0)))
     (row,) = box.list()
-    assert (row["version"], row["hash"]) == (1, hash_of(encode(make(1.0))))
+    assert (row["version"], row["hash"]) == (1, hash_of(encode(make_policy(1.0))))
     assert [ok for _, ok, _ in box.verify()] == [True]
     assert (box.show("insert")["kept_versions"], box.log("insert")) == ([], [])
-    box.save(make(2.0))
+    box.save(make_policy(2.0))
     assert [(event["what"], event["version"]) for event in box.log("insert")] == [("found", 1), ("learned", 2)]
     assert (box.rollback("insert").number, in_use(box)) == (1, 1.0)
 
 
-def test_a_damaged_one_in_use_is_replaced_and_its_versions_stay(box: Toolbox, make: MakePolicy) -> None:
-    path = box.save(make(1.0, final_steps=3))
+def test_a_damaged_one_in_use_is_replaced_and_its_versions_stay(box: Toolbox, make_policy: MakePolicy) -> None:
+    path = box.save(make_policy(1.0, final_steps=3))
     path.write_bytes(path.read_bytes()[:-1])
-    assert box.put(make(2.0, final_steps=9)).in_use
+    assert box.put(make_policy(2.0, final_steps=9)).in_use
     assert box.promote("insert", "1").number == 1
     assert in_use(box) == 1.0
 
 
 def test_one_that_may_not_be_read_is_not_replaced(
-    box: Toolbox, make: MakePolicy, monkeypatch: pytest.MonkeyPatch
+    box: Toolbox, make_policy: MakePolicy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    box.save(make(1.0))
+    box.save(make_policy(1.0))
     plain = Path.read_bytes
 
     def refuse(path: Path) -> bytes:
@@ -186,29 +186,29 @@ def test_one_that_may_not_be_read_is_not_replaced(
     with monkeypatch.context() as patch:
         patch.setattr(Path, "read_bytes", refuse)
         with pytest.raises(BadInput, match=r"policy file .*insert.safetensors: Input/output error"):
-            box.save(make(2.0, final_steps=9))
+            box.save(make_policy(2.0, final_steps=9))
     assert in_use(box) == 1.0
 
 
-def test_a_file_that_is_none_of_its_versions_is_reported(box: Toolbox, make: MakePolicy) -> None:
-    path = box.save(make(1.0))
-    path.write_bytes(encode(make(2.0)))
+def test_a_file_that_is_none_of_its_versions_is_reported(box: Toolbox, make_policy: MakePolicy) -> None:
+    path = box.save(make_policy(1.0))
+    path.write_bytes(encode(make_policy(2.0)))
     assert box.verify() == [(path, False, f"policy file {path}: it is none of the kept versions: it was changed")]
-    box.save(make(3.0))
+    box.save(make_policy(3.0))
     assert [version.number for version in box.versions("insert").kept().values()] == [1, 2, 3]
     assert all(ok for _, ok, _ in box.verify())
 
 
-def test_remove_and_restore(box: Toolbox, make: MakePolicy) -> None:
+def test_remove_and_restore(box: Toolbox, make_policy: MakePolicy) -> None:
     with pytest.raises(BadInput, match=r"unknown removed policy 'insert' \(toolbox .*known: none"):
         box.restore("insert")
-    path = box.save(make(1.0))
+    path = box.save(make_policy(1.0))
     assert box.remove("insert") == path
     assert not path.exists()
     assert [event["what"] for event in box.log("insert")] == ["learned", "removed"]
     assert (box.restore("insert"), in_use(box)) == (path, 1.0)
     box.remove("insert")
-    box.save(make(2.0))
+    box.save(make_policy(2.0))
     with pytest.raises(BadInput, match=r"one is in use; promote chooses among its versions"):
         box.restore("insert")
     box.remove("insert")
@@ -217,8 +217,8 @@ def test_remove_and_restore(box: Toolbox, make: MakePolicy) -> None:
         box.restore("../insert")
 
 
-def test_notes(box: Toolbox, make: MakePolicy) -> None:
-    saved = box.put(make(1.0))
+def test_notes(box: Toolbox, make_policy: MakePolicy) -> None:
+    saved = box.put(make_policy(1.0))
     box.note("insert", "used", run="toast", succeeded=True)
     note = box.log("insert")[-1]
     assert {**note, "time": ""} == {
@@ -237,10 +237,10 @@ def test_notes(box: Toolbox, make: MakePolicy) -> None:
     assert [(where, reason) for where, ok, reason in box.verify() if not ok] == [(log, f"log {log}: damaged lines: 1")]
 
 
-def test_lineage(box: Toolbox, make: MakePolicy) -> None:
-    first = box.put(make(1.0, name="Old one", scene="toast", parent="lost@aaaabbbbcccc"))
-    second = box.put(make(2.0, name="second", scene="moved", parent=f"Old one@{first.hash}"))
-    box.put(make(3.0, name="third", parent=f"second@{second.hash}"))
+def test_lineage(box: Toolbox, make_policy: MakePolicy) -> None:
+    first = box.put(make_policy(1.0, name="Old one", scene="toast", parent="lost@aaaabbbbcccc"))
+    second = box.put(make_policy(2.0, name="second", scene="moved", parent=f"Old one@{first.hash}"))
+    box.put(make_policy(3.0, name="third", parent=f"second@{second.hash}"))
     assert box.show("third")["lineage"] == [
         {"name": "second", "hash": second.hash, "scene": "moved", "kept": True},
         {"name": "Old one", "hash": first.hash, "scene": "toast", "kept": True},

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from lab.production.recorder import Recorder
-from lab.sim.kinematics import ToolPose
-from lab.sim.scene import Scene
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.scene.scene import Scene
 from lab.sim.world import World
 from lab.skills.prepared_scene import lay_out
 from lab.tasks import task_file as taskfile

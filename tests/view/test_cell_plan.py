@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.sim.ground_plan import (
+from lab.sim.scene.ground_plan import (
     Approach,
     Block,
     BlockedCells,

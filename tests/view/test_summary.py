@@ -11,6 +11,7 @@ from lab.view.summary import (
     lesson_summary,
     run_summary,
     sequence_summary,
+    study_summary,
     table_of,
 )
 
@@ -294,3 +295,14 @@ def test_a_grid_is_seen_from_above() -> None:
         "S  █  ·",
         "start (0, 0), goal (2, 1), 1 cell with obstacles, 3 markers",
     ]
+
+
+def test_a_study_shows_the_settings_that_vary_in_the_rows_shown() -> None:
+    """Thirty rows have a place, those after them an order, too."""
+    measured = {"measure": "saved_percent", "ci95": None, "thesis": None, "within": None, "seed": 0}
+    rows = [{"place": n, "value": 0.5 * n} | measured for n in range(30)]
+    rows += [{"place": n, "order": n, "value": 1.0} | measured for n in range(2)]
+    lines = shown(study_summary({"rows": rows, "summary": {"answer": "yes"}, "files": {}, "notes": ["why"]}))
+    assert lines[0].split() == ["place", "measure", "value", "95", "%", "printed", "inside"]
+    assert lines[3].split() == ["2", "saved_percent", "1"]
+    assert lines[31:] == ["... and 2 more rows", "", "answer: yes", "", "why"]

@@ -1,5 +1,6 @@
 """Maps of what a policy has learned: on rows and boards that a reader can draw by hand."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,40 +14,28 @@ from lab.view.canvas import ORANGE, RED
 from lab.view.grid_planes import Planes
 from lab.view.value_levels import Learned, can_be_drawn, value_levels
 
+MakePolicy = Callable[..., Policy]
 SPACE = ("left", "right", "backward", "forward", "down", "up")
 
 
-def policy(shape: tuple[int, ...], labels: tuple[str, ...] = SPACE, ends: Any = None, **changed: Any) -> Policy:
-    """A policy of a grid whose goal is its last cell, and which has seen every cell."""
-    states = int(np.prod(shape)) if shape else 6
-    closed = np.full(states, ON, np.uint8)
-    closed[-1] = GOAL
-    fields: dict[str, Any] = {
-        "name": "made",
-        "subtask": "made",
-        "task": "made",
-        "q": np.arange(float(states * len(labels))).reshape(states, -1),
-        "visits": np.ones((states, len(labels)), np.int64),
-        "action_labels": labels,
-        "shape": shape,
-        "start": 0,
-        "signature": "0" * 16,
-        "learner": {},
-        "gate": {},
-        "advisor": "none",
-        "seed": 0,
-        "curve": [],
-        "guided": [],
-        "helped_steps": 0,
-        "requests": 0,
-        "optimal_steps": None,
-        "final_steps": None,
-        "solved": False,
-        "created": "2026-05-01T12:00:00+00:00",
-        "versions": {},
-        "ends": closed if ends is None else ends,
-    }
-    return Policy(**(fields | changed))
+@pytest.fixture(scope="session")
+def policy(make_policy: MakePolicy) -> MakePolicy:
+    """Makes a policy of a grid whose goal is its last cell, and which has seen every cell."""
+
+    def made(shape: tuple[int, ...], labels: tuple[str, ...] = SPACE, ends: Any = None, **changed: Any) -> Policy:
+        states = int(np.prod(shape)) if shape else 6
+        closed = np.full(states, ON, np.uint8)
+        closed[-1] = GOAL
+        fields: dict[str, Any] = {
+            "q": np.arange(float(states * len(labels))).reshape(states, -1),
+            "visits": np.ones((states, len(labels)), np.int64),
+            "action_labels": labels,
+            "shape": shape,
+            "ends": closed if ends is None else ends,
+        }
+        return make_policy(**(fields | changed))
+
+    return made
 
 
 def colours(path: Path) -> set[str]:
@@ -62,7 +51,7 @@ def colours(path: Path) -> set[str]:
     [((5,), ("left", "right")), ((3, 4), ("up", "down", "left", "right")), ((3, 2, 7), SPACE), ((2, 2, 2, 3), SPACE)],
 )
 def test_grids_of_any_dimension_are_drawn_alike_each_time(
-    tmp_path: Path, shape: tuple[int, ...], labels: tuple[str, ...]
+    policy: MakePolicy, tmp_path: Path, shape: tuple[int, ...], labels: tuple[str, ...]
 ) -> None:
     for file in ("one.png", "two.png"):
         value_levels(policy(shape, labels), tmp_path / file)
@@ -70,7 +59,7 @@ def test_grids_of_any_dimension_are_drawn_alike_each_time(
     assert colours(tmp_path / "one.png") >= {ORANGE, RED}
 
 
-def test_another_best_move_and_another_end_are_another_picture(tmp_path: Path) -> None:
+def test_another_best_move_and_another_end_are_another_picture(policy: MakePolicy, tmp_path: Path) -> None:
     shape, drawn = (3, 2, 2), []
     turned = np.full((12, 6), 0.0)
     turned[:, 2] = 71.0
@@ -84,7 +73,7 @@ def test_another_best_move_and_another_end_are_another_picture(tmp_path: Path) -
     assert len(set(drawn)) == 5
 
 
-def test_one_that_nothing_was_learned_of_and_an_older_one_are_drawn(tmp_path: Path) -> None:
+def test_one_that_nothing_was_learned_of_and_an_older_one_are_drawn(policy: MakePolicy, tmp_path: Path) -> None:
     value_levels(policy((3, 4), visits=np.zeros((12, 6), np.int64)), tmp_path / "new.png")
     older = policy((3, 4))
     object.__setattr__(older, "ends", None)
@@ -111,7 +100,7 @@ def test_up_is_out_of_the_plane_where_there_is_forward() -> None:
     assert levels._signs(("left", "down", "right", "up")) == {}
 
 
-def test_what_is_no_grid_is_refused(tmp_path: Path) -> None:
+def test_what_is_no_grid_is_refused(policy: MakePolicy, tmp_path: Path) -> None:
     assert not can_be_drawn(policy(()))
     with pytest.raises(BadInput, match="a grid with up to 10000 cells a level is needed"):
         value_levels(policy(()), tmp_path / "map.png")

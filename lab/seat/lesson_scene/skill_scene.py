@@ -6,11 +6,11 @@ from math import hypot, radians
 import numpy as np
 
 from lab.seat.lesson_scene.episode_trail import STEP_S, Changes, EpisodeTrail
-from lab.sim.blocked_cells import FINGERS_OFF_M
 from lab.sim.frames import Body, Frame, Rgba, Shape, Vector, Viewpoint
-from lab.sim.kinds import Spot
-from lab.sim.places import Layout
-from lab.sim.scene import Scene
+from lab.sim.parts.kinds import Spot
+from lab.sim.scene.blocked_cells import FINGERS_OFF_M
+from lab.sim.scene.places import Layout
+from lab.sim.scene.scene import Scene
 from lab.sim.world import World
 from lab.skills import Skill
 from lab.skills.skill import Bench
@@ -111,14 +111,14 @@ class SkillScene:
         return float(lengths[lengths > 0].min())
 
     def _goal(self) -> tuple[Body, ...]:
-        """A ball where the tool is to go through the cell; at a station the slice says so."""
+        """A ball where the tool is to go through the cell; at a station the part says so."""
         if self._skill.near:
             return ()
         at = self._place(int(np.flatnonzero(self._mdp.goal)[0]))
         return (Body("goal", (Shape("sphere", (0.35 * self._size(),), None, GREEN, at),)),)
 
     def _camera(self) -> Viewpoint:
-        """From the front, of the slice or of the whole cell; a little from the right, so that nothing hides the rest."""
+        """From the front, of the part or of the whole cell; a little from the right, so that nothing hides the rest."""
         free = np.flatnonzero(~self._mdp.terminal | self._mdp.goal)
         places = np.array([self._place(int(state)) for state in free])
         azimuth, elevation = (radians(angle) for angle in self._skill.looks_from)

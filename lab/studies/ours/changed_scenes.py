@@ -8,8 +8,8 @@ from zlib import crc32
 import numpy as np
 
 from lab.errors import BadInput
-from lab.sim.places import Layout
-from lab.sim.scene import in_grid
+from lab.sim.scene.places import Layout
+from lab.sim.scene.scene import in_grid
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Obstacle

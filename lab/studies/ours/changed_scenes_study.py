@@ -93,9 +93,9 @@ def learned_here() -> tuple[Prepared, Known, Known]:
     task = load(TASK)
     prepared = prepare(task, task.order(TOASTS), 0)
     problems = distinct(prepared)
-    lessons = taught(prepared, {}, problems)
+    lessons = [one.lesson for one in taught(prepared, {}, problems)]
     anew = {key_of(problem): _from_nothing(prepared, problem) for problem in problems}
-    return prepared, {(one.policy.subtask, one.policy.signature): one.policy for one, _ in lessons}, anew
+    return prepared, {(one.policy.subtask, one.policy.signature): one.policy for one in lessons}, anew
 
 
 def tried(scene: Scene) -> Outcome:
@@ -105,19 +105,19 @@ def tried(scene: Scene) -> Outcome:
     problems = distinct(prepared)
     here = taught(prepared, known, problems)
     anew = [learned.get(key_of(problem)) or _from_nothing(prepared, problem) for problem in problems]
-    ways = [_way(lesson) for lesson, _ in here]
+    ways = [_way(one.lesson) for one in here]
     tallies = {}
     for way in WAYS:
         own = [n for n, one in enumerate(ways) if one == way]
-        costs = [spent(here[n][0]) for n in own]
+        costs = [spent(here[n].lesson) for n in own]
         tallies[way] = Tally(
             len(own),
             sum(episodes for episodes, _ in costs),
             sum(helped for _, helped in costs),
-            sum(here[n][1] for n in own),
+            sum(here[n].wall_s for n in own),
             (sum(len(anew[n].curve) for n in own), sum(anew[n].helped_steps for n in own)),
         )
-    lessons = [lesson for lesson, _ in here]
+    lessons = [one.lesson for one in here]
     failing = [fails(prepared, problem, lesson.policy) for problem, lesson in zip(problems, lessons, strict=True)]
     return Outcome(
         words,
@@ -141,8 +141,7 @@ def tried(scene: Scene) -> Outcome:
 
 def _from_nothing(prepared: Prepared, problem: Problem) -> Policy:
     """What a problem gives to who knows nothing else."""
-    ((lesson, _),) = taught(prepared, {}, [problem])
-    return lesson.policy
+    return taught(prepared, {}, [problem])[0].lesson.policy
 
 
 def _way(lesson: Lesson) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import WorkFailed
-from lab.sim.part_shape import shape_of
+from lab.sim.parts.part_shape import shape_of
 from lab.sim.urdf_reader import rotation
 from lab.sim.world import World
 from lab.tasks.part_fields import PartFields

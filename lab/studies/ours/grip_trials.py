@@ -10,13 +10,13 @@ import numpy as np
 
 from lab.errors import BadInput, WorkFailed
 from lab.files import write_whole
-from lab.sim.arm_models import arm_of
-from lab.sim.grip import Grip
-from lab.sim.kinds import Spot, kinds_of
-from lab.sim.kinematics import ToolPose
-from lab.sim.part_shape import shape_of
-from lab.sim.places import Layout
-from lab.sim.scene import Scene
+from lab.sim.arms.arm_models import arm_of
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.parts.grip import Grip
+from lab.sim.parts.kinds import Spot, kinds_of
+from lab.sim.parts.part_shape import shape_of
+from lab.sim.scene.places import Layout
+from lab.sim.scene.scene import Scene
 from lab.sim.world import World
 from lab.skills.place import let_go, release_pose
 from lab.skills.skill import NOT_OFF, SETTLE_STEPS, UPRIGHT, Bench

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lab.sim.arm_models import arm_of
-from lab.sim.grip import BESIDE_M
+from lab.sim.arms.arm_models import arm_of
+from lab.sim.parts.grip import BESIDE_M
 from lab.studies.findings import Findings, Row, row, share_row
 from lab.studies.ours.grip_models import FITTED_M, FRICTION, GRASPABLE_M, MASS_KG, MODELS
 from lab.studies.ours.grip_trials import ARM, CARRY_M, HEADINGS, NEAR_M, ROLLED_M, Outcome, Setting, tried

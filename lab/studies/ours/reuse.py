@@ -13,16 +13,15 @@ from lab.learning.problem import Problem
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.studies.findings import Findings, Row, row, those, varying_row
 from lab.studies.ours.reuse_figures import by_place, by_task
-from lab.studies.ours.skills_taught import Known, distinct, fails, spent, taught, works
+from lab.studies.ours.skills_taught import Known, Taught, distinct, fails, spent, taught, works
 from lab.studies.runner import Job
 from lab.tasks.task_file import load
-from lab.teaching.lesson_plan import Lesson
 
 TASKS = ("toast", "two-toasters", "breakfast", "sorting", "fms-arm")
 OTHER_ARM = "toast-panda"  # taught after the first task alone
 SOURCES = ("reused", "adapted", "learned")
 FATES = ("taken", "adapted", "own", "learned")
-COSTS = ("episodes", "helped_steps", "moves", "wall_s")
+COSTS = ("episodes", "helped_steps", "moves", "wall_s", "cpu_s")
 LATER = "later"  # all places of an order but the first
 GROWTH = "more_saved_a_place_percent"
 CARRIED, NOT_CARRIED = 50.0, 10.0  # [%] of its skills: from which on a sub-task carries over, up to which it does not
@@ -40,7 +39,7 @@ COLUMNS = (
     "task. Learned: from nothing. from_earlier: how many skills are taken or adapted from earlier tasks. saved_percent: of "
     "the episodes that the same skills take from nothing. Place 'later': all places but the first. after: the toolbox holds "
     f"that task's skills alone. {GROWTH}: how much more a task saves for each place that it comes later, "
-    "from the second on; a task is only held against itself."
+    "from the second on; a task is only held against itself. wall_s is as the clock has it, cpu_s the processor's share of it."
 )
 CHECKS = (
     "Checks, none of which the verdict has seen: taken_failing_percent: policies of earlier tasks that are used or adapted and "
@@ -71,6 +70,7 @@ class Outcome:
     helped_steps: int
     moves: int
     wall_s: float
+    cpu_s: float
     failing: bool = False
     unsolved: bool = False
 
@@ -133,11 +133,9 @@ def _lived(life: Life) -> tuple[tuple[Place, ...], Known]:
     prepared = _prepared(life.order[-1], life.seed)
     problems = distinct(prepared)
     lessons = taught(prepared, known, problems, life.seed)
-    place = tuple(
-        outcome_of(prepared, problem, lesson, wall_s)
-        for problem, (lesson, wall_s) in zip(problems, lessons, strict=True)
-    )
-    learned = {(one.policy.subtask, one.policy.signature): one.policy for one, _ in lessons}
+    place = tuple(outcome_of(prepared, problem, one) for problem, one in zip(problems, lessons, strict=True))
+    policies = [one.lesson.policy for one in lessons]
+    learned = {(policy.subtask, policy.signature): policy for policy in policies}
     return (*before, place), {**known, **learned}
 
 
@@ -147,18 +145,19 @@ def _prepared(name: str, seed: int) -> Prepared:
     return prepare(task, task.order(), seed)
 
 
-def outcome_of(prepared: Prepared, problem: Problem, lesson: Lesson, wall_s: float) -> Outcome:
+def outcome_of(prepared: Prepared, problem: Problem, one: Taught) -> Outcome:
     """What is counted of a lesson; a policy of an earlier task is tried in physics."""
-    task, (episodes, helped_steps) = prepared.task.name, spent(lesson)
+    lesson, (episodes, helped_steps) = one.lesson, spent(one.lesson)
     found = Outcome(
-        task,
+        prepared.task.name,
         problem.subtask,
         lesson.source if lesson.source in SOURCES else "learned",
         lesson.from_task,
         episodes,
         helped_steps,
         0 if lesson.result is None else int(lesson.result.visits.sum()),
-        wall_s,
+        one.wall_s,
+        one.cpu_s,
         unsolved=not works(problem, lesson.policy),
     )
     return replace(found, failing=found.carried and fails(prepared, problem, lesson.policy))

@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
 from lab.learning.problem import Problem
 from lab.mdp import greedy_path
@@ -19,6 +20,14 @@ Key = tuple[str, str]  # sub-task, signature
 Known = Mapping[Key, Policy]
 
 
+class Taught(NamedTuple):
+    """A lesson, and how long it took: as the clock has it, and on the processor, whatever else that does [s]."""
+
+    lesson: Lesson
+    wall_s: float
+    cpu_s: float
+
+
 def key_of(problem: Problem) -> Key:
     """What a policy of this problem is known by."""
     return problem.subtask, problem.mdp.signature
@@ -29,16 +38,16 @@ def distinct(prepared: Prepared) -> list[Problem]:
     return [*reversed({key_of(problem): problem for problem in reversed(prepared.problems.values())}.values())]
 
 
-def taught(prepared: Prepared, known: Known, problems: Iterable[Problem], seed: int = 0) -> list[tuple[Lesson, float]]:
-    """A lesson of a run for each problem, and how long it took [s]; what one learns the next ones know."""
+def taught(prepared: Prepared, known: Known, problems: Iterable[Problem], seed: int = 0) -> list[Taught]:
+    """A lesson of a run for each problem; what one learns the next ones know."""
     found, so_far = [], KnownPolicies.of(known.values())
     with TemporaryDirectory() as folder:
         teacher = Teacher(Toolbox(Path(folder)), seed=seed, trial=trial_of(prepared))
         for problem in problems:
-            began, how = time.perf_counter(), prepared.task.subtask(problem.subtask)
+            wall, cpu, how = time.perf_counter(), time.process_time(), prepared.task.subtask(problem.subtask)
             lesson = teacher.find_or_teach(LessonPlan(problem, how.learner, how.gate, prepared.task.name), so_far)
             so_far[lesson.policy.subtask, lesson.policy.signature] = lesson.policy
-            found.append((lesson, time.perf_counter() - began))
+            found.append(Taught(lesson, time.perf_counter() - wall, time.process_time() - cpu))
     return found
 
 

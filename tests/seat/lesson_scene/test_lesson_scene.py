@@ -14,9 +14,9 @@ from lab.learning.problem import Problem
 from lab.mdp import FloatArray, TabularMDP, grid
 from lab.seat.lesson_scene import LessonScene, SkillScene, WorldScene, lesson_scene_of
 from lab.seat.lesson_scene.episode_trail import TRAIL
-from lab.sim.arm_models import arm_named
+from lab.sim.arms.arm_models import arm_named
+from lab.sim.arms.kinematics import TOOL, ToolPose
 from lab.sim.frames import Frame, Recording, Viewpoint
-from lab.sim.kinematics import TOOL, ToolPose
 from lab.skills.prepared_scene import prepare
 from lab.skills.skill import Skill
 from lab.tasks.grid_world import GridWorld, random_world

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.sim.arm_models import arm_of
-from lab.sim.grip import Grip
-from lab.sim.kinematics import ToolPose
-from lab.sim.part_shape import shape_of
+from lab.sim.arms.arm_models import arm_of
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.parts.grip import Grip
+from lab.sim.parts.part_shape import shape_of
 from lab.sim.urdf_reader import rotation
 from lab.studies import STUDIES
 from lab.studies.findings import those

@@ -1,0 +1,140 @@
+"""An arm: its URDF, its joints, its gripper, and which joints hold its tool where; those that ship, and any other."""
+
+from dataclasses import dataclass
+from math import pi
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.sim.arms.fingers import Fingers
+from lab.sim.arms.gripper import Gripper
+from lab.sim.arms.kinematics import ToolPose
+
+Array = NDArray[np.float64]
+_WAYS_ROUND = (0, 1, -1, 2, -2, 3, -3, 4, -4)  # half turns of the tool that are tried
+
+
+class Kinematics(Protocol):
+    """How an arm bends between its first joint, which turns it, and its last, which turns its tool; see `NumericKinematics`."""
+
+    @property
+    def home(self) -> Array:
+        """Joints (k,) in which it waits, its tool down."""
+
+    @property
+    def spins(self) -> tuple[float, float]:
+        """1 or -1 of the first and of the last joint: which way the tool turns with them, seen from above."""
+
+    def bent(self, out: Array, up: Array) -> Array:
+        """The joints (n, k) for a tool `out` (n,) [m] ahead of the first axis and `up` (n,) [m], at yaw 0; NaN: none."""
+
+    def tools(self, joints: Array) -> Array:
+        """The tool poses x, y, z [m], yaw [rad] (n, 4) that joints (n, k) hold."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """One arm with its gripper, its foot `base_up_m` [m] above the origin.
+
+    urdf: what physics loads, checked; joints (k,) from the foot to the tool, their ranges lower, upper (k,) [rad] and speed
+    (k,) [rad/s]; tool_link, tip (4, 4): the finger tips' frame in it, x out of the gripper, y across; nearest_m: nearer to
+    its own axis than this the tool would touch the arm.
+    """
+
+    name: str
+    urdf: Path
+    joints: tuple[str, ...]
+    lower: Array
+    upper: Array
+    speed: Array
+    fingers: Fingers
+    tool_link: str
+    tip: Array
+    nearest_m: float
+    base_up_m: float
+    kinematics: Kinematics
+
+    @property
+    def gripper(self) -> Gripper:
+        """What its fingers can take."""
+        return self.fingers.gripper
+
+    @property
+    def home(self) -> Array:
+        """Joints (k,) in which it waits, its tool down."""
+        return self.kinematics.home
+
+    def inverse(self, pose: ToolPose) -> Array | None:
+        """The joints (k,) that hold the tool at `pose`, which depend on nothing else; None when out of reach or range.
+
+        A gripper looks the same after half a turn: where the last joint cannot turn the tool to its yaw, it is half a turn on.
+        """
+        joints = self.inverse_each(np.array([[pose.x, pose.y, pose.z, pose.yaw]]))[0]
+        return None if np.isnan(joints[0]) else joints
+
+    def inverse_each(self, poses: Array) -> Array:
+        """As `inverse`, of each of many poses x, y, z [m], yaw [rad] (n, 4) by itself: (n, k), NaN where there are none."""
+        joints = self._bent(poses)
+        last, low, high = joints[:, -1].copy(), self.lower[-1], self.upper[-1]
+        best = np.full(len(joints), np.nan)
+        for half in sorted(_WAYS_ROUND, key=lambda half: (half % 2, abs(half))):
+            turned = last + half * pi
+            best = np.where(np.isnan(best) & (turned >= low) & (turned <= high), turned, best)
+        joints[:, -1] = best
+        joints[np.isnan(best)] = np.nan
+        return joints
+
+    def inverse_path(self, poses: Array, before: Array | None = None) -> Array:
+        """The joints (n, k) along a path of poses (n, 4), the tool turning without jumps; NaN where there are none.
+
+        `before` (k,): the joints it comes from; its tool turns from there, if it can, the same way round. Where the last joint
+        cannot turn through all of the path, the tool goes all of it half a turn on.
+        """
+        joints = self._bent(poses)
+        reached = ~np.isnan(joints[:, 0])
+        if not reached.any():
+            return joints
+        turns = np.unwrap(joints[reached, -1])
+        begun = turns[0] if before is None else float(before[-1])
+        ways = sorted(_WAYS_ROUND, key=lambda half: (half % 2, round(abs(turns[0] + half * pi - begun), 9), half))
+        for half in ways:
+            turned = turns + half * pi
+            if turned.min() >= self.lower[-1] and turned.max() <= self.upper[-1]:
+                joints[reached, -1] = turned
+                return joints
+        joints[:] = np.nan
+        return joints
+
+    def forward(self, joints: Array) -> ToolPose:
+        """The tool pose that joints (k,) hold; for joints that `inverse` gave, or that are near to such."""
+        x, y, z, yaw = (float(number) for number in self.kinematics.tools(joints[None])[0])
+        return ToolPose(x, y, z + self.base_up_m, yaw)
+
+    def is_half_on(self, joints: Array, pose: ToolPose) -> bool:
+        """Whether joints hold the tool half a turn on from the yaw of `pose`."""
+        return abs((self.forward(joints).yaw - pose.yaw + pi) % (2 * pi) - pi) > pi / 2
+
+    def reach_in_words(self, z: float) -> str:
+        """How near and how far the tool reaches at a height [m] ahead of the arm."""
+        out = np.arange(self.nearest_m, 3.0, 0.01)
+        found = self.inverse_each(np.stack([out, 0 * out, 0 * out + z, 0 * out], axis=1))
+        reached = out[~np.isnan(found[:, 0])]
+        if not len(reached):
+            return f"reaches nothing at a height of {z:.2f} m"
+        return f"reaches {reached[0]:.2f} to {reached[-1]:.2f} m at a height of {z:.2f} m"
+
+    def _bent(self, poses: Array) -> Array:
+        """Joints (n, k) within all ranges but the last's, whose turn is within half a turn of its own zero; NaN: none."""
+        with np.errstate(invalid="ignore"):
+            poses = np.where(np.abs(poses).max(axis=1, keepdims=True) < 1e3, poses, np.nan)
+            first, last = self.kinematics.spins
+            turn = np.arctan2(poses[:, 1], poses[:, 0])
+            joints = self.kinematics.bent(np.hypot(poses[:, 0], poses[:, 1]), poses[:, 2] - self.base_up_m)
+            joints[:, 0] += first * turn
+            joints[:, -1] = (joints[:, -1] + last * (poses[:, 3] - turn) + pi) % (2 * pi) - pi
+            under, over = joints[:, :-1] < self.lower[:-1], joints[:, :-1] > self.upper[:-1]
+            inside = ~np.any(under | over, axis=1)
+        joints[~inside] = np.nan
+        return joints

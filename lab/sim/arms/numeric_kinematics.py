@@ -1,0 +1,212 @@
+"""Joints for a vertical tool by Newton's method, for any arm whose first joint turns it and whose last turns its tool.
+
+What is left between these two depends on two numbers, how far out and how high the tool is. A table over both is made once,
+each place from its neighbours, so that all of it is one bending of the arm; a pose begins from its table's cell. Joints are
+thereby a function of the pose alone, and neighbouring poses have neighbouring joints.
+Source: damped least squares, Y. Nakamura and H. Hanafusa, 1986; a redundant arm stays near one posture, A. Liegeois, 1977.
+"""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput
+from lab.sim.arms.chain import Chain
+
+STEP_M = 0.02  # between the table's places
+WITHIN_M, WITHIN_RAD = 5e-4, 0.0087  # what is checked of every answer: 0.5 mm, 0.5 degrees
+_EXACT = 1e-9  # [m], [rad] at which Newton's method ends
+_JUMP = 0.35  # [rad or m] between two places of the table: farther apart, the arm has snapped over
+_DAMPING = 1e-5
+_SEEDS, _TRIES = 160, 60
+_UPRIGHT = 1e-6
+
+Array = NDArray[np.float64]
+DOWN = np.array(
+    [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
+)  # the tool's axes (columns) at yaw 0: x down, y across
+
+
+class NumericKinematics:
+    """The bending of one arm: `chain` ends in the finger tips, x out of the gripper, y across it, where the fingers close."""
+
+    def __init__(self, chain: Chain, name: str) -> None:
+        """BadInput unless the first joint turns about the vertical and the last about the tool's own axis."""
+        self.chain, self.name = chain, name
+        self.count = len(chain.names)
+        self.spins = self._spins()  # of the first and the last joint: 1 or -1, how the tool turns with them
+        self._rest = (chain.lower + chain.upper) / 2  # a redundant arm stays near the middle of its ranges
+
+    def _spins(self) -> tuple[float, float]:
+        chain = self.chain
+        if self.count < 4:
+            raise BadInput(f"arm '{self.name}': {self.count} joints lead to its tool, wanted 4 or more")
+        _, axes, moved = chain.jacobian(np.zeros((1, self.count)))
+        first, last = moved[0, 3:, 0], axes[0].T @ moved[0, 3:, -1]  # of the last joint: in the tool's axes
+        aside = np.hypot(*moved[0, :2, 0] - np.cross(first, chain.ends(np.zeros((1, self.count)))[0][0])[:2])
+        if abs(abs(first[2]) - 1.0) > _UPRIGHT or aside > 1e-4:
+            raise BadInput(f"arm '{self.name}': its first joint '{chain.names[0]}' does not turn it about the vertical")
+        if abs(abs(last[0]) - 1.0) > 1e-4 or np.linalg.norm(moved[0, :3, -1]) > 1e-4:
+            raise BadInput(
+                f"arm '{self.name}': its last joint '{chain.names[-1]}' does not turn the tool about the tool's own axis"
+            )
+        return float(np.sign(first[2])), -float(np.sign(last[0]))  # x points down: turned about it, the yaw falls
+
+    @property
+    def home(self) -> Array:
+        """The joints (k,) from which its table was made: the tool down, half-way out."""
+        return self._begun[1]
+
+    # ---- questions ----------------------------------------------------------------------------------------------
+
+    def bent(self, out: Array, up: Array) -> Array:
+        """The joints (n, k) for a tool `out` (n,) [m] ahead of the first joint's axis and `up` (n,) [m], at yaw 0; NaN: none."""
+        table, low = self._table
+        place = np.stack([out, up], axis=1) / STEP_M - low
+        inside = np.all((place >= 0.0) & (place <= np.array(table.shape[:2]) - 1.0), axis=1)
+        corner = np.clip(np.nan_to_num(place).astype(int), 0, np.array(table.shape[:2]) - 2)
+        share = np.clip(np.nan_to_num(place) - corner, 0.0, 1.0)
+        seeds, weights = np.zeros((len(out), self.count)), np.zeros(len(out))
+        for i in (0, 1):
+            for j in (0, 1):
+                found = table[corner[:, 0] + i, corner[:, 1] + j]
+                weight = np.abs(1 - i - share[:, 0]) * np.abs(1 - j - share[:, 1]) + 1e-9
+                weight = np.where(np.isnan(found[:, 0]), 0.0, weight)
+                seeds += weight[:, None] * np.nan_to_num(found)
+                weights += weight
+        known = inside & (weights > 0.0)
+        joints = np.full((len(out), self.count), np.nan)
+        if known.any():
+            seeds = seeds[known] / weights[known, None]
+            solved, _ = self._solved(seeds, out[known], up[known], 12)
+            good = self._near(solved, seeds) & self._holds(solved, out[known], up[known])
+            joints[known] = np.where(good[:, None], solved, np.nan)
+        return joints
+
+    def tools(self, joints: Array) -> Array:
+        """The tool poses x, y, z [m], yaw [rad] (n, 4) that joints (n, k) hold, in the foot's frame."""
+        at, axes = self.chain.ends(joints)
+        return np.column_stack([at, np.arctan2(-axes[:, 0, 1], axes[:, 1, 1])])
+
+    def misses(self, joints: Array, tools: Array) -> tuple[Array, Array]:
+        """How far (n,) [m] and by what angle (n,) [rad], off the vertical or in yaw, joints miss tool poses (n, 4)."""
+        at, axes = self.chain.ends(joints)
+        c, s = np.cos(tools[:, 3]), np.sin(tools[:, 3])
+        wanted = np.zeros_like(axes)
+        wanted[:, 2, 0] = -1.0
+        wanted[:, 0, 1], wanted[:, 1, 1], wanted[:, 0, 2], wanted[:, 1, 2] = -s, c, c, s
+        cosine = (np.einsum("nij,nij->n", axes, wanted) - 1.0) / 2.0
+        return np.linalg.norm(at - tools[:, :3], axis=1), np.arccos(np.clip(cosine, -1.0, 1.0))
+
+    # ---- the table ----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _table(self) -> tuple[Array, Array]:
+        """Joints (i, j, k) by how far out and how high, NaN where there are none; and the first place's numbers (2,)."""
+        reach, foot = self._stretch
+        low = np.array([1.0, np.floor((foot - reach) / STEP_M)])
+        shape = (int(reach / STEP_M) + 1, int(2 * reach / STEP_M) + 2)
+        table = np.full((*shape, self.count), np.nan)
+        start, joints = self._begun
+        table[tuple(start - low.astype(int))] = joints
+        fresh = [tuple(start - low.astype(int))]
+        while fresh:
+            seeds: dict[tuple[int, int], list[Array]] = {}
+            for i, j in fresh:
+                for place in ((i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)):
+                    if 0 <= place[0] < shape[0] and 0 <= place[1] < shape[1] and np.isnan(table[place][0]):
+                        seeds.setdefault(place, []).append(table[i, j])
+            places = list(seeds)
+            if not places:
+                break
+            begun = np.array([np.mean(seeds[place], axis=0) for place in places])
+            out, up = ((np.array(places) + low) * STEP_M).T
+            solved, _ = self._solved(begun, out, up, 20)
+            fresh = [place for place, near in zip(places, self._near(solved, begun), strict=True) if near]
+            for place, joints in zip(places, solved, strict=True):
+                if place in set(fresh):
+                    table[place] = joints
+        return table, low
+
+    @property
+    def _stretch(self) -> tuple[float, float]:
+        """How far the arm reaches at most, and how high its first joint is [m]."""
+        links = np.linalg.norm([*self.chain.roots[1:], self.chain.end[:3, 3]], axis=1).sum()
+        slides = np.abs([self.chain.lower, self.chain.upper])[:, self.chain.slides].sum()
+        return float(links + slides), float(self.chain.roots[0, 2])
+
+    @cached_property
+    def _begun(self) -> tuple[NDArray[np.int_], Array]:
+        """A place of the table and the joints there: of all bendings that are found, the one that stands highest."""
+        reach, foot = self._stretch
+        rng = np.random.default_rng(0)
+        seeds = rng.uniform(self.chain.lower, self.chain.upper, (_SEEDS, self.count))
+        for share in (0.5, 0.4, 0.6, 0.3, 0.7):
+            for high in (0.0, 0.2, -0.2, 0.4, -0.4):
+                place = np.array([round(share * reach / STEP_M), round((foot + high * reach) / STEP_M)])
+                out, up = (np.full(_SEEDS, number * STEP_M) for number in place)
+                solved, good = self._solved(seeds, out, up, _TRIES)
+                middles = self.chain.middles(solved)
+                good &= self._within(solved) & self._holds(solved, out, up) & (middles[:, 0] > 0.0)  # not over its back
+                if good.any():
+                    solved, heights = solved[good], middles[good, 2]
+                    solved[:, [0, -1]] = (solved[:, [0, -1]] + np.pi) % (2 * np.pi) - np.pi
+                    away = np.linalg.norm(solved[:, 1:-1] - self._rest[1:-1], axis=1)
+                    best = np.lexsort((np.round(away, 6), -np.round(heights, 3)))[0]
+                    return place, solved[best]
+        raise BadInput(f"arm '{self.name}': no joints were found that hold its tool upright in front of it")
+
+    def _holds(self, joints: Array, out: Array, up: Array) -> NDArray[np.bool_]:
+        """Whether joints hold a vertical tool at `out`, 0, `up`, yaw 0, near enough."""
+        far, angle = self.misses(joints, np.stack([out, 0 * out, up, 0 * out], axis=1))
+        held: NDArray[np.bool_] = (far <= WITHIN_M) & (angle <= WITHIN_RAD)
+        return held
+
+    def _near(self, solved: Array, seeds: Array) -> NDArray[np.bool_]:
+        near: NDArray[np.bool_] = np.abs(solved - seeds)[:, 1:-1].max(axis=1) < _JUMP
+        return near & self._within(solved)
+
+    def _within(self, joints: Array) -> NDArray[np.bool_]:
+        """Whether the joints between first and last keep to their limits, and none is lost."""
+        chain = self.chain
+        inside = (joints >= chain.lower - 1e-12) & (joints <= chain.upper + 1e-12)
+        return np.asarray(inside[:, 1:-1].all(axis=1))
+
+    def _solved(self, joints: Array, out: Array, up: Array, tries: int) -> tuple[Array, NDArray[np.bool_]]:
+        """Newton's method from `joints` (n, k) for tools at `out`, 0, `up`, yaw 0: the joints, NaN where it fails; which held."""
+        joints = joints.copy()
+        going = np.arange(len(joints))
+        for _ in range(tries):
+            at, axes, moved = self.chain.jacobian(joints[going])
+            missed = np.concatenate([np.stack([out[going], 0 * going, up[going]], axis=1) - at, _turn(axes)], axis=1)
+            aside = np.zeros((len(going), self.count))
+            if self.count > 6:
+                aside[:, 1:-1] = (self._rest - joints[going])[:, 1:-1]
+            wanted = missed - np.einsum("nij,nj->ni", moved, aside)
+            step = _damped(moved, wanted) + aside
+            step *= np.minimum(1.0, 0.4 / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
+            joints[going] += step
+            left = (np.abs(missed).max(axis=1) > _EXACT) | (np.abs(step).max(axis=1) > 1e-7)
+            going = going[left]
+            if not going.size:
+                break
+        held = np.ones(len(joints), bool)
+        held[going] = False
+        joints[~held] = np.nan
+        return joints, held
+
+
+def _damped(moved: Array, wanted: Array) -> Array:
+    """The joints' steps (n, k) that bring the end by `wanted` (n, 6), as far as `moved` (n, 6, k) lets them."""
+    back = moved.transpose(0, 2, 1)
+    if moved.shape[2] < 6:
+        square = back @ moved + _DAMPING**2 * np.eye(moved.shape[2])
+        return np.asarray(np.linalg.solve(square, back @ wanted[:, :, None])[:, :, 0])
+    square = moved @ back + _DAMPING**2 * np.eye(6)
+    return np.asarray((back @ np.linalg.solve(square, wanted[:, :, None]))[:, :, 0])
+
+
+def _turn(axes: Array) -> Array:
+    """The small rotation (n, 3) [rad] that takes the tool's axes (n, 3, 3) to those of a vertical one at yaw 0."""
+    return np.asarray(0.5 * np.cross(axes, DOWN, axisa=1, axisb=0, axisc=2).sum(axis=1))

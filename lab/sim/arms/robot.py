@@ -1,0 +1,222 @@
+"""The arm and its gripper: paths of the tool become joint targets, one a physics step."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import atan2, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import WorkFailed
+from lab.sim.arms.arm import Arm
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.urdf_reader import rotation
+from lab.sim.world import TIME_STEP, World
+
+NAME = "robot"
+_TURNED_RAD = pi / 2  # [rad] from here on the tool begins a path by turning on the spot
+YAW_ARM = 0.15  # [m/rad] a turn of the tool counts as this much way
+_SAMPLE = 0.004  # [m] between points of a path before it is timed
+_SETTLE_STEPS = 12  # after a path ends
+_GRIP_STEPS = 72  # 0.3 s to close or open
+_PEDESTAL_M, _PEDESTAL_RGBA = 0.09, (0.22, 0.23, 0.26, 1.0)  # radius
+_LINKAGE_ITERATIONS = 200  # of the solver: with 60 a slice creeps 2 mm a second in fingers that a linkage moves
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Joint targets, one row a physics step: positions (n, k) [rad] and velocities (n, k) [rad/s]."""
+
+    positions: Array
+    velocities: Array
+
+
+def plan(
+    arm: Arm,
+    poses: Sequence[ToolPose],
+    speed: float,
+    acceleration: float,
+    blend: float = 0.0,
+    before: Array | None = None,
+) -> Trajectory:
+    """Time a path of tool poses: rounded by `blend` [m] at its corners, at most `speed` [m/s] and `acceleration` [m/s2].
+
+    Joint speeds stay within the arm's; `before` (k,) [rad] are the joints it starts from. WorkFailed names a pose out of reach.
+    """
+    points = _rounded(_sampled(poses), blend)
+    way = np.concatenate([[0.0], np.cumsum(_lengths(points))])
+    ticks = _trapezoid(float(way[-1]), speed, acceleration)
+    timed = np.stack([np.interp(ticks, way, points[:, k]) for k in range(4)], axis=1)
+    joints = arm.inverse_path(timed, before)
+    _check_reached(joints, timed)
+    if before is not None and abs(joints[0, -1] - before[-1]) > _TURNED_RAD:
+        joints = np.concatenate([_turned_back(before[-1], joints[0], speed, acceleration), joints])
+    velocities = np.gradient(joints, TIME_STEP, axis=0) if len(joints) > 1 else np.zeros_like(joints)
+    hurry = float(np.max(np.abs(velocities) / arm.speed)) if len(joints) > 1 else 0.0
+    if hurry > 1.0:
+        return plan(arm, poses, speed / (hurry * 1.02), acceleration / (hurry * 1.02) ** 2, blend, before)
+    return Trajectory(joints, velocities)
+
+
+def _check_reached(joints: Array, poses: Array) -> None:
+    lost = np.isnan(joints[:, 0])
+    if lost.all() and len(poses) > 1:
+        lost[:-1] = False  # all are lost where the tool cannot turn: its end says where to
+    if lost.any():
+        x, y, z, _ = poses[int(np.argmax(lost))]
+        raise WorkFailed(f"the tool cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m")
+
+
+def _sampled(poses: Sequence[ToolPose]) -> Array:
+    corners = np.array([[p.x, p.y, p.z, p.yaw] for p in poses])
+    rows = [corners[:1]]
+    for start, end in pairwise(corners):
+        count = max(1, int(np.ceil(_lengths(np.array([start, end]))[0] / _SAMPLE)))
+        rows.append(start + (end - start) * (np.arange(1, count + 1) / count)[:, None])
+    return np.concatenate(rows)
+
+
+def _rounded(points: Array, blend: float) -> Array:
+    """A moving average along the path cuts its corners by about blend / 2; the ends stay."""
+    half = int(blend / _SAMPLE / 2)
+    if half < 1 or len(points) < 3:
+        return points
+    padded = np.concatenate([np.repeat(points[:1], half, 0), points, np.repeat(points[-1:], half, 0)])
+    kernel = np.full(2 * half + 1, 1.0 / (2 * half + 1))
+    smooth = np.stack([np.convolve(padded[:, k], kernel, mode="valid") for k in range(4)], axis=1)
+    smooth[0], smooth[-1] = points[0], points[-1]
+    return smooth
+
+
+def _lengths(points: Array) -> Array:
+    steps = np.diff(points, axis=0) * np.array([1.0, 1.0, 1.0, YAW_ARM])
+    return np.asarray(np.linalg.norm(steps, axis=1))
+
+
+def _trapezoid(length: float, speed: float, acceleration: float) -> Array:
+    """Way [m] after each physics step when speeding up, cruising and slowing down over `length` [m]."""
+    if length < 1e-9:
+        return np.array([0.0])
+    ramp = min(speed**2 / acceleration, length) / 2.0
+    top = np.sqrt(2.0 * acceleration * ramp)
+    speeding, cruising = top / acceleration, (length - 2.0 * ramp) / top
+    total = 2.0 * speeding + cruising
+    t = np.minimum(np.arange(1, int(np.ceil(total / TIME_STEP)) + 1) * TIME_STEP, total)
+    left = np.maximum(total - t, 0.0)
+    slowing = np.where(left < speeding, length - acceleration * left**2 / 2.0, ramp + top * (t - speeding))
+    return np.asarray(np.where(t < speeding, acceleration * t**2 / 2.0, slowing))
+
+
+def _turned_back(turn: float, first: Array, speed: float, acceleration: float) -> Array:
+    """Rows (n, k) that take the tool on the spot from `turn` [rad] by half turns to `first` (k,): its range ends there."""
+    back = first[-1] - turn
+    ticks = _trapezoid(abs(float(back)), speed / YAW_ARM, acceleration / YAW_ARM)
+    rows = np.repeat(first[None], len(ticks), axis=0)
+    rows[:, -1] = turn + np.sign(back) * ticks
+    return rows
+
+
+class Robot:
+    """The arm in a world. Its motions are generators: each `next` sets the targets of one physics step."""
+
+    def __init__(self, world: World, arm: Arm, speed: float, acceleration: float, grip_force: float) -> None:
+        """Load the arm at the world's origin; `speed` [m/s], `acceleration` [m/s2], `grip_force` [N]."""
+        self.world, self.arm, self.grip_force = world, arm, grip_force
+        self.speed, self.acceleration = speed, acceleration
+        fingers = arm.fingers
+        holding = [link for side in fingers.links for link in side]
+        world.load(NAME, arm.urdf, (0.0, 0.0, arm.base_up_m), checked=True)
+        if arm.base_up_m > 0.0:
+            world.disc(f"{NAME} pedestal", _PEDESTAL_M, arm.base_up_m, (0.0, 0.0, arm.base_up_m / 2), _PEDESTAL_RGBA)
+        world.friction(NAME, 1.0, links=holding, spinning=0.002)
+        for follower, leader in fingers.leaders.items():
+            world.gear(NAME, leader, follower, fingers.ratio(follower))
+        if len(fingers.joints) > 2:
+            world.iterations(_LINKAGE_ITERATIONS)
+        self._free = [joint for joint in fingers.joints if joint not in fingers.driven]
+        self.closed = False
+        self._half_on = False  # whether the tool is half a turn on from the yaw that was asked for
+        self.hold(arm.home)
+        self.open_at_once()
+
+    def hold(self, joints: Array) -> None:
+        """Put the arm at `joints` (k,) [rad] at once and hold it there: for building and surveying a scene."""
+        self.world.set_joints(NAME, self.arm.joints, joints)
+        self.world.drive(NAME, self.arm.joints, joints)
+
+    def stand(self, pose: ToolPose) -> bool:
+        """Put the arm at a tool pose at once; False when that is out of reach."""
+        joints = self.arm.inverse(pose)
+        if joints is not None:
+            self.hold(joints)
+            self._half_on = self.arm.is_half_on(joints, pose)
+        return joints is not None
+
+    def open_at_once(self, opening: float | None = None) -> None:
+        """Put the fingers at `opening` [m] from the middle at once, by default open: for building and surveying a scene."""
+        joints = self.arm.fingers.at(self.arm.fingers.open_m if opening is None else opening)
+        self.world.set_joints(NAME, self.arm.fingers.joints, joints)
+        self._press(joints, 200.0)
+
+    def _press(self, joints: Array, force: float) -> None:
+        """Drive the fingers to `joints` (k,), each with `force` [N] at the most; what is geared follows."""
+        fingers = self.arm.fingers
+        now = fingers.opening(self.world.joints(NAME, fingers.joints))
+        targets = [joints[fingers.joints.index(joint)] for joint in fingers.driven]
+        self.world.drive(NAME, fingers.driven, targets, force=fingers.forces(force, now))
+        if self._free:
+            self.world.drive(NAME, self._free, [0.0] * len(self._free), force=0.0)
+
+    def touches(self, name: str) -> bool:
+        """Whether fingers of both sides touch a body."""
+        return all(any(self.world.touching(NAME, name, link) for link in side) for side in self.arm.fingers.links)
+
+    def tool(self) -> ToolPose:
+        """Where the finger tips are, as measured from the links' poses in physics; half a turn of the tool does not count."""
+        position, turn = self.world.pose(NAME, self.arm.tool_link)
+        axes = rotation(turn)
+        tip, across = position + axes @ self.arm.tip[:3, 3], axes @ self.arm.tip[:3, 1]
+        yaw = atan2(-float(across[0]), float(across[1]))
+        return ToolPose(float(tip[0]), float(tip[1]), float(tip[2]), self._counted(yaw))
+
+    def _counted(self, yaw: float) -> float:
+        return (yaw + 2 * pi) % (2 * pi) - pi if self._half_on else yaw
+
+    def override(self, share: float) -> None:
+        """Move from now on with a share of speed and acceleration, as an operator's speed override."""
+        self.speed, self.acceleration = share * self.speed, share * self.acceleration
+
+    def follow(self, poses: Sequence[ToolPose], *, blend: float = 0.0, slow: float = 1.0) -> Iterator[None]:
+        """Move the tool from where it is along `poses`; `slow` < 1 lowers speed and acceleration."""
+        before = self.world.joints(NAME, self.arm.joints)
+        here = self.arm.forward(before)
+        first = poses[0]
+        turn = (self._counted(here.yaw) - first.yaw + pi) % (2 * pi) - pi
+        start = ToolPose(here.x, here.y, here.z, first.yaw + turn)
+        way = plan(self.arm, [start, *poses], self.speed * slow, self.acceleration * slow, blend, before)
+        self._half_on = self.arm.is_half_on(way.positions[-1], poses[-1])
+        for position, velocity in zip(way.positions, way.velocities, strict=True):
+            self.world.drive(NAME, self.arm.joints, position, velocity)
+            yield
+        self.world.drive(NAME, self.arm.joints, way.positions[-1])
+        yield from self.rest(_SETTLE_STEPS)
+
+    def rest(self, steps: int) -> Iterator[None]:
+        """Stay for so many physics steps."""
+        for _ in range(steps):
+            yield
+
+    def grip(self) -> Iterator[None]:
+        """Close the fingers and keep pressing with the grip force."""
+        self._press(self.arm.fingers.strokes[0], self.grip_force)
+        self.closed = True
+        yield from self.rest(_GRIP_STEPS)
+
+    def release(self) -> Iterator[None]:
+        """Open the fingers."""
+        self._press(self.arm.fingers.at(self.arm.fingers.open_m), 60.0)
+        self.closed = False
+        yield from self.rest(_GRIP_STEPS)

@@ -1,0 +1,1 @@
+"""Parts: their shapes, and where a gripper takes them."""

@@ -1,0 +1,80 @@
+"""A scene -> the cells of a grid that are free, out of reach or blocked, and by what. Run it in a world of its own."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.arms.robot import NAME
+from lab.sim.parts.kinds import Spot
+from lab.sim.scene.scene import Scene
+
+OUT_OF_REACH = "out of reach"
+CARRIED = "carried part"
+FINGERS_OFF_M = 0.0005  # [m] of a finger off a part that is put between them
+_AWAY = Spot(0.0, 0.0, -5.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What stands in the way of each cell: `causes` has the grid's shape and holds '' (free), 'out of reach' or a body's name."""
+
+    causes: NDArray[np.str_]
+
+    @property
+    def blocked(self) -> NDArray[np.bool_]:
+        """The cells that the tool cannot be in, bool, the grid's shape."""
+        return np.asarray(self.causes != "")
+
+    def names(self, cells: Sequence[tuple[int, ...]]) -> list[str]:
+        """What blocks these cells, each cause once, in order of the alphabet."""
+        return sorted({str(self.causes[cell]) for cell in cells} - {""})
+
+
+class Surveyor:
+    """Puts the arm at one pose after the other in a scene and measures what is near; with or without a part in the fingers."""
+
+    def __init__(self, scene: Scene, carried: str | None, *, clearance: float, ignore: Sequence[str] = ()) -> None:
+        """carried: the kind in the fingers; `clearance` [m] is how far everything must stay away; `ignore` may be touched."""
+        self.scene, self.carried, self.clearance = scene, carried, clearance
+        self.solid = [name for name in scene.solid if name not in ignore]
+        self.moving = [NAME]
+        if carried is not None:
+            scene.add(CARRIED, carried, _AWAY)
+            self.moving += scene.bodies_of(CARRIED, carried)
+            scene.robot.open_at_once(scene.kinds[carried].grip.width_m / 2 + FINGERS_OFF_M)
+
+    def cause(self, pose: ToolPose) -> str:
+        """'' when the tool can be at `pose`, else why not."""
+        return self._causes([pose])[0]
+
+    def _causes(self, poses: Sequence[ToolPose]) -> list[str]:
+        """The cause of each of many poses: their joints are found all at once."""
+        robot = self.scene.robot
+        joints = robot.arm.inverse_each(np.array([[p.x, p.y, p.z, p.yaw] for p in poses]))  # (n, k)
+        found = []
+        for pose, own in zip(poses, joints, strict=True):
+            if hypot(pose.x, pose.y) < robot.arm.nearest_m or np.isnan(own[0]):
+                found.append(OUT_OF_REACH)
+                continue
+            robot.hold(own)
+            found.append(self._touched(pose))
+        return found
+
+    def _touched(self, pose: ToolPose) -> str:
+        """'' when the arm, which is at `pose`, and what it carries are clear of everything, else what is too near."""
+        world = self.scene.world
+        if self.carried is not None:
+            self.scene.put(CARRIED, self.carried, pose)
+        for name in self.solid:
+            if any(world.nearest(moving, name, self.clearance) < self.clearance for moving in self.moving):
+                return name
+        return ""
+
+    def grid(self, shape: tuple[int, ...], pose_of: Callable[[tuple[int, ...]], ToolPose]) -> Survey:
+        """Survey every cell of a grid whose cell i has the tool at pose_of(i)."""
+        causes = np.array(self._causes([pose_of(cell) for cell in np.ndindex(*shape)]), dtype="U40")
+        return Survey(causes.reshape(shape))

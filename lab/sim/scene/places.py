@@ -1,0 +1,242 @@
+"""Where things stand in a task's cell: the spots for parts at each station, what room they take, what a seed lays out."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import ceil, cos, hypot, pi, sin
+
+import numpy as np
+
+from lab.errors import BadInput
+from lab.sim.frames import Vector
+from lab.sim.parts.kinds import Kind, Spot, beside, comes_as, on_its_pallet
+from lab.sim.scene import station_bodies
+from lab.tasks.task import Order, Task
+from lab.tasks.task_fields import Obstacle, Station
+
+SLAB = 0.012  # [m] plates and buffers are slabs this thick, where the file says nothing else
+COLUMNS = 4  # of a storage
+BETWEEN_M, FINGERS_M = 0.02, 0.02  # [m] between parts at a station, and as much more where a finger comes between them
+AROUND_M, OPEN_M = 0.01, 0.0325  # [m] kept free around a part, and as much more where the fingers are open beside it
+SLAB_M, CLOSING_M = (
+    0.06,
+    0.025,
+)  # [m] that a slab is larger than what stands on it, and as much more where fingers close
+FREE_M = 0.0125  # [m] beyond an open finger to what stands beside, at least
+MAX_DRAWS = 100  # of an obstacle's place
+SPARE_SPOTS = 4  # so many spots of a station are reckoned with, however few parts there are
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the seed decides: obstacle centres, and how far each part stands off its spot (x, y [m], yaw [rad])."""
+
+    obstacles: tuple[tuple[float, float], ...]
+    parts: tuple[tuple[float, float, float], ...]
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """A turned rectangle on the table: its middle, half its length and half its width [m], and yaw [rad]."""
+
+    x: float
+    y: float
+    half_along: float
+    half_across: float
+    yaw: float
+
+    def meets(self, other: "Rectangle") -> bool:
+        """Whether the two overlap: no side of either has the other wholly beyond it."""
+        dx, dy = other.x - self.x, other.y - self.y
+        for yaw in (self.yaw, self.yaw + pi / 2, other.yaw, other.yaw + pi / 2):
+            apart = abs(cos(yaw) * dx + sin(yaw) * dy)
+            if apart >= self._reach(yaw) + other._reach(yaw):
+                return False
+        return True
+
+    def corners(self) -> list[tuple[float, float]]:
+        """Its corners (x, y) [m], in their order around it."""
+        signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+        return [beside((self.x, self.y), self.yaw, (a * self.half_along, b * self.half_across)) for a, b in signs]
+
+    def _reach(self, yaw: float) -> float:
+        turn = yaw - self.yaw
+        return abs(cos(turn)) * self.half_along + abs(sin(turn)) * self.half_across
+
+
+class Places:
+    """The stations of a task as places for parts of its kinds."""
+
+    def __init__(self, task: Task, kinds: Mapping[str, Kind]) -> None:
+        self.task, self.kinds = task, kinds
+
+    def kinds_at(self, station: str) -> list[Kind]:
+        """The kinds that may stand at a station, with their pallets where they come on one."""
+        found = []
+        for part in self.task.kinds_at(station):
+            found.append(self.kinds[part.name if self.task.station(station).kind == "machine" else comes_as(part)])
+        return found
+
+    def floor(self, station: Station) -> float:
+        """How high a part's foot is above the table at this station [m]."""
+        if station.floor_m is not None:
+            return station.floor_m
+        if station.stands_on == "box" and station.size_m is not None:
+            return station.size_m[2]
+        return SLAB if station.size_m is None else station.size_m[2]
+
+    def spots(self, station: Station) -> list[Spot]:
+        """The places for parts at a station, the middle ones first; as many as its capacity."""
+        at, yaw, high = station.pose[:2], station.pose[2], self.floor(station)
+        if station.spots is not None:
+            return [Spot(*beside(at, yaw, off[:2]), high, yaw + off[2]) for off in station.spots]
+        if station.kind == "machine":
+            offsets: list[tuple[float, float]] = [(0.0, 0.0)]
+            if station.capacity > 1:
+                offsets = self._rows(station, 1)
+        else:
+            offsets = self._rows(station, min(COLUMNS, station.capacity) if station.kind == "storage" else 1)
+        return [Spot(*beside(at, yaw, off), high, yaw) for off in offsets[: station.capacity]]
+
+    def raised(self, kind: str, station: Station, spot: Spot) -> Spot:
+        """Where a part of a kind stands on a spot: on the floor, or on its pallet that stands there."""
+        if not on_its_pallet(self.task, kind, station.name):
+            return spot
+        pallet = self.kinds[str(self.task.part(kind).pallet)]
+        return spot.raised(pallet.shape.height_m)
+
+    def _rows(self, station: Station, columns: int) -> list[tuple[float, float]]:
+        rows = ceil(station.capacity / columns)
+        column_m, row_m = self.pitch(station)
+        grid = product(range(columns), range(rows))
+        found = [((c - (columns - 1) / 2) * column_m, (r - (rows - 1) // 2) * row_m) for c, r in grid]
+        return sorted(found, key=lambda at: (round(hypot(*at), 6), at))
+
+    def pitch(self, station: Station) -> tuple[float, float]:
+        """From one spot to the next, along and across [m]."""
+        return self._largest(station, BETWEEN_M, lambda kind: max(FINGERS_M, kind.finger_m - BETWEEN_M + FREE_M), 2.0)
+
+    def room(self, station: Station) -> tuple[float, float]:
+        """How far a part and the gripper around it reach from a spot, along and across [m]."""
+        return self._largest(station, AROUND_M, lambda kind: max(OPEN_M, kind.finger_m - AROUND_M + FREE_M), 1.0)
+
+    def _largest(
+        self, station: Station, beside_m: float, closing_m: Callable[[Kind], float], times: float
+    ) -> tuple[float, float]:
+        """So many times what the kinds at a station reach, and so much beside them, more where their fingers close [m]."""
+        sizes = []
+        for kind in self.kinds_at(station.name):
+            reach, margins = kind.footprint_m(), kind.margins_m(beside_m, closing_m(kind))
+            sizes.append([times * reach[0] + margins[0], times * reach[1] + margins[1]])
+        x, y = np.max(sizes, axis=0) if sizes else (BETWEEN_M, BETWEEN_M)
+        return float(x), float(y)
+
+    def used_spots(self, station: Station, parts: int) -> list[Spot]:
+        """The spots that so many parts can ever need, and a few more for a plate."""
+        return self.spots(station)[: max(parts, SPARE_SPOTS)]
+
+    def slab(self, station: Station, parts: int) -> tuple[Vector, Vector]:
+        """Size and centre [m] of the slab under the spots that so many parts can need, turned as the station is."""
+        x, y, yaw = station.pose
+        if station.size_m is not None:
+            return station.size_m, (x, y, station.size_m[2] / 2)
+        feet = [beside((0.0, 0.0), -yaw, (f.x - x, f.y - y)) for f in self.used_spots(station, parts)]
+        low, high = np.min(feet, axis=0), np.max(feet, axis=0)  # (2,) [m] along and across
+        reach = self._largest(station, SLAB_M, lambda kind: CLOSING_M, 2.0)
+        middle = beside((x, y), yaw, ((high + low) / 2).tolist())
+        length, width = (high - low + np.array(reach)).tolist()
+        return (length, width, self.floor(station)), (*middle, self.floor(station) / 2)
+
+    def body(self, station: Station, parts: int) -> Rectangle:
+        """The ground that a station's body takes."""
+        x, y, yaw = station.pose
+        if station.stands_on in ("slab", "box"):
+            size, middle = self.slab(station, parts)
+            return Rectangle(middle[0], middle[1], size[0] / 2, size[1] / 2, yaw)
+        low, high = station_bodies.bounds(station, self.task.folder)
+        at = beside((x, y), yaw, ((low[0] + high[0]) / 2, (low[1] + high[1]) / 2))
+        return Rectangle(*at, (high[0] - low[0]) / 2, (high[1] - low[1]) / 2, yaw)
+
+    def kept_free(self, parts: int) -> list[tuple[str, Rectangle]]:
+        """What no obstacle may stand on: the machines' bodies, and around the spots in use a part and the gripper; by station."""
+        kept = []
+        for station in self.task.stations:
+            if station.kind == "machine":
+                kept.append((station.name, self.body(station, parts)))
+                continue
+            # only where they start do parts stand off their spots: the robot sets them down on them
+            areas = [part.area[:2] for part in self.task.made if self.task.starts(part.name) == station.name]
+            off_x, off_y = np.max(areas, axis=0).tolist() if areas else (0.0, 0.0)
+            along, across = self.room(station)
+            spots = self.used_spots(station, parts)
+            kept += [(station.name, Rectangle(s.x, s.y, along + off_x, across + off_y, s.yaw)) for s in spots]
+        return kept
+
+    def draw(self, order: Order, rng: np.random.Generator) -> Layout:
+        """A layout drawn uniformly within the areas that the task gives its obstacles and parts.
+
+        An obstacle drawn onto a station is drawn again; BadInput names both when its area leaves no room beside the station.
+        """
+        kept = self.kept_free(len(order))
+        places = [_draw_place(obstacle, kept, rng) for obstacle in self.task.obstacles]
+        offsets = [tuple(map(float, rng.uniform(-1, 1, 3) * self.task.part(kind).area)) for kind in order]
+        return Layout(tuple(places), tuple(offsets))  # type: ignore[arg-type]
+
+    def begins(self, order: Order) -> list[Spot]:
+        """The spot on which each part of an order stands at the start, part 1 first: the stations' first ones."""
+        taken: dict[str, int] = {}
+        found = []
+        for kind in order:
+            start = self.task.starts(kind)
+            found.append(self.spots(self.task.station(start))[taken.get(start, 0)])
+            taken[start] = taken.get(start, 0) + 1
+        return found
+
+    def neighbours(self, station: Station, spot: Spot) -> dict[str, tuple[str, Spot]]:
+        """Parts that may stand beside one spot, their kind and spots by name; where there is one place only there are none."""
+        largest = max(self.kinds_at(station.name), key=lambda kind: kind.footprint_m(), default=None)
+        if largest is None or station.capacity == 1:
+            return {}
+        if station.spots is not None:
+            others = enumerate(self._seen_from(station, spot), 1)
+            return {f"{largest.name} {n} beside": (largest.name, other) for n, other in others}
+        column_m, row_m = self.pitch(station)
+        steps = {"in front": (0.0, -row_m), "behind": (0.0, row_m)}
+        if station.kind == "storage":
+            steps |= {"to the left": (-column_m, 0.0), "to the right": (column_m, 0.0)}
+        return {
+            f"{largest.name} {where}": (
+                largest.name,
+                Spot(*beside((spot.x, spot.y), spot.yaw, off), spot.z, spot.yaw),
+            )
+            for where, off in steps.items()
+        }
+
+    def _seen_from(self, station: Station, spot: Spot) -> list[Spot]:
+        """Where the station's other spots lie as seen from any of them, seen from this one."""
+        all_spots, found = self.spots(station), {}
+        for one in all_spots:
+            for other in all_spots:
+                along, across = beside((0.0, 0.0), -one.yaw, (other.x - one.x, other.y - one.y))
+                if other != one:
+                    x, y = beside((spot.x, spot.y), spot.yaw, (along, across))
+                    key = round(along, 4), round(across, 4), round(other.yaw - one.yaw, 4)
+                    found[key] = Spot(x, y, spot.z, spot.yaw + other.yaw - one.yaw)
+        return list(found.values())
+
+
+def _draw_place(
+    obstacle: Obstacle, kept: Sequence[tuple[str, Rectangle]], rng: np.random.Generator
+) -> tuple[float, float]:
+    length, width, _ = obstacle.size
+    for _ in range(MAX_DRAWS):
+        dx, dy = rng.uniform(-1, 1, 2) * obstacle.area
+        x, y = obstacle.position_m[0] + float(dx), obstacle.position_m[1] + float(dy)
+        ground = Rectangle(x, y, length / 2, width / 2, obstacle.yaw)
+        hit = next((station for station, taken in kept if taken.meets(ground)), None)
+        if hit is None:
+            return x, y
+    raise BadInput(
+        f"obstacle '{obstacle.name}' stands on station '{hit}' or too near for the gripper: at ({x:.2f}, {y:.2f}) m "
+        f"its {length:g} x {width:g} m meet where parts are set down; change position_m or area, or move the station"
+    )

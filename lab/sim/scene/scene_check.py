@@ -1,0 +1,139 @@
+"""What is wrong with a task's cell before anything is surveyed in it: reach, heights, and stations in each other's way."""
+
+from itertools import combinations
+from math import hypot, sin
+
+from lab.errors import BadInput
+from lab.sim import models
+from lab.sim.arms.arm import Arm
+from lab.sim.arms.arm_models import arm_of
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.camera import Camera
+from lab.sim.parts.kinds import Kind, Spot, comes_as, kinds_of
+from lab.sim.scene import station_bodies
+from lab.sim.scene.places import Places, Rectangle
+from lab.sim.scene.scene import in_grid, marker_of
+from lab.tasks.task import Task
+from lab.tasks.task_fields import CameraGrid, Station
+
+ACROSS = 0.3  # sine of the angle at most between the fingers and the way in
+OVER_M = 0.01  # [m] between a carried part and what stands below its way
+INTO_M = 0.005  # [m] the same above a machine that it is let down into
+
+
+def places_of(task: Task) -> Places:
+    """The stations of a task as places for its parts, as its robot grips them. Raises BadInput."""
+    return Places(task, kinds_of(task, arm_of(task.robot, task.folder).gripper))
+
+
+def check_scene(task: Task) -> None:
+    """BadInput when a part cannot be gripped, spots are out of the arm's reach, or transfers would sweep parts."""
+    arm, places = arm_of(task.robot, task.folder), places_of(task)
+    low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
+    _check_lowest(places, low)
+    for station in task.stations:
+        station_bodies.check(station, task.folder)
+        if station.grid is not None:
+            _check_seen(task, station, station.grid)
+        spots, own = places.spots(station), places.kinds_at(station.name)
+        for kind in own:
+            _check_grid(station, kind, places.floor(station))
+            _check_side(station, kind)
+            for spot in spots:
+                pose = kind.held_at(spot)
+                for at in (pose, ToolPose(pose.x, pose.y, low, pose.yaw)):
+                    _check_reach(arm, station, at)
+
+
+def _check_lowest(places: Places, low: float) -> None:
+    """BadInput when what is carried in the lowest cells would meet what stands at the stations."""
+    standing = {
+        station.name: places.floor(station) + kind.height_m
+        for station in places.task.stations
+        for kind in places.kinds_at(station.name)
+    }
+    where = max(standing, key=lambda name: standing[name])
+    for kind in (places.kinds[comes_as(part)] for part in places.task.made):
+        if low - kind.grip.up_m < standing[where] + OVER_M:
+            raise BadInput(
+                f"workspace.lower_m: the lowest tool height {low:.3f} m would sweep a carried {kind.name} through what "
+                f"stands at '{where}': at least {standing[where] + OVER_M + kind.grip.up_m:.3f} needed"
+            )
+
+
+def _check_seen(task: Task, station: Station, grid: CameraGrid) -> None:
+    """BadInput when a grid does not hold its start and its station's marker, or the camera does not see them."""
+    assert task.camera is not None
+    camera = Camera.overhead(task.camera.position_m, task.camera.field_of_view_rad, task.camera.pixels)
+    marker, start = marker_of(station, grid), grid.start_m
+    gripper = (start[0] + models.MARKER_OUT, start[1], grid.height_m + models.MARKER_UP)
+    ends = [low + count * grid.cell_m for low, count in zip(grid.origin_m, grid.shape, strict=True)]
+    for field, place, shown in (("start_m", start, gripper), ("marker_m", marker[:2], marker)):
+        if not in_grid(grid, place):
+            raise BadInput(
+                f"station '{station.name}': grid.{field}: it is at ({place[0]:.2f}, {place[1]:.2f}) m, outside the grid: "
+                f"({grid.origin_m[0]:.2f}, {grid.origin_m[1]:.2f}) to ({ends[0]:.2f}, {ends[1]:.2f}) m"
+            )
+        across, down, far = camera.pixel_from_world() @ (*shown, 1.0)
+        if far <= 0 or not (0 <= across / far < camera.width and 0 <= down / far < camera.height):
+            raise BadInput(
+                f"camera.position_m = {list(task.camera.position_m)}: the marker at ({shown[0]:.2f}, {shown[1]:.2f}) m, of "
+                f"{field} of the grid of '{station.name}', is out of its picture; "
+                f"field_of_view_rad = {camera.field_of_view_rad:g}"
+            )
+
+
+def _check_grid(station: Station, kind: Kind, floor: float) -> None:
+    """BadInput when a carried part would hit the machine to which the camera's grid leads."""
+    if station.grid is None:
+        return
+    lowest = max(station.grid.marker_m[2], floor) + kind.grip.up_m + INTO_M
+    if station.grid.height_m < lowest:
+        raise BadInput(
+            f"station '{station.name}': grid.height_m {station.grid.height_m}: a carried {kind.name} would hit it, "
+            f"at least {lowest:.3f} needed"
+        )
+
+
+def _check_side(station: Station, kind: Kind) -> None:
+    """BadInput when a finger would stand in the way of a part that is brought in from the side."""
+    if station.approach == "side" and abs(sin(kind.grip.yaw)) > ACROSS:
+        raise BadInput(
+            f"station '{station.name}': approach = 'side': the fingers hold a {kind.name} before and behind, at yaw "
+            f"{kind.grip.yaw:.2f}: only what is held at its sides, at yaw 0, can be brought in along its x axis"
+        )
+
+
+def _check_reach(arm: Arm, station: Station, at: ToolPose) -> None:
+    if arm.inverse(at) is None or hypot(at.x, at.y) < arm.nearest_m:
+        raise BadInput(
+            f"station '{station.name}' is out of reach: its spot at ({at.x:.2f}, {at.y:.2f}) m, by "
+            f"pose = {list(station.pose)}, is {hypot(at.x, at.y):.2f} m from the robot; "
+            f"the arm '{arm.name}' {arm.reach_in_words(at.z)}"
+        )
+
+
+def check_apart(task: Task, parts: int) -> None:
+    """BadInput when two stations stand in each other's place, with so many parts under way."""
+    places = places_of(task)
+    ground = {station.name: _ground(places, station, parts) for station in task.stations}
+    for (one, here), (other, there) in combinations(ground.items(), 2):
+        for a in here:
+            for b in there:
+                if a.meets(b):
+                    raise BadInput(
+                        f"stations '{one}' and '{other}' overlap: at ({a.x:.2f}, {a.y:.2f}) and ({b.x:.2f}, {b.y:.2f}) m "
+                        f"parts, machines and the gripper around them need {2 * a.half_along:.2f} x "
+                        f"{2 * a.half_across:.2f} and {2 * b.half_along:.2f} x {2 * b.half_across:.2f} m: change the pose of one"
+                    )
+
+
+def _ground(places: Places, station: Station, parts: int) -> list[Rectangle]:
+    """What a station takes: its machine's body, and around each spot in use a part and the gripper."""
+    along, across = places.room(station)
+
+    def around(spot: Spot) -> Rectangle:
+        return Rectangle(spot.x, spot.y, along, across, spot.yaw)
+
+    found = [around(spot) for spot in places.spots(station)[:parts]]
+    return [*found, places.body(station, parts)] if station.kind == "machine" else found
