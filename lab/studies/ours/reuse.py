@@ -32,7 +32,8 @@ ABOUT = (
     "learned as `lab run` does, with the advisor 'expert', into the toolbox that the tasks before it left; the first task of "
     "an order finds an empty one. For comparison each task is learned from nothing, which shares skills within the task, too: "
     "what is saved is saved by earlier tasks. A problem that several skills share counts once. A table fits only where there are "
-    "the same states and moves: ways between stations carry over where the workspaces have the same grid."
+    "the same states and moves: ways between stations carry over where the workspaces have the same grid. "
+    "Intervals are over the orders: they say nothing of other tasks or scenes."
 )
 COLUMNS = (
     "Taken: the policy of an earlier task is used as it is. Adapted: learned on from it. Own: taken or adapted within the "
