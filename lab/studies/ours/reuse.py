@@ -304,9 +304,10 @@ def _answer(later: Mapping[str, Row]) -> str:
     verdict = "yes" if ends[0] > 0 else "no" if ends[1] <= 0 else "not shown"
     said = f"{verdict}: later tasks of an order save {percent(found)} of the episodes that they take from nothing"
     growth = later.get(GROWTH)
-    return (
-        said if growth is None else f"{said}, and {growth['value']:+.1f} points for each place that a task comes later"
-    )
+    if growth is None:
+        return said
+    points = f"{abs(growth['value']):.1f} points {'more' if growth['value'] >= 0 else 'less'}"
+    return f"{said}, and {points} for each place that a task comes later"
 
 
 def _carried(rows: Sequence[Row]) -> dict[str, float]:
