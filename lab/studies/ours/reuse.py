@@ -32,7 +32,8 @@ ABOUT = (
     "learned as `lab run` does, with the advisor 'expert', into the toolbox that the tasks before it left; the first task of "
     "an order finds an empty one. For comparison each task is learned from nothing, which shares skills within the task, too: "
     "what is saved is saved by earlier tasks. A problem that several skills share counts once. A table fits only where there are "
-    "the same states and moves: ways between stations carry over where the workspaces have the same grid."
+    "the same states and moves: ways between stations carry over where the workspaces have the same grid. "
+    "Intervals are over the orders: they say nothing of other tasks or scenes."
 )
 COLUMNS = (
     "Taken: the policy of an earlier task is used as it is. Adapted: learned on from it. Own: taken or adapted within the "
@@ -303,9 +304,10 @@ def _answer(later: Mapping[str, Row]) -> str:
     verdict = "yes" if ends[0] > 0 else "no" if ends[1] <= 0 else "not shown"
     said = f"{verdict}: later tasks of an order save {percent(found)} of the episodes that they take from nothing"
     growth = later.get(GROWTH)
-    return (
-        said if growth is None else f"{said}, and {growth['value']:+.1f} points for each place that a task comes later"
-    )
+    if growth is None:
+        return said
+    points = f"{abs(growth['value']):.1f} points {'more' if growth['value'] >= 0 else 'less'}"
+    return f"{said}, and {points} for each place that a task comes later"
 
 
 def _carried(rows: Sequence[Row]) -> dict[str, float]:

@@ -78,7 +78,7 @@ def test_a_task_that_saves_more_the_later_it_comes() -> None:
     lives = [(A, nothing, other), (A, other, everything)]
     rows = rows_of(lives, ANEW | {"c": other})
     assert value(rows, "more_saved_a_place_percent", place="later") == pytest.approx(50.0)
-    assert str(in_short(rows, 2)["answer"]).endswith(", and +50.0 points for each place that a task comes later")
+    assert str(in_short(rows, 2)["answer"]).endswith(", and 50.0 points more for each place that a task comes later")
 
 
 def test_rows_of_each_task_of_an_order_by_hand() -> None:
