@@ -157,7 +157,10 @@ class World:
         with silence():
             solid, seen = self._solid(shape), self._seen(shape)
             entry.number = self._call("createMultiBody", mass_kg, solid, seen, list(position), list(body))
-        moments, rolling = [one * mass_kg for one in shape.inertia_m2], PART_ROLLING * (shape.solid != "box")
+        moments, rolling = (
+            [float(f"{one * mass_kg:.12g}") for one in shape.inertia_m2],
+            PART_ROLLING * (shape.solid != "box"),
+        )
         self._call("changeDynamics", entry.number, -1, localInertiaDiagonal=moments, rollingFriction=rolling)
         self._add(name, entry)
         self.friction(name, friction, spinning=PART_SPINNING)
