@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from lab.errors import BadInput
-from lab.sim.scene import Layout
+from lab.sim.places import Layout
 from lab.studies.ours import changed_scenes
 from lab.studies.ours.changed_scenes import FARTHEST_M, KINDS, NEAREST_M, Changed, Scene, still, surveyed
-from lab.tasks.task_file import Task, load
+from lab.tasks.task import Order, Task
+from lab.tasks.task_file import load
 
 LAYOUT = Layout(((0.72, -0.08), (0.78, 0.08), (0.98, -0.12), (0.68, 0.45), (0.26, -0.42)), ())
 
@@ -60,19 +61,19 @@ def test_cubes_come_and_go(task: Task) -> None:
 def test_a_scene_that_cannot_be_surveyed_is_drawn_again(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
     tried: list[int] = []
 
-    def prepare(task: Task, toasts: int, seed: int) -> int:
+    def prepare(task: Task, order: Order, seed: int) -> Order:
         tried.append(seed)
         if len(tried) % 4:
             raise BadInput("two things overlap")
-        return toasts
+        return order
 
     monkeypatch.setattr(changed_scenes, "prepare", prepare)
-    prepared, words, refused = surveyed(Scene("another seed", 3, 5), task, LAYOUT, 0, 3)
+    prepared, words, refused = surveyed(Scene("another seed", 3, 5), task, LAYOUT, 0, task.order(3))
     found: object = prepared
-    assert (found, words, refused, len(set(tried))) == (3, f"seed {tried[-1]}", 3, 4)
-    again = surveyed(Scene("another seed", 3, 5), task, LAYOUT, 0, 3)
+    assert (found, words, refused, len(set(tried))) == (task.order(3), f"seed {tried[-1]}", 3, 4)
+    again = surveyed(Scene("another seed", 3, 5), task, LAYOUT, 0, task.order(3))
     assert again[1:] == (words, refused)  # its own chance, whoever draws it
     monkeypatch.setattr(changed_scenes, "MAX_DRAWS", 3)
     tried.clear()
     with pytest.raises(BadInput, match="another seed, scene 3: none of 3 draws can be surveyed; the last: two things"):
-        surveyed(Scene("another seed", 3, 5), task, LAYOUT, 0, 3)
+        surveyed(Scene("another seed", 3, 5), task, LAYOUT, 0, task.order(3))
