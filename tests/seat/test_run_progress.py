@@ -168,8 +168,8 @@ def test_the_rest_of_a_run() -> None:
         progress.hear(SequenceFound(SequenceResult((1, 2, 1), 110.0, (120.0, 110.0)), Reference(100.0, True, "A*")))
         progress.hear(PhaseBegan("carry out", 2))
         progress.hear(MoveMade(Move(1, "plate", "plate", "toaster", 0.0, 0.0, 0.0, 17.14), "slice 1"))
-        progress.hear(MoveMade(Move(2, "toaster", "toaster", "oven [hot]", 20.0, 21.0, 81.0, 84.4), "slice 2"))
-        progress.hear(MoveRetried("toast 2 at 'oven': it [slipped]"))
+        progress.hear(MoveMade(Move(2, "toaster", "toaster", "oven [hot]", 20.0, 21.0, 81.0, 84.4), "cup 2"))
+        progress.hear(MoveRetried("cup 2 at 'oven': it [slipped]"))
         progress.hear(RecordSkipped("policy file x.safetensors: cut [off]"))
         progress.hear(KeptBeside("grasp", 2, "version 1 does better"))
         progress.hear(PhaseBegan("another", 1))
@@ -178,10 +178,10 @@ def test_the_rest_of_a_run() -> None:
         "  plate > toaster, loaded                               15.13 s",
         "Find the order of the transfers",
         "  parts 1 2 1: 110.0 s found in episode 2 of 2, proven optimum 100.0 s, gap 10.0%",
-        "Make toast in physics",
+        "Carry the order out in physics",
         "     17.1 s  slice 1: plate to toaster",
-        "     84.4 s  slice 2: toaster to oven [hot], waited 60.0 s",
-        "  failed, trying again: toast 2 at 'oven': it [slipped]",
+        "     84.4 s  cup 2: toaster to oven [hot], waited 60.0 s",
+        "  failed, trying again: cup 2 at 'oven': it [slipped]",
         "  skipped: policy file x.safetensors: cut [off]",
         "  'grasp', version 2 is kept, but not put in use: version 1 does better",
         "another",
