@@ -265,7 +265,7 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.learning.session", "from lab.advice.trust import x", "runs back up"),
         ("lab.sequencing.methods.srl", "def f():\n    import lab.advice.advisors", "runs back up"),
         ("lab.sequencing.methods.srl", "from lab.seat.terminal.prompt import ReadLine", "lab.sequencing never does"),
-        ("lab.sim.arms.robot", "from ..learning import session", "imports lab.learning.session: lab.sim never does"),
+        ("lab.sim.arms.robot", "from ...learning import session", "imports lab.learning.session: lab.sim never does"),
         ("lab.sim.world", "from lab.sequencing.cell.cell import Cell", "lab.sim never does"),
         ("lab.production.composer", "from ..cli import main", "runs back up"),
         ("lab.vision.pictures", "from lab.sim.world import World", "runs back up"),
