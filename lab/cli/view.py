@@ -99,9 +99,10 @@ def seen(what: str, asked: Asked) -> "Iterator[tuple[str, Recording]]":
     from lab.production.recorder import show_scene
     from lab.sim.scene.scene_check import check_scene
     from lab.skills.prepared_scene import lay_out
+    from lab.tasks.cell_file import CellFile
     from lab.tasks.grid_world import GridWorld
     from lab.tasks.task import Task
-    from lab.tasks.task_file import load_any
+    from lab.tasks.task_file import load, load_any
     from lab.view.still import Still
     from lab.view.world_bodies import WorldBodies
 
@@ -115,6 +116,8 @@ def seen(what: str, asked: Asked) -> "Iterator[tuple[str, Recording]]":
                 said.append(f"{drawn.drawn} of {len(found.obstacles)} obstacles drawn")
             yield "; ".join(said), drawn.still(way)
         return
+    if isinstance(found, CellFile) and found.in_physics is not None:
+        found = load(what)
     if not isinstance(found, Task):
         raise BadInput(
             f"{what}: it is a cell, which has no scene: look at its order with lab sequence {what} --gantt x.svg"

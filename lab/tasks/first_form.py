@@ -7,7 +7,8 @@ from lab.tasks.toml_text import Loc
 TOASTER = {"body": "toaster.urdf", "floor_m": 0.015, "approach": "camera", "finish": [0.70, 0.42, 0.16]}
 TOASTER_MARKER = [0.0, 0.03825, 0.1]
 APPLIER = {"body": "applier.urdf", "floor_m": 0.02}
-SLICE = {"name": "slice", "count": 3, "shape": "box", "size_m": [0.12, 0.015, 0.12], "look": "slice.urdf"}
+COUNT = 3
+SLICE = {"name": "slice", "shape": "box", "size_m": [0.12, 0.015, 0.12], "look": "slice.urdf"}
 HEAD = {"head_speed_m_s": ("speed_m_s", 0.02), "dwell_s": ("dwell_s", 3.0)}
 
 
@@ -18,8 +19,9 @@ def renewed(raw: dict[str, Any]) -> dict[str, Any]:
         return raw
     kept = {name: value for name, value in raw.items() if name not in old}
     slices, grid = raw.get("slices", {}), raw.get("insert", {})
-    kept["parts"] = [SLICE | (slices if isinstance(slices, dict) else {}) | {"routes": [raw.get("route", [])]}]
     stations = raw.get("stations")
+    own = {"count": _count(stations), "routes": [raw.get("route", [])]}
+    kept["parts"] = [SLICE | (slices if isinstance(slices, dict) else {}) | own]
     if isinstance(stations, list):
         kept["stations"] = [_station(station, grid) if isinstance(station, dict) else station for station in stations]
         heads = {s["process"]: s for s in stations if isinstance(s, dict) and isinstance(s.get("process"), str)}
@@ -31,6 +33,17 @@ def renewed(raw: dict[str, Any]) -> dict[str, Any]:
     if isinstance(subtasks, dict) and "butter" in subtasks:
         kept["subtasks"] = {("cover" if name == "butter" else name): table for name, table in subtasks.items()}
     return kept
+
+
+def _count(stations: Any) -> int:
+    """Three slices, or as many as the plates hold."""
+    plates = (
+        [s for s in stations if isinstance(s, dict) and s.get("kind") == "storage"]
+        if isinstance(stations, list)
+        else []
+    )
+    room = [s["capacity"] for s in plates if isinstance(s.get("capacity"), int) and s["capacity"] > 0]
+    return min([COUNT, *room])
 
 
 def own_loc(raw: dict[str, Any], loc: Loc) -> Loc:

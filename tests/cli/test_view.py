@@ -92,7 +92,7 @@ def test_a_page_that_cannot_be_written(tmp_path: Path, lab: Lab) -> None:
     for what, out, line in (
         ("world-1", tmp_path / "w.png", r"its name must end in \.html"),
         (str(tmp_path), tmp_path / "w.html", r"its replay\.html is such a page already"),
-        ("fms", tmp_path / "w.html", r"it is a cell, which has no scene"),
+        ("toast-case-1", tmp_path / "w.html", r"it is a cell, which has no scene"),
     ):
         with pytest.raises(BadInput, match=line):
             write_page(what, ONE, out)

@@ -94,3 +94,13 @@ def test_a_route_of_one_place_is_too_short(refused: Refused) -> None:
 )
 def test_what_is_no_table_is_left_for_the_check(raw: dict[str, Any]) -> None:
     assert ("parts" in renewed(raw)) == bool(raw.keys() & {"slices", "route", "insert", "parts"})
+
+
+@pytest.mark.parametrize(("room", "count"), [(50, 3), (2, 2), (1, 1)])
+def test_as_many_slices_as_the_plates_hold(room: int, count: int) -> None:
+    raw = {
+        "slices": {},
+        "route": [],
+        "stations": [{"kind": "storage", "capacity": 50}, {"kind": "storage", "capacity": room}],
+    }
+    assert renewed(raw)["parts"][0]["count"] == count
