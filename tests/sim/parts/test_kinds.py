@@ -77,17 +77,17 @@ def test_a_tool_turned_like_another_holds_the_part_as_before_and_is_as_near_as_c
 
 
 def test_how_far_a_carried_part_reaches_from_the_tool(sign: Kind, kinds: dict[str, Kind]) -> None:
-    """60 x 12 mm: 30 and 6 mm from the middle, 40 mm when the tool is 10 mm off it; across when it is turned."""
-    assert gripped(sign).carried_half_m() == pytest.approx((0.030, 0.006))
-    assert gripped(sign, x=0.01).carried_half_m() == pytest.approx((0.040, 0.006))
-    assert gripped(sign, yaw=QUARTER, x=0.01).carried_half_m() == pytest.approx((0.006, 0.040))
-    eighth = 0.030 * cos(pi / 4) + 0.006 * sin(pi / 4)
+    """60 x 18 mm: 30 and 9 mm from the middle, 40 mm when the tool is 10 mm off it; across when it is turned."""
+    assert gripped(sign).carried_half_m() == pytest.approx((0.030, 0.009))
+    assert gripped(sign, x=0.01).carried_half_m() == pytest.approx((0.040, 0.009))
+    assert gripped(sign, yaw=QUARTER, x=0.01).carried_half_m() == pytest.approx((0.009, 0.040))
+    eighth = 0.030 * cos(pi / 4) + 0.009 * sin(pi / 4)
     assert gripped(sign, yaw=pi / 4).carried_half_m() == pytest.approx((eighth, eighth))
     assert kinds["sign on pallet"].carried_half_m() == pytest.approx((0.060, 0.017))  # the pallet is the larger
 
 
 def test_how_far_a_standing_part_reaches_from_its_spot(sign: Kind, kinds: dict[str, Kind]) -> None:
-    assert sign.footprint_m() == pytest.approx((0.030, 0.006))
+    assert sign.footprint_m() == pytest.approx((0.030, 0.009))
     assert kinds["sign on pallet"].footprint_m() == kinds["pallet"].footprint_m() == pytest.approx((0.060, 0.017))
 
 
@@ -102,7 +102,7 @@ def test_pallets_are_kinds_of_their_own_and_with_what_rides_on_them(kinds: dict[
     assert [kind.name for kind in loaded.stack()] == ["pallet", "sign"]
     assert loaded.stack()[0].rider is None
     assert loaded.grip == kinds["pallet"].grip  # the gripper holds the pallet
-    assert loaded.height_m == pytest.approx(0.020 + 0.050)
+    assert loaded.height_m == pytest.approx(0.020 + 0.044)
     assert [kind.name for kind in kinds["sign"].stack()] == ["sign"]
 
 
