@@ -106,7 +106,7 @@ def test_a_pallet_is_surveyed_with_its_part_on_it(fms: Task, world: World) -> No
     surveyor = Surveyor(scene, "sign on pallet", clearance=0.01)
     assert surveyor.moving == [NAME, f"{CARRIED}'s pallet", CARRIED]
     assert surveyor.cause(ToolPose(0.7, 0.1, 0.4, 0.3)) == ""
-    for body, middle in ((f"{CARRIED}'s pallet", 0.010), (CARRIED, 0.020 + 0.025)):
+    for body, middle in ((f"{CARRIED}'s pallet", 0.010), (CARRIED, 0.020 + 0.022)):
         position, turn = world.pose(body)
         assert position == pytest.approx((0.7, 0.1, 0.395 + middle))
         assert 2 * np.arctan2(turn[2], turn[3]) == pytest.approx(0.3)
