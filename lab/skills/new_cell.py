@@ -10,7 +10,8 @@ from lab.sim.parts.grip import grip_of
 from lab.sim.parts.part_shape import shape_of
 from lab.sim.scene.reach import ring_of
 from lab.skills.prepared_scene import prepare
-from lab.tasks.new_task import FRICTION, Around, NewPart, NewTask, does_not_fit, heights_m, layouts, text_of
+from lab.tasks.new_task import FRICTION, Around, NewPart, NewTask, does_not_fit, heights_m, layouts
+from lab.tasks.new_task_text import text_of
 from lab.tasks.part_fields import PartFields
 from lab.tasks.robot_fields import RobotSettings
 from lab.tasks.task import Task

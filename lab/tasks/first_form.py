@@ -43,7 +43,7 @@ def _count(stations: Any) -> int:
         else []
     )
     room = [s["capacity"] for s in plates if isinstance(s.get("capacity"), int) and s["capacity"] > 0]
-    return min([COUNT, *room])
+    return int(min([COUNT, *room]))
 
 
 def own_loc(raw: dict[str, Any], loc: Loc) -> Loc:

@@ -26,8 +26,8 @@ from lab.tasks.new_task import (
     machine_of_word,
     new_task,
     part_of_word,
-    text_of,
 )
+from lab.tasks.new_task_text import text_of
 from lab.tasks.task_file import task_of_text
 
 ROOMY = Around(0.36, 1.3, 2.9)
