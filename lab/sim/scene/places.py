@@ -22,6 +22,7 @@ SLAB_M, CLOSING_M = (
     0.06,
     0.025,
 )  # [m] that a slab is larger than what stands on it, and as much more where fingers close
+APART_M = 0.002  # [m] between parts where they begin, at least
 FREE_M = 0.0125  # [m] beyond an open finger to what stands beside, at least
 MAX_DRAWS = 100  # of an obstacle's place
 SPARE_SPOTS = 4  # so many spots of a station are reckoned with, however few parts there are
@@ -175,12 +176,31 @@ class Places:
     def draw(self, order: Order, rng: np.random.Generator) -> Layout:
         """A layout drawn uniformly within the areas that the task gives its obstacles and parts.
 
-        An obstacle drawn onto a station is drawn again; BadInput names both when its area leaves no room beside the station.
+        An obstacle drawn onto a station, and a part drawn into another one, is drawn again; BadInput names what an area
+        leaves no room for.
         """
         kept = self.kept_free(len(order))
         places = [_draw_place(obstacle, kept, rng) for obstacle in self.task.obstacles]
-        offsets = [tuple(map(float, rng.uniform(-1, 1, 3) * self.task.part(kind).area)) for kind in order]
-        return Layout(tuple(places), tuple(offsets))  # type: ignore[arg-type]
+        stand: list[Rectangle] = []
+        offsets = [self._draw_off(*one, stand, rng) for one in zip(order, self.begins(order), strict=True)]
+        return Layout(tuple(places), tuple(offsets))
+
+    def _draw_off(
+        self, kind: str, spot: Spot, stand: list[Rectangle], rng: np.random.Generator
+    ) -> tuple[float, float, float]:
+        """How far a part stands off its spot, clear of those that `stand` already, to which it is added."""
+        part = self.task.part(kind)
+        along, across = (reach + APART_M / 2 for reach in self.kinds[comes_as(part)].footprint_m())
+        for _ in range(MAX_DRAWS):
+            dx, dy, turn = (float(value) for value in rng.uniform(-1, 1, 3) * part.area)
+            ground = Rectangle(*beside((spot.x, spot.y), spot.yaw, (dx, dy)), along, across, spot.yaw + turn)
+            if not any(other.meets(ground) for other in stand):
+                stand.append(ground)
+                return dx, dy, turn
+        raise BadInput(
+            f"part '{kind}': area = {list(part.area)}: parts would stand in one another at '{self.task.starts(kind)}'; "
+            "wanted a smaller one, or spots that are farther apart"
+        )
 
     def begins(self, order: Order) -> list[Spot]:
         """The spot on which each part of an order stands at the start, part 1 first: the stations' first ones."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.sim import models
-from lab.sim.parts.kinds import Spot
+from lab.sim.parts.kinds import Spot, beside
 from lab.sim.scene.places import SLAB, Layout, Rectangle
 from lab.sim.scene.scene_check import places_of
 from lab.tasks.task import Order, Task
@@ -213,7 +213,7 @@ def test_a_layout_stays_within_its_areas(task: Task, seed: int, toasts: int) -> 
 
 
 def test_each_part_is_drawn_within_its_own_kinds_area(breakfast: Task) -> None:
-    order = ("slice", "cup") * 4
+    order = ("slice", "cup") * 3
     layout = places_of(breakfast).draw(order, np.random.default_rng(7))
     for kind, off in zip(order, layout.parts, strict=True):
         assert np.all(np.abs(off) <= breakfast.part(kind).area)
@@ -338,3 +338,23 @@ def test_meeting_is_mutual(
     one, other = Rectangle(0.0, z, a, b, e), Rectangle(x, y, c, d, f)
     assert one.meets(other) == other.meets(one)
     assert one.meets(Rectangle(0.0, z, c, d, f))
+
+
+def test_parts_do_not_begin_in_one_another(task: Task) -> None:
+    """Two slices 14 cm apart, each up to 2 cm off along its 12 cm: some draws would have them overlap."""
+    places, order = places_of(task), ("slice",) * 2
+    for seed in range(60):
+        ground = []
+        for spot, (dx, dy, turn) in zip(
+            places.begins(order), places.draw(order, np.random.default_rng(seed)).parts, strict=True
+        ):
+            ground.append(Rectangle(*beside((spot.x, spot.y), spot.yaw, (dx, dy)), 0.06, 0.0075, spot.yaw + turn))
+        assert not ground[0].meets(ground[1])
+
+
+def test_an_area_that_leaves_no_room_is_refused(task: Task) -> None:
+    slices = task.parts[0].model_copy(update={"area": (0.0, 0.0, 0.0)})
+    plate = task.station("plate").model_copy(update={"spots": ((0.0, 0.0, 0.0), (0.05, 0.0, 0.0)), "capacity": 2})
+    near = task.changed(parts=(slices,), stations=tuple(plate if s.name == "plate" else s for s in task.stations))
+    with pytest.raises(BadInput, match="parts would stand in one another at 'plate'"):
+        places_of(near).draw(("slice",) * 2, np.random.default_rng(0))
