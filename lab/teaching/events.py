@@ -10,7 +10,7 @@ from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Request
 from lab.learning.session import Session
 from lab.learning.settings import GateSettings
-from lab.sequencing.cell.schedule import Move
+from lab.sequencing.cell.schedule import Move, Schedule
 from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
 from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.toolbox.policy import Policy
@@ -144,6 +144,129 @@ class MoveRetried:
     why: str
 
 
+@dataclass(frozen=True)
+class PlanMade:
+    """An order for the work that remains was found: its schedule, how many moves, and the proven gap (None: not known).
+
+    at_s: when; the schedule's times are counted from the same beginning of the run [s], as all of a run's. why: what
+    made a new plan necessary, "" at first.
+    """
+
+    schedule: Schedule
+    moves: int
+    gap: float | None
+    proven: bool
+    at_s: float
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class MoveBegan:
+    """The robot sets out to bring a part on: the move's number of how many, from where it is to where it picks and drops."""
+
+    number: int
+    moves: int
+    part: str
+    start: str
+    origin: str
+    target: str
+    at_s: float
+
+
+@dataclass(frozen=True)
+class SkillBegan:
+    """The robot begins with a skill; words: what it does, for people."""
+
+    name: str
+    words: str
+    part: str
+    at_s: float
+
+
+@dataclass(frozen=True)
+class MachineBegan:
+    """A machine works on a part; until_s: until when, None where that is not known before."""
+
+    station: str
+    part: str
+    at_s: float
+    until_s: float | None
+
+
+@dataclass(frozen=True)
+class MachineDone:
+    """A machine has finished its part."""
+
+    station: str
+    part: str
+    at_s: float
+
+
+@dataclass(frozen=True)
+class MachineFailed:
+    """A machine does not do what it is for."""
+
+    station: str
+    part: str
+    why: str
+    at_s: float
+
+
+@dataclass(frozen=True)
+class PartDone:
+    """A part stands at the end of its route."""
+
+    part: str
+    at_s: float
+
+
+@dataclass(frozen=True)
+class PartLost:
+    """A part is given up."""
+
+    part: str
+    why: str
+    at_s: float
+
+
+@dataclass(frozen=True)
+class RunHeld:
+    """The run stands still: kind "pause", "protective" or "emergency", and who stopped it."""
+
+    kind: str
+    why: str
+    by: str
+    at_s: float
+
+
+@dataclass(frozen=True)
+class RunWentOn:
+    """The run goes on."""
+
+    at_s: float
+
+
+@dataclass(frozen=True)
+class OperatorActed:
+    """The operator gave a command; refused: why it was not followed, "" when it was."""
+
+    words: str
+    by: str
+    at_s: float
+    refused: str = ""
+
+
+@dataclass(frozen=True)
+class TroubleMet:
+    """Something is not as planned: what was noticed, and what is done about it."""
+
+    what: str
+    answer: str
+    part: str
+    station: str
+    at_s: float
+
+
 Event = (
     ScenePrepared
     | LessonContinued
@@ -162,6 +285,18 @@ Event = (
     | SequenceFound
     | MoveMade
     | MoveRetried
+    | PlanMade
+    | MoveBegan
+    | SkillBegan
+    | MachineBegan
+    | MachineDone
+    | MachineFailed
+    | PartDone
+    | PartLost
+    | RunHeld
+    | RunWentOn
+    | OperatorActed
+    | TroubleMet
 )
 Tell = Callable[[Event], None]
 
