@@ -73,7 +73,7 @@ class Controls:
         self._press(Held(StopKind.EMERGENCY, why, by))
 
     def reset(self) -> str:
-        """Release the emergency stop: the arm stays where it is until `go_on`; why there is nothing to reset, "" when there was."""
+        """Release the emergency stop: it stays until `go_on`; why there is nothing to reset, ""."""
         if StopKind.EMERGENCY not in self.stops:
             return "no emergency stop is pressed"
         self._release(StopKind.EMERGENCY, StopKind.PROTECTIVE, instead=Held(StopKind.PAUSE, "after the emergency stop"))
