@@ -3,7 +3,7 @@
 import fcntl
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -38,7 +38,7 @@ class EntryKinds:
         kind = record.pop("kind", None) if isinstance(record, dict) else None
         if not isinstance(kind, str) or kind not in self._kinds:
             raise ValueError(f"kind {kind!r} is none of {', '.join(self._kinds)}")
-        model = self._kinds[kind]
+        model: Any = self._kinds[kind]
         try:
             found = _reader(model).validate_json(json.dumps(record))
         except ValidationError as error:
@@ -48,11 +48,12 @@ class EntryKinds:
 
 
 @cache
-def _reader(model: Any) -> Any:
+def _reader(model: Hashable) -> Any:
     from pydantic import ConfigDict, TypeAdapter
 
     strict = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
-    return TypeAdapter(type(model.__name__, (model,), {"__pydantic_config__": strict, "__doc__": model.__doc__}))
+    kind: Any = model
+    return TypeAdapter(type(kind.__name__, (kind,), {"__pydantic_config__": strict, "__doc__": kind.__doc__}))
 
 
 class AppendedFile:

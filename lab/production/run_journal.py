@@ -6,18 +6,27 @@ a run, it is carried out again from its beginning while the journal stands in fo
 what was written. Skills that were learned before are taken from the run's folder.
 """
 
+import json
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from lab import __version__
 from lab.advice.json_lines import AppendedFile, EntryKinds
 from lab.errors import BadInput, WorkFailed
 from lab.production.controls import Held, StopKind
 from lab.production.stop_record import StopsChanged
+from lab.tasks.record import write_whole
+from lab.toolbox.folder_place import FolderPlace
+from lab.toolbox.index import KnownPolicies
+from lab.toolbox.names import SUFFIX, slug
+from lab.toolbox.policy import Policy
+from lab.toolbox.policy_file import decode, encode
 
 FILE = "run.jsonl"
+KNOWN = "known.json"  # which policies the toolbox held when the run began
+SKILLS = "skills"  # the folder for the policies of the run
 SCHEMA = 1
 MAX_STEP = 10**12  # physics steps, more than a century
 
@@ -121,6 +130,13 @@ KINDS: dict[str, type[Any]] = {
 _LINES = EntryKinds(KINDS)
 
 
+class KeptSkill(NamedTuple):
+    """A skill that was there when the run was stopped."""
+
+    row: dict[str, Any]
+    policy: Policy
+
+
 @dataclass
 class RunJournal:
     """The journal of a run under way; without a path, one that is not written.
@@ -142,6 +158,7 @@ class RunJournal:
             folder.mkdir(parents=True, exist_ok=True)
             if path.exists():
                 os.replace(path, path.with_name("run-before.jsonl"))
+            path.with_name(KNOWN).unlink(missing_ok=True)
             journal = cls(path, head, file=AppendedFile.new(path))
         except OSError as error:
             raise BadInput(f"journal '{path}' (--out) cannot be written: {error.strerror or error}") from error
@@ -170,9 +187,33 @@ class RunJournal:
 
     # ---- what is known of a run that is gone on with ---------------------------------------------------------------
 
-    def skill(self, name: str) -> SkillKept | None:
-        """What was kept of a skill."""
-        return next((e for e in self.known if isinstance(e, SkillKept) and e.row.get("name") == name), None)
+    def known_at_first(self, now: KnownPolicies) -> KnownPolicies:
+        """Of the toolbox's policies those that were there when the run began: what it does must not depend on its break."""
+        if self.path is None:
+            return now
+        path = self.path.with_name(KNOWN)
+        if not path.exists():
+            write_whole(path, json.dumps(now.made(), indent=0) + "\n")
+            return now
+        try:
+            made = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise BadInput(f"'{path}' (--resume): cannot be read: {error}") from None
+        return now.only(made if isinstance(made, dict) else {})
+
+    def skill(self, name: str) -> "KeptSkill | None":
+        """What was kept of a skill. BadInput when its policy is damaged or gone."""
+        found = next((e for e in self.known if isinstance(e, SkillKept) and e.row.get("name") == name), None)
+        if found is None or self.path is None:
+            return None
+        return KeptSkill(found.row, decode(FolderPlace(self.path.parent / SKILLS).read(found.file), found.file))
+
+    def keep_skill(self, row: dict[str, Any], policy: Policy) -> None:
+        """A skill is there: its policy is written to the run's folder, then its line."""
+        if self.path is not None:
+            file = f"{slug(str(row['name']))}{SUFFIX}"
+            FolderPlace(self.path.parent / SKILLS).write(file, encode(policy))
+            self.write(SkillKept(row, file))
 
     def session(self, name: str) -> Path | None:
         """The folder of the session of a lesson that was begun."""
