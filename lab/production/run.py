@@ -38,13 +38,12 @@ def teach_all(prepared: Prepared, teacher: Teacher, journal: RunJournal | None =
         dict[str, str](),
     )  # by signature, the skill that it was first found or learned for
     for name, problem in prepared.problems.items():
-        kept = journal.skill(name)
+        kept, same = journal.skill(name), first.setdefault(f"{problem.subtask} {problem.mdp.signature}", name)
         if kept is not None:
             lesson, row = Lesson(kept.policy, "reused", reason="it was there before this run was stopped"), kept.row
         else:
             settings = task.subtask(problem.subtask)
             lesson = teacher.find_or_teach(LessonPlan(problem, settings.learner, settings.gate, task.name), known)
-            same = first.setdefault(f"{problem.subtask} {problem.mdp.signature}", name)
             if same != name and lesson.source == "reused":  # it would have been learned only once
                 lesson = replace(lesson, reason=f"it is the same problem as '{same}'", saved=(0, 0))
             row = skill_row(name, lesson)
