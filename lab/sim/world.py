@@ -228,6 +228,12 @@ class World:
         states = self._call("getJointStates", entry.number, [entry.joints[joint] for joint in names])
         return np.array([state[0] for state in states])
 
+    def joint_speeds(self, name: str, names: Sequence[str]) -> Array:
+        """Joint velocities [rad/s or m/s], shape (n,)."""
+        entry = self._bodies[name]
+        states = self._call("getJointStates", entry.number, [entry.joints[joint] for joint in names])
+        return np.array([state[1] for state in states])
+
     def set_joints(self, name: str, names: Sequence[str], positions: Sequence[float] | Array) -> None:
         """Put joints at `positions` at once, without physics: for building and surveying a scene."""
         if not np.isfinite(positions).all():
@@ -278,6 +284,15 @@ class World:
         first, second = self._bodies[one], self._bodies[other]
         chosen = {"linkIndexA": first.links[link]} if link else {}
         return bool(self._call("getContactPoints", first.number, second.number, **chosen))
+
+    def pressed(self, name: str) -> tuple[str, float]:
+        """The body that a body pressed on most in the last step, and with which force [N]; ("", 0) when it touched none."""
+        forces: dict[int, float] = {}
+        for point in self._call("getContactPoints", self._bodies[name].number):
+            if point[1] != point[2]:
+                forces[point[2]] = forces.get(point[2], 0.0) + float(point[9])
+        number, force = max(forces.items(), key=lambda one: one[1], default=(-1, 0.0))
+        return self._names.get(number, ""), force
 
     def nearest(self, one: str, other: str, within: float) -> float:
         """Distance [m] between two bodies where they are now, `within` when they are farther apart than that."""
