@@ -5,11 +5,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lab.production.faults.fault import GROUND_M, Fault, Happened, out_of_sight
+from lab.production.faults.fault import GROUND_M, NEVER, Fault, Happened, out_of_sight
 from lab.production.faults.where import (
     AT_STATION_M,
     CLEAR_M,
-    TABLE,
     UP,
     around,
     distance,
@@ -21,7 +20,7 @@ from lab.production.faults.where import (
 )
 from lab.sim import models
 from lab.sim.scene.places import Rectangle
-from lab.sim.scene.scene import MARKER_ABOVE, Scene, in_grid
+from lab.sim.scene.scene import MARKER, MARKER_ABOVE, TABLE, Scene, in_grid
 from lab.sim.scene.scene_check import places_of
 from lab.tasks.task import Order, Task
 
@@ -67,7 +66,9 @@ class MachineSlow(Fault):
     def strikes(self, floor: "Floor") -> Happened:
         """At any time."""
         station, share = str(self.fields.station), self.fields.share or SLOWER
-        floor.machine(station).share = share
+        machine = floor.machine(station)
+        machine.until_s += max(0.0, machine.until_s - floor.now_s) * (share / machine.share - 1.0)
+        machine.share = share
         words = f"'{station}' takes {share:g} times as long"
         return Happened(self.what, words, floor.now_s, station=station)
 
@@ -87,7 +88,10 @@ class MachineFails(Fault):
     def strikes(self, floor: "Floor") -> Happened:
         """At any time."""
         station = str(self.fields.station)
-        floor.machine(station).fails = True
+        machine = floor.machine(station)
+        machine.fails = True
+        if machine.part and not machine.done(floor.now_s):
+            machine.until_s = NEVER
         return Happened(self.what, f"'{station}' does not get done", floor.now_s, station=station)
 
 
@@ -129,7 +133,7 @@ class ObstaclePut(Fault):
         self.marked = _in_a_grid(scene.task, self.fields.at_m or (0.0, 0.0))
         if self.marked:
             at = (x, y, GROUND_M + size[2] + MARKER_ABOVE)
-            scene.world.disc(f"{self.name} marker", models.MARKER_RADIUS, models.MARKER_THICK, at, models.MARKER_GREEN)
+            scene.world.disc(f"{self.name}{MARKER}", models.MARKER_RADIUS, models.MARKER_THICK, at, models.MARKER_GREEN)
 
     def strikes(self, floor: "Floor") -> Happened | None:
         """Once nothing is in its place."""
@@ -140,7 +144,7 @@ class ObstaclePut(Fault):
             world.put(self.name, before)
             return None
         if self.marked:
-            world.put(f"{self.name} marker", (x, y, size[2] + MARKER_ABOVE))
+            world.put(f"{self.name}{MARKER}", (x, y, size[2] + MARKER_ABOVE))
         words = f"a box was put at ({x:.2f}, {y:.2f}) m"
         return Happened(self.what, words, floor.now_s, obstacle=self.name)
 
@@ -166,7 +170,7 @@ class ObstacleMoved(Fault):
         for dx, dy in around(self.fields.by_m or (OBSTACLE_M, 0.0)):
             world.put(name, (at[0] + dx, at[1] + dy, at[2]), turn)
             if is_clear(floor, [name], {TABLE}) and is_robot_away(floor, [name], CLEAR_M):
-                _along(floor, [f"{name} marker"], dx, dy)
+                _along(floor, [f"{name}{MARKER}"], dx, dy)
                 far = float(np.hypot(dx, dy))
                 return Happened(self.what, f"'{name}' was moved by {far:.2f} m", floor.now_s, obstacle=name)
         world.put(name, at, turn)
@@ -190,7 +194,7 @@ class ObstacleGone(Fault):
         name, (x, y) = str(self.fields.obstacle), out_of_sight(self.number)
         if not is_robot_away(floor, [name], OUT_OF_THE_WAY_M):
             return None
-        for body in (name, f"{name} marker"):
+        for body in (name, f"{name}{MARKER}"):
             if body in floor.world.names():
                 at, turn = floor.world.pose(body)
                 floor.world.put(body, (x, y, at[2] + GROUND_M), turn)
@@ -220,7 +224,7 @@ class StationMoved(Fault):
         for dx, dy in around(self.fields.by_m or (STATION_M, 0.0)):
             world.put(name, (at[0] + dx, at[1] + dy, at[2]), turn)
             if is_clear(floor, [name], {TABLE, *inside}):
-                _along(floor, [f"{name} marker", *inside], dx, dy)
+                _along(floor, [f"{name}{MARKER}", *inside], dx, dy)
                 far = float(np.hypot(dx, dy))
                 return Happened(self.what, f"'{name}' was moved by {far:.3f} m", floor.now_s, station=name)
         world.put(name, at, turn)

@@ -10,7 +10,7 @@ import numpy as np
 from lab.sim.arms.robot import NAME
 from lab.sim.frames import Quaternion, Vector
 from lab.sim.parts.kinds import Kind, beside
-from lab.sim.scene.scene import pallet_of
+from lab.sim.scene.scene import TABLE, pallet_of
 from lab.sim.urdf_reader import rotation
 from lab.skills.skill import UPRIGHT
 from lab.tasks.task import part_name
@@ -26,7 +26,6 @@ ABOVE_M = 0.001  # what it is put on
 LEVEL_M = 0.001  # ground is level where heights differ by no more
 EDGE_M = 0.003  # a foot stands so far within what it stands on
 LOW_M = 0.25  # above all that parts stand on, and below an arm that reaches over it
-TABLE = "table"
 UP = (0.0, 0.0, 0.0, 1.0)
 LYING = ((sin(pi / 4), 0.0, 0.0, cos(pi / 4)), (-sin(pi / 4), 0.0, 0.0, cos(pi / 4)))  # on the one side, or the other
 LYING_ACROSS = ((0.0, sin(pi / 4), 0.0, cos(pi / 4)), (0.0, -sin(pi / 4), 0.0, cos(pi / 4)))

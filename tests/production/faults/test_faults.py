@@ -1,6 +1,6 @@
-"""Each kind of fault strikes for real: what it says that it did is what physics then shows, and the same again with the same seed."""
+"""Each kind of fault strikes for real: physics then shows what it says that it did, and the same again for the same seed."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import hypot
 from typing import Any, get_args
 
@@ -13,10 +13,10 @@ from lab.production.faults.injector import Injector
 from lab.production.faults.where import whereabouts
 from lab.production.floor import Floor
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.world import TIME_STEP, World
+from lab.sim.world import TIME_STEP
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.skill import UPRIGHT
-from lab.tasks.fault_fields import NEEDS, TAKES, FaultFields, FaultKind
+from lab.tasks.fault_fields import NEEDS, TAKES, FaultKind
 from lab.tasks.task_file import load, names_of
 
 Struck = Callable[..., tuple[Floor, Injector]]
@@ -31,30 +31,27 @@ def prepared() -> Prepared:
 
 
 @pytest.fixture
-def struck(prepared: Prepared) -> Iterator[Struck]:
+def struck(prepared: Prepared, floor_with: Callable[..., tuple[Floor, Injector]]) -> Struck:
     """A floor on which one fault has struck, and a while has passed: struck({"what": ...}, carried=True)."""
-    worlds: list[World] = []
 
     def make(
-        fields: dict[str, Any], carried: bool = False, put: Any = None, seconds: float = 0.5
+        fields: dict[str, Any], carried: bool = False, put: str = "", seconds: float = 0.5
     ) -> tuple[Floor, Injector]:
-        worlds.append(World())
-        floor = Floor(worlds[-1], prepared.skillset, prepared.layout, prepared.order)
-        injector = Injector([FaultFields.model_validate(fields)])
-        injector.prepare(floor.scene)
+        floor, injector = floor_with(prepared, [fields])
         if carried:
             hold(floor)
-        if put is not None:
+        if put:
             place = floor.scene.places.spots(floor.scene.task.station(put))[0]
             floor.world.put(SLICE, (place.x, place.y, place.z + 0.061))
-        for _ in range(round(seconds / TIME_STEP)):
-            injector.tick(floor)
-            floor.tick()
+        let_pass(floor, seconds)
         return floor, injector
 
-    yield make
-    for world in worlds:
-        world.close()
+    return make
+
+
+def let_pass(floor: Floor, seconds: float) -> None:
+    for _ in range(round(seconds / TIME_STEP)):
+        floor.tick()
 
 
 def hold(floor: Floor) -> None:
@@ -187,13 +184,23 @@ def place_of_spot(floor: Floor, station: str) -> tuple[float, float]:
     return spot.x, spot.y
 
 
+@pytest.mark.parametrize(("what", "done_s"), [("machine slow", 4.0), ("machine fails", float("inf"))])
+def test_a_machine_at_work_takes_longer_or_never_gets_done(
+    prepared: Prepared, floor_with: Any, what: str, done_s: float
+) -> None:
+    """It began at 0 s for 3 s; from 1 s on it takes half as long again: 1 + 2 * 1.5 s."""
+    floor, _ = floor_with(prepared, [{"what": what, "station": "toaster", "at_s": 1.0}])
+    machine = floor.begin("toaster", SLICE, 3.0)
+    let_pass(floor, 1.5)
+    assert machine.until_s == pytest.approx(done_s, abs=0.01)
+    assert floor.begin("toaster", SLICE, 3.0).until_s == pytest.approx(1.5 + 4.5 if done_s < 9 else done_s, abs=0.01)
+
+
 def test_the_camera_is_blind_for_a_while(struck: Struck) -> None:
     floor, injector = struck({"what": "camera blind", "at_s": 0.1, "seconds": 0.3}, seconds=0.3)
-    assert floor.world.dark
-    for _ in range(60):
-        injector.tick(floor)
-        floor.tick()
-    assert not floor.world.dark
+    assert floor.world.dark is True
+    let_pass(floor, 0.25)
+    assert floor.world.dark is False
     assert injector.next_s == float("inf")
 
 
