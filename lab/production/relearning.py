@@ -1,6 +1,6 @@
 """A scene that is no more as it was learned in: surveyed again, and what has changed learned again from its old table."""
 
-from collections.abc import Mapping, MutableMapping
+from collections.abc import MutableMapping
 from dataclasses import dataclass, replace
 
 from lab.errors import BadInput, LabError
@@ -26,24 +26,24 @@ SAME_SPOT_M = 0.001
 
 @dataclass(frozen=True)
 class Relearned:
-    """What is prepared and taught in the changed scene: the skills that were learned again, and why others cannot be."""
+    """What is prepared and taught in the changed scene, and the skills whose problem is another there."""
 
     prepared: Prepared
     taught: Taught
     again: tuple[str, ...]
-    blocked: Mapping[str, str]
 
 
 def relearned(prepared: Prepared, taught: Taught, scene: tuple[Task, Layout], teacher: Teacher) -> Relearned:
     """Survey the scene as it is now seen, and learn what is another problem there, beginning with what was known.
 
     Policies of problems that are as they were are kept. Only this run's own policies are looked at, so that it comes to the
-    same whatever else a toolbox holds. A skill without a solution is blocked, its ways keep the times that they had.
+    same whatever else a toolbox holds. A skill without a solution is blocked (`SkillSet.blocked`), its ways keep the times
+    that they had.
     Raises BadInput for a scene in which nothing can be done.
     """
     task, layout = scene
     check_scene(task)
-    fresh, blocked = _surveyed(prepared, task, layout)
+    fresh = _surveyed(prepared, task, layout)
     teacher = replace(teacher, trial=trial_of(fresh))
     known = KnownPolicies.of(lesson.policy for lesson in taught.lessons.values())
     lessons: dict[str, Lesson] = {}
@@ -60,9 +60,9 @@ def relearned(prepared: Prepared, taught: Taught, scene: tuple[Task, Layout], te
             again.append(name)
         fresh.skillset.policies[name] = lessons[name].policy
     others = {name for name in again if name not in taught.lessons or not _same(lessons[name], taught.lessons[name])}
-    durations = _timed(fresh, taught.durations, others, blocked, teacher)
+    durations = _timed(fresh, taught.durations, others, teacher)
     cell = cell_of(task, durations, prepared.order)
-    return Relearned(fresh, Taught(lessons, durations, cell), tuple(again), blocked)
+    return Relearned(fresh, Taught(lessons, durations, cell), tuple(again))
 
 
 def _same(lesson: Lesson, before: Lesson) -> bool:
@@ -70,30 +70,29 @@ def _same(lesson: Lesson, before: Lesson) -> bool:
     return lesson.policy.q.tobytes() == before.policy.q.tobytes()
 
 
-def _surveyed(prepared: Prepared, task: Task, layout: Layout) -> tuple[Prepared, dict[str, str]]:
-    """Every problem of the scene, and why there is none, by skill."""
+def _surveyed(prepared: Prepared, task: Task, layout: Layout) -> Prepared:
+    """Every problem of the scene; a skill for which there is none is blocked."""
     order = prepared.order
     skillset, surveys = SkillSet.of(task, order), Surveys(task, order, layout)
     words = scene_in_words(task, order, layout)
     problems: dict[str, Problem] = {}
-    blocked: dict[str, str] = {}
     for name, skill in skillset.skills.items():
         skill.surveys = surveys
         try:
             problems[name] = replace(skill.setup(surveys), scene=words, arm=task.robot.model)
         except BadInput as error:
-            blocked[name] = str(error)
-    return Prepared(task, order, prepared.seed, layout, surveys, skillset, problems), blocked
+            skillset.blocked[name] = str(error)
+    return Prepared(task, order, prepared.seed, layout, surveys, skillset, problems)
 
 
 def _timed(
-    fresh: Prepared, before: Durations, others: set[str], blocked: Mapping[str, str], teacher: Teacher
+    fresh: Prepared, before: Durations, others: set[str], teacher: Teacher
 ) -> Durations:
     """What was believed, with the ways measured anew in which a skill with another table has a share."""
     skills = fresh.skillset
 
     def changed(names: set[str]) -> bool:
-        return bool(names & others) and not names & blocked.keys()
+        return bool(names & others) and not names & skills.blocked.keys()
 
     legs = {way: leg for way, leg in skills.legs.items() if changed({skill.name for skill in leg})}
     travels = {pair: way for pair, way in skills.travels.items() if changed({skill.name for skill in way})}

@@ -99,7 +99,7 @@ def test_a_scene_learned_again_is_as_it_is(
     believed = spots(floor)
     scene = scene_seen(prepared.task, prepared.layout, perceive(floor, prepared.task, prepared.layout, believed))
     made = relearned(prepared, taught, scene, teacher)
-    assert not made.blocked
+    assert not made.prepared.skillset.blocked
     anew = prepare(scene[0].changed(obstacles=at_their_places(*scene)), prepared.order, 0)
     for name, problem in made.prepared.problems.items():
         assert problem.mdp.signature == anew.problems[name].mdp.signature, name
@@ -148,9 +148,9 @@ def test_a_wall_around_a_station_blocks_its_ways_and_says_so(
     made = relearned(
         prepared, taught, (walled, type(layout)((*layout.obstacles, (x, y + 0.07)), layout.parts)), teacher
     )
-    assert made.blocked
-    assert all("toaster_buffer" in name for name in made.blocked)
-    assert all("wall" in why for why in made.blocked.values())
+    assert made.prepared.skillset.blocked
+    assert all("toaster_buffer" in name for name in made.prepared.skillset.blocked)
+    assert all("wall" in why for why in made.prepared.skillset.blocked.values())
 
 
 def test_a_station_out_of_reach_is_refused(two_toasts: Any, teacher: Teacher) -> None:
