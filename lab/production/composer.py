@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from lab.production.conditions import Conditions
 from lab.production.durations import TimedMove
 from lab.production.floor import Floor
-from lab.production.recorder import Viewer, finish_name
+from lab.production.recorder import finish_name
 from lab.production.recovery import Recovery
+from lab.production.run_journal import Met, Moved, RunJournal
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.cell.cell import Cell
@@ -16,7 +18,7 @@ from lab.sequencing.simulate.run import branch
 from lab.sim.frames import Recording
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared
-from lab.teaching.events import MachineDone, Tell, unheard
+from lab.teaching.events import Event, MachineDone, MoveMade, Tell, TroubleMet, unheard
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class Outcome:
     """A run in physics: the measured schedule, which parts were delivered, retries, and why it stopped (None: it did not).
 
     timed: how long each move took in which nothing had to be tried again. skipped_s: of sim_s, the time that passed without
-    physics, while the robot waited and nothing moved.
+    physics, while the robot waited and nothing moved. interrupted: by Ctrl-C; all else is what came of it until then.
     """
 
     schedule: Schedule
@@ -36,6 +38,7 @@ class Outcome:
     camera_deviations_m: tuple[float, ...]
     timed: tuple[TimedMove, ...] = ()
     skipped_s: float = 0.0
+    interrupted: bool = False
 
 
 @dataclass
@@ -97,7 +100,7 @@ class Production:
             for name in names:
                 self.floor.recorder.show(name)
 
-    def outcome(self, failure: str | None) -> Outcome:
+    def outcome(self, failure: str | None, interrupted: bool = False) -> Outcome:
         """What came of it."""
         work, floor = self.work, self.floor
         delivered = tuple(part for part in work.done() if work.stands(part))
@@ -112,6 +115,7 @@ class Production:
             tuple(work.deviations_m),
             tuple(work.timed),
             floor.skipped_s,
+            interrupted,
         )
 
 
@@ -119,22 +123,45 @@ def carry_out(
     prepared: Prepared,
     cell: Cell,
     sequence: Sequence[int],
-    *,
-    override: float = 1.0,
-    viewer: Viewer | None = None,
+    conditions: Conditions | None = None,
     tell: Tell = unheard,
 ) -> tuple[Outcome, Recording]:
     """Carry `sequence` (one decision a move, see `Run`) out in physics, from parts on their first stations to the end.
 
-    override: the share of the task's speed and acceleration with which the arm moves. A part is delivered when it stands
-    on its last station at the end, on its pallet if it has one; dropped when it is nowhere upright.
+    A part is delivered when it stands on its last station at the end, on its pallet if it has one; dropped when it is
+    nowhere upright. Ctrl-C ends it with what came of it until then.
     """
+    conditions = conditions or Conditions()
     with World() as world:
-        floor = Floor(world, prepared.skillset, prepared.layout, prepared.order, film=True, viewer=viewer)
-        floor.scene.robot.override(override)
+        floor = Floor(world, prepared.skillset, prepared.layout, prepared.order, film=True, viewer=conditions.viewer)
+        floor.scene.robot.override(conditions.override)
         floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
-        production = Production(floor, cell, tell)
-        failure = production.carry_out(sequence)
+        journal = conditions.journal
+        noted = _noting(floor, journal, tell)
+        floor.tell = noted
+        floor.controls = conditions.controls
+        floor.stops.note = journal.note_stops
+        floor.stops.again(journal.stops(), journal.last_step())
+        production = Production(floor, cell, noted)
+        interrupted = False
+        try:
+            failure = production.carry_out(sequence)
+        except KeyboardInterrupt:
+            failure, interrupted = "stopped by Ctrl-C", True
         floor.recorder.take()  # type: ignore[union-attr]
-        return production.outcome(failure), floor.recorder.recording  # type: ignore[union-attr]
+        return production.outcome(failure, interrupted), floor.recorder.recording  # type: ignore[union-attr]
+
+
+def _noting(floor: Floor, journal: RunJournal, tell: Tell) -> Tell:
+    """Tells on what happens, once it is in the journal."""
+
+    def noted(event: Event) -> None:
+        match event:
+            case MoveMade(move, part):
+                journal.tell(Moved(floor.steps, part, move.origin, move.target, move.pick_s, move.drop_s))
+            case TroubleMet(what, answer, part, station):
+                journal.tell(Met(floor.steps, what, answer, part, station))
+        tell(event)
+
+    return noted

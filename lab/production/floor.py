@@ -18,7 +18,7 @@ from lab.skills import Skill
 from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, SkillFailed, Status
 from lab.skills.skillset import SkillSet
 from lab.tasks.task import Order
-from lab.teaching.events import RunHeld, RunWentOn, unheard
+from lab.teaching.events import RunHeld, RunWentOn, Tell, unheard
 
 AT_REST_STEPS = 60  # physics steps at the end of a wait that are simulated in any case
 SKIPPED_STEPS = 240  # at the most without a look at what else goes on
@@ -48,7 +48,8 @@ class Floor:
         self.scene = Scene(world, skillset.task, order, layout)
         self.bench = Bench(self.scene)
         self.machines = {s.name: Machine(s.name) for s in skillset.task.stations if s.kind == "machine"}
-        self.controls, self.stops, self.tell = Controls(), StopRecord(), unheard
+        self.controls, self.stops = Controls(), StopRecord()
+        self.tell: Tell = unheard
         self.on_tick: Callable[[], None] | None = None
         self.hand: Callable[[], bool] | None = None
         self.force_limit_n: float | None = None
