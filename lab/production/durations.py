@@ -213,7 +213,7 @@ def durations_key(
     """
     code = sources(modules, DECIDED_BY_RESULT)
     decides = {
-        "task": task.model_dump(mode="json", exclude={"name", "title", "sequencing", "subtasks"}),
+        "task": task.model_dump(mode="json", exclude={"name", "title", "sequencing", "subtasks", "faults"}),
         "obstacles": layout.obstacles,
         "moves": [asdict(skillset.moves), [*skillset.legs]],
         "policies": {name: [policy.signature, _hash(policy.q.tobytes())] for name, policy in policies.items()},

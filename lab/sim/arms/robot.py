@@ -224,3 +224,7 @@ class Robot:
         self._press(self.arm.fingers.at(self.arm.fingers.open_m), 60.0)
         self.closed = False
         yield from self.rest(_GRIP_STEPS)
+
+    def lose(self) -> None:
+        """The fingers open by themselves, as when their air fails: who moves the arm still holds them to be closed."""
+        self._press(self.arm.fingers.at(self.arm.fingers.open_m), 60.0)
