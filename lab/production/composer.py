@@ -1,10 +1,12 @@
 """Sequence + skills -> motions: carries the order of transfers out in physics, and goes on from whatever was reached."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from lab.production.conditions import Conditions
 from lab.production.durations import TimedMove
+from lab.production.faults.fault import Happened
+from lab.production.faults.injector import Injector
 from lab.production.floor import Floor
 from lab.production.recorder import finish_name
 from lab.production.recovery import Recovery
@@ -27,6 +29,7 @@ class Outcome:
 
     timed: how long each move took in which nothing had to be tried again. skipped_s: of sim_s, the time that passed without
     physics, while the robot waited and nothing moved. interrupted: by Ctrl-C; all else is what came of it until then.
+    happened: the faults that struck.
     """
 
     schedule: Schedule
@@ -39,6 +42,7 @@ class Outcome:
     timed: tuple[TimedMove, ...] = ()
     skipped_s: float = 0.0
     interrupted: bool = False
+    happened: tuple[Happened, ...] = ()
 
 
 @dataclass
@@ -133,10 +137,13 @@ def carry_out(
     """
     conditions = conditions or Conditions()
     with World() as world:
-        floor = Floor(world, prepared.skillset, prepared.layout, prepared.order, film=True, viewer=conditions.viewer)
+        floor, injector = Floor(world, prepared.skillset, prepared.layout, prepared.order), Injector(conditions.faults)
+        injector.prepare(floor.scene)
+        floor.record(conditions.viewer)
         floor.scene.robot.override(conditions.override)
         floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
+        floor.hand = lambda: injector.tick(floor)
         journal = conditions.journal
         noted = _noting(floor, journal, tell)
         floor.tell = noted
@@ -150,7 +157,8 @@ def carry_out(
         except KeyboardInterrupt:
             failure, interrupted = "stopped by Ctrl-C", True
         floor.recorder.take()  # type: ignore[union-attr]
-        return production.outcome(failure, interrupted), floor.recorder.recording  # type: ignore[union-attr]
+        outcome = replace(production.outcome(failure, interrupted), happened=tuple(injector.happened))
+        return outcome, floor.recorder.recording  # type: ignore[union-attr]
 
 
 def _noting(floor: Floor, journal: RunJournal, tell: Tell) -> Tell:

@@ -2,12 +2,13 @@
 
 from collections.abc import MutableMapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from lab.errors import BadInput, LabError
 from lab.learning.problem import Problem
 from lab.production.durations import Durations, cell_of, measure
 from lab.production.floor import Floor
-from lab.production.report import Taught
+from lab.production.report import Taught, skill_row
 from lab.sim.parts.kinds import Spot
 from lab.sim.scene.places import Layout, Places
 from lab.sim.scene.scene_check import check_scene
@@ -47,6 +48,7 @@ def relearned(prepared: Prepared, taught: Taught, scene: tuple[Task, Layout], te
     teacher = replace(teacher, trial=trial_of(fresh))
     known = KnownPolicies.of(lesson.policy for lesson in taught.lessons.values())
     lessons: dict[str, Lesson] = {}
+    rows: dict[str, dict[str, Any]] = {}
     again = []
     for name, problem in fresh.problems.items():
         if name in taught.lessons and problem.mdp.signature == prepared.problems[name].mdp.signature:
@@ -58,11 +60,12 @@ def relearned(prepared: Prepared, taught: Taught, scene: tuple[Task, Layout], te
             known[problem.subtask, lessons[name].policy.signature] = lessons[name].policy
             teacher.tell(SkillReady(name, lessons[name]))
             again.append(name)
+        rows[name] = skill_row(name, lessons[name])
         fresh.skillset.policies[name] = lessons[name].policy
     others = {name for name in again if name not in taught.lessons or not _same(lessons[name], taught.lessons[name])}
     durations = _timed(fresh, taught.durations, others, teacher)
     cell = cell_of(task, durations, prepared.order)
-    return Relearned(fresh, Taught(lessons, durations, cell), tuple(again))
+    return Relearned(fresh, Taught(lessons, rows, durations, cell), tuple(again))
 
 
 def _same(lesson: Lesson, before: Lesson) -> bool:
@@ -85,9 +88,7 @@ def _surveyed(prepared: Prepared, task: Task, layout: Layout) -> Prepared:
     return Prepared(task, order, prepared.seed, layout, surveys, skillset, problems)
 
 
-def _timed(
-    fresh: Prepared, before: Durations, others: set[str], teacher: Teacher
-) -> Durations:
+def _timed(fresh: Prepared, before: Durations, others: set[str], teacher: Teacher) -> Durations:
     """What was believed, with the ways measured anew in which a skill with another table has a share."""
     skills = fresh.skillset
 
