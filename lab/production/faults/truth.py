@@ -12,19 +12,17 @@ Came = Literal["delivered", "stopped", "wrong"]
 PART = ("part moved", "part gone", "part fallen", "part slips", "part dropped")
 FIXED = ("obstacle put", "obstacle moved", "obstacle gone", "station moved")
 MACHINE = ("machine slow", "machine fails")
-# what a reason may say, and the faults of which that can be true; the first that fits counts
-CLAIMS: tuple[tuple[str, tuple[str, ...]], ...] = (
-    (r"not done|takes longer|out of order", MACHINE),
-    (r"not of this order|no spot of .* is free|is taken", ("station full",)),
-    (r"camera sees nothing", ("camera blind",)),
-    (r"camera does not see|camera sees", (*FIXED, "camera blind", "station full")),
-    (r"was surveyed|something new|is gone from|since it was learned|since '.*' was learned|in the way", FIXED),
-    (r"no path reaches|cannot be approached|no room for gripper|enclosed by", FIXED),
-    (
-        r"lies on its side|nowhere on the table|seen .* m away|it stands at|out of reach|fallen",
-        (*PART, "station moved"),
-    ),
-    (r"is not in the gripper|does not stand|is not in the slot|missed \d+ of", (*PART, *FIXED, "station full")),
+# what a reason may say, the faults of which that can be true, and whether it need not name what they are about, as what
+# stands elsewhere is in many ways; the first that fits counts
+CLAIMS: tuple[tuple[str, tuple[str, ...], bool], ...] = (
+    (r"not done|takes longer|out of order", MACHINE, False),
+    (r"not of this order|no spot of .* is free|is taken", ("station full",), False),
+    (r"camera sees nothing", ("camera blind",), True),
+    (r"camera does not see|camera sees", (*FIXED, "camera blind", "station full"), True),
+    (r"was surveyed|something new|is gone from|since it was learned|since '.*' was learned|in the way", FIXED, True),
+    (r"no path reaches|cannot be approached|no room for gripper|enclosed by", FIXED, True),
+    (r"lies on its side|nowhere on the table|seen .* m away|it stands at|out of reach|fallen", (*PART, "station moved"), False),
+    (r"is not in the gripper|does not stand|is not in the slot|missed \d+ of", (*FIXED, "station full"), True),
 )
 
 
@@ -77,11 +75,13 @@ def explained(reason: str, happened: Sequence[Happened], part: str = "", station
 
 
 def _explains(one: Happened, reason: str, part: str, station: str) -> bool:
-    kinds = next((kinds for pattern, kinds in CLAIMS if re.search(pattern, reason)), None)
-    if kinds is not None and one.what not in kinds:
-        return False
-    anywhere = kinds is not None and one.what in FIXED  # what stands elsewhere is in many ways
-    return anywhere or one.what == "camera blind" or one.explains(reason, part, station)
+    claims = [(kinds, anywhere) for pattern, kinds, anywhere in CLAIMS if re.search(pattern, reason)]
+    for kinds, anywhere in claims[:1]:
+        if one.what in kinds and anywhere:
+            return True
+        if one.what not in kinds and not (anywhere and one.what in PART):
+            return False
+    return one.explains(reason, part, station)
 
 
 def pieces(failure: str) -> Iterator[str]:
