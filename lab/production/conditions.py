@@ -12,7 +12,7 @@ from lab.tasks.fault_fields import FaultFields
 class Conditions:
     """override: the share of the task's speed and acceleration with which the arm moves. viewer: who watches live.
 
-    faults: what goes wrong in it.
+    faults: what goes wrong in it; fault_seed: draws more of that, None: nothing more.
     """
 
     override: float = 1.0
@@ -20,3 +20,4 @@ class Conditions:
     controls: Controls = field(default_factory=Controls)
     journal: RunJournal = field(default_factory=RunJournal)
     faults: tuple[FaultFields, ...] = ()
+    fault_seed: int | None = None
