@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import hypot
 
+from lab.export.program import Program
+from lab.export.recorder import MotionRecorder
 from lab.production.durations import TimedMove
 from lab.production.floor import Floor
 from lab.production.recorder import Viewer, finish_name
@@ -31,7 +33,7 @@ class Outcome:
     """A run in physics: the measured schedule, which parts were delivered, retries, and why it stopped (None: it did not).
 
     timed: how long each move took in which nothing had to be tried again. skipped_s: of sim_s, the time that passed without
-    physics, while the robot waited and nothing moved.
+    physics, while the robot waited and nothing moved. program: what the robot carried out, for `lab export`.
     """
 
     schedule: Schedule
@@ -43,6 +45,7 @@ class Outcome:
     camera_deviations_m: tuple[float, ...]
     timed: tuple[TimedMove, ...] = ()
     skipped_s: float = 0.0
+    program: Program | None = None
 
 
 class _Stopped(Exception):
@@ -275,6 +278,7 @@ def carry_out(
         floor.scene.robot.override(override)
         floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
+        motions = MotionRecorder(floor.scene.robot)
         work = Production(floor, cell, tell)
         floor.on_tick = work.watch
         failure = work.carry_out(sequence)
@@ -293,5 +297,8 @@ def carry_out(
             tuple(work.deviations_m),
             tuple(work.timed),
             floor.skipped_s,
+            motions.program(
+                prepared.task, prepared.seed, work.moves, [cell.part_name(n + 1) for n in range(cell.parts)]
+            ),
         )
         return outcome, floor.recorder.recording  # type: ignore[union-attr]
