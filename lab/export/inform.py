@@ -154,7 +154,8 @@ class InformJob:
 def _written(position: Position) -> list[str]:
     if position.configuration is None:
         return [str(int(pulses)) for pulses in position.numbers]
-    return [f"{mm:.3f}" for mm in position.numbers[:3]] + [f"{degrees:.2f}" for degrees in position.numbers[3:]]
+    millimetres, degrees = position.numbers[:3], position.numbers[3:]
+    return [f"{round(mm, 3) + 0.0:.3f}" for mm in millimetres] + [f"{round(turn, 2) + 0.0:.2f}" for turn in degrees]
 
 
 class _Lines:

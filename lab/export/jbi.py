@@ -253,7 +253,7 @@ class _Reader:
         if position.configuration is None:
             if self.arm.name not in PULSES:
                 raise BadInput(f"{where}: pulses of arm '{self.arm.name}' are not known; known: {', '.join(PULSES)}")
-            return np.array(position.numbers) / np.array(PULSES[self.arm.name])
+            return np.asarray(np.array(position.numbers) / np.array(PULSES[self.arm.name]))
         joints = self.arm.inverse_each(self._tool(position)[None])[0]
         if np.isnan(joints[0]):
             raise BadInput(f"{where}: out of reach of arm '{self.arm.name}'")

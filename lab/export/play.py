@@ -7,8 +7,8 @@ from math import ceil
 import numpy as np
 
 from lab.errors import BadInput
-from lab.export.commands import Command, Grip, Joint, Path, Pause, moving
-from lab.export.program import Array, Motion, Program
+from lab.export.commands import Await, Command, Grip, Joint, Path, Pause, jobs_of, moving
+from lab.export.program import Array, Program
 from lab.export.recorder import SEEN_EVERY, tips
 from lab.export.timed import TimedPoints
 from lab.sim.arms.arm import Arm
@@ -53,8 +53,11 @@ class Deviation:
 
 
 def deviation(program: Program, played: "list[Command] | TimedPoints") -> Deviation:
-    """Play it and compare. BadInput when it does not have as many ways as the run had."""
+    """Play it and compare. BadInput when it has not the ways, gripper outputs and waits of the run, in their order."""
     arm, robot = program.arm, program.carried.robot
+    wanted = [job.commands for job in jobs_of(program)]
+    if signals(played, program) != signals([command for commands in wanted for command in commands], program):
+        raise BadInput("what was read back has other gripper outputs or waits than the run")
     if isinstance(played, TimedPoints):
         return _compared_by_time(program, play_timed(played, arm, robot, program.seen_at_s))
     motions, ways = moving(program), play(played, arm, robot)
@@ -63,13 +66,31 @@ def deviation(program: Program, played: "list[Command] | TimedPoints") -> Deviat
     worst, poses = np.zeros(4), 0
     for motion, way in zip(motions, ways, strict=True):
         seen = program.seen[motion.seen_first : motion.seen_last]
-        there, back = apart(seen, way), apart(way[::SEEN_EVERY], _planned(program, motion))
+        there, back = apart(seen, way), apart(way[::SEEN_EVERY], seen)
         rest = _gaps(seen[-1:], way[-1:]) if motion.complete else (np.zeros(1), np.zeros(1))
         along = max(there[0].max(), back[0].max()), max(there[1].max(), back[1].max())
         worst = np.maximum(worst, [*along, rest[0].max(), rest[1].max()])
         poses += len(seen)
     along_m, along_rad, at_rest_m, at_rest_rad = worst.tolist()
     return Deviation(along_m, along_rad, at_rest_m, at_rest_rad, len(motions), poses)
+
+
+def signals(played: "Sequence[Command] | TimedPoints", program: Program) -> list[str]:
+    """What the gripper does when it changes, and the machines waited for, in order; it begins open."""
+    machines, found, closed = program.carried.machines, list[str](), False
+    if isinstance(played, TimedPoints):
+        told: list[Command] = []
+        for point in played.points:
+            told += [Await(machines.index(point.waits_for) + 1)] if point.waits_for in machines else []
+            told.append(Grip(point.closed))
+        played = told
+    for command in played:
+        if isinstance(command, Await):
+            found.append(f"wait for input {command.machine}")
+        elif isinstance(command, Grip) and command.closed != closed:
+            closed = command.closed
+            found.append("close" if closed else "open")
+    return found
 
 
 def _compared_by_time(program: Program, played: Array) -> Deviation:
@@ -176,16 +197,6 @@ def _at(times: Array, joints: Array, step: int) -> Array:
 
 
 # ---- comparing ----------------------------------------------------------------------------------------------------
-
-
-def _planned(program: Program, motion: Motion) -> Array:
-    """Where the tool was to be (n, 7): the joint targets of a motion, from where it began."""
-    from scipy.spatial.transform import Rotation
-
-    poses = program.tools(motion.first, motion.last)
-    c, s, o = np.cos(poses[:, 3]), np.sin(poses[:, 3]), np.zeros(len(poses))
-    axes = np.array([[o, -s, c], [o, c, s], [o - 1.0, o, o]]).transpose(2, 0, 1)  # columns: down, across, along
-    return np.hstack([poses[:, :3], Rotation.from_matrix(axes).as_quat()])
 
 
 def _gaps(one: Array, other: Array) -> tuple[Array, Array]:

@@ -84,7 +84,7 @@ class Transfer(Record):
 
 
 class Carried(Record):
-    """What `program.json` says; the numbers that it counts by stand in `trajectory.npz`."""
+    """What `program.json` says; the rows that it counts stand in `trajectory.npz`. folder: of an arm that is a URDF file."""
 
     version: Literal[1] = 1
     task: str
@@ -132,9 +132,10 @@ class Program:
         """Write its two files into a folder that is there. Raises OSError."""
         text = self.carried.model_dump_json(indent=1)
         (folder / PROGRAM).write_text(f"{text}\n", encoding="utf-8")
-        small = {name: np.asarray(getattr(self, name), np.float32) for name in ("joints", "seen")}
-        times = {name: getattr(self, name) for name in ("at_s", "closed", "seen_at_s")}
-        np.savez_compressed(folder / TRAJECTORY, **times, **small)
+        joints, seen = np.asarray(self.joints, np.float32), np.asarray(self.seen, np.float32)
+        np.savez_compressed(
+            folder / TRAJECTORY, at_s=self.at_s, joints=joints, closed=self.closed, seen_at_s=self.seen_at_s, seen=seen
+        )
 
     @classmethod
     def load(cls, folder: Path) -> "Program":

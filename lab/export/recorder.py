@@ -12,7 +12,7 @@ from lab.sim.arms.robot import NAME, Robot, Trajectory
 from lab.sim.world import TIME_STEP
 from lab.tasks.task import Task
 
-SEEN_EVERY = 4  # physics steps: the tool is looked at 60 times a simulated second
+SEEN_EVERY = 2  # physics steps: the tool is looked at 120 times a simulated second
 
 
 class MotionRecorder:
@@ -99,7 +99,7 @@ class MotionRecorder:
             task=task.name,
             seed=seed,
             robot=task.robot,
-            folder=str(task.folder),
+            folder=str(task.folder) if task.robot.is_file else "",
             machines=machines,
             transfers=tuple(_transfer(move, names[move.part - 1], machines) for move in moves),
             actions=tuple(self._actions),

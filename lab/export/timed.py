@@ -59,8 +59,8 @@ def _rows(program: Program) -> Iterator[tuple[float, Array, str]]:
     joints = program.joints[0] if len(program.joints) else None
     for action in program.carried.actions:
         while waits and joints is not None and waits[0][0] <= action.at_s + 1e-9:
-            at_s, station = waits.pop(0)
-            yield at_s, joints, station
+            reach_s, station = waits.pop(0)
+            yield reach_s, joints, station
         if isinstance(action, Motion):
             at_s, rows = program.at_s[action.first : action.last], program.joints[action.first : action.last]
             for row in thinned(at_s, rows, WITHIN_RAD):

@@ -91,7 +91,7 @@ class _Writer:
 
 
 def _pose_text(place: tuple[float, ...], turn: tuple[float, ...]) -> str:
-    return f"p[{', '.join(f'{number:.6f}' for number in (*place, *turn))}]"
+    return f"p[{', '.join(f'{round(number, 6) + 0.0:.6f}' for number in (*place, *turn))}]"
 
 
 def _down(yaw: float) -> tuple[float, float, float]:
