@@ -1,6 +1,6 @@
 """Writes down what a robot carries out, as it does, to be exported afterwards."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,8 +90,8 @@ class MotionRecorder:
             )
         )
 
-    def program(self, task: Task, seed: int, moves: Sequence[Move], names: Sequence[str]) -> Program:
-        """What was written down so far; `moves`: the transfers that were made, `names`: of the parts, part 1 first."""
+    def program(self, task: Task, seed: int, moves: Sequence[Move], name: Callable[[int], str]) -> Program:
+        """What was written down so far; `moves`: the transfers that were made, `name`: of a part."""
         self._close(complete=False)
         arm = self._robot.arm
         machines = tuple(station.name for station in task.stations if station.kind == "machine")
@@ -101,7 +101,7 @@ class MotionRecorder:
             robot=task.robot,
             folder=str(task.folder) if task.robot.is_file else "",
             machines=machines,
-            transfers=tuple(_transfer(move, names[move.part - 1], machines) for move in moves),
+            transfers=tuple(_transfer(move, name(move.part), machines) for move in moves),
             actions=tuple(self._actions),
         )
         joints = np.concatenate([np.empty((0, len(arm.joints))), *self._rows])
