@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, radians
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from lab.sim.arms.robot import NAME, YAW_ARM, Robot
 from lab.sim.world import TIME_STEP, World
 from lab.tasks.robot_fields import RobotSettings
 
-MOST_M, MOST_RAD = 0.001, np.radians(1.0)  # what is near enough
+MOST_M, MOST_RAD = 0.001, radians(1.0)  # what is near enough
 HOLD_STEPS = 60  # physics steps of a rest that are simulated; the rest of it nothing moves
 _AT_REST_RAD = 1e-3  # between two points that are far apart in time: the arm rests
 
