@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from lab.errors import LabError, WorkFailed
+from lab.export.recorder import MotionRecorder
 from lab.production.conditions import Conditions
 from lab.production.faults.injector import Injector
 from lab.production.floor import Floor
@@ -151,6 +152,7 @@ def carry_out(
         floor, injector = Floor(world, prepared.skillset, prepared.layout, prepared.order), Injector(conditions.faults)
         injector.prepare(floor.scene)
         floor.record(conditions.viewer)
+        motions = MotionRecorder(floor.scene.robot)
         floor.scene.robot.override(conditions.override)
         floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
@@ -170,7 +172,10 @@ def carry_out(
             failure, interrupted = "stopped by Ctrl-C", True
         floor.recorder.take()  # type: ignore[union-attr]
         outcome = replace(
-            production.outcome(failure, interrupted), happened=tuple(injector.happened), troubles=tuple(troubles)
+            production.outcome(failure, interrupted),
+            happened=tuple(injector.happened),
+            troubles=tuple(troubles),
+            program=motions.program(prepared.task, prepared.seed, production.work.moves, cell.part_name),
         )
         return outcome, floor.recorder.recording  # type: ignore[union-attr]
 

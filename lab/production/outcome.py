@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from lab.export.program import Program
 from lab.production.durations import TimedMove
 from lab.production.faults.fault import Happened
 from lab.sequencing.cell.schedule import Schedule
@@ -18,7 +19,7 @@ class Outcome:
     said: the parts that the run itself holds for delivered. timed: how long each move took in which nothing had to be
     tried again. skipped_s: of sim_s, the time that passed without physics, while the robot waited and nothing moved.
     interrupted: by Ctrl-C; all else is what came of it until then. happened: the faults that struck. troubles: what was
-    noticed, and what was done about it.
+    noticed, and what was done about it. program: what the robot carried out.
     """
 
     schedule: Schedule
@@ -34,6 +35,7 @@ class Outcome:
     interrupted: bool = False
     happened: tuple[Happened, ...] = ()
     troubles: tuple[TroubleMet, ...] = ()
+    program: Program | None = None
 
     def verdict(self, parts: int) -> Verdict:
         """Whether all parts were delivered, or the run stopped and told why, or it was wrong in what it told.

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from lab.errors import WorkFailed
+from lab.export.program import PROGRAM, TRAJECTORY
 from lab.files import draft
 from lab.production.outcome import Outcome
 from lab.production.taught import Taught
 from lab.sequencing.cell.schedule import Schedule
+from lab.sequencing.cell.schedule_rows import csv_of, rows_of
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
@@ -28,6 +30,10 @@ FILES = {
     "overhead": "overhead.png",
     "replay": "replay.html",
     "sequence": "sequence.json",
+    "schedule_table": "schedule.csv",
+    "schedule": "schedule.json",
+    "program": PROGRAM,
+    "trajectory": TRAJECTORY,
     "run": "run.json",
 }
 
@@ -112,6 +118,8 @@ def _names(report: Report) -> list[str]:
     missing = set() if report.outcome.schedule.robot else {"gantt"}
     if _photographed(report.prepared) is None:
         missing |= {"value_map", "overhead"}
+    if report.outcome.program is None:
+        missing |= {"program", "trajectory"}
     return [name for name in FILES if name not in missing]
 
 
@@ -143,6 +151,11 @@ def _draw_all(report: Report, folder: Path) -> None:
     title = f"{prepared.task.title or prepared.task.name}: {prepared.words}"
     replay_html(report.recording, paths["replay"], title=title)
     _write_json(paths["sequence"], _sequence_document(report, predicted))
+    rows = rows_of(predicted, taught.cell, "planned") + rows_of(report.outcome.schedule, taught.cell, "measured")
+    paths["schedule_table"].write_text(csv_of(rows), encoding="utf-8")
+    _write_json(paths["schedule"], {"schedule": rows})
+    if report.outcome.program is not None:
+        report.outcome.program.save(folder)
     report.wall_s = time.perf_counter() - report.began_s
     _write_json(paths["run"], report.to_json() | {"schedule": report.outcome.schedule.to_json()})
 

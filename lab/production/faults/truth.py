@@ -21,7 +21,11 @@ CLAIMS: tuple[tuple[str, tuple[str, ...], bool], ...] = (
     (r"camera does not see|camera sees", (*FIXED, "camera blind", "station full"), True),
     (r"was surveyed|something new|is gone from|since it was learned|since '.*' was learned|in the way", FIXED, True),
     (r"no path reaches|cannot be approached|no room for gripper|enclosed by", FIXED, True),
-    (r"lies on its side|nowhere on the table|seen .* m away|it stands at|out of reach|fallen", (*PART, "station moved"), False),
+    (
+        r"lies on its side|nowhere on the table|seen .* m away|it stands at|out of reach|fallen",
+        (*PART, "station moved"),
+        False,
+    ),
     (r"is not in the gripper|does not stand|is not in the slot|missed \d+ of", (*FIXED, "station full"), True),
 )
 

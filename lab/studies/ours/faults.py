@@ -19,7 +19,7 @@ from lab.view.canvas import BLUE, INK, ORANGE, RED, picture_bytes
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from lab.production.report import Taught
+    from lab.production.taught import Taught
     from lab.sim.frames import Body, Frame
     from lab.skills.prepared_scene import Prepared
     from lab.teaching.teacher import Teacher
