@@ -15,7 +15,7 @@ from lab.sequencing.search import Reference
 from lab.skills.prepared_scene import Prepared
 from lab.skills.trial import trial_of
 from lab.tasks.sequencing import search_for
-from lab.teaching.events import MoveTimed, PhaseBegan, RecordSkipped, SequenceFound, SkillReady
+from lab.teaching.events import MoveTimed, PhaseBegan, RecordSkipped, ScenePrepared, SequenceFound, SkillReady
 from lab.teaching.lesson_plan import LessonPlan
 from lab.teaching.teacher import Teacher
 
@@ -27,6 +27,7 @@ def teach_all(prepared: Prepared, teacher: Teacher) -> Taught:
     known, damaged = teacher.toolbox.index()
     for what in damaged:
         teacher.tell(RecordSkipped(what))
+    teacher.tell(ScenePrepared(prepared))
     teacher.tell(PhaseBegan("learn", len(prepared.problems)))
     lessons, first = {}, dict[str, str]()  # by signature, the skill that it was first found or learned for
     for name, problem in prepared.problems.items():

@@ -20,10 +20,13 @@ ORDER = "The order of the transfers"  # the lesson of that name in a `LessonEven
 
 @dataclass(frozen=True)
 class ScenePrepared:
-    """Where the next lesson takes place, for those who show it: a prepared task, a world, None for no place at all."""
+    """Where the next lesson takes place, for those who show it: a prepared task, a world, None for no place at all.
+
+    problem: its own; None for a task whose skills are about to be learned one after the other.
+    """
 
     scene: Any
-    problem: Problem
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True)
