@@ -59,10 +59,6 @@ class AroundPart(Skill):
         """Around `goal`, by default where the part is by the task."""
         return near_pose(goal or self.goal_pose(), self.problem.mdp.state_cell(state), self.surveys.into(self.station))
 
-    def cell_steps(self) -> tuple[float, ...]:
-        """As `near_pose` has it."""
-        return (*NEAR_STEP_M, NEAR_YAW_STEP)[: len(self.problem.mdp.shape)]
-
     def begins_at(self) -> ToolPose:
         """At the station's approach."""
         return self.surveys.approach(self.station)

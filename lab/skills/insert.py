@@ -124,10 +124,6 @@ class Insert(Skill):
         """The part comes to the machine, seen from above."""
         return f"{plain(self.kind).capitalize()} in the fingers is", f"the slot of {plain(self.station)}"
 
-    def cell_steps(self) -> tuple[float, ...]:
-        """Those of the camera's grid."""
-        return (self.grid.settings.cell_m,) * 2
-
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Cell by cell, each time seen by the camera; then above the slot, down, let go, and see that the part is in it."""
         robot, mdp, body = bench.scene.robot, self.problem.mdp, bench.held

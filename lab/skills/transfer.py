@@ -74,10 +74,6 @@ class Transfer(Skill):
         camera = grid_of(self.surveys.task, self.target) is not None
         return what, f"the end of its way{', where the camera takes over' if camera else f' over {plain(self.target)}'}"
 
-    def cell_steps(self) -> tuple[float, ...]:
-        """Those of the workspace."""
-        return self.surveys.task.workspace.cell_m
-
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Along the learned cells from where the tool is, then to the target's approach."""
         mdp = self.problem.mdp
