@@ -28,6 +28,7 @@ def signature_of(cell: Cell, objective: str) -> str:
         cell.buffers,
         cell.due_s,
         objective,
+        *((cell.begins, cell.closed) if cell.begins or cell.closed else ()),
     )
     return sha256(repr(parts).encode() + cell.empty_s.tobytes() + cell.loaded_s.tobytes()).hexdigest()[:16]
 

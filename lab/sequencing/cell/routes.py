@@ -4,7 +4,7 @@ What a route says in words (a buffer when the machine is busy, a pallet that has
 options to leave them. The simulations, the bound and the searches know these only.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from graphlib import TopologicalSorter
 from typing import Literal, TypeVar
@@ -98,17 +98,40 @@ def from_the_ends(positions: Sequence[Position], value: Callable[[int, list[Valu
     return [found[number] for number in range(len(positions))]
 
 
+def open_ways(positions: Sequence[Position], shut: Collection[int]) -> list[Position]:
+    """The positions without the ways to stations, by index, to which nothing may be brought, nor to where these end.
+
+    Where nothing is left to choose the part can go nowhere.
+    """
+    kept = [replace(at, options=tuple(way for way in at.options if way.target not in shut)) for at in positions]
+    ends = [not at.options for at in positions]
+    leads = from_the_ends(kept, lambda place, ahead: ends[place] or any(ahead))
+    return [replace(at, options=tuple(way for way in at.options if leads[way.to])) for at in kept]
+
+
+def reached_from(positions: Sequence[Position], places: Collection[int]) -> set[int]:
+    """The positions that a part in one of these may come to, its own among them."""
+    ahead = from_the_ends(positions, lambda place, after: {place}.union(*after))
+    return set[int]().union(*(ahead[place] for place in places))
+
+
 def moves_between(
-    stations: Sequence[Station], positions: Sequence[Position], robot_start: str, parts: int
+    stations: Sequence[Station],
+    positions: Sequence[Position],
+    begins: Collection[int],
+    first: Collection[Option],
+    robot_start: str,
+    parts: int,
 ) -> NeededMoves:
-    """The moves that may follow one another, and those that carry something; staying is left out."""
+    """The moves that may follow one another, and those that carry something; staying is left out.
+
+    begins: the positions in which parts begin; first: the ways that may be taken first; parts: how many have something to do.
+    """
     names = [station.name for station in stations]
-    options = [(place, option) for place in positions for option in place.options]
-    reached = {option.to for _, option in options}
-    starts = [place for index, place in enumerate(positions) if index not in reached]
+    options = [(positions[at], way) for at in sorted(reached_from(positions, begins)) for way in positions[at].options]
     loaded = dict.fromkeys((option.origin, option.target) for _, option in options)
     begin = names.index(robot_start)
-    empty = dict.fromkeys((begin, option.origin) for place in starts for option in place.options)
+    empty = dict.fromkeys((begin, option.origin) for option in first)
     for left, done in options:
         there = positions[done.to]
         empty |= dict.fromkeys((done.target, own.origin) for own in there.options)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
 
 from lab.errors import BadInput
@@ -81,19 +81,27 @@ class Schedule:
     ) -> "Schedule":
         """A schedule from timed moves, simulated or measured; sequence None: the parts moved, in their order.
 
-        came_s: when each part came to its first station [s]; None: all at 0.
+        came_s: when each part came to its first station [s]; None: all at 0. A part that has nothing to do has no row.
         """
         robot = [activity for move in moves for activity in robot_activities(move)]
         end_s = max((move.drop_s for move in moves), default=0.0)
         parts: list[Activity] = []
         machines: list[Activity] = []
-        for part in range(1, cell.parts + 1):
+        for part in cell.unfinished:
             own = [move for move in moves if move.part == part and move.carries == "part"]
             rows = _part_activities(cell, part, own, 0.0 if came_s is None else came_s[part - 1], end_s)
             parts += rows[0]
             machines += rows[1]
         order = [move.part for move in moves] if sequence is None else sequence
         return cls(tuple(robot), _by_start(machines), tuple(parts), end_s, tuple(order))
+
+    def later(self, by_s: float) -> "Schedule":
+        """The same so much later [s]: of what was planned anew in the middle, its times counted from the beginning."""
+        rows = [
+            tuple(replace(a, start_s=a.start_s + by_s, end_s=a.end_s + by_s) for a in row)
+            for row in (self.robot, self.machines, self.parts)
+        ]
+        return Schedule(rows[0], rows[1], rows[2], self.makespan_s + by_s, self.sequence)
 
     def to_json(self) -> dict[str, Any]:
         """Plain dicts, lists, numbers and strings, for `json.dumps`."""
@@ -118,8 +126,8 @@ def _part_activities(
     cell: Cell, part: int, moves: Sequence[Move], came_s: float, end_s: float
 ) -> tuple[list[Activity], list[Activity]]:
     """Rows of one part, and of the machines that it passes, from its arrival to `end_s`."""
-    row, since_s, process_s = cell.part_name(part), came_s, 0.0
-    place = cell.names[cell.positions[cell.starts[part - 1]].station]
+    row, since_s, process_s = cell.part_name(part), came_s, cell.begin_s[part - 1]
+    place = cell.names[cell.positions[cell.begin_at[part - 1]].station]
     rows: list[Activity] = []
     machines: list[Activity] = []
     for move in [*moves, None]:

@@ -66,6 +66,20 @@ class Arrivals:
     after: Literal["clock", "pick"] = "clock"
 
 
+@dataclass(frozen=True)
+class Begins:
+    """Where a part is when the work begins, for work that begins in the middle.
+
+    position: its place on its product's routes, an index of `Cell.positions`; None: it is finished or lost, takes no room,
+    and nothing is to be done with it. ready_s: when it may be picked, counted from now [s]. stays: it cannot be finished; it
+    stays there and takes its room.
+    """
+
+    position: int | None
+    ready_s: float = 0.0
+    stays: bool = False
+
+
 def check_layout(stations: Sequence[Station], products: Sequence[Product]) -> None:
     """BadInput for stations and routes that cannot be."""
     _check_stations(stations)

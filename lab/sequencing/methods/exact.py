@@ -8,6 +8,7 @@ from operator import le
 
 import numpy as np
 
+from lab.errors import WorkFailed, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.ways import TICKS_PER_S
@@ -58,8 +59,13 @@ class _Search:
         self._greedy = False
         self._reach(self.merged.start())
 
+    @property
+    def exhausted(self) -> bool:
+        """Whether every state that can be reached was opened."""
+        return not self._heap
+
     def run(self, most: int) -> MergedState | None:
-        """The first complete state; None: when `most` states were opened in all there was none."""
+        """The first complete state; None: when `most` states were opened in all, or all there are, there was none."""
         while self._heap:
             bound, serial, state = heapq.heappop(self._heap)
             if self._times(state) not in self._fronts[state.counts, state.robot]:
@@ -107,7 +113,8 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
 
     States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
     optimal; a deadlock leads nowhere. After `max_expanded` states it gives up and opens as many again, nearest to the end
-    first, for the sequence it returns: `proven` False, and the bound reached so far.
+    first, for the sequence it returns: `proven` False, and the bound reached so far. WorkFailed where no sequence comes to
+    its end, or none was found.
     Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
     states that are otherwise alike is the thesis's branch and bound, App. IV.
     """
@@ -120,7 +127,13 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     bound_s, expanded = search.bound / TICKS_PER_S, search.expanded
     search.hasten()
     state = search.run(2 * max_expanded)
-    sequence = first_come(cell) if state is None else search.merged.decisions(state)
+    sequence = () if search.exhausted and state is None else first_come(cell)
+    sequence = sequence if state is None else search.merged.decisions(state)
+    if not sequence:
+        why = "is proven: all were tried" if search.exhausted else f"was not proven, in {search.expanded} states"
+        raise WorkFailed(
+            f"no order was found that finishes {counted(len(cell.unfinished), 'part')}; that there is none {why}"
+        )
     return Optimum(simulate(cell, sequence).makespan_s, sequence, False, bound_s, expanded)
 
 

@@ -29,6 +29,8 @@ class CellArrays(NamedTuple):
     first_option (P + 1,): where the options of each position begin. holds (P, 2), needs (O, 2) and if_full (O,):
     stations; where there are fewer, S stands for one with endless room and S + 1 for one that is always full.
     begins (P,): whether a processing begins there. rooms (S + 2,): room for parts. empty_s, loaded_s (S, S) [s];
+    starts, begin_at (K,): the first position of a part's routes, and the one in which it begins; begin_s (K,): when it may be
+    picked there [s]; coming (C,): the parts, from 0, that begin at a start.
     interval_s, due_s (K,) [s]. many: whether a part may have several choices. The codes are those of this module.
     """
 
@@ -48,6 +50,9 @@ class CellArrays(NamedTuple):
     empty_s: Floats
     loaded_s: Floats
     starts: Ints
+    begin_at: Ints
+    begin_s: Floats
+    coming: Ints
     interval_s: Floats
     due_s: Floats
     robot_start: int
@@ -103,6 +108,9 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
         empty_s=_with_stays(cell.empty_s),
         loaded_s=_with_stays(cell.loaded_s),
         starts=np.array(cell.starts),
+        begin_at=np.array(cell.begin_at),
+        begin_s=np.array(cell.begin_s, np.float64),
+        coming=np.array(cell.coming, np.int64) - 1,
         interval_s=np.array(cell.arrivals.interval_s if cell.arrivals else (0.0,) * cell.parts, np.float64),
         due_s=np.array(cell.due_s or (0.0,) * cell.parts, np.float64),
         robot_start=cell.index(cell.robot_start),
@@ -135,7 +143,7 @@ def run_arrays(cell: Cell) -> RunArrays:
 def most_moves(cell: Cell) -> int:
     """How many moves the longest sequence has."""
     longest = from_the_ends(cell.positions, lambda _, ahead: max((1 + moves for moves in ahead), default=0))
-    return sum(longest[start] for start in cell.starts)
+    return sum(longest[start] for start in cell.begin_at)
 
 
 def _padded(stations: Sequence[Sequence[int]], spare: int) -> Ints:

@@ -46,7 +46,7 @@ class Execution:
         self.sequence: list[int] = []
         # For each part: when its latest process began, and how long that takes on average; when it came to its first
         # station, and when it was picked there.
-        self._began_s, self._mean_s = [0.0] * cell.parts, [0.0] * cell.parts
+        self._began_s, self._mean_s = [0.0] * cell.parts, list(cell.begin_s)
         self._came_s, self._left_s = [0.0] * cell.parts, [0.0] * cell.parts
 
     def observe(self) -> Observed:
@@ -90,8 +90,9 @@ class Execution:
     def _coming(self, index: int) -> bool:
         """Whether the part has not even set out: where each is brought after a pick, those behind the next one."""
         arrivals = self.run.cell.arrivals
-        after_pick = arrivals is not None and arrivals.after == "pick"
-        return after_pick and self._at_start(index) and index > self.run.fetched
+        if arrivals is None or arrivals.after != "pick" or not self._at_start(index):
+            return False
+        return index + 1 > self.run.cell.coming[self.run.fetched]
 
     def _at_start(self, index: int) -> bool:
         return self.run.locations[index] == self.run.cell.starts[index]
@@ -101,7 +102,8 @@ class Execution:
         arrivals, came_s = seen.cell.arrivals, 0.0
         if arrivals is None:
             return
-        for index, mean_s in enumerate(arrivals.interval_s):
+        for index in (part - 1 for part in seen.cell.coming):
+            mean_s = arrivals.interval_s[index]
             if not self._at_start(index):
                 came_s = self._left_s[index] if arrivals.after == "pick" else self._came_s[index]
             elif seen.ready[index]:

@@ -48,16 +48,22 @@ def _interval(cell: Any, seed: Any, part: int) -> float:
 @lean
 def reset(cell: Any, run: Any, seed: Any) -> None:
     """`Run.__init__`, with the times of an episode's seed (uint64)."""
-    parts, came_s = len(run.locations), 0.0
+    unfinished, came_s = 0, 0.0
     for station in range(len(cell.rooms)):
         run.room[station] = cell.rooms[station]
-    for part in range(parts):
-        run.locations[part], run.ready_s[part], run.finished_s[part] = cell.starts[part], 0.0, 0.0
-        if cell.arrivals == CLOCK or (cell.arrivals == PICK and part == 0):
-            came_s += _interval(cell, seed, part)
-            run.ready_s[part] = came_s
+    for part in range(len(run.locations)):
+        place = cell.begin_at[part]
+        run.locations[part], run.ready_s[part], run.finished_s[part] = place, cell.begin_s[part], 0.0
+        run.room[cell.holds[place, 0]] -= 1
+        run.room[cell.holds[place, 1]] -= 1
+        if cell.first_option[place] < cell.first_option[place + 1]:
+            unfinished += 1
+    for i in range(len(cell.coming)):
+        if cell.arrivals == CLOCK or (cell.arrivals == PICK and i == 0):
+            came_s += _interval(cell, seed, cell.coming[i])
+            run.ready_s[cell.coming[i]] = came_s
     run.clock[0], run.clock[1], run.clock[2] = 0.0, 0.0, 0.0
-    run.whole[0], run.whole[1], run.whole[2] = cell.robot_start, 0, parts
+    run.whole[0], run.whole[1], run.whole[2] = cell.robot_start, 0, unfinished
 
 
 @lean
@@ -66,7 +72,7 @@ def list_allowed(cell: Any, run: Any) -> int:
     parts, count = len(run.locations), 0
     for part in range(parts):
         place = run.locations[part]
-        if cell.arrivals != NO_ARRIVALS and place == cell.starts[part] and part != run.whole[1]:
+        if cell.arrivals != NO_ARRIVALS and place == cell.starts[part] and part != cell.coming[run.whole[1]]:
             continue
         for o in range(cell.first_option[place], cell.first_option[place + 1]):
             room = run.room[cell.needs[o, 0]] > 0 and run.room[cell.needs[o, 1]] > 0
@@ -101,8 +107,8 @@ def move(cell: Any, run: Any, i: int, seed: Any) -> None:
     drop_s = pick_s + cell.loaded_s[cell.origin[o], cell.target[o]]
     if here == cell.starts[part]:
         run.whole[1] += 1
-        following = run.whole[1]
-        if cell.arrivals == PICK and following < parts:
+        if cell.arrivals == PICK and run.whole[1] < len(cell.coming):
+            following = cell.coming[run.whole[1]]
             run.ready_s[following] = pick_s + _interval(cell, seed, following)
     run.room[cell.holds[here, 0]] += 1  # WIDTH stations, written out: a loop takes twice the time of the whole move
     run.room[cell.holds[here, 1]] += 1

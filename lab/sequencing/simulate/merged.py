@@ -49,11 +49,13 @@ class MergedCell:
         self._loaded = [ticks(row) for row in cell.loaded_s.tolist()]
         process = [place.processing_s for place in cell.positions]
         self.process = [None if seconds is None else round(seconds * TICKS_PER_S) for seconds in process]
-        timed = [place for place, seconds in enumerate(process) if seconds is None or seconds > 0]
+        later = {cell.begin_at[part - 1] for part in cell.unfinished if cell.begin_s[part - 1] > 0}
+        timed = [n for n, seconds in enumerate(process) if seconds is None or seconds > 0 or n in later]
         self.slots = {place: slot for slot, place in enumerate(timed)}
-        self._intervals = ticks(cell.arrivals.interval_s) if cell.arrivals is not None else []
-        self.one_by_one = cell.arrivals is not None and cell.arrivals.after == "pick"
-        self.starts = frozenset(cell.starts)
+        intervals_s = [cell.arrivals.interval_s[part - 1] for part in cell.coming] if cell.arrivals is not None else []
+        self._intervals = ticks(intervals_s)
+        self.one_by_one = bool(self._intervals) and cell.arrivals is not None and cell.arrivals.after == "pick"
+        self.starts = frozenset(cell.starts[part - 1] for part in cell.coming)
         self.ends = [place for place, at in enumerate(cell.positions) if not at.options]
         self._ways: list[list[Way]] = [[] for _ in cell.positions]
         for way in ways_of(cell):
@@ -62,13 +64,11 @@ class MergedCell:
 
     def start(self, *, named: bool = False) -> MergedState:
         """Where all begins; `named`: parts are told from one another."""
-        cell, waits = self.cell, list[tuple[int, ...]]([()] * len(self.slots))
-        if self._intervals:
-            first = (self._intervals[0], *[0] * (cell.parts - 1))
-            waits.append(first if self.one_by_one else tuple(accumulate(self._intervals)))
-        who = [tuple(n for n, start in enumerate(cell.starts, 1) if start == at) for at in range(len(cell.positions))]
-        robot = cell.index(cell.robot_start)
-        return MergedState(0, self._code_of(cell.starts), robot, tuple(waits), tuple(who) if named else None)
+        begin = self.of_run(Run(self.cell))
+        waits = list(begin.waits)
+        if self._intervals and not self.one_by_one:  # whole ticks added up, not seconds
+            waits[-1] = tuple(accumulate(self._intervals))
+        return begin._replace(waits=tuple(waits), who=begin.who if named else None)
 
     def of_run(self, run: Run) -> MergedState:
         """Where a run is, to go on from by the cell's own times; parts are told from one another."""
@@ -99,11 +99,11 @@ class MergedCell:
 
     def done(self, state: MergedState) -> bool:
         """Whether all parts are finished."""
-        return self.finished(state) == self.cell.parts
+        return self.finished(state) == self.cell.parts  # those that have nothing to do among them
 
     def fetched(self, state: MergedState) -> int:
-        """How many parts have left their first station."""
-        return self.cell.parts - sum([state.counts >> _BITS * place & _LOW for place in self.starts])
+        """How many parts have left the start of their routes."""
+        return len(self.cell.coming) - sum([state.counts >> _BITS * place & _LOW for place in self.starts])
 
     def key(self, state: MergedState) -> MergedKey:
         """All that the future depends on when parts are alike: counts, robot, how long there is still to wait."""
@@ -185,7 +185,7 @@ class MergedCell:
                 occupied[station] += count
         full = [taken >= most for taken, most in zip(occupied, cell.capacities, strict=True)]
         waiting = sum(counted[place] for place in self.starts)
-        in_turn = cell.starts[cell.parts - waiting] if waiting and self._intervals else None
+        in_turn = cell.starts[cell.coming[-waiting] - 1] if waiting and self._intervals else None
         return {
             (place, way.option.choice): way
             for place, count in enumerate(counted)
@@ -197,7 +197,7 @@ class MergedCell:
     def _left_to_come(self, coming: tuple[int, ...], fetched: int, pick: int) -> tuple[int, ...]:
         """When parts come once the first of them is picked: then the next one sets out, where they are brought so."""
         coming, following = coming[1:], fetched + 1
-        if not self.one_by_one or following == self.cell.parts:
+        if not self.one_by_one or following == len(self.cell.coming):
             return coming
         return (pick + self._intervals[following], *coming[1:])
 

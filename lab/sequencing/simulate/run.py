@@ -16,7 +16,8 @@ class Run:
     on. The robot travels empty to where the part, or its pallet, is picked, waits there until it is ready, does its
     service work and carries it on; processing starts at arrival. locations: the position of each part, part 1 first.
     occupied: room taken at each station. ready_s: when each part may be picked. finished_s: when each part reached the
-    end of its route (None: not yet). waited_s: how long the robot has waited. processed_s: how long machines were
+    end of its route (None: not yet; 0: before the work began, or nothing is to be done with it). fetched: how many parts
+    were taken from the start of their routes. waited_s: how long the robot has waited. processed_s: how long machines were
     given work for.
     Source: thesis ch. 7.4, 7.5; App. III.
     """
@@ -24,11 +25,14 @@ class Run:
     def __init__(self, cell: Cell, times: Episode | None = None) -> None:
         self.cell = cell
         self.times = times or Episode(cell)
-        self.locations = list(cell.starts)
+        self.locations = list(cell.begin_at)
         self.occupied = [0] * len(cell.stations)
+        for place in self.locations:
+            for station in cell.positions[place].holds:
+                self.occupied[station] += 1
         self.robot = cell.index(cell.robot_start)
         self.now_s = self.waited_s = self.processed_s = 0.0
-        self.finished_s: list[float | None] = [None] * cell.parts
+        self.finished_s: list[float | None] = [None if n in cell.unfinished else 0.0 for n in range(1, cell.parts + 1)]
         self.fetched = 0
         self.ready_s = self._first_ready_s()
 
@@ -101,38 +105,40 @@ class Run:
         place = cell.positions[self.locations[part - 1]]
         name, where = cell.part_name(part), cell.names[place.station]
         if not place.options:
-            return f"{name} is already at '{where}'"
+            return f"{name} {'is already' if not place.holds else 'stays'} at '{where}'"
         if not self._in_turn(part):
-            return f"{name} has not come yet: {cell.part_name(self.fetched + 1)} is before it"
+            return f"{name} has not come yet: {cell.part_name(cell.coming[self.fetched])} is before it"
         full = self._full()
+        choice = choice_of(decision, cell.parts)
+        if all(option.choice != choice for option in place.options):
+            for option in cell.laid_out[self.locations[part - 1]].options:
+                if option.choice == choice:
+                    return f"{name} at '{where}': the way by '{cell.names[option.target]}' is closed"
         taken = dict.fromkeys(repr(cell.names[s]) for option in place.options for s in option.needs if full[s])
         if not taken:
             return f"{name} at '{where}' has no choice {choice_of(decision, cell.parts) + 1}"
         return f"{name} at '{where}' cannot move on: {' and '.join(taken)} full"
 
     def _first_ready_s(self) -> list[float]:
-        arrivals = self.cell.arrivals
-        if arrivals is None:
-            return [0.0] * self.cell.parts
-        if arrivals.after == "pick":
-            return [self.times.interval_s(1)] + [0.0] * (self.cell.parts - 1)
-        came_s, all_s = 0.0, []
-        for part in range(1, self.cell.parts + 1):
-            came_s += self.times.interval_s(part)
-            all_s.append(came_s)
+        arrivals, all_s, came_s = self.cell.arrivals, list(self.cell.begin_s), 0.0
+        if arrivals is not None:
+            for part in self.cell.coming[: 1 if arrivals.after == "pick" else None]:
+                came_s += self.times.interval_s(part)
+                all_s[part - 1] = came_s
         return all_s
 
     def _fetch(self, pick_s: float) -> None:
         """A part was taken from its first station: where the next one is brought only now, it sets out."""
         self.fetched += 1
-        arrivals = self.cell.arrivals
-        if arrivals is not None and arrivals.after == "pick" and self.fetched < self.cell.parts:
-            self.ready_s[self.fetched] = pick_s + self.times.interval_s(self.fetched + 1)
+        arrivals, coming = self.cell.arrivals, self.cell.coming
+        if arrivals is not None and arrivals.after == "pick" and self.fetched < len(coming):
+            following = coming[self.fetched]
+            self.ready_s[following - 1] = pick_s + self.times.interval_s(following)
 
     def _in_turn(self, part: int) -> bool:
         """Whether it is there: parts that arrive are taken in their order."""
         waits = self.locations[part - 1] == self.cell.starts[part - 1]
-        return self.cell.arrivals is None or not waits or part == self.fetched + 1
+        return self.cell.arrivals is None or not waits or part == self.cell.coming[self.fetched]
 
     def _full(self) -> list[bool]:
         """Whether each station is."""
