@@ -60,6 +60,7 @@ class Report:
     began_s: float
     wall_s: float = 0.0
     files: dict[str, str] = field(default_factory=dict)
+    receipts: dict[str, Any] | None = None
 
     @property
     def success(self) -> bool:
@@ -97,6 +98,7 @@ class Report:
             "skipped_s": outcome.skipped_s,
             "interrupted": outcome.interrupted,
             "wall_s": self.wall_s,
+            "receipts": self.receipts,
             "files": self.files,
         }
 

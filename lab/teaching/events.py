@@ -133,6 +133,15 @@ class SequenceFound:
 
 
 @dataclass(frozen=True)
+class OrderChosen:
+    """Which of several orders is used, and what each of them costs, by whom it is: "advised", "given", "exact", or a method."""
+
+    used: str
+    costs: dict[str, float]
+    objective: str = "makespan"
+
+
+@dataclass(frozen=True)
 class MoveMade:
     """A part was brought on; part: what it is called."""
 
@@ -286,6 +295,7 @@ Event = (
     | SequencingBegan
     | EpisodeSequenced
     | SequenceFound
+    | OrderChosen
     | MoveMade
     | MoveRetried
     | PlanMade
