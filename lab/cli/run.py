@@ -1,6 +1,7 @@
 """`lab run`: the main job."""
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -11,7 +12,9 @@ from lab.cli.output import end, show
 
 
 def run(
-    task: Annotated[str, typer.Argument(help="A task that ships, or a .toml file.")] = "toast",
+    task: Annotated[
+        str | None, typer.Argument(help="A task that ships, or a .toml file.", show_default="toast")
+    ] = None,
     toasts: Toasts = None,
     parts: Parts = None,
     advisor: AdvisorNames = None,
@@ -27,6 +30,9 @@ def run(
     ] = 100,
     seed: Seed = 0,
     toolbox: ToolboxPlace = None,
+    resume: Annotated[
+        Path | None, typer.Option("--resume", help="Go on with the run in this folder, as it was begun.")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures, replay and JSON; default: TASK-run.")
     ] = None,
@@ -36,33 +42,38 @@ def run(
     from dataclasses import replace
 
     from lab.advice.advisors import PEOPLE
-    from lab.files import check_out
+    from lab.production.conditions import Conditions
     from lab.production.run import run as run_task
+    from lab.production.run_options import RunOptions, begun, gone_on
     from lab.skills.prepared_scene import prepare
-    from lab.tasks import task_file as taskfile
     from lab.teaching.kept_session import kept_by
-    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
+    from lab.teaching.lesson_options import DEFAULT_ADVISORS
     from lab.view.summary import delivered_in_words, run_summary
 
-    loaded = taskfile.load(task)
-    folder = out or Path(f"{loaded.name}-run")
-    check_out(folder)
-    names = tuple(advisor or DEFAULT_ADVISORS)
-    options = LessonOptions(
-        task=task, advisors=names, asked=asked, decide=decide, seed=seed, toasts=toasts, parts=parts
-    )
-    options.advising()
-    prepared = prepare(loaded, loaded.ordered(toasts, parts), seed)
-    with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
-        teacher = teacher_of(toolbox, options, seat)
-        if any(name in PEOPLE for name in options.advisors):
-            teacher = replace(teacher, keep=kept_by(teacher.toolbox, options))
-        try:
+    given = RunOptions(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed)
+    if resume is None:
+        options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
+        loaded, folder, journal = begun(options, out)
+    else:
+        options, loaded, folder, journal = gone_on(given, resume, out)
+    lessons = options.lessons()
+    try:
+        prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed)
+        with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
+            teacher = teacher_of(toolbox, lessons, seat)
+            if any(name in PEOPLE for name in options.advisors):
+                teacher = replace(teacher, keep=kept_by(teacher.toolbox, lessons))
+            conditions = Conditions(options.override / 100, seat.page, journal=journal)
             with seat.progress:
-                report = run_task(prepared, teacher, folder, override=override / 100, viewer=seat.page)
-        except KeyboardInterrupt as stopped:
-            raise KeyboardInterrupt(str(stopped) or "stopped by Ctrl-C; what was learned is kept") from None
+                report = run_task(prepared, teacher, folder, conditions)
+    except KeyboardInterrupt as stopped:
+        why = str(stopped) or "stopped by Ctrl-C; what was learned is kept"
+        raise KeyboardInterrupt(f"{why}; go on with: lab run --resume {quote(str(folder))}") from None
+    finally:
+        journal.close()
     document = report.to_json()
     show(document, as_json, run_summary)
+    if report.outcome.interrupted:
+        raise KeyboardInterrupt(f"stopped by Ctrl-C; go on with: lab run --resume {quote(str(folder))}")
     if not report.success:
         end(report.outcome.failure or delivered_in_words(document["delivered"], document["parts"]), 1)

@@ -33,10 +33,11 @@ class Controls:
     """The stops and the pace of one run; a page's or a terminal's thread sets them, the simulation looks once a step.
 
     speed: simulated seconds per second of the clock on the wall; None: as fast as it can. on_change: told of every change,
-    in the thread that made it.
+    in the thread that made it. attended: somebody is there who can go on after a protective stop.
     """
 
     speed: float | None = None
+    attended: bool = False
     on_change: list[Callable[[], None]] = field(default_factory=list)
     stops: dict[StopKind, Held] = field(default_factory=dict)
     _one_move: bool = False

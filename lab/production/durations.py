@@ -52,7 +52,7 @@ class Durations:
     service_s: Mapping[Pair, float] = field(default_factory=dict)
     sim_s: float = 0.0
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, dict[str, float]]:
         """Plain dicts: 'origin > target' or 'origin > target with kind' -> seconds."""
         return {
             "empty_s": {_word(pair): seconds for pair, seconds in self.empty_s.items()},
@@ -213,7 +213,7 @@ def durations_key(
     """
     code = sources(modules, DECIDED_BY_RESULT)
     decides = {
-        "task": task.model_dump(mode="json", exclude={"name", "title", "sequencing", "subtasks"}),
+        "task": task.model_dump(mode="json", exclude={"name", "title", "sequencing", "subtasks", "faults"}),
         "obstacles": layout.obstacles,
         "moves": [asdict(skillset.moves), [*skillset.legs]],
         "policies": {name: [policy.signature, _hash(policy.q.tobytes())] for name, policy in policies.items()},

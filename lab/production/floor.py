@@ -1,23 +1,37 @@
-"""A scene with the robot and the machines at work in it: who is where, at one clock."""
+"""A scene with the robot and the machines at work in it: who is where, at one clock, and what stops it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import ceil
+from time import perf_counter
 
+from lab.errors import WorkFailed
+from lab.production.controls import Controls, StopKind
+from lab.production.machine import Machine
 from lab.production.recorder import Recorder, Viewer, extras_of
+from lab.production.stop_record import StopRecord
 from lab.sim.arms.kinematics import ToolPose
+from lab.sim.arms.robot import NAME
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
-from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, Status
+from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, SkillFailed, Status
 from lab.skills.skillset import SkillSet
 from lab.tasks.task import Order
+from lab.teaching.events import RunHeld, RunWentOn, Tell, unheard
 
 AT_REST_STEPS = 60  # physics steps at the end of a wait that are simulated in any case
+SKIPPED_STEPS = 240  # at the most without a look at what else goes on
+FORCE_EVERY = 4  # physics steps between two looks at what presses on the arm
+DISTURBED_S = 2.0  # after a hand has reached into the scene, all of it is simulated for so long
 
 
 class Floor:
-    """A scene in which skills are carried out: one clock, the robot's skill and the machines' processes side by side."""
+    """A scene in which skills are carried out: one clock, the robot's skill and the machines' processes side by side.
+
+    controls: what stops it and sets its pace; stops: when they did, for the journal. on_tick: called after each physics
+    step; hand: called before each, to reach into the scene as a fault does, and says whether it did.
+    """
 
     def __init__(
         self,
@@ -33,51 +47,203 @@ class Floor:
         self.world, self.skillset = world, skillset
         self.scene = Scene(world, skillset.task, order, layout)
         self.bench = Bench(self.scene)
-        self.machines: dict[str, Skill] = {}
+        self.machines = {s.name: Machine(s.name) for s in skillset.task.stations if s.kind == "machine"}
+        self.controls, self.stops = Controls(), StopRecord()
+        self.tell: Tell = unheard
         self.on_tick: Callable[[], None] | None = None
+        self.hand: Callable[[], bool] | None = None
+        self.force_limit_n: float | None = None
+        self.was_held = False  # by the operator, in the last motion
         for _ in range(SETTLE_STEPS):
             world.step()
-        self.recorder = Recorder(world, extras_of(self.scene, skillset), viewer) if film or viewer else None
-        self._zero = world.steps
+        self.recorder: Recorder | None = None
+        if film or viewer:
+            self.record(viewer)
+        self.restart_clock()
         self.skipped_s = 0.0
+        self._quiet_s = 0.0  # from when on waiting may be skipped
+        self._told_held = ""
+        self._paced = (0.0, 0.0, 0.0)  # speed, simulated and real time from which on it holds
+
+    def record(self, viewer: Viewer | None = None) -> None:
+        """Keep frames from now on, of all that is there; `viewer` sees them live."""
+        self.recorder = Recorder(self.world, extras_of(self.scene, self.skillset), viewer)
 
     @property
     def now_s(self) -> float:
         """Seconds since the floor was ready."""
-        return (self.world.steps - self._zero) * TIME_STEP
+        return self.steps * TIME_STEP
+
+    @property
+    def steps(self) -> int:
+        """Physics steps since the floor was ready."""
+        return self.world.steps - self._zero
 
     def restart_clock(self) -> None:
         """Let the floor's time begin now."""
         self._zero = self.world.steps
 
+    def machine(self, station: str) -> Machine:
+        """The machine of that name."""
+        return self.machines[station]
+
+    # ---- one step ------------------------------------------------------------------------------------------------
+
     def tick(self) -> None:
         """One physics step, with every running machine."""
+        self._reached_in()
         for machine in self.machines.values():
             machine.step()
         self.world.step()
+        self._after()
+
+    def wait(self, until_s: float) -> None:
+        """One physics step, or, when nothing moves, the time until then, a second at the most: nothing happens meanwhile."""
+        steps = min(ceil((until_s - self.now_s) / TIME_STEP) - AT_REST_STEPS, SKIPPED_STEPS)
+        still = self.now_s >= self._quiet_s and not any(machine.moves for machine in self.machines.values())
+        if steps > 0 and still and not self._reached_in():
+            self.skipped_s += steps * TIME_STEP
+            self.world.pass_time(steps)
+            self._after()
+        else:
+            self.tick()
+        self.held()
+
+    def _reached_in(self) -> bool:
+        if self.hand is not None and self.hand():
+            self._quiet_s = self.now_s + DISTURBED_S
+            return True
+        return False
+
+    def _after(self) -> None:
         if self.on_tick is not None:
             self.on_tick()
         if self.recorder is not None:
             self.recorder.step()
+        self._pace()
 
-    def wait(self, until_s: float) -> None:
-        """One physics step, or, when no machine's head moves, all of the time until then: nothing happens meanwhile."""
-        steps = ceil((until_s - self.now_s) / TIME_STEP) - AT_REST_STEPS
-        if steps > 0 and not any(machine.status is Status.RUNNING for machine in self.machines.values()):
-            self.skipped_s += steps * TIME_STEP
-            self.world.pass_time(steps)
-        self.tick()
+    def _pace(self) -> None:
+        """Let the clock on the wall catch up where a speed is set; a stop ends the waiting."""
+        speed = None if self.stops.folding else self.controls.speed
+        if not speed:
+            self._paced = (0.0, 0.0, 0.0)
+            return
+        if self._paced[0] != speed:
+            self._paced = (speed, self.now_s, perf_counter())
+        _, simulated_s, real_s = self._paced
+        ahead_s = (self.now_s - simulated_s) / speed - (perf_counter() - real_s)
+        if ahead_s > 0.004:
+            self.controls.wait(ahead_s)
+        elif ahead_s < -1.0:  # it cannot be so fast: what is lost is not made up for
+            self._paced = (speed, self.now_s, perf_counter())
+
+    # ---- stops ---------------------------------------------------------------------------------------------------
+
+    def held(self) -> str:
+        """Hold the arm as long as an emergency or protective stop says; why it was held, "" when it was not.
+
+        The arm's brakes act in the very step; time goes on meanwhile, at the pace of the clock on the wall at the most.
+        """
+        if not self._stopped():
+            return ""
+        held = self.stops.held
+        assert held is not None
+        why = f"{held.kind} stop: {held.why}"
+        self.scene.robot.brake()
+        while self._stopped():
+            self._tell_held()
+            self.tick()
+            if not self.stops.folding:
+                self.controls.wait(TIME_STEP)
+        self.between_moves(again=True)
+        return why
+
+    def between_moves(self, *, again: bool = False) -> None:
+        """Wait as long as there is a pause, without any time going by; again: the move is not over."""
+        if not again:
+            self.controls.move_ended()
+        while self.stops.look(self.steps, self.controls) and self.stops.pauses(self.controls):
+            self._tell_held()
+            self.controls.wait(0.1)
+        self._tell_held()
+        self._paced = (0.0, 0.0, 0.0)
+
+    def _stopped(self) -> bool:
+        """Whether the arm is to stand still now."""
+        return self.stops.look(self.steps, self.controls) and self.stops.holds_arm
+
+    def _tell_held(self) -> None:
+        held = self.stops.held
+        text = "" if held is None else f"{held.kind} {held.why}"
+        if text != self._told_held:
+            self._told_held = text
+            self.tell(RunWentOn(self.now_s) if held is None else RunHeld(held.kind, held.why, held.by, self.now_s))
+
+    def _too_hard(self) -> str:
+        """What the arm presses on harder than the task allows; "" for nothing."""
+        if self.force_limit_n is None or self.steps % FORCE_EVERY:
+            return ""
+        body, force_n = self.world.pressed(NAME)
+        if force_n <= self.force_limit_n:
+            return ""
+        return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {self.force_limit_n:g}"
+
+    # ---- skills --------------------------------------------------------------------------------------------------
 
     def start(self, skill: Skill) -> None:
         """Begin to carry a skill out with its policy."""
         skill.start(self.bench, self.skillset.policies[skill.name])
 
     def run(self, skill: Skill) -> Status:
-        """Carry one skill out to its end."""
+        """Carry one skill out to its end, or until something stops it: it has failed then, as one that is blocked has."""
+        if why := self.skillset.blocked.get(skill.name):
+            skill.fail(why)
+            return skill.status
         self.start(skill)
+        self.was_held = False
         while skill.step() is Status.RUNNING:
+            if why := self._stopped_by():
+                skill.fail(why)
+                break
             self.tick()
         return skill.status
+
+    def follow(self, motion: Iterator[None]) -> str:
+        """Carry a motion of the arm out that is no skill; what stopped it, "" when nothing did."""
+        self.was_held = False
+        try:
+            for _ in motion:
+                if why := self._stopped_by():
+                    return why
+                self.tick()
+        except (SkillFailed, WorkFailed) as failure:
+            return str(failure)
+        return ""
+
+    def _stopped_by(self) -> str:
+        """What stops the motion under way now, once that is over; "" when nothing does."""
+        if why := self.held():
+            self.was_held = True
+            return why
+        if too_hard := self._too_hard():
+            self.scene.robot.brake()
+            if self.controls.attended:
+                self.controls.protective(too_hard)
+                self.held()
+            return f"{StopKind.PROTECTIVE} stop: {too_hard}"
+        return ""
+
+    def begin(self, station: str, part: str, seconds: float) -> Machine:
+        """Let a machine begin with a part: with its learned process, or for so long [s]."""
+        machine, skills = self.machines[station], self.skillset.processes[station]
+        machine.begin(part, self.now_s, seconds, skills)
+        self.again(machine)
+        return machine
+
+    def again(self, machine: Machine) -> None:
+        """Let a machine carry its process out, from the beginning."""
+        if machine.skill is not None:
+            machine.start(self.bench, self.skillset.policies[machine.skill.name])
 
     def stand(self, pose: ToolPose) -> None:
         """Put the open gripper at once to a pose, to begin there."""

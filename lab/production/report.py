@@ -35,12 +35,16 @@ FILES = {
 
 @dataclass
 class Taught:
-    """A prepared task whose skills are all there, with the durations of its moves and the cell that they make."""
+    """A prepared task whose skills are all there, with the durations of its moves and the cell that they make.
+
+    rows: each skill as `lab run --json` shows it. durations_key: under which they are kept; "": they are not.
+    """
 
     lessons: dict[str, Lesson]
+    rows: dict[str, dict[str, Any]]
     durations: Durations
     cell: Cell
-    durations_key: str = ""  # under which they are kept; "": they are not
+    durations_key: str = ""
 
 
 @dataclass
@@ -80,7 +84,7 @@ class Report:
             "dropped": len(outcome.dropped),
             "failure": outcome.failure,
             "retries": list(outcome.retries),
-            "skills": [_skill_row(name, lesson) for name, lesson in self.taught.lessons.items()],
+            "skills": list(self.taught.rows.values()),
             "sequence": list(self.sequenced.sequence),
             "predicted_makespan_s": self.sequenced.cost,
             "measured_makespan_s": outcome.schedule.makespan_s if self.success else None,
@@ -91,12 +95,14 @@ class Report:
             "camera_deviation_m": max(outcome.camera_deviations_m, default=None),
             "sim_s": outcome.sim_s - outcome.skipped_s + self.taught.durations.sim_s,
             "skipped_s": outcome.skipped_s,
+            "interrupted": outcome.interrupted,
             "wall_s": self.wall_s,
             "files": self.files,
         }
 
 
-def _skill_row(name: str, lesson: Lesson) -> dict[str, Any]:
+def skill_row(name: str, lesson: Lesson) -> dict[str, Any]:
+    """What the document says of a skill: where it came from, why, and what it took."""
     policy, result = lesson.policy, lesson.result
     return {
         "name": name,

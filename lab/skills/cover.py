@@ -33,6 +33,7 @@ class Cover(Skill):
 
     subtask: ClassVar[str] = "cover"
     help: ClassVar[str] = "a surface is covered cell by cell, as with butter or by vacuuming"
+    doing: ClassVar[str] = "covers {part}"
 
     def __init__(self, task: Task, name: str, station: str, kind: str) -> None:
         super().__init__(f"{name} at {station}", kind)

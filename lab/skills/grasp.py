@@ -21,6 +21,7 @@ class Grasp(AroundPart):
 
     subtask: ClassVar[str] = "grasp"
     help: ClassVar[str] = "the gripper comes to a part, closes and lifts it"
+    doing: ClassVar[str] = "takes {part} up"
     tried: ClassVar[bool] = True
     actions: ClassVar[tuple[str, ...]] = ACTIONS
     goal: ClassVar[tuple[int, ...]] = GOAL

@@ -37,6 +37,7 @@ class Insert(Skill):
 
     subtask: ClassVar[str] = "insert"
     help: ClassVar[str] = "by the overhead camera's picture to a machine, and down into its slot"
+    doing: ClassVar[str] = "puts {part} in by the camera's picture"
     looks_from: ClassVar[tuple[float, float]] = (-84.0, 46.0)
     carries = True
 

@@ -27,6 +27,7 @@ class Place(AroundPart):
 
     subtask: ClassVar[str] = "place"
     help: ClassVar[str] = "a part is set down at a station and let go"
+    doing: ClassVar[str] = "sets {part} down"
     actions: ClassVar[tuple[str, ...]] = ACTIONS
     goal: ClassVar[tuple[int, ...]] = GOAL
     carries = True

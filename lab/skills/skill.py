@@ -118,6 +118,7 @@ class Skill:
 
     subtask: ClassVar[str]
     help: ClassVar[str]  # what is learned, in one line of plain words
+    doing: ClassVar[str]  # what the robot does meanwhile, in words; "{part}" is what it does it with
     moves_arm: ClassVar[bool] = True  # a machine's process does not
     tried: ClassVar[bool] = False  # whether a lesson ends with a trial in physics
     looks_from: ClassVar[tuple[float, float]] = (-72.0, 36.0)  # [deg] the camera of a lesson, azimuth and elevation
@@ -202,6 +203,10 @@ class Skill:
             bench.scene.put(self.part, self.kind, pose)
         return True
 
+    def does(self, name: str) -> str:
+        """What the robot does now with part `name`, in words for people."""
+        return f"{self.doing.format(part=name)} at '{self.station}'"
+
     def on_part(self, name: str, kind: Kind) -> tuple[Body, ...]:
         """What this skill may make to be seen on a part."""
         return ()
@@ -275,6 +280,10 @@ class Skill:
         except (SkillFailed, WorkFailed) as failure:
             self.status, self.reason = Status.FAILURE, str(failure)
         return self.status
+
+    def fail(self, reason: str) -> None:
+        """Break off, because of something outside of the skill."""
+        self._motion, self.status, self.reason = None, Status.FAILURE, reason
 
     def stop(self) -> None:
         """Break off; the skill can be started again."""

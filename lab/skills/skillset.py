@@ -34,7 +34,8 @@ class SkillSet:
 
     legs: what brings a part from one station to another, in order. travels: what takes the empty gripper there. picks:
     what takes a part up, by kind and station. processes: what a machine does with its part, once it is learned.
-    services: what the robot does before it takes a part out, by the part's kind and the station.
+    services: what the robot does before it takes a part out, by the part's kind and the station. blocked: why skills cannot
+    be carried out in a scene that has changed, by name.
     """
 
     task: Task
@@ -46,6 +47,7 @@ class SkillSet:
     processes: dict[str, Skills] = field(default_factory=dict)
     services: dict[Pair, Skills] = field(default_factory=dict)
     policies: dict[str, Policy] = field(default_factory=dict)
+    blocked: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, task: Task, order: Order) -> "SkillSet":

@@ -24,6 +24,8 @@ class Transfer(Skill):
     subtask: ClassVar[str] = "transfer"
     help: ClassVar[str] = "the tool's way through the workspace from one station to another"
 
+    doing: ClassVar[str] = "carries {part}"
+
     def __init__(self, origin: str, target: str, kind: str = "") -> None:
         """kind: what is carried; "": nothing."""
         super().__init__(f"transfer {origin} to {target}{f' with {kind}' if kind else ''}", kind)
@@ -62,6 +64,10 @@ class Transfer(Skill):
     def pose(self, state: int) -> ToolPose:
         """In the middle of the workspace's cell."""
         return self.surveys.cell_pose(self.problem.mdp.state_cell(state))
+
+    def does(self, name: str) -> str:
+        """Carries the part to where it is set down, or goes there."""
+        return f"{self.doing.format(part=name) if self.carries else 'goes'} from '{self.origin}' to '{self.target}'"
 
     def begins_at(self) -> ToolPose:
         """At the origin's approach."""

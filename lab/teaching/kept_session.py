@@ -231,11 +231,16 @@ class KeptSession(SessionInFolder):
 
 def check_same(given: Any, read: Read) -> None:
     """BadInput when a command that goes on with a session names options, too, or when the session is over."""
-    for name, value in asdict(given).items():
-        if value != getattr(type(given)(), name):
-            option, folder = given.typed.get(name, f"--{name}"), read.path.parent
-            raise BadInput(f"{option} beside --resume {folder}: a session goes on as it was begun: leave it away")
+    check_alone(given, type(given)(), read.path.parent)
     read.check_goes_on()
+
+
+def check_alone(given: Any, nothing: Any, folder: Path) -> None:
+    """BadInput when options were given beside --resume; `nothing`: what they are when none is."""
+    for name, value in asdict(given).items():
+        if value != getattr(nothing, name):
+            option = given.typed.get(name, f"--{name}")
+            raise BadInput(f"{option} beside --resume {folder}: it goes on as it was begun: leave it away")
 
 
 def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:

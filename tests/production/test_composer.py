@@ -7,11 +7,15 @@ import numpy as np
 import pytest
 
 from lab.errors import WorkFailed
-from lab.production.composer import MAX_TRIES, Outcome, Production, carry_out
+from lab.production.composer import Outcome, Production, carry_out
+from lab.production.controls import RESET_FIRST
 from lab.production.durations import Durations, cell_of, measure
-from lab.production.floor import AT_REST_STEPS, Floor
+from lab.production.floor import AT_REST_STEPS, SKIPPED_STEPS, Floor
+from lab.production.machine import Machine
+from lab.production.recovery import MAX_TRIES
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.simulate.run import simulate
+from lab.sim.arms.robot import NAME
 from lab.sim.frames import Body, Frame
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene_check import places_of
@@ -25,7 +29,7 @@ from lab.skills.trial import trial_of
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import Part, Stage
 from lab.tasks.task_file import load
-from lab.teaching.events import Event, MoveMade, MoveRetried
+from lab.teaching.events import Event, MoveMade, MoveRetried, RunHeld, RunWentOn, TroubleMet
 from lab.teaching.lesson_plan import LessonPlan
 from lab.teaching.teacher import Teacher
 from lab.toolbox.index import KnownPolicies
@@ -197,7 +201,6 @@ def failed(outcome: Outcome, where: str, why: str) -> None:
 @pytest.mark.parametrize(
     ("skill", "where"),
     [
-        ("transfer toaster_buffer to plate", "plate"),
         ("grasp at plate", "plate"),
         ("transfer plate to insert with slice", "toaster"),
         ("insert at toaster", "toaster"),
@@ -217,16 +220,26 @@ def test_a_step_that_goes_on_failing_stops_the_run_with_part_place_and_reason(
     start = skillset.skills[skill].reason
     assert start.startswith(f"policy '{skillset.policies[skill].name}' does not reach its goal from ")
     failed(outcome, where, start)
-    assert heard == [MoveRetried(why) for why in outcome.retries]
+    assert [event for event in heard if isinstance(event, MoveRetried)] == [MoveRetried(why) for why in outcome.retries]
     assert all(text.startswith(f"slice 1 at '{where}', '{skill}', try ") for text in outcome.retries)
     assert outcome.schedule.robot == ()
+
+
+def test_where_no_learned_way_leads_the_empty_gripper_goes_over_everything(
+    prepared: Prepared, cell: Cell, clueless: Callable[[str], None]
+) -> None:
+    clueless("transfer toaster_buffer to plate")
+    outcome, _ = carry_out(prepared, cell, (1, 1, 1))
+    assert (outcome.delivered, outcome.failure) == ((1,), None)
+    assert len(outcome.retries) == 1
+    assert "'transfer toaster_buffer to plate', try 1: policy " in outcome.retries[0]
 
 
 def test_slippery_slices_are_not_delivered_and_said_to_be_lost(task: Task, prepared: Prepared, cell: Cell) -> None:
     oily = task.changed(parts=(task.parts[0].model_copy(update={"friction": 0.0}),))
     outcome, recording = carry_out(replace(prepared, skillset=replace(prepared.skillset, task=oily)), cell, (1, 1, 1))
     assert outcome.failure is not None
-    assert outcome.failure.startswith("slice 1 at 'plate': slice 1 is ")
+    assert outcome.failure.startswith("slice 1 at 'plate': it lies on its side at ")
     assert outcome.retries[0] == (
         "slice 1 at 'plate', 'grasp at plate', try 1: slice 1 is not in the gripper after grasping at 'plate'"
     )
@@ -242,7 +255,12 @@ class Ground:
         self.floor = Floor(world, prepared.skillset, prepared.layout, prepared.order)
         self.floor.stand(prepared.surveys.approach(cell.robot_start))
         self.floor.restart_clock()
-        self.work = Production(self.floor, cell)
+        self.production = Production(self.floor, cell)
+        self.work = self.production.work
+
+    @property
+    def notes(self) -> list[str]:
+        return self.production.recovery.notes
 
     def put(self, name: str, x: float, y: float, z: float) -> None:
         self.floor.world.put(name, (x, y, z))
@@ -254,18 +272,14 @@ def ground(prepared: Prepared, cell: Cell) -> Iterator[Ground]:
         yield Ground(world, prepared, cell)
 
 
-def test_a_grasp_that_failed_once_is_tried_again_and_the_run_goes_on(ground: Ground) -> None:
-    place = ground.floor.world.pose("slice 1")[0]
-    ground.put("slice 1", 0.6, 0.0, -9.0)
-
-    def put_back(event: Event) -> None:
-        if isinstance(event, MoveRetried):
-            assert event.why.endswith("try 1: slice 1 is out of reach at (0.60, 0.00) m")
-            ground.put("slice 1", *place)
-
-    ground.work.tell = put_back
-    assert ground.work.carry_out((1,)) is None
-    assert len(ground.work.retries) == 1
+def test_a_slice_that_was_moved_is_taken_up_where_it_stands(ground: Ground) -> None:
+    ground.put("slice 1", 0.30, 0.30, 0.061)  # on the table, half a metre from its plate
+    heard: list[Event] = []
+    ground.work.tell = heard.append
+    assert ground.production.carry_out((1,)) is None
+    trouble = [event for event in heard if isinstance(event, TroubleMet)]
+    assert [(one.part, one.answer) for one in trouble] == [("slice 1", "takes it up there")]
+    assert ground.notes == []
     assert ground.work.moves[0].target == "toaster"
 
 
@@ -281,11 +295,11 @@ def test_a_slice_set_down_beside_the_slot_is_picked_up_again_and_inserted(ground
             floor.world.put("slice 1", (x, y - 0.11, 0.06))  # beside the toaster
 
     floor.on_tick = spoil
-    failure = ground.work.carry_out((1,))
+    failure = ground.production.carry_out((1,))
     assert spoiled
-    assert failure is None, ground.work.retries
-    assert len(ground.work.retries) == 1
-    assert "slice 1 is not in the slot of 'toaster'" in ground.work.retries[0]
+    assert failure is None, ground.notes
+    assert len(ground.notes) == 1
+    assert "slice 1 is not in the slot of 'toaster'" in ground.notes[0]
 
 
 def test_a_slice_set_down_beside_its_spot_on_the_last_plate_is_taken_up_again_and_delivered(
@@ -302,28 +316,25 @@ def test_a_slice_set_down_beside_its_spot_on_the_last_plate_is_taken_up_again_an
             floor.world.put("slice 1", (x - 0.03, y + 0.02, 0.073))
 
     floor.on_tick = spoil
-    failure = ground.work.carry_out((1, 1, 1))
+    failure = ground.production.carry_out((1, 1, 1))
     assert spoiled
-    assert failure is None, ground.work.retries
-    assert [note for note in ground.work.retries if "does not stand on 'finished_plate'" in note] == ground.work.retries
-    assert len(ground.work.retries) == 1
+    assert failure is None, ground.notes
+    assert [note for note in ground.notes if "does not stand on 'finished_plate'" in note] == ground.notes
+    assert len(ground.notes) == 1
     assert floor.bench.stands("slice 1", ground.work.spot_of["slice 1"], 0.012)
 
 
-def at_butter(ground: Ground, surveys: Surveys) -> Cover:
-    """Slice 1 and the robot are at the butter applier, whose skill is aimed at it."""
+def at_butter(ground: Ground, surveys: Surveys) -> Machine:
+    """Slice 1 and the robot are at the butter applier, which begins with it."""
     floor, work = ground.floor, ground.work
-    floor.bench.held = None
     for decision in (1, 1):  # plate to toaster, toaster to butter_applier
         work.plan.move(decision)
     ground.put("slice 1", 0.80, -0.52, 0.0805)
+    work.spot_of["slice 1"] = floor.scene.places.spots(floor.skillset.task.station("butter_applier"))[0]
     floor.stand(surveys.approach("butter_applier"))
     work.place = "butter_applier"
-    butter = floor.skillset.skills["butter at butter_applier"]
-    assert isinstance(butter, Cover)
-    butter.aim("slice 1")
-    floor.machines["butter_applier"] = butter
-    return butter
+    work.expected_s["butter_applier"] = floor.now_s
+    return floor.begin("butter_applier", "slice 1", 20.0)
 
 
 def test_a_machine_that_failed_while_the_robot_was_away_is_noticed_and_tried_again(
@@ -332,32 +343,32 @@ def test_a_machine_that_failed_while_the_robot_was_away_is_noticed_and_tried_aga
     """The butter's failure is over long before the robot asks for the slice; that goes to the first plate that is free."""
     work, places = ground.work, ground.floor.scene.places
     plates = places.spots(task.station("finished_plate"))
-    butter = at_butter(ground, surveys)
-    butter.status, butter.reason = Status.FAILURE, "the butter missed 9 of 9 cells"
+    butter = at_butter(ground, surveys).skill
+    assert isinstance(butter, Cover)
+    butter.fail("the butter missed 9 of 9 cells")
     work.spot_of |= {"slice 2": plates[0], "slice 3": places.spots(task.station("plate"))[1]}
-    assert work.carry_out((1,)) is None
-    assert work.retries == ["slice 1 at 'butter_applier', try 1: the butter missed 9 of 9 cells"]
-    assert butter.status is Status.SUCCESS
+    assert ground.production.carry_out((1,)) is None
+    assert ground.notes == ["slice 1 at 'butter_applier', try 1: the butter missed 9 of 9 cells"]
     assert len(butter.covered) == 9
     assert work.spot_of["slice 1"] == plates[1]
 
 
-def test_a_machine_that_goes_on_failing_stops_the_run(
+def test_a_machine_that_goes_on_failing_is_out_of_order_and_its_part_is_left(
     ground: Ground, clueless: Callable[[str], None], surveys: Surveys
 ) -> None:
     clueless("butter at butter_applier")
-    butter = at_butter(ground, surveys)
-    butter.start(ground.floor.bench, ground.floor.skillset.policies[butter.name])
-    failure = ground.work.carry_out((1,))
+    at_butter(ground, surveys)
+    failure = ground.production.carry_out((1,))
     assert failure is not None
     assert failure.startswith("slice 1 at 'butter_applier': policy 'butter at butter_applier ")
     assert failure.endswith(f"(tried {MAX_TRIES} times)")
+    assert list(ground.production.recovery.out) == ["butter_applier"]
 
 
 def test_a_part_that_may_not_move_is_a_failure_in_words(ground: Ground) -> None:
     for decision in (1, 1, 1):
         ground.work.plan.move(decision)
-    assert ground.work.carry_out((1,)) == "slice 1 is already at 'finished_plate'"
+    assert ground.production.carry_out((1,)) == "slice 1 is already at 'finished_plate'"
     assert ground.work.done() == [1]
 
 
@@ -369,21 +380,47 @@ def test_a_grasp_can_be_tried_alone(prepared: Prepared, clueless: Callable[[str]
     assert "does not reach its goal" in (trial(grasp.problem, prepared.skillset.policies[grasp.name]) or "")
 
 
-def test_time_is_skipped_only_while_nothing_moves(ground: Ground) -> None:
-    """Ten seconds: all but the last quarter; while a machine's head moves, or for a short time: one step."""
+def test_time_is_skipped_only_while_nothing_moves(ground: Ground, surveys: Surveys) -> None:
+    """Ten seconds: one at a time, but not the last quarter; while a machine's head moves, or for a short time: one step."""
     floor = ground.floor
     before = floor.now_s
     floor.wait(before + 0.2)
     assert floor.now_s == pytest.approx(before + TIME_STEP)
     assert floor.skipped_s == 0.0
-    butter = floor.skillset.skills["butter at butter_applier"]
-    floor.machines["butter_applier"], butter.status = butter, Status.RUNNING
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(butter, "step", lambda: Status.RUNNING)
-        floor.wait(before + 10.0)
-    assert floor.now_s == pytest.approx(before + 2 * TIME_STEP)
-    assert floor.skipped_s == 0.0
-    butter.status = Status.SUCCESS
+    machine = at_butter(ground, surveys)
+    before = floor.now_s
     floor.wait(before + 10.0)
-    assert floor.skipped_s == pytest.approx(10.0 - (AT_REST_STEPS + 2) * TIME_STEP)
-    assert floor.now_s == pytest.approx(before + 10.0 - (AT_REST_STEPS - 1) * TIME_STEP)
+    assert floor.now_s == pytest.approx(before + TIME_STEP)
+    machine.clear()
+    before = floor.now_s
+    floor.wait(before + 10.0)
+    assert floor.now_s == pytest.approx(before + SKIPPED_STEPS * TIME_STEP)
+    while floor.skipped_s < 10.0 - (AT_REST_STEPS + 1) * TIME_STEP:
+        floor.wait(before + 10.0)
+    assert floor.now_s == pytest.approx(before + 10.0 - AT_REST_STEPS * TIME_STEP)
+
+
+def test_an_emergency_stop_holds_every_joint_within_one_step(ground: Ground) -> None:
+    """In the middle of a way at full speed; reset and go on, and the move is done again from there."""
+    floor, arm = ground.floor, ground.floor.scene.robot.arm
+    held: list[float] = []
+
+    def press() -> None:
+        if floor.steps == 200:
+            floor.controls.emergency()
+            held.append(float(np.abs(floor.world.joint_speeds(NAME, arm.joints)).max()))
+        elif floor.steps == 201 or floor.steps == 300:
+            held.append(float(np.abs(floor.world.joint_speeds(NAME, arm.joints)).max()))
+        elif floor.steps == 301:
+            assert floor.controls.go_on() == RESET_FIRST
+            assert floor.controls.reset() == ""
+            assert floor.controls.go_on() == ""
+
+    floor.on_tick = press
+    heard: list[Event] = []
+    floor.tell = heard.append
+    assert ground.production.carry_out((1,)) is None
+    assert held[0] > 0.5
+    assert held[1:] == pytest.approx([0.0, 0.0], abs=1e-3)
+    stops = [(e.kind, e.by) if isinstance(e, RunHeld) else "on" for e in heard if isinstance(e, (RunHeld, RunWentOn))]
+    assert stops == [("emergency", "operator"), "on"]

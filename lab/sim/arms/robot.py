@@ -185,6 +185,10 @@ class Robot:
     def _counted(self, yaw: float) -> float:
         return (yaw + 2 * pi) % (2 * pi) - pi if self._half_on else yaw
 
+    def brake(self) -> None:
+        """Hold all joints where they are, from the next physics step on: what a protective or emergency stop does."""
+        self.world.drive(NAME, self.arm.joints, self.world.joints(NAME, self.arm.joints))
+
     def override(self, share: float) -> None:
         """Move from now on with a share of speed and acceleration, as an operator's speed override."""
         self.speed, self.acceleration = share * self.speed, share * self.acceleration
@@ -220,3 +224,7 @@ class Robot:
         self._press(self.arm.fingers.at(self.arm.fingers.open_m), 60.0)
         self.closed = False
         yield from self.rest(_GRIP_STEPS)
+
+    def lose(self) -> None:
+        """The fingers open by themselves, as when their air fails: who moves the arm still holds them to be closed."""
+        self._press(self.arm.fingers.at(self.arm.fingers.open_m), 60.0)

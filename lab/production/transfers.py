@@ -1,0 +1,297 @@
+"""One decision at a time: go to a part, wait for its machine, take it up, carry it on; from whatever state was reached."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import hypot
+
+from lab.production.durations import TimedMove
+from lab.production.floor import Floor
+from lab.production.trouble import Trouble
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import Option, part_of
+from lab.sequencing.cell.schedule import Move
+from lab.sequencing.simulate.run import Run
+from lab.sim.parts.kinds import Kind, Spot, comes_as, on_its_pallet
+from lab.sim.scene.scene import pallet_of
+from lab.skills import Skill
+from lab.skills.skill import UPRIGHT, Status, over_everything
+from lab.skills.skillset import Carried, ways_of
+from lab.teaching.events import MachineBegan, MoveBegan, MoveMade, PartDone, SkillBegan, Tell, TroubleMet, unheard
+
+ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
+DELIVERED_M = 0.02  # a part this near to its spot has been delivered
+BEGINS_M = 0.05  # a tool this near to where a skill begins need not be brought there
+PATIENCE, PATIENCE_S = (
+    1.0,
+    10.0,
+)  # of its time, and at least so much, a machine may take longer before it is out of order
+
+
+def _unseen() -> None:
+    """Nobody looks."""
+
+
+@dataclass
+class _UnderWay:
+    """The times [s] of a move under way; smooth: nothing had to be done twice."""
+
+    what: tuple[str, Carried]
+    start: str
+    leave_s: float
+    reach_s: float = 0.0
+    served_s: float = 0.0
+    pick_s: float = 0.0
+    smooth: bool = True
+
+
+@dataclass
+class Transfers:
+    """Parts being brought on upon a floor: where they are, which spots are taken, when machines should be done.
+
+    spot_of: by body, a part's or its pallet's. expected_s: by machine, when it should be done [s]. place: the station at
+    whose approach the tool is; "": it is somewhere else. came_from: by part, its position before the one it is in.
+    look: called while the robot waits; raises Trouble.
+    """
+
+    floor: Floor
+    cell: Cell
+    tell: Tell = unheard
+    moves: list[Move] = field(default_factory=list)
+    timed: list[TimedMove] = field(default_factory=list)
+    deviations_m: list[float] = field(default_factory=list)
+    expected_s: dict[str, float] = field(default_factory=dict)
+    spot_of: dict[str, Spot] = field(default_factory=dict)
+    came_from: dict[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.plan = Run(self.cell)  # where parts are and may go; its times are the predicted ones
+        self.place = self.cell.robot_start
+        self.look: Callable[[], None] = _unseen
+        self._under_way: _UnderWay | None = None
+        self._served: set[str] = set()  # parts for which the robot's service is done
+        scene = self.floor.scene
+        for number, spot in enumerate(scene.places.begins(scene.order), start=1):
+            for body in scene.bodies_of(self.name(number), comes_as(scene.task.part(scene.order[number - 1]))):
+                self.spot_of[body] = spot
+
+    def name(self, part: int) -> str:
+        """What a part is called."""
+        return self.cell.part_name(part)
+
+    def comes_as(self, part: int) -> str:
+        """The kind that a part is as it comes, on its pallet if it has one."""
+        return comes_as(self.floor.scene.task.part(self.cell.order[part - 1]))
+
+    def bring_on(self, decision: int, ahead: int) -> None:
+        """Carry one decision out; what was done of it before is not done again. Raises Trouble.
+
+        ahead: how many decisions are still to come, with this one.
+        """
+        option = self.plan.option(decision)
+        if option is None:
+            raise Trouble(self.plan.refusal(decision), final=True)
+        part, floor = part_of(decision, self.cell.parts), self.floor
+        way, name = self.way(part, option), self.name(part)
+        move = self._begin(name, way, ahead)
+        spot = self._spot_for(part, way)
+        if floor.bench.held != floor.scene.body_of(name, way.kind):
+            if floor.bench.held is not None:
+                raise Trouble(f"the robot still holds {floor.bench.held}", name, way.origin)
+            self._go(way.origin, name, move)
+            if option.waits:
+                self._await(name, way.origin)
+            move.served_s = floor.now_s
+            if option.service_s:
+                self._serve(part, way.origin)
+            move.pick_s = floor.now_s
+            self._take_up(name, way, spot)
+        self._bring(name, way, spot)
+        self._finish(decision, way, spot, move)
+
+    def _begin(self, name: str, way: Carried, ahead: int) -> _UnderWay:
+        """The times of the move, which begins now or was interrupted."""
+        now_s = self.floor.now_s
+        if self._under_way is None or self._under_way.what != (name, way):
+            self._under_way = _UnderWay((name, way), self.place or way.origin, now_s)
+            number = len(self.moves) + 1
+            self.tell(MoveBegan(number, number - 1 + ahead, name, self.place, way.origin, way.target, now_s))
+        else:
+            self._under_way.smooth = False
+        return self._under_way
+
+    def _finish(self, decision: int, way: Carried, spot: Spot, move: _UnderWay) -> None:
+        """The part stands where it was to be brought: all that knows of it is told."""
+        part, floor, name = part_of(decision, self.cell.parts), self.floor, move.what[0]
+        if move.smooth:
+            self.timed.append(TimedMove(way, floor.now_s - move.pick_s))
+        self.place, self._under_way = way.target, None
+        for body in floor.scene.bodies_of(name, way.kind):
+            self.spot_of[body] = spot
+        self.came_from[name] = self.plan.locations[part - 1]
+        planned = self.plan.move(decision)
+        times_s = move.leave_s, move.reach_s, move.pick_s, floor.now_s, planned.process_s, move.pick_s - move.served_s
+        self.moves.append(Move(part, move.start, way.origin, way.target, *times_s, planned.carries))
+        if planned.carries == "part" and way.target in floor.machines:
+            self._served.discard(name)
+            self.expected_s[way.target] = floor.now_s + planned.process_s
+            floor.begin(way.target, name, planned.process_s)
+            self.tell(MachineBegan(way.target, name, floor.now_s, self.expected_s[way.target]))
+        self.tell(MoveMade(self.moves[-1], name))
+        if self.plan.finished_s[part - 1] is not None:
+            self.tell(PartDone(name, floor.now_s))
+
+    # ---- ways and spots ------------------------------------------------------------------------------------------
+
+    def way(self, part: int, option: Option) -> Carried:
+        """From where to where an option leads, and what the gripper then holds."""
+        names, own = self.cell.names, self.floor.skillset.task.part(self.cell.order[part - 1])
+        origin, target = names[option.origin], names[option.target]
+        if option.carries == "pallet":
+            return Carried(origin, target, str(own.pallet))
+        return next(way for way in ways_of(own) if way[:2] == (origin, target) and way.kind != own.pallet)
+
+    def _spot_for(self, part: int, way: Carried) -> Spot:
+        """Where to set it down: where its pallet waits for it, or the first spot on which nothing stands."""
+        scene, name = self.floor.scene, self.name(part)
+        if on_its_pallet(scene.task, way.kind, way.target):
+            return self.spot_of[pallet_of(name)]
+        own = scene.bodies_of(name, way.kind)
+        taken = [spot for body, spot in self.spot_of.items() if body not in own]
+        free = (s for s in scene.places.spots(scene.task.station(way.target)) if s not in taken)
+        spot = next(free, None)
+        if spot is None:
+            raise Trouble(f"no spot of '{way.target}' is free", name, way.target, final=True)
+        return spot
+
+    # ---- what a move is made of ------------------------------------------------------------------------------------
+
+    def _go(self, station: str, name: str, move: _UnderWay) -> None:
+        """Bring the empty gripper to a station: by the learned way, or over everything from where none leads."""
+        if self.place == station:
+            move.reach_s = self.floor.now_s
+            return
+        leave_s, learned = self.floor.now_s, self.floor.skillset.travels.get((self.place, station), ())
+        start, self.place = self.place, ""
+        for skill in learned:
+            self._do(skill, name, station)
+        if not learned:
+            self.over_to(station)
+        elif move.smooth:
+            self.timed.append(TimedMove((start, station), self.floor.now_s - leave_s))
+        self.place, move.reach_s = station, self.floor.now_s
+
+    def over_to(self, station: str) -> None:
+        """Take the tool to a station's approach over everything, from wherever it is. Raises Trouble."""
+        surveys = next(iter(self.floor.skillset.skills.values())).surveys
+        self.place = ""
+        why = self.floor.follow(over_everything(self.floor.bench, surveys.approach(station)))
+        if why:
+            raise Trouble(why, station=station, held=True)
+        self.place = station
+
+    def _await(self, name: str, station: str) -> None:
+        """Wait until the machine is done with the part; Trouble when it fails, or takes far too long."""
+        floor, machine = self.floor, self.floor.machines.get(station)
+        if machine is None or machine.part != name:
+            return
+        expected_s, told = self.expected_s[station], False
+        patience_s = max(PATIENCE_S, PATIENCE * (expected_s - self._begun_s(name)))
+        while not machine.done(floor.now_s):
+            if machine.failed:
+                raise Trouble(machine.failed, name, station)
+            late_s = floor.now_s - expected_s
+            if late_s > patience_s:
+                raise Trouble(f"it is not done {late_s:.0f} s after it should be", name, station, final=True)
+            if late_s > 1.0 and not told:
+                told = True
+                self.tell(TroubleMet("it is not done when it should be", "waits for it", name, station, floor.now_s))
+            floor.wait(expected_s if late_s < 0 else floor.now_s + 1.0)
+            self.look()
+
+    def _begun_s(self, name: str) -> float:
+        """When the part was brought to where it is [s]."""
+        return next((move.drop_s for move in reversed(self.moves) if self.name(move.part) == name), 0.0)
+
+    def _serve(self, part: int, station: str) -> None:
+        """What the robot does at a station before it takes a part out, once."""
+        name = self.name(part)
+        if name not in self._served:
+            for skill in self.floor.skillset.services.get((self.cell.order[part - 1], station), ()):
+                self._do(skill, name, station)
+            self._served.add(name)
+
+    def _take_up(self, name: str, way: Carried, spot: Spot) -> None:
+        """Take a part up: by the way of the station that it stands near to, or of its own where it stands astray."""
+        bench, skillset, body = self.floor.bench, self.floor.skillset, self.floor.scene.body_of(name, way.kind)
+        near = self._near(body, way)
+        if near != way.origin:
+            self.over_to(near)
+        self.place = ""
+        for skill in skillset.picks[way.kind, near]:
+            self._do(skill.aim(name, spot), name, near)
+        self.place = near
+        if near == way.origin and (machine := self.floor.machines.get(near)) is not None and machine.part == name:
+            machine.clear()
+        assert bench.held == body
+
+    def _near(self, body: str, way: Carried) -> str:
+        """The station of the two on a way that a part stands at; its origin when it stands at neither."""
+        scene, at = self.floor.scene, self.floor.bench.part_pose(body)
+        for station in (way.origin, way.target):
+            foots = scene.places.spots(scene.task.station(station))
+            near = any(hypot(at.x - foot.x, at.y - foot.y) < ASTRAY_M for foot in foots)
+            if near and (way.kind, station) in self.floor.skillset.picks:
+                return station
+        return way.origin
+
+    def _bring(self, name: str, way: Carried, spot: Spot) -> None:
+        """Carry what is in the gripper to its target and set it down; from a station near the target, that is all."""
+        legs = self.floor.skillset.legs[way]
+        rest = [skill for skill in legs if skill.carries]
+        for skill in rest[-1:] if self.place == way.target else rest:
+            self._to_begin(skill, name, way.target)
+            self.place = ""
+            self._do(skill.aim(name, spot), name, way.target)
+            self.deviations_m += skill.deviations_m
+        self.place = way.target
+
+    def _to_begin(self, skill: Skill, name: str, where: str) -> None:
+        """Bring the tool to where a skill begins, over everything, when it is far from there as after an interruption."""
+        begin, tool = skill.begins_at(), self.floor.scene.robot.tool()
+        if begin is None or self._under_way is None or self._under_way.smooth:
+            return
+        if hypot(tool.x - begin.x, tool.y - begin.y, tool.z - begin.z) > BEGINS_M:
+            why = self.floor.follow(over_everything(self.floor.bench, begin))
+            if why:
+                raise Trouble(why, name, where, held=True)
+
+    def _do(self, skill: Skill, name: str, where: str) -> None:
+        """Carry a skill out; Trouble when it fails."""
+        self.tell(SkillBegan(skill.name, skill.does(name), name, self.floor.now_s))
+        if self.floor.run(skill) is not Status.SUCCESS:
+            raise Trouble(skill.reason, name, where, held=self.floor.was_held, skill=skill.name)
+
+    # ---- what came of it -------------------------------------------------------------------------------------------
+
+    def done(self) -> list[int]:
+        """The parts that reached the end of their route."""
+        return [part for part, end_s in enumerate(self.plan.finished_s, start=1) if end_s is not None]
+
+    def stands(self, part: int) -> bool:
+        """Whether a part, and its pallet, stands where it was set down last."""
+        scene, name = self.floor.scene, self.name(part)
+        spot = self.spot_of[name]
+        for body, own in zip(scene.bodies_of(name, comes_as(scene.kind_of[name].part)), self._stack(part), strict=True):
+            if not self.floor.bench.stands(body, spot, DELIVERED_M):
+                return False
+            spot = spot.raised(own.shape.height_m)
+        return True
+
+    def has_fallen(self, part: int) -> bool:
+        """Whether a part is neither held nor upright."""
+        bench, name = self.floor.bench, self.name(part)
+        return bench.held not in (name, pallet_of(name)) and bench.upright(name) < UPRIGHT
+
+    def _stack(self, part: int) -> list[Kind]:
+        scene = self.floor.scene
+        return scene.kinds[comes_as(scene.kind_of[self.name(part)].part)].stack()

@@ -1,0 +1,31 @@
+"""What keeps a run from going on as planned, in words that are true."""
+
+
+class Trouble(Exception):
+    """Something that was noticed: with which part, by its name, and at which station; "" where it is about neither.
+
+    skill: what was being carried out. held: the operator stopped the arm: what was under way is done again, and that does
+    not count as a try. final: to try again is no use.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        part: str = "",
+        station: str = "",
+        *,
+        skill: str = "",
+        held: bool = False,
+        final: bool = False,
+    ) -> None:
+        super().__init__(what)
+        self.what, self.part, self.station, self.skill = what, part, station, skill
+        self.held, self.final = held, final
+
+    def __str__(self) -> str:
+        where = " at ".join(one for one in (self.part, self.station and f"'{self.station}'") if one)
+        return f"{where}: {self.what}" if where else self.what
+
+
+class RunStopped(Exception):
+    """The run stands still safely and cannot go on by itself; the text says why, and what a person must do."""
