@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from lab.errors import LabError, WorkFailed
+from lab.export.recorder import MotionRecorder
 from lab.production.conditions import Conditions
 from lab.production.faults.injector import Injector
 from lab.production.floor import Floor
@@ -22,7 +23,7 @@ from lab.sequencing.simulate.rest import Mishaps
 from lab.sim.frames import Recording
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared
-from lab.teaching.events import Event, MachineDone, MoveMade, PlanMade, Tell, TroubleMet, unheard
+from lab.teaching.events import Event, MachineBegan, MachineDone, MoveMade, PlanMade, Tell, TroubleMet, unheard
 
 
 @dataclass
@@ -51,6 +52,7 @@ class Production:
             try:
                 self.floor.between_moves()
                 self.recovery.look()
+                self.work.set_right()
                 if not self.sequence:
                     return self.recovery.failure()
                 self.work.bring_on(self.sequence[0], len(self.sequence))
@@ -119,7 +121,6 @@ class Production:
         left = [part for part in range(1, self.cell.parts + 1) if part not in delivered]
         return Outcome(
             Schedule.from_moves(self.cell, work.moves),
-            tuple(sorted(work.finished)),
             delivered,
             tuple(part for part in left if work.has_fallen(part)),
             tuple(self.recovery.notes),
@@ -150,13 +151,14 @@ def carry_out(
         floor, injector = Floor(world, prepared.skillset, prepared.layout, prepared.order), Injector(conditions.faults)
         injector.prepare(floor.scene)
         floor.record(conditions.viewer)
+        motions = MotionRecorder(floor.scene.robot)
         floor.scene.robot.override(conditions.override)
         floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
         floor.hand = lambda: injector.tick(floor)
         journal = conditions.journal
-        troubles: list[TroubleMet] = []
-        noted = _noting(floor, journal, troubles, tell)
+        heard: list[Event] = []
+        noted = _noting(floor, journal, heard, tell)
         floor.tell = noted
         floor.controls = conditions.controls
         floor.stops.note = journal.note_stops
@@ -169,12 +171,15 @@ def carry_out(
             failure, interrupted = "stopped by Ctrl-C", True
         floor.recorder.take()  # type: ignore[union-attr]
         outcome = replace(
-            production.outcome(failure, interrupted), happened=tuple(injector.happened), troubles=tuple(troubles)
+            production.outcome(failure, interrupted),
+            happened=tuple(injector.happened),
+            heard=tuple(heard),
+            program=motions.program(prepared.task, prepared.seed, production.work.moves, cell.part_name),
         )
         return outcome, floor.recorder.recording  # type: ignore[union-attr]
 
 
-def _noting(floor: Floor, journal: RunJournal, troubles: list[TroubleMet], tell: Tell) -> Tell:
+def _noting(floor: Floor, journal: RunJournal, heard: list[Event], tell: Tell) -> Tell:
     """Tells on what happens, once it is in the journal."""
 
     def noted(event: Event) -> None:
@@ -182,8 +187,10 @@ def _noting(floor: Floor, journal: RunJournal, troubles: list[TroubleMet], tell:
             case MoveMade(move, part):
                 journal.tell(Moved(floor.steps, part, move.origin, move.target, move.pick_s, move.drop_s))
             case TroubleMet(what, answer, part, station):
-                troubles.append(event)
+                heard.append(event)
                 journal.tell(Met(floor.steps, what, answer, part, station))
+            case MachineBegan():
+                heard.append(event)
         tell(event)
 
     return noted

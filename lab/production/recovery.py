@@ -161,11 +161,10 @@ class Recovery:
                 self.back[part], answer = before, "takes it up there, and brings it to the machine again"
             machine.clear()
         elif part in work.finished:
-            before = work.came_from.get(name)
-            if before is not None:
-                self.back[part], answer = before, "brings it there again"
-                del work.finished[part]
-        work.spot_of[seen.name] = seen.at
+            answer = "sets it right"
+            work.to_set_right.append(part)
+        if part not in work.finished:
+            work.spot_of[seen.name] = seen.at
         self._tell_seen(seen, answer)
 
     def _learn_again(self, fixed: Sequence[Deviation]) -> None:
@@ -199,6 +198,8 @@ class Recovery:
 
     def _lose(self, part: int, why: str) -> None:
         self.lost[part] = why
+        self.work.finished.pop(part, None)
+        self.work.to_set_right = [one for one in self.work.to_set_right if one != part]
         self.work.tell(PartLost(self.work.name(part), why, self.work.floor.now_s))
 
     def _wait(self, seconds: float) -> None:
@@ -217,7 +218,9 @@ class Recovery:
 
     def _is_known(self, one: Deviation) -> bool:
         part = self._part_of(one.name)
-        return part in self.lost if part is not None else one.name in self._strange and one.sort != "part gone"
+        if part is None:
+            return one.name in self._strange and one.sort != "part gone"
+        return part in self.lost or part in self.work.to_set_right
 
     def _part_of(self, body: str) -> int | None:
         """The number of the part that a body is, or whose pallet."""
@@ -237,4 +240,5 @@ class Recovery:
 
     def _tell_seen(self, seen: Deviation, answer: str) -> None:
         name = "" if self._part_of(seen.name) is None else seen.name
-        self.work.tell(TroubleMet(seen.words, answer, name, seen.station, self.work.floor.now_s))
+        about = seen.station or ("" if name else seen.name)
+        self.work.tell(TroubleMet(seen.words, answer, name, about, self.work.floor.now_s))
