@@ -121,4 +121,4 @@ def test_writing_down_changes_nothing() -> None:
             run(robot, robot.follow([HIGH.shifted(dz=-0.1), HIGH.shifted(dy=0.2)], blend=0.05))
             run(robot, robot.grip())
             joints.append(world.joints("robot", UP6.joints))
-    assert np.array_equal(*joints)
+    assert np.array_equal(joints[0], joints[1])
