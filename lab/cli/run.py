@@ -28,6 +28,9 @@ def run(
         int,
         typer.Option("--override", min=10, max=100, help="The arm's speed override [%]; the next plan knows of it."),
     ] = 100,
+    faults: Annotated[
+        int | None, typer.Option("--faults", min=0, help="Draw faults for the run with this seed; default: none.")
+    ] = None,
     seed: Seed = 0,
     toolbox: ToolboxPlace = None,
     resume: Annotated[
@@ -50,7 +53,7 @@ def run(
     from lab.teaching.lesson_options import DEFAULT_ADVISORS
     from lab.view.summary import delivered_in_words, run_summary
 
-    given = RunOptions(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed)
+    given = RunOptions(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults)
     if resume is None:
         options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
         loaded, folder, journal = begun(options, out)
@@ -63,7 +66,7 @@ def run(
             teacher = teacher_of(toolbox, lessons, seat)
             if any(name in PEOPLE for name in options.advisors):
                 teacher = replace(teacher, keep=kept_by(teacher.toolbox, lessons))
-            conditions = Conditions(options.override / 100, seat.page, journal=journal)
+            conditions = Conditions(options.override / 100, seat.page, journal=journal, fault_seed=options.faults)
             with seat.progress:
                 report = run_task(prepared, teacher, folder, conditions)
     except KeyboardInterrupt as stopped:

@@ -5,13 +5,19 @@ from dataclasses import dataclass, field
 from lab.production.controls import Controls
 from lab.production.recorder import Viewer
 from lab.production.run_journal import RunJournal
+from lab.tasks.fault_fields import FaultFields
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """override: the share of the task's speed and acceleration with which the arm moves. viewer: who watches live."""
+    """override: the share of the task's speed and acceleration with which the arm moves. viewer: who watches live.
+
+    faults: what goes wrong in it; fault_seed: draws more of that, None: nothing more.
+    """
 
     override: float = 1.0
     viewer: Viewer | None = None
     controls: Controls = field(default_factory=Controls)
     journal: RunJournal = field(default_factory=RunJournal)
+    faults: tuple[FaultFields, ...] = ()
+    fault_seed: int | None = None

@@ -56,12 +56,18 @@ class Floor:
         self.was_held = False  # by the operator, in the last motion
         for _ in range(SETTLE_STEPS):
             world.step()
-        self.recorder = Recorder(world, extras_of(self.scene, skillset), viewer) if film or viewer else None
+        self.recorder: Recorder | None = None
+        if film or viewer:
+            self.record(viewer)
         self.restart_clock()
         self.skipped_s = 0.0
         self._quiet_s = 0.0  # from when on waiting may be skipped
         self._told_held = ""
         self._paced = (0.0, 0.0, 0.0)  # speed, simulated and real time from which on it holds
+
+    def record(self, viewer: Viewer | None = None) -> None:
+        """Keep frames from now on, of all that is there; `viewer` sees them live."""
+        self.recorder = Recorder(self.world, extras_of(self.scene, self.skillset), viewer)
 
     @property
     def now_s(self) -> float:
@@ -189,7 +195,10 @@ class Floor:
         skill.start(self.bench, self.skillset.policies[skill.name])
 
     def run(self, skill: Skill) -> Status:
-        """Carry one skill out to its end, or until something stops it: it has failed then."""
+        """Carry one skill out to its end, or until something stops it: it has failed then, as one that is blocked has."""
+        if why := self.skillset.blocked.get(skill.name):
+            skill.fail(why)
+            return skill.status
         self.start(skill)
         self.was_held = False
         while skill.step() is Status.RUNNING:

@@ -26,6 +26,7 @@ class Machine:
     until_s: float = 0.0
     skill: Skill | None = None
     told: bool = field(default=True, repr=False)  # that it is done
+    _due: float = field(default=0.0, repr=False)  # steps of its process
 
     def begin(self, part: str, now_s: float, seconds: float, skills: Sequence[Skill] = ()) -> None:
         """Begin to work on a part: for `seconds` [s], or with the process, which `start` then carries out."""
@@ -49,9 +50,11 @@ class Machine:
         return self.skill.reason if self.skill is not None and self.skill.status is Status.FAILURE else ""
 
     def step(self) -> None:
-        """Set what the next physics step needs."""
-        if self.skill is not None and not self.fails:
+        """Set what the next physics step needs; a slow machine's process stands still in some of them."""
+        self._due += 1.0 / self.share
+        if self.skill is not None and not self.fails and self._due >= 1.0:
             self.skill.step()
+        self._due %= 1.0
 
     def done(self, now_s: float) -> bool:
         """Whether it has finished its part."""

@@ -2,12 +2,14 @@
 
 from collections.abc import MutableMapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from lab.errors import BadInput, LabError
 from lab.learning.problem import Problem
 from lab.production.durations import Durations, cell_of, measure
 from lab.production.floor import Floor
-from lab.production.report import Taught
+from lab.production.taught import Taught, skill_row
+from lab.sequencing.cell.cell import Cell
 from lab.sim.parts.kinds import Spot
 from lab.sim.scene.places import Layout, Places
 from lab.sim.scene.scene_check import check_scene
@@ -33,6 +35,21 @@ class Relearned:
     again: tuple[str, ...]
 
 
+@dataclass
+class Relearner:
+    """Learns in the middle of a run what changed in its scene; prepared, taught: how they are now."""
+
+    prepared: Prepared
+    taught: Taught
+    teacher: Teacher
+
+    def learn(self, scene: tuple[Task, Layout]) -> Cell:
+        """The cell of the changed scene, once its skills are learned. Raises BadInput as `relearned` does."""
+        found = relearned(self.prepared, self.taught, scene, self.teacher)
+        self.prepared, self.taught = found.prepared, found.taught
+        return found.taught.cell
+
+
 def relearned(prepared: Prepared, taught: Taught, scene: tuple[Task, Layout], teacher: Teacher) -> Relearned:
     """Survey the scene as it is now seen, and learn what is another problem there, beginning with what was known.
 
@@ -47,6 +64,7 @@ def relearned(prepared: Prepared, taught: Taught, scene: tuple[Task, Layout], te
     teacher = replace(teacher, trial=trial_of(fresh))
     known = KnownPolicies.of(lesson.policy for lesson in taught.lessons.values())
     lessons: dict[str, Lesson] = {}
+    rows: dict[str, dict[str, Any]] = {}
     again = []
     for name, problem in fresh.problems.items():
         if name in taught.lessons and problem.mdp.signature == prepared.problems[name].mdp.signature:
@@ -58,11 +76,12 @@ def relearned(prepared: Prepared, taught: Taught, scene: tuple[Task, Layout], te
             known[problem.subtask, lessons[name].policy.signature] = lessons[name].policy
             teacher.tell(SkillReady(name, lessons[name]))
             again.append(name)
+        rows[name] = skill_row(name, lessons[name])
         fresh.skillset.policies[name] = lessons[name].policy
     others = {name for name in again if name not in taught.lessons or not _same(lessons[name], taught.lessons[name])}
     durations = _timed(fresh, taught.durations, others, teacher)
     cell = cell_of(task, durations, prepared.order)
-    return Relearned(fresh, Taught(lessons, durations, cell), tuple(again))
+    return Relearned(fresh, Taught(lessons, rows, durations, cell), tuple(again))
 
 
 def _same(lesson: Lesson, before: Lesson) -> bool:

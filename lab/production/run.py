@@ -9,9 +9,12 @@ from lab.errors import LabError
 from lab.production.composer import carry_out
 from lab.production.conditions import Conditions
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
+from lab.production.faults.draw import draw
 from lab.production.recorder import show_scene
-from lab.production.report import Report, Taught, skill_row, write_files
+from lab.production.relearning import Relearner
+from lab.production.report import Report, write_files
 from lab.production.run_journal import DurationsKept, RunEnded, RunJournal
+from lab.production.taught import Taught, skill_row
 from lab.sequencing import find_sequence
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Reference
@@ -97,7 +100,12 @@ def run(prepared: Prepared, teacher: Teacher, out: Path, conditions: Conditions 
     proven = optimum(taught.cell)
     teacher.tell(SequenceFound(found, Reference(proven.bound_s, proven.proven, "A*")))
     teacher.tell(PhaseBegan("carry out", len(found.sequence)))
-    outcome, recording = carry_out(prepared, taught.cell, found.sequence, conditions, teacher.tell)
+    faults = prepared.task.faults
+    if conditions.fault_seed is not None:
+        faults += draw(prepared.task, prepared.order, conditions.fault_seed, found.cost)
+    conditions = replace(conditions, faults=faults)
+    relearner = Relearner(prepared, taught, teacher)
+    outcome, recording = carry_out(prepared, taught.cell, found.sequence, conditions, teacher.tell, relearner)
     report = Report(prepared, taught, found, proven, outcome, recording, began)
     teacher.tell(PhaseBegan("draw", 1))
     write_files(report, out)
