@@ -23,7 +23,7 @@ from lab.sequencing.simulate.rest import Mishaps
 from lab.sim.frames import Recording
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared
-from lab.teaching.events import Event, MachineDone, MoveMade, PlanMade, Tell, TroubleMet, unheard
+from lab.teaching.events import Event, MachineBegan, MachineDone, MoveMade, PlanMade, Tell, TroubleMet, unheard
 
 
 @dataclass
@@ -121,7 +121,6 @@ class Production:
         left = [part for part in range(1, self.cell.parts + 1) if part not in delivered]
         return Outcome(
             Schedule.from_moves(self.cell, work.moves),
-            tuple(sorted(work.finished)),
             delivered,
             tuple(part for part in left if work.has_fallen(part)),
             tuple(self.recovery.notes),
@@ -158,8 +157,8 @@ def carry_out(
         floor.restart_clock()
         floor.hand = lambda: injector.tick(floor)
         journal = conditions.journal
-        troubles: list[TroubleMet] = []
-        noted = _noting(floor, journal, troubles, tell)
+        heard: list[Event] = []
+        noted = _noting(floor, journal, heard, tell)
         floor.tell = noted
         floor.controls = conditions.controls
         floor.stops.note = journal.note_stops
@@ -174,13 +173,13 @@ def carry_out(
         outcome = replace(
             production.outcome(failure, interrupted),
             happened=tuple(injector.happened),
-            troubles=tuple(troubles),
+            heard=tuple(heard),
             program=motions.program(prepared.task, prepared.seed, production.work.moves, cell.part_name),
         )
         return outcome, floor.recorder.recording  # type: ignore[union-attr]
 
 
-def _noting(floor: Floor, journal: RunJournal, troubles: list[TroubleMet], tell: Tell) -> Tell:
+def _noting(floor: Floor, journal: RunJournal, heard: list[Event], tell: Tell) -> Tell:
     """Tells on what happens, once it is in the journal."""
 
     def noted(event: Event) -> None:
@@ -188,8 +187,10 @@ def _noting(floor: Floor, journal: RunJournal, troubles: list[TroubleMet], tell:
             case MoveMade(move, part):
                 journal.tell(Moved(floor.steps, part, move.origin, move.target, move.pick_s, move.drop_s))
             case TroubleMet(what, answer, part, station):
-                troubles.append(event)
+                heard.append(event)
                 journal.tell(Met(floor.steps, what, answer, part, station))
+            case MachineBegan():
+                heard.append(event)
         tell(event)
 
     return noted

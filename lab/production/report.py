@@ -51,6 +51,7 @@ class Report:
     began_s: float
     wall_s: float = 0.0
     files: dict[str, str] = field(default_factory=dict)
+    receipts: dict[str, Any] | None = None
 
     @property
     def success(self) -> bool:
@@ -64,7 +65,8 @@ class Report:
 
     def to_json(self) -> dict[str, Any]:
         """The document of `lab run --json`."""
-        outcome, prepared = self.outcome, self.prepared
+        outcome, prepared, cell = self.outcome, self.prepared, self.taught.cell
+        verdict = outcome.verdict([cell.part_name(part) for part in range(1, cell.parts + 1)])
         return {
             "task": prepared.task.name,
             "seed": prepared.seed,
@@ -86,10 +88,11 @@ class Report:
             "camera_deviation_m": max(outcome.camera_deviations_m, default=None),
             "sim_s": outcome.sim_s - outcome.skipped_s + self.taught.durations.sim_s,
             "skipped_s": outcome.skipped_s,
-            "faults": outcome.fault_rows(),
-            "outcome": outcome.verdict(len(prepared.order)),
+            "faults": [*verdict.rows],
+            "outcome": verdict.came,
             "interrupted": outcome.interrupted,
             "wall_s": self.wall_s,
+            "receipts": self.receipts,
             "files": self.files,
         }
 
