@@ -166,10 +166,10 @@ def carry_out(
         floor, injector = Floor(world, prepared.skillset, prepared.layout, prepared.order), Injector(conditions.faults)
         injector.prepare(floor.scene)
         floor.record(conditions.viewer)
-        motions = MotionRecorder(floor.scene.robot)
         floor.scene.robot.override(conditions.override)
         floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
+        motions = MotionRecorder(floor.scene.robot)  # its times begin with the floor's
         floor.hand = lambda: injector.tick(floor)
         journal = conditions.journal
         heard: list[Event] = []
