@@ -4,7 +4,8 @@ import json
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-MAX_CHARS = 1024
+MAX_CHARS = 4096
+MOST_MOVES = 1000  # of one path
 WORDS = ("skip", "auto", "undo", "quit")
 
 
@@ -14,11 +15,12 @@ class Refused(Exception):
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer to a question, by its number: an action, or one of WORDS."""
+    """An answer to a question, by its number: an action, one of WORDS, or the actions of a whole path."""
 
     question: int
     action: int | None = None
     word: str = ""
+    path: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Layer:
 def understood(message: str | bytes) -> Answer | Wish | Layer:
     """What a page says. Raises Refused for anything else."""
     if isinstance(message, bytes) or len(message) > MAX_CHARS:
-        raise Refused("That was no message of this page: text of at most 1024 characters is wanted.")
+        raise Refused(f"That was no message of this page: text of at most {MAX_CHARS} characters is wanted.")
     try:
         said = json.loads(message)
     except (ValueError, RecursionError):
@@ -50,6 +52,9 @@ def understood(message: str | bytes) -> Answer | Wish | Layer:
         case {"answer": {"question": int(number), "word": str(word), **rest}, **more} if not (rest or more):
             if not isinstance(number, bool) and word in WORDS:
                 return Answer(number, None, word)
+        case {"answer": {"question": int(number), "path": list(path), **rest}, **more} if not (rest or more):
+            if not isinstance(number, bool) and 0 < len(path) <= MOST_MOVES and all(type(move) is int for move in path):
+                return Answer(number, path[0], path=tuple(path))
         case {"seat": "take" | "give" as wish, **more} if not more:
             return Wish(wish)
         case {"layer": int() | None as layer, **more} if not more and not isinstance(layer, bool):

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.learning.requests import AdviceRequest, Request
+from lab.seat.grid_text import ARROWS, direction_of
 from lab.seat.page.page_messages import Answer, Chair, Layer, Refused, Wish, understood
 from lab.seat.page.page_state import PARTS, Known, Pending, layer_of
 
@@ -160,7 +161,9 @@ class SeatPanel:
             raise Refused("This session is only shown: it takes no answers.")
         if answer.word == "undo" and "undo" not in pending.words:
             raise Refused("Nothing of this episode can be taken back.")
-        if not answer.word and answer.action not in pending.moves:
+        if len(answer.path) > 1 and not isinstance(pending.request, AdviceRequest):
+            raise Refused("Which part moves next is said move by move.")
+        if not answer.word and not {answer.action, *answer.path} <= {*pending.moves}:
             raise Refused("There is no such move here.")
         return pending
 
@@ -226,7 +229,10 @@ def _finite(value: Any) -> Any:
 
 
 def word_of(request: Request, answer: Answer) -> str:
-    """An answer as a terminal understands it: the label of an action, the number of a move, or the word itself."""
+    """An answer as a terminal understands it: the label of an action, the number of a move, the word itself, or a path."""
     if answer.word or answer.action is None:
         return answer.word
+    if len(answer.path) > 1 and isinstance(request, AdviceRequest):
+        pointing = [direction_of(request.mdp, action) for action in answer.path]
+        return f"path {''.join(ARROWS[d] for d in pointing if d is not None)}"
     return request.mdp.action_labels[answer.action] if isinstance(request, AdviceRequest) else str(answer.action)

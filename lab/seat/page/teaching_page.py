@@ -12,9 +12,10 @@ from math import inf
 from typing import Any
 
 from lab.advice.journal import Undo
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
 from lab.mdp import NoPath, shortest_steps
+from lab.seat.event_text import Told
 from lab.seat.grid_views import StateWords
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_messages import Answer
@@ -22,6 +23,7 @@ from lab.seat.page.page_order import bars_of, made_until
 from lab.seat.page.page_panel import CLOSED, SeatPanel
 from lab.seat.page.page_run import hear_run
 from lab.seat.page.page_state import Pending, ShownLesson, standing_of
+from lab.seat.path_ahead import PathAhead
 from lab.sequencing.request import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonBegan, LessonEvent
 from lab.teaching.lesson_plan import LessonPlan
@@ -44,6 +46,7 @@ class SeatPage(LiveView):
         super().__init__(port, title=TITLE)
         self._wait_s = wait_s
         self._panel: SeatPanel = SeatPanel(TITLE)
+        self._path = PathAhead()
 
     def close(self) -> None:
         """Stop serving; who waits for an answer learns that there is nobody any more. Safe to call again."""
@@ -58,12 +61,28 @@ class SeatPage(LiveView):
         Raises AdvisorLeft for "auto", after the time and when the page is closed, Undo when an answer is taken back, and
         KeyboardInterrupt for "quit".
         """
+        if self._path.goes_on(request):
+            self.look(request)
+            return self._path.step()
+        self._drop_path()
         pending = self._pose(request)
         try:
             answer = self._panel.wait(pending)
         finally:
             self.withdraw()
+        if answer is not None and len(answer.path) > 1 and isinstance(request, AdviceRequest):
+            self._path = PathAhead(request, answer.path)
+            return self._path.step()
         return _said(pending, answer)
+
+    def _drop_path(self) -> None:
+        """What is left of a drawn way leads elsewhere than the learner went: that is said."""
+        if left := len(self._path.left):
+            with self._panel.lock:
+                text = f"The rest of your way is dropped ({counted(left, 'move')}): the learner is elsewhere now."
+                self._panel.known.learning.notice(Told(text, "note"))
+                self._panel.known.changed("notices")
+        self._path = PathAhead()
 
     def offer(self, request: Request, on_word: Callable[[str], None] | None = None) -> None:
         """Show a question that is answered elsewhere, too; returns at once.

@@ -63,6 +63,7 @@ const seat = (() => {
     button.hidden = !(send && (you.seat ? you.pages > 1 : you.free));
     button.textContent = you.seat ? "Hand over" : "Answer here";
     el("says").textContent = shown ? shown.title : state.ended || idle();
+    el("where").textContent = shown ? shown.where || "" : "";
     el("detail").textContent = shown ? detail() : "";
     el("words").hidden = !shown;
     el("because").hidden = !(shown && whyOpen);
@@ -146,9 +147,9 @@ const seat = (() => {
       text("chance", `${move.ready_s ? `ready in ${move.ready_s} s` : "ready now"}${own ? " · ★ its choice" : ""}`);
       return;
     }
-    text("chance", `${own ? "★ " : ""}${percent(move.chance)}`);
+    text("chance", `${move.size ? `${move.size} · ` : ""}${own ? "★ " : ""}${percent(move.chance)}`);
     button.querySelector(".sure").style.width = move.chance < 0.01 ? "0" : `${100 * move.chance}%`;
-    button.setAttribute("aria-label", `${move.label}: chance ${percent(move.chance)}${own ? ", its own choice" : ""}${move.leads ? `, leads ${move.leads}` : ""}`);
+    button.setAttribute("aria-label", `${move.label}${move.size ? ` ${move.size}` : ""}: chance ${percent(move.chance)}${own ? ", its own choice" : ""}${move.leads ? `, leads ${move.leads}` : ""}`);
   }
 
   // ---- answers
@@ -180,6 +181,14 @@ const seat = (() => {
   function choose(action, event) {
     if (canAnswer() && moveButtons.has(action)) moveButtons.get(action).classList.add("said");
     answer({ action }, event);
+  }
+
+  // The whole way that is drawn on the map, as the moves that lead along it
+  function sendWay() {
+    const path = seatMap.drawn().map((direction) => shown.moves.find((one) => one.direction === direction)).filter(Boolean).map((move) => move.action);
+    seatMap.drop();
+    if (path.length === 1) choose(path[0]);
+    else if (path.length) answer({ path });
   }
 
   function go(direction) {
@@ -227,10 +236,20 @@ const seat = (() => {
     if (shown) enable();
   }
 
+  // Shift and an arrow key draw on, Enter sends what is drawn
+  function draws(event) {
+    const direction = ARROW_KEYS.indexOf(event.key);
+    if (event.shiftKey && direction >= 0 && direction < 4) return seatMap.step(direction) || true;
+    if (event.key !== "Enter" || !seatMap.drawn().length) return false;
+    sendWay();
+    return true;
+  }
+
   function pressed(event) {
-    if (event.key === "Escape") event.target.blur();
+    if (event.key === "Escape" && !seatMap.drop()) event.target.blur();
     if (event.ctrlKey || event.altKey || event.metaKey || !shown || event.target.matches("input, select, textarea")) return;
     if (event.key === "Enter" && event.target.matches("button")) return; // that button's own
+    if (draws(event)) return event.preventDefault();
     const direction = ARROW_KEYS.indexOf(event.key), digit = Number.parseInt(event.key, 10) - 1;
     const word = LETTERS[event.key] || LETTERS[event.key.toLowerCase()];
     const numbered = shown.moves[digit] && shown.moves[digit].direction === null ? shown.moves[digit] : undefined;
@@ -262,6 +281,8 @@ const seat = (() => {
     if (button && event.detail) button.blur();
   });
   el("chair-button").onclick = () => send && send({ seat: state.you.seat ? "give" : "take" });
+  el("way-send").onclick = sendWay;
+  el("way-drop").onclick = () => seatMap.drop();
   window.addEventListener("resize", redraw);
   setInterval(countDown, 250);
 
@@ -271,7 +292,7 @@ const seat = (() => {
     connected(how) {
       sent = 0;
       online(how);
-      seatMap.tell({ go, look: (layer) => how({ layer }) });
+      seatMap.tell({ go, look: (layer) => how({ layer }), can: canAnswer });
     },
     lost: () => online(null),
     spare() {
