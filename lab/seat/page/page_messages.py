@@ -4,6 +4,8 @@ import json
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from lab.seat.replay_pace import WORDS as REPLAY_WORDS
+
 MAX_CHARS = 4096
 MOST_MOVES = 1000  # of one path
 WORDS = ("skip", "auto", "undo", "quit")
@@ -37,7 +39,14 @@ class Layer:
     layer: int | None
 
 
-def understood(message: str | bytes) -> Answer | Wish | Layer:
+@dataclass(frozen=True)
+class Pace:
+    """The page wants a session that is shown again to pause, to go on and so on: a word of `replay_pace.WORDS`."""
+
+    word: str
+
+
+def understood(message: str | bytes) -> Answer | Wish | Layer | Pace:
     """What a page says. Raises Refused for anything else."""
     if isinstance(message, bytes) or len(message) > MAX_CHARS:
         raise Refused(f"That was no message of this page: text of at most {MAX_CHARS} characters is wanted.")
@@ -57,6 +66,8 @@ def understood(message: str | bytes) -> Answer | Wish | Layer:
                 return Answer(number, path[0], path=tuple(path))
         case {"seat": "take" | "give" as wish, **more} if not more:
             return Wish(wish)
+        case {"replay": str(word), **more} if not more and word in REPLAY_WORDS:
+            return Pace(word)
         case {"layer": int() | None as layer, **more} if not more and not isinstance(layer, bool):
             return Layer(layer)
     raise Refused("That was no message of this page: it is ignored.")

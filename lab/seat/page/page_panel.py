@@ -11,7 +11,7 @@ from typing import Any
 
 from lab.learning.requests import AdviceRequest, Request
 from lab.seat.grid_text import ARROWS, direction_of
-from lab.seat.page.page_messages import Answer, Chair, Layer, Refused, Wish, understood
+from lab.seat.page.page_messages import Answer, Chair, Layer, Pace, Refused, Wish, understood
 from lab.seat.page.page_state import PARTS, Known, Pending, layer_of
 
 SLICE_EVERY_S = 0.1  # a layer's values are sent at most ten times a second,
@@ -36,7 +36,7 @@ class SeatPanel:
     """What is known, who has the seat, the question that waits, and its answer; `lock` guards all of it.
 
     on_word: told, in the server's thread, in a word of the terminal what was answered to a question that nobody waits
-    for here.
+    for here. on_pace: told in a word how a session that is shown again is to go on.
     """
 
     files: Sequence[Path] = tuple(
@@ -53,6 +53,7 @@ class SeatPanel:
         self.known = Known(title)
         self.chair = Chair()
         self.on_word: Callable[[str], None] | None = None
+        self.on_pace: Callable[[str], None] | None = None
         self._answer: Answer | None = None
         self._ended = False
         self._pages: dict[int, _Seen] = {}
@@ -131,10 +132,15 @@ class SeatPanel:
         if word and self.on_word is not None:
             self.on_word(word)
 
-    def _do(self, page: int, meant: Answer | Wish | Layer) -> str:
+    def _do(self, page: int, meant: Answer | Wish | Layer | Pace) -> str:
         """The terminal's word for the answer to a question that was only offered, "" for everything else."""
         if isinstance(meant, Layer):
             self._pages[page].layer, self._pages[page].layer_version = meant.layer, 0
+            return ""
+        if isinstance(meant, Pace):
+            if self.on_pace is None:
+                raise Refused("Nothing is shown again here.")
+            self.on_pace(meant.word)
             return ""
         if isinstance(meant, Wish):
             self.chair.wish(page, meant)

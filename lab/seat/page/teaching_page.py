@@ -21,9 +21,11 @@ from lab.seat.page.page_events import hear
 from lab.seat.page.page_messages import Answer
 from lab.seat.page.page_order import bars_of, made_until
 from lab.seat.page.page_panel import CLOSED, SeatPanel
+from lab.seat.page.page_question import said_of
 from lab.seat.page.page_run import hear_run
 from lab.seat.page.page_state import Pending, ShownLesson, standing_of
 from lab.seat.path_ahead import PathAhead
+from lab.seat.replay_pace import ReplayPace
 from lab.sequencing.request import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonBegan, LessonEvent
 from lab.teaching.lesson_plan import LessonPlan
@@ -97,6 +99,26 @@ class SeatPage(LiveView):
         with self._panel.lock:
             self._see(request)
         self._wake()
+
+    def paced(self, pace: ReplayPace) -> None:
+        """A session is shown again: pages pause it, step through it and change its speed."""
+
+        def changed(now: Mapping[str, Any]) -> None:
+            with self._panel.lock:
+                self._panel.known.replay = {**(self._panel.known.replay or {}), **now}
+                self._panel.known.changed("replay")
+            self._wake()
+
+        pace.on_change, self._panel.on_pace = changed, pace.do
+        changed(pace.now())
+
+    def replayed(self, request: Request, action: int | None) -> None:
+        """Show a question of a session that is shown again, with what was answered; None: it was left to the learner."""
+        known = self._panel.known
+        with self._panel.lock:
+            known.replay = {**(known.replay or {}), "action": action, "said": said_of(request, action)}
+            known.changed("replay")
+        self.offer(request)
 
     def withdraw(self) -> None:
         """The question was answered elsewhere."""
