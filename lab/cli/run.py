@@ -28,6 +28,9 @@ def run(
         int,
         typer.Option("--override", min=10, max=100, help="The arm's speed override [%]; the next plan knows of it."),
     ] = 100,
+    faults: Annotated[
+        int | None, typer.Option("--faults", min=0, help="Draw faults for the run with this seed; default: none.")
+    ] = None,
     order: Annotated[
         str | None, typer.Option("--order", help="The order of the moves by part numbers, such as 1,2,1,1,2,2.")
     ] = None,
@@ -52,7 +55,7 @@ def run(
     from lab.teaching.lesson_options import DEFAULT_ADVISORS
     from lab.view.summary import delivered_in_words, run_summary
 
-    given = RunOptions(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, order=order)
+    given = RunOptions(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order)
     if resume is None:
         options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
         loaded, folder, journal = begun(options, out)
@@ -65,7 +68,8 @@ def run(
             teacher = teacher_of(toolbox, lessons, seat)
             advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "")
             teacher = replace(teacher, keep=advice.keep)
-            conditions = Conditions(options.override / 100, seat.page, journal=journal, advice=advice)
+            share = options.override / 100
+            conditions = Conditions(share, seat.page, journal=journal, fault_seed=options.faults, advice=advice)
             with seat.progress:
                 report = run_task(prepared, teacher, folder, conditions)
     except KeyboardInterrupt as stopped:

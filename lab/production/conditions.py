@@ -13,7 +13,8 @@ from lab.tasks.fault_fields import FaultFields
 class Conditions:
     """override: the share of the task's speed and acceleration with which the arm moves. viewer: who watches live.
 
-    faults: what goes wrong in it. advice: who is asked, None: nobody about the order.
+    faults: what goes wrong in it; fault_seed: draws more of that, None: nothing more. advice: who is asked, None: nobody
+    about the order.
     """
 
     override: float = 1.0
@@ -21,4 +22,5 @@ class Conditions:
     controls: Controls = field(default_factory=Controls)
     journal: RunJournal = field(default_factory=RunJournal)
     faults: tuple[FaultFields, ...] = ()
+    fault_seed: int | None = None
     advice: RunAdvice | None = None

@@ -9,10 +9,13 @@ from lab.errors import LabError
 from lab.production.composer import carry_out
 from lab.production.conditions import Conditions
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
+from lab.production.faults.draw import draw
 from lab.production.order import OrderAdvice, ordered
 from lab.production.recorder import show_scene
-from lab.production.report import Report, Taught, skill_row, write_files
+from lab.production.relearning import Relearner
+from lab.production.report import Report, write_files
 from lab.production.run_journal import DurationsKept, RunEnded, RunJournal
+from lab.production.taught import Taught, skill_row
 from lab.skills.prepared_scene import Prepared
 from lab.skills.trial import trial_of
 from lab.teaching.events import MoveTimed, PhaseBegan, RecordSkipped, ScenePrepared, SkillReady
@@ -94,7 +97,11 @@ def run(prepared: Prepared, teacher: Teacher, out: Path, conditions: Conditions 
     whose = OrderAdvice() if advice is None else advice.order(people, taught.durations.to_json())
     order = ordered(taught.cell, prepared.task.sequencing, whose, prepared.seed, teacher.tell)
     teacher.tell(PhaseBegan("carry out", len(order.found.sequence)))
-    outcome, recording = carry_out(prepared, taught.cell, order.found.sequence, conditions, teacher.tell)
+    faults = prepared.task.faults
+    if conditions.fault_seed is not None:
+        faults += draw(prepared.task, prepared.order, conditions.fault_seed, order.found.cost)
+    conditions, relearner = replace(conditions, faults=faults), Relearner(prepared, taught, teacher)
+    outcome, recording = carry_out(prepared, taught.cell, order.found.sequence, conditions, teacher.tell, relearner)
     receipts = None if advice is None else advice.receipts(order)
     report = Report(prepared, taught, order.found, order.proven, outcome, recording, began, receipts=receipts)
     teacher.tell(PhaseBegan("draw", 1))

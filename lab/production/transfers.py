@@ -33,7 +33,7 @@ def _unseen() -> None:
 
 @dataclass
 class _UnderWay:
-    """The times [s] of a move under way; smooth: nothing had to be done twice."""
+    """The times [s] of a move under way; leg: what of the carrying comes next; smooth: nothing had to be done twice."""
 
     what: tuple[str, Carried]
     start: str
@@ -41,6 +41,7 @@ class _UnderWay:
     reach_s: float = 0.0
     served_s: float = 0.0
     pick_s: float = 0.0
+    leg: int = 0
     smooth: bool = True
 
 
@@ -50,6 +51,8 @@ class Transfers:
 
     spot_of: by body, a part's or its pallet's. expected_s: by machine, when it should be done [s]. place: the station at
     whose approach the tool is; "": it is somewhere else. came_from: by part, its position before the one it is in.
+    taken: spots on which something stands that belongs to nobody. finished: when a part reached the end of its route [s];
+    to_set_right: those of them that were moved there.
     look: called while the robot waits; raises Trouble.
     """
 
@@ -62,12 +65,16 @@ class Transfers:
     expected_s: dict[str, float] = field(default_factory=dict)
     spot_of: dict[str, Spot] = field(default_factory=dict)
     came_from: dict[str, int] = field(default_factory=dict)
+    taken: set[Spot] = field(default_factory=set)
+    finished: dict[int, float] = field(default_factory=dict)
+    to_set_right: list[int] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.plan = Run(self.cell)  # where parts are and may go; its times are the predicted ones
         self.place = self.cell.robot_start
         self.look: Callable[[], None] = _unseen
         self._under_way: _UnderWay | None = None
+        self._last_way: dict[str, Carried] = {}
         self._served: set[str] = set()  # parts for which the robot's service is done
         scene = self.floor.scene
         for number, spot in enumerate(scene.places.begins(scene.order), start=1):
@@ -105,8 +112,20 @@ class Transfers:
                 self._serve(part, way.origin)
             move.pick_s = floor.now_s
             self._take_up(name, way, spot)
-        self._bring(name, way, spot)
+        self._bring(way, spot, move)
         self._finish(decision, way, spot, move)
+
+    def set_right(self) -> None:
+        """Set parts that were moved at the ends of their routes onto their spots again. Raises Trouble."""
+        while self.to_set_right and self.floor.bench.held in (None, self.name(self.to_set_right[0])):
+            name = self.name(self.to_set_right[0])
+            way, spot = self._last_way[name], self.spot_of[name]
+            move = self._under_way = _UnderWay((name, way), self.place, self.floor.now_s, smooth=False)
+            if self.floor.bench.held is None:
+                self._take_up(name, way, spot)
+            self._bring(way, spot, move)
+            self._under_way = None
+            self.to_set_right.pop(0)
 
     def _begin(self, name: str, way: Carried, ahead: int) -> _UnderWay:
         """The times of the move, which begins now or was interrupted."""
@@ -127,6 +146,7 @@ class Transfers:
         self.place, self._under_way = way.target, None
         for body in floor.scene.bodies_of(name, way.kind):
             self.spot_of[body] = spot
+        self._last_way[name] = way
         self.came_from[name] = self.plan.locations[part - 1]
         planned = self.plan.move(decision)
         times_s = move.leave_s, move.reach_s, move.pick_s, floor.now_s, planned.process_s, move.pick_s - move.served_s
@@ -138,6 +158,7 @@ class Transfers:
             self.tell(MachineBegan(way.target, name, floor.now_s, self.expected_s[way.target]))
         self.tell(MoveMade(self.moves[-1], name))
         if self.plan.finished_s[part - 1] is not None:
+            self.finished[part] = floor.now_s
             self.tell(PartDone(name, floor.now_s))
 
     # ---- ways and spots ------------------------------------------------------------------------------------------
@@ -156,7 +177,7 @@ class Transfers:
         if on_its_pallet(scene.task, way.kind, way.target):
             return self.spot_of[pallet_of(name)]
         own = scene.bodies_of(name, way.kind)
-        taken = [spot for body, spot in self.spot_of.items() if body not in own]
+        taken = [spot for body, spot in self.spot_of.items() if body not in own] + [*self.taken]
         free = (s for s in scene.places.spots(scene.task.station(way.target)) if s not in taken)
         spot = next(free, None)
         if spot is None:
@@ -244,15 +265,17 @@ class Transfers:
                 return station
         return way.origin
 
-    def _bring(self, name: str, way: Carried, spot: Spot) -> None:
+    def _bring(self, way: Carried, spot: Spot, move: _UnderWay) -> None:
         """Carry what is in the gripper to its target and set it down; from a station near the target, that is all."""
-        legs = self.floor.skillset.legs[way]
-        rest = [skill for skill in legs if skill.carries]
-        for skill in rest[-1:] if self.place == way.target else rest:
+        name, legs = move.what[0], [skill for skill in self.floor.skillset.legs[way] if skill.carries]
+        if self.place:
+            move.leg = len(legs) - 1 if self.place == way.target else 0
+        for skill in legs[move.leg :]:
             self._to_begin(skill, name, way.target)
             self.place = ""
             self._do(skill.aim(name, spot), name, way.target)
             self.deviations_m += skill.deviations_m
+            move.leg += 1
         self.place = way.target
 
     def _to_begin(self, skill: Skill, name: str, where: str) -> None:
@@ -272,10 +295,6 @@ class Transfers:
             raise Trouble(skill.reason, name, where, held=self.floor.was_held, skill=skill.name)
 
     # ---- what came of it -------------------------------------------------------------------------------------------
-
-    def done(self) -> list[int]:
-        """The parts that reached the end of their route."""
-        return [part for part, end_s in enumerate(self.plan.finished_s, start=1) if end_s is not None]
 
     def stands(self, part: int) -> bool:
         """Whether a part, and its pallet, stands where it was set down last."""
