@@ -22,7 +22,7 @@ from lab.sequencing.simulate.rest import Mishaps
 from lab.sim.frames import Recording
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared
-from lab.teaching.events import Event, MachineDone, MoveMade, PlanMade, Tell, TroubleMet, unheard
+from lab.teaching.events import Event, MachineBegan, MachineDone, MoveMade, PlanMade, Tell, TroubleMet, unheard
 
 
 @dataclass
@@ -155,8 +155,8 @@ def carry_out(
         floor.restart_clock()
         floor.hand = lambda: injector.tick(floor)
         journal = conditions.journal
-        troubles: list[TroubleMet] = []
-        noted = _noting(floor, journal, troubles, tell)
+        heard: list[TroubleMet | MachineBegan] = []
+        noted = _noting(floor, journal, heard, tell)
         floor.tell = noted
         floor.controls = conditions.controls
         floor.stops.note = journal.note_stops
@@ -169,12 +169,12 @@ def carry_out(
             failure, interrupted = "stopped by Ctrl-C", True
         floor.recorder.take()  # type: ignore[union-attr]
         outcome = replace(
-            production.outcome(failure, interrupted), happened=tuple(injector.happened), troubles=tuple(troubles)
+            production.outcome(failure, interrupted), happened=tuple(injector.happened), heard=tuple(heard)
         )
         return outcome, floor.recorder.recording  # type: ignore[union-attr]
 
 
-def _noting(floor: Floor, journal: RunJournal, troubles: list[TroubleMet], tell: Tell) -> Tell:
+def _noting(floor: Floor, journal: RunJournal, heard: list[TroubleMet | MachineBegan], tell: Tell) -> Tell:
     """Tells on what happens, once it is in the journal."""
 
     def noted(event: Event) -> None:
@@ -182,8 +182,10 @@ def _noting(floor: Floor, journal: RunJournal, troubles: list[TroubleMet], tell:
             case MoveMade(move, part):
                 journal.tell(Moved(floor.steps, part, move.origin, move.target, move.pick_s, move.drop_s))
             case TroubleMet(what, answer, part, station):
-                troubles.append(event)
+                heard.append(event)
                 journal.tell(Met(floor.steps, what, answer, part, station))
+            case MachineBegan():
+                heard.append(event)
         tell(event)
 
     return noted

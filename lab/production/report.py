@@ -59,6 +59,7 @@ class Report:
     def to_json(self) -> dict[str, Any]:
         """The document of `lab run --json`."""
         outcome, prepared = self.outcome, self.prepared
+        verdict = outcome.verdict(prepared.order)
         return {
             "task": prepared.task.name,
             "seed": prepared.seed,
@@ -80,8 +81,8 @@ class Report:
             "camera_deviation_m": max(outcome.camera_deviations_m, default=None),
             "sim_s": outcome.sim_s - outcome.skipped_s + self.taught.durations.sim_s,
             "skipped_s": outcome.skipped_s,
-            "faults": outcome.fault_rows(),
-            "outcome": outcome.verdict(len(prepared.order)),
+            "faults": list(verdict.rows),
+            "outcome": verdict.came,
             "interrupted": outcome.interrupted,
             "wall_s": self.wall_s,
             "files": self.files,
