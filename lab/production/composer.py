@@ -51,6 +51,7 @@ class Production:
             try:
                 self.floor.between_moves()
                 self.recovery.look()
+                self.work.set_right()
                 if not self.sequence:
                     return self.recovery.failure()
                 self.work.bring_on(self.sequence[0], len(self.sequence))

@@ -146,6 +146,7 @@ class Recovery:
             self.out[machine.station] = f"{seen.name} lies in '{machine.station}'"
         if machine is not None:
             machine.clear()
+        self.work.finished.pop(part, None)
         self._lose(part, seen.words)
         self._tell_seen(seen, "leaves it")
 
@@ -161,10 +162,9 @@ class Recovery:
                 self.back[part], answer = before, "takes it up there, and brings it to the machine again"
             machine.clear()
         elif part in work.finished:
-            before = work.came_from.get(name)
-            if before is not None:
-                self.back[part], answer = before, "brings it there again"
-                del work.finished[part]
+            answer = "sets it right"
+            work.to_set_right.append(part)
+            return self._tell_seen(seen, answer)
         work.spot_of[seen.name] = seen.at
         self._tell_seen(seen, answer)
 
@@ -217,7 +217,9 @@ class Recovery:
 
     def _is_known(self, one: Deviation) -> bool:
         part = self._part_of(one.name)
-        return part in self.lost if part is not None else one.name in self._strange and one.sort != "part gone"
+        if part is None:
+            return one.name in self._strange and one.sort != "part gone"
+        return part in self.lost or part in self.work.to_set_right
 
     def _part_of(self, body: str) -> int | None:
         """The number of the part that a body is, or whose pallet."""
@@ -237,4 +239,5 @@ class Recovery:
 
     def _tell_seen(self, seen: Deviation, answer: str) -> None:
         name = "" if self._part_of(seen.name) is None else seen.name
-        self.work.tell(TroubleMet(seen.words, answer, name, seen.station, self.work.floor.now_s))
+        about = seen.station or ("" if name else seen.name)
+        self.work.tell(TroubleMet(seen.words, answer, name, about, self.work.floor.now_s))

@@ -51,7 +51,8 @@ class Transfers:
 
     spot_of: by body, a part's or its pallet's. expected_s: by machine, when it should be done [s]. place: the station at
     whose approach the tool is; "": it is somewhere else. came_from: by part, its position before the one it is in.
-    taken: spots on which something stands that belongs to nobody. finished: when a part reached the end of its route [s].
+    taken: spots on which something stands that belongs to nobody. finished: when a part reached the end of its route [s];
+    to_set_right: those of them that were moved there.
     look: called while the robot waits; raises Trouble.
     """
 
@@ -66,12 +67,14 @@ class Transfers:
     came_from: dict[str, int] = field(default_factory=dict)
     taken: set[Spot] = field(default_factory=set)
     finished: dict[int, float] = field(default_factory=dict)
+    to_set_right: list[int] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.plan = Run(self.cell)  # where parts are and may go; its times are the predicted ones
         self.place = self.cell.robot_start
         self.look: Callable[[], None] = _unseen
         self._under_way: _UnderWay | None = None
+        self._last_way: dict[str, Carried] = {}
         self._served: set[str] = set()  # parts for which the robot's service is done
         scene = self.floor.scene
         for number, spot in enumerate(scene.places.begins(scene.order), start=1):
@@ -112,6 +115,17 @@ class Transfers:
         self._bring(way, spot, move)
         self._finish(decision, way, spot, move)
 
+    def set_right(self) -> None:
+        """Set parts that were moved at the ends of their routes onto their spots again. Raises Trouble."""
+        while self.to_set_right and self.floor.bench.held is None:
+            name = self.name(self.to_set_right[0])
+            way, spot = self._last_way[name], self.spot_of[name]
+            move = self._under_way = _UnderWay((name, way), self.place, self.floor.now_s, smooth=False)
+            self._take_up(name, way, spot)
+            self._bring(way, spot, move)
+            self._under_way = None
+            self.to_set_right.pop(0)
+
     def _begin(self, name: str, way: Carried, ahead: int) -> _UnderWay:
         """The times of the move, which begins now or was interrupted."""
         now_s = self.floor.now_s
@@ -131,6 +145,7 @@ class Transfers:
         self.place, self._under_way = way.target, None
         for body in floor.scene.bodies_of(name, way.kind):
             self.spot_of[body] = spot
+        self._last_way[name] = way
         self.came_from[name] = self.plan.locations[part - 1]
         planned = self.plan.move(decision)
         times_s = move.leave_s, move.reach_s, move.pick_s, floor.now_s, planned.process_s, move.pick_s - move.served_s
