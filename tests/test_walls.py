@@ -21,7 +21,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.sequencing", "lab.toolbox"),
     ("lab.advice", "lab.tasks"),
     ("lab.sim",),
-    ("lab.skills", "lab.view"),
+    ("lab.skills", "lab.view", "lab.export"),
     ("lab.teaching",),
     ("lab.production",),
     ("lab.studies", "lab.seat", "lab.gym"),

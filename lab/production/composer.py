@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from lab.errors import LabError, WorkFailed
+from lab.export.recorder import MotionRecorder
 from lab.production.conditions import Conditions
 from lab.production.faults.injector import Injector
 from lab.production.floor import Floor
@@ -120,7 +121,6 @@ class Production:
         left = [part for part in range(1, self.cell.parts + 1) if part not in delivered]
         return Outcome(
             Schedule.from_moves(self.cell, work.moves),
-            tuple(sorted(work.finished)),
             delivered,
             tuple(part for part in left if work.has_fallen(part)),
             tuple(self.recovery.notes),
@@ -151,12 +151,13 @@ def carry_out(
         floor, injector = Floor(world, prepared.skillset, prepared.layout, prepared.order), Injector(conditions.faults)
         injector.prepare(floor.scene)
         floor.record(conditions.viewer)
+        motions = MotionRecorder(floor.scene.robot)
         floor.scene.robot.override(conditions.override)
         floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
         floor.hand = lambda: injector.tick(floor)
         journal = conditions.journal
-        heard: list[TroubleMet | MachineBegan] = []
+        heard: list[Event] = []
         noted = _noting(floor, journal, heard, tell)
         floor.tell = noted
         floor.controls = conditions.controls
@@ -170,12 +171,15 @@ def carry_out(
             failure, interrupted = "stopped by Ctrl-C", True
         floor.recorder.take()  # type: ignore[union-attr]
         outcome = replace(
-            production.outcome(failure, interrupted), happened=tuple(injector.happened), heard=tuple(heard)
+            production.outcome(failure, interrupted),
+            happened=tuple(injector.happened),
+            heard=tuple(heard),
+            program=motions.program(prepared.task, prepared.seed, production.work.moves, cell.part_name),
         )
         return outcome, floor.recorder.recording  # type: ignore[union-attr]
 
 
-def _noting(floor: Floor, journal: RunJournal, heard: list[TroubleMet | MachineBegan], tell: Tell) -> Tell:
+def _noting(floor: Floor, journal: RunJournal, heard: list[Event], tell: Tell) -> Tell:
     """Tells on what happens, once it is in the journal."""
 
     def noted(event: Event) -> None:

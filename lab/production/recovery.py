@@ -146,7 +146,6 @@ class Recovery:
             self.out[machine.station] = f"{seen.name} lies in '{machine.station}'"
         if machine is not None:
             machine.clear()
-        self.work.finished.pop(part, None)
         self._lose(part, seen.words)
         self._tell_seen(seen, "leaves it")
 
@@ -164,8 +163,8 @@ class Recovery:
         elif part in work.finished:
             answer = "sets it right"
             work.to_set_right.append(part)
-            return self._tell_seen(seen, answer)
-        work.spot_of[seen.name] = seen.at
+        if part not in work.finished:
+            work.spot_of[seen.name] = seen.at
         self._tell_seen(seen, answer)
 
     def _learn_again(self, fixed: Sequence[Deviation]) -> None:
@@ -199,6 +198,8 @@ class Recovery:
 
     def _lose(self, part: int, why: str) -> None:
         self.lost[part] = why
+        self.work.finished.pop(part, None)
+        self.work.to_set_right = [one for one in self.work.to_set_right if one != part]
         self.work.tell(PartLost(self.work.name(part), why, self.work.floor.now_s))
 
     def _wait(self, seconds: float) -> None:

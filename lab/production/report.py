@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from lab.errors import WorkFailed
+from lab.export.program import PROGRAM, TRAJECTORY
 from lab.files import draft
 from lab.production.outcome import Outcome
 from lab.production.taught import Taught
 from lab.sequencing.cell.schedule import Schedule
+from lab.sequencing.cell.schedule_rows import csv_of, rows_of
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
@@ -28,6 +30,10 @@ FILES = {
     "overhead": "overhead.png",
     "replay": "replay.html",
     "sequence": "sequence.json",
+    "schedule_table": "schedule.csv",
+    "schedule": "schedule.json",
+    "program": PROGRAM,
+    "trajectory": TRAJECTORY,
     "run": "run.json",
 }
 
@@ -45,6 +51,7 @@ class Report:
     began_s: float
     wall_s: float = 0.0
     files: dict[str, str] = field(default_factory=dict)
+    receipts: dict[str, Any] | None = None
 
     @property
     def success(self) -> bool:
@@ -58,8 +65,8 @@ class Report:
 
     def to_json(self) -> dict[str, Any]:
         """The document of `lab run --json`."""
-        outcome, prepared = self.outcome, self.prepared
-        verdict = outcome.verdict(prepared.order)
+        outcome, prepared, cell = self.outcome, self.prepared, self.taught.cell
+        verdict = outcome.verdict([cell.part_name(part) for part in range(1, cell.parts + 1)])
         return {
             "task": prepared.task.name,
             "seed": prepared.seed,
@@ -81,10 +88,11 @@ class Report:
             "camera_deviation_m": max(outcome.camera_deviations_m, default=None),
             "sim_s": outcome.sim_s - outcome.skipped_s + self.taught.durations.sim_s,
             "skipped_s": outcome.skipped_s,
-            "faults": list(verdict.rows),
+            "faults": [*verdict.rows],
             "outcome": verdict.came,
             "interrupted": outcome.interrupted,
             "wall_s": self.wall_s,
+            "receipts": self.receipts,
             "files": self.files,
         }
 
@@ -113,6 +121,8 @@ def _names(report: Report) -> list[str]:
     missing = set() if report.outcome.schedule.robot else {"gantt"}
     if _photographed(report.prepared) is None:
         missing |= {"value_map", "overhead"}
+    if report.outcome.program is None:
+        missing |= {"program", "trajectory"}
     return [name for name in FILES if name not in missing]
 
 
@@ -144,6 +154,11 @@ def _draw_all(report: Report, folder: Path) -> None:
     title = f"{prepared.task.title or prepared.task.name}: {prepared.words}"
     replay_html(report.recording, paths["replay"], title=title)
     _write_json(paths["sequence"], _sequence_document(report, predicted))
+    rows = rows_of(predicted, taught.cell, "planned") + rows_of(report.outcome.schedule, taught.cell, "measured")
+    paths["schedule_table"].write_text(csv_of(rows), encoding="utf-8")
+    _write_json(paths["schedule"], {"schedule": rows})
+    if report.outcome.program is not None:
+        report.outcome.program.save(folder)
     report.wall_s = time.perf_counter() - report.began_s
     _write_json(paths["run"], report.to_json() | {"schedule": report.outcome.schedule.to_json()})
 

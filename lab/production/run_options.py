@@ -10,6 +10,8 @@ from annotated_types import Ge, Le
 
 from lab.errors import BadInput
 from lab.files import check_out
+from lab.production.durations import cell_without_times
+from lab.production.order import checked_order
 from lab.production.run_journal import RunBegan, RunJournal, read_run
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
@@ -59,6 +61,8 @@ def begun(options: RunOptions, out: Path | None) -> tuple[Task, Path, RunJournal
     folder = out or Path(f"{task.name}-run")
     check_out(folder)
     options.lessons().advising()
+    if options.order is not None:
+        checked_order(cell_without_times(task, task.ordered(options.toasts, options.parts)), options.order)
     return task, folder, RunJournal.begin(folder, RunBegan(options.to_json(), task.name, hash_of(task)))
 
 

@@ -117,11 +117,12 @@ class Transfers:
 
     def set_right(self) -> None:
         """Set parts that were moved at the ends of their routes onto their spots again. Raises Trouble."""
-        while self.to_set_right and self.floor.bench.held is None:
+        while self.to_set_right and self.floor.bench.held in (None, self.name(self.to_set_right[0])):
             name = self.name(self.to_set_right[0])
             way, spot = self._last_way[name], self.spot_of[name]
             move = self._under_way = _UnderWay((name, way), self.place, self.floor.now_s, smooth=False)
-            self._take_up(name, way, spot)
+            if self.floor.bench.held is None:
+                self._take_up(name, way, spot)
             self._bring(way, spot, move)
             self._under_way = None
             self.to_set_right.pop(0)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from lab.advice.entries import Answer
 from lab.advice.panel import Panel
+from lab.learning.problem import Problem
 from lab.learning.requests import Ask, Request
 from lab.learning.session_events import EpisodeEnded
 from lab.mdp import FloatArray
@@ -18,6 +19,7 @@ from lab.teaching.kept_session import known_values, receipt_of
 if TYPE_CHECKING:
     from lab.seat.lesson_scene import LessonScene
     from lab.seat.page.teaching_page import SeatPage
+    from lab.skills import Skill
 
 WORTH_S = 2.0  # the shortest time between two receipts of one lesson
 PAGE_S = 30.0  # how long a replay waits for a browser
@@ -33,6 +35,8 @@ class LessonSeat:
     def __init__(self, progress: RunProgress, prompt: TeachingPrompt | None, page: "SeatPage | None") -> None:
         self.progress, self._prompt, self.page = progress, prompt, page
         self._scene: LessonScene | None = None
+        self._scene_of: Problem | None = None
+        self._place: Any = None  # where lessons take place, a prepared task or another
         self._pause_s: float | None = None  # between two answers of a replay
         self._asked_here = False  # the last question was put to somebody here, and was shown
         self._shown_s = 0.0  # when the page was last shown a question that is not put to it
@@ -54,12 +58,25 @@ class LessonSeat:
                 self._show_answer(event.request, event.action)
             case LessonBegan():
                 self._lesson = event
+                self._about(event.plan.problem)
             case AdvisorGathered():
                 self._panel = event.advisor if isinstance(event.advisor, Panel) else None
             case ScenePrepared():
-                self._show_scene(event)
+                self._place = event.scene
+                self._show_scene(event.problem)
             case _:
                 self.progress.hear(event)
+
+    def _about(self, problem: Problem) -> None:
+        """What is learned now: who asks says it in the words of its skill, where there is one; another's scene goes."""
+        if self._scene_of not in (None, problem):
+            self.clear_scene()
+        skillset = getattr(self._place, "skillset", None)
+        skill: Skill | None = None if skillset is None else skillset.skills.get(problem.name)
+        if self._prompt is not None:
+            self._prompt.about(skill)
+        if self.page is not None:
+            self.page.about(skill)
 
     def _hear_session(self, event: LessonEvent) -> None:
         if event.is_new or self._pause_s is not None:
@@ -123,6 +140,7 @@ class LessonSeat:
         """Asks at the terminal; a page shows the question, too, and may answer it there."""
         assert self._prompt is not None
         self._asked_here = True
+        self._set_scene()
         self._show_state(request)
         if self.page is not None:
             self.page.offer(request, self._prompt.answer_from_outside)
@@ -136,6 +154,7 @@ class LessonSeat:
     def _ask_page(self, request: Request) -> int | None:
         assert self.page is not None
         self._asked_here = True
+        self._set_scene()
         self._show_state(request)
         return self.page.ask(request)
 
@@ -146,13 +165,18 @@ class LessonSeat:
         if self.page is not None and self._scene is not None:
             self.page.update(self._scene.frame(request.state))
 
-    def _show_scene(self, event: ScenePrepared) -> None:
+    def _set_scene(self) -> None:
+        """In a run, the scene of a lesson is set up when somebody is first asked in it."""
+        if self._scene is None and self._lesson is not None and self._place is not None:
+            self._show_scene(self._lesson.plan.problem)
+
+    def _show_scene(self, problem: Problem | None) -> None:
         self.clear_scene()
-        if self.page is None:
+        if self.page is None or problem is None:
             return
         from lab.seat.lesson_scene import lesson_scene_of
 
-        self._scene = lesson_scene_of(event.scene, event.problem)
+        self._scene, self._scene_of = lesson_scene_of(self._place, problem), problem
         if self._scene is not None:
             self.page.show(self._scene.bodies, self._scene.camera)
 
@@ -161,7 +185,7 @@ class LessonSeat:
         if self._scene is not None:
             with suppress(Exception):
                 self._scene.close()
-            self._scene = None
+            self._scene = self._scene_of = None
 
     # ---- a replay
 

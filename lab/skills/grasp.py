@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 from lab.sim.arms.kinematics import ToolPose
 from lab.skills.around_part import SLOW, AroundPart
 from lab.skills.skill import Bench, SkillFailed, over_everything
+from lab.skills.state_words import plain
 from lab.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -33,6 +34,10 @@ class Grasp(AroundPart):
     def at_pick(cls, task: Task, kind: str, station: str) -> "Grasp":
         """It takes parts up everywhere."""
         return cls(task, kind, station)
+
+    def way_in_words(self) -> tuple[str, str]:
+        """The fingers come to the part."""
+        return "The open fingers are", f"where they close on {plain(self.kind)}"
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Open, go above the part, follow the learned cells down, close, lift, and see that the part came along."""

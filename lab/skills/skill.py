@@ -17,6 +17,7 @@ from lab.sim.frames import Body
 from lab.sim.parts.kinds import Kind, Spot, on_its_pallet
 from lab.sim.scene.blocked_cells import FINGERS_OFF_M
 from lab.sim.scene.scene import Scene, pallet_of
+from lab.skills.state_words import away_in_words, size_in_words
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Stage
 from lab.vision import GridView
@@ -193,6 +194,34 @@ class Skill:
         raise NotImplementedError
 
     # ---- what it shows -------------------------------------------------------------------------------------------
+
+    def in_words(self, state: int) -> str:
+        """Where the tool is in a state of the problem, seen from the goal, for somebody who knows no table."""
+        mdp = self.problem.mdp
+        if len(mdp.action_labels) != 2 * len(mdp.shape):
+            return f"{self.way_in_words()[0]} in state {mdp.state_label(state)}."
+        goal = mdp.state_cell(int(np.flatnonzero(mdp.goal)[0]))
+        by = [here - there for here, there in zip(mdp.state_cell(state), goal, strict=True)]
+        return away_in_words(*self.way_in_words(), by, mdp.action_labels, self.cell_steps())
+
+    def way_in_words(self) -> tuple[str, str]:
+        """What moves, with its verb, and to where: "The open fingers are", "where they close on the slice"."""
+        return "The tool is", "its goal"
+
+    def cell_steps(self) -> tuple[float, ...]:
+        """How far a cell is from the next along each axis of the problem's grid [m], about the vertical [rad]."""
+        shape = self.problem.mdp.shape
+        cells = [(0,) * len(shape), *np.eye(len(shape), dtype=int)]
+        first, *others = (self.pose(int(np.ravel_multi_index(cell, shape, mode="clip"))) for cell in cells)
+        return tuple(hypot(p.x - first.x, p.y - first.y, p.z - first.z) or abs(p.yaw - first.yaw) for p in others)
+
+    def moves_in_words(self) -> tuple[str, ...]:
+        """How far each action goes, such as "1.2 cm"."""
+        labels = self.problem.mdp.action_labels
+        if len(labels) != 2 * len(self.problem.mdp.shape):
+            return ("",) * len(labels)
+        steps = self.cell_steps()
+        return tuple(size_in_words(label, steps[action // 2]) for action, label in enumerate(labels))
 
     def show(self, bench: Bench, state: int) -> bool:
         """Put the bench into a state at once, without physics; False, and nothing moves, when the arm cannot reach it."""

@@ -1,7 +1,7 @@
 """What commands show when they are done: short rich tables and lines from plain data."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rich.console import Group, RenderableType
@@ -46,12 +46,27 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     table.add_row("makespan", text)
     proven = "proven optimum" if report["optimum_proven"] else "proven bound"
     table.add_row(proven, f"{bound}, gap {gap_of(report['optimality_gap'], 2)}")
+    for what, lines in _worth(report["receipts"] or {}):
+        table.add_row(what, Text("\n".join(lines)))
     rate = report["sim_s"] / report["wall_s"] if report["wall_s"] else 0.0
     spent = f"{report['wall_s']:.1f} s for {report['sim_s']:.0f} simulated seconds ({rate:.0f} x real time)"
     table.add_row("time", spent)
     for name, path in report["files"].items():
         table.add_row(name.replace("_", " "), Text(path))
     return table
+
+
+def _worth(receipts: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
+    """What advice was worth: of each skill that people were asked about, and of the order, beside what other orders cost."""
+    for name, worth in receipts.get("skills", {}).items():
+        yield f"advice on {name}", worth["receipt"]["lines"]
+    order = receipts.get("order")
+    if order is not None:
+        unit = " s" if order["objective"] == "makespan" else ""
+        costs = ", ".join(f"{by} {cost:.1f}{unit}" for by, cost in order["costs"].items())
+        guided = order.get("guided_best")
+        own = "" if guided is None else f"; best episode with advice {guided:.1f}{unit}"
+        yield "advice on the order", [f"{costs}; used: {order['used']}{own}", *order.get("lines", [])]
 
 
 def delivered_in_words(delivered: int, parts: Mapping[str, int]) -> str:

@@ -359,7 +359,7 @@ def failed(prepared: Prepared, toolbox: Toolbox) -> Report:
     """A run whose second step failed."""
     taught = teach_all(prepared, Teacher(toolbox))
     why = "slice 1 at 'plate': slice 1 is not in the gripper after grasping at 'plate' (tried 3 times)"
-    outcome = Outcome(Schedule.from_moves(taught.cell, []), (), (), (1,), ("try 1",), why, 30.0, ())
+    outcome = Outcome(Schedule.from_moves(taught.cell, []), (), (1,), ("try 1",), why, 30.0, ())
     settings = prepared.task.sequencing
     found = find_sequence(taught.cell, settings.method, search_for(settings), 0)
     return Report(prepared, taught, found, optimum(taught.cell), outcome, Recording((), []), 0.0)

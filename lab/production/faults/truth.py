@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 from lab.production.faults.fault import Happened
 from lab.teaching.events import Event, MachineBegan, TroubleMet
@@ -30,14 +30,6 @@ CLAIMS: tuple[tuple[str, tuple[str, ...], bool], ...] = (
 )
 
 
-class Parts(NamedTuple):
-    """The parts of an order, those that the run itself holds for delivered, and those that are."""
-
-    all: Sequence[str]
-    told: Sequence[str]
-    there: Sequence[str]
-
-
 @dataclass(frozen=True)
 class Verdict:
     """What a run with faults came to, and why it is wrong; rows: of each fault, what was noticed; unexplained: what was told
@@ -49,8 +41,11 @@ class Verdict:
     why: str = ""
 
 
-def verdict(happened: Sequence[Happened], heard: Sequence[Event], failure: str | None, parts: Parts) -> Verdict:
-    """heard: what the run told; failure: why not all was delivered, as it says; None: all was.
+def verdict(
+    happened: Sequence[Happened], heard: Sequence[Event], failure: str | None, lacking: Sequence[str]
+) -> Verdict:
+    """heard: what the run told; failure: why not all was delivered, as it says, None: all was; lacking: the parts that do not
+    stand at the end of their routes.
 
     Delivered: all parts are there, and each was finished. Stopped: some are not there, the run said why, and each reason is
     about a fault. Else it is wrong; a run in which nothing struck may stop for reasons that nobody can check.
@@ -58,20 +53,18 @@ def verdict(happened: Sequence[Happened], heard: Sequence[Event], failure: str |
     troubles = [event for event in heard if isinstance(event, TroubleMet)]
     rows = tuple(_row(one, troubles) for one in happened)
     unexplained = tuple(t.what for t in troubles if not explained(t.what, happened, t.part, t.station, t.at_s))
-    why = "; ".join(_wrong(happened, heard, failure, parts))
+    why = "; ".join(_wrong(happened, heard, failure, lacking))
     came: Came = "delivered" if failure is None else "stopped"
     return Verdict("wrong" if why else came, rows, unexplained, why)
 
 
-def _wrong(happened: Sequence[Happened], heard: Sequence[Event], failure: str | None, parts: Parts) -> Iterator[str]:
+def _wrong(
+    happened: Sequence[Happened], heard: Sequence[Event], failure: str | None, lacking: Sequence[str]
+) -> Iterator[str]:
     """What is not true."""
-    for name in parts.told:
-        if name not in parts.there:
-            yield f"{name} is not where it is said to be delivered"
     for one in happened:
-        if one.undone and one.part in parts.there and not _begun_again(one, heard):
+        if one.undone and one.part not in lacking and not _begun_again(one, heard):
             yield f"{one.part} was delivered, and '{one.station}' had not finished it"
-    lacking = [name for name in parts.all if name not in parts.there]
     if failure is None and lacking:
         yield f"nothing was said of {', '.join(lacking)}"
     for piece in pieces(failure or ""):

@@ -15,6 +15,7 @@ from lab.advice.journal import Undo
 from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
 from lab.mdp import NoPath, shortest_steps
+from lab.seat.grid_views import StateWords
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_messages import Answer
 from lab.seat.page.page_order import bars_of, made_until
@@ -140,6 +141,11 @@ class SeatPage(LiveView):
             else:  # anew, too, because an answer was taken back
                 known.receipt, known.ended = None, ""
                 known.begin(made)
+
+    def about(self, known: StateWords | None) -> None:
+        """What says in words where the learner is in the lesson that begins, None where nothing does."""
+        with self._panel.lock:
+            self._panel.known.learning.known = known
 
     # ---- what is shown beside
 

@@ -14,6 +14,7 @@ from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
 from lab.learning.session_events import EpisodeEnded
 from lab.seat import request_text
 from lab.seat.event_text import SessionText
+from lab.seat.grid_views import StateWords
 from lab.seat.terminal.line_reader import Outside, ReadLine, default_reader
 from lab.seat.terminal.order_question import OrderQuestion
 from lab.seat.terminal.screen import folded, room
@@ -63,6 +64,10 @@ class TeachingPrompt:
     def answer_from_outside(self, word: str) -> None:
         """Ends the question that waits with a word as if it were typed, from any thread; no effect when nothing waits."""
         self._outside.answer(word)
+
+    def about(self, known: StateWords | None) -> None:
+        """What is learned next: its states in words, None for what has none."""
+        self._table.known = known
 
     def show(self, request: Request) -> None:
         """Shows where the learner is, what it would do, and how it has been doing."""

@@ -103,7 +103,7 @@ def measured(job: Job, settings: Sequence[Setting]) -> dict[Setting, Ran]:
             continue  # not ours: carried out anew
         if setting in settings:
             done[setting] = ran
-    left = sorted((one for one in settings if one not in done), key=lambda one: (one.seed, one.task))
+    left = sorted((one for one in settings if one not in done), key=lambda one: (one.task, one.seed))
     job.progress(len(done), len(settings))
     for setting, ran in job.computed(carried_out, left):
         done[setting] = ran
@@ -178,7 +178,8 @@ def carried_out(setting: Setting) -> Ran:
         outcome, _ = carry_out(prepared, ready.taught.cell, ready.sequence, conditions, relearner=relearner)
     except Exception as error:  # whatever a run comes to that is no way to end one
         return replace(ran, why=f"{type(error).__name__}: {error}", wall_s=time.perf_counter() - began)
-    found = outcome.verdict(prepared.order)
+    cell = ready.taught.cell
+    found = outcome.verdict([cell.part_name(part) for part in range(1, cell.parts + 1)])
     vain = not outcome.happened and outcome.failure is not None  # then no reason can be true
     return replace(
         ran,

@@ -4,7 +4,7 @@ import pytest
 
 from lab.production.faults import FAULTS
 from lab.production.faults.fault import Happened
-from lab.production.faults.truth import CLAIMS, Parts, explained, verdict
+from lab.production.faults.truth import CLAIMS, explained, verdict
 from lab.teaching.events import MachineBegan, TroubleMet
 
 MOVED = Happened("part moved", "slice 1 was moved by 0.06 m from 'plate'", 10.0, part="slice 1", station="plate")
@@ -39,28 +39,29 @@ def test_what_is_said_before_a_fault_is_not_explained_by_it() -> None:
     assert explained("it stands at (0.1, 0.8) m", [MOVED], "slice 1", at_s=11.0)
 
 
-BOTH = ("slice 1", "slice 2")
-ALL, ONE = Parts(BOTH, BOTH, BOTH), Parts(BOTH, BOTH[1:], BOTH[1:])
 SEEN = TroubleMet("it stands at (0.1, 0.8) m", "takes it up there", "slice 1", "plate", 12.0)
 
 
 def test_a_run_is_delivered_or_stopped_or_wrong() -> None:
-    assert verdict([MOVED], [SEEN], None, ALL).came == "delivered"
-    assert verdict([MOVED], [SEEN], "slice 1 at 'plate': it is out of reach at (1.3, 1.3) m", ONE).came == "stopped"
-    silent = verdict([MOVED], [SEEN], None, ONE)
+    assert verdict([MOVED], [SEEN], None, []).came == "delivered"
+    assert (
+        verdict([MOVED], [SEEN], "slice 1 at 'plate': it is out of reach at (1.3, 1.3) m", ["slice 1"]).came
+        == "stopped"
+    )
+    silent = verdict([MOVED], [SEEN], None, ["slice 1"])
     assert (silent.came, silent.why) == ("wrong", "nothing was said of slice 1")
-    lie = verdict([MOVED], [SEEN], "slice 1: it lies on its side; slice 2: it lies on its side", Parts(BOTH, (), ()))
+    lie = verdict([MOVED], [SEEN], "slice 1: it lies on its side; slice 2: it lies on its side", ["slice 1", "slice 2"])
     assert (lie.came, lie.why) == ("wrong", "no fault explains: slice 2: it lies on its side")
-    vain = verdict([MOVED], [SEEN], None, Parts(BOTH, BOTH, BOTH[1:]))
-    assert vain.why.startswith("slice 1 is not where it is said to be delivered")
 
 
 def test_a_run_in_which_nothing_struck_may_stop() -> None:
-    assert verdict([], [], "slice 1 at 'toaster': it is not done 60 s after it should be", ONE).came == "stopped"
+    assert (
+        verdict([], [], "slice 1 at 'toaster': it is not done 60 s after it should be", ["slice 1"]).came == "stopped"
+    )
 
 
 def test_what_was_noticed_of_each_fault_is_told() -> None:
-    moved, blind = verdict([MOVED, BLIND], [SEEN], None, ALL).rows
+    moved, blind = verdict([MOVED, BLIND], [SEEN], None, []).rows
     assert (moved["noticed"], moved["answer"], moved["noticed_s"]) == (SEEN.what, SEEN.answer, 12.0)
     assert (blind["noticed"], blind["true_reason"]) == (None, BLIND.words)
 
@@ -68,5 +69,5 @@ def test_what_was_noticed_of_each_fault_is_told() -> None:
 def test_a_part_that_no_machine_finished_is_not_delivered() -> None:
     taken = Happened("part moved", "", 50.0, part="slice 1", station="toaster", undone=True)
     again = MachineBegan("toaster", "slice 1", 70.0, 130.0)
-    assert verdict([taken], [MachineBegan("toaster", "slice 1", 40.0, 100.0)], None, ALL).came == "wrong"
-    assert verdict([taken], [again], None, ALL).came == "delivered"
+    assert verdict([taken], [MachineBegan("toaster", "slice 1", 40.0, 100.0)], None, []).came == "wrong"
+    assert verdict([taken], [again], None, []).came == "delivered"

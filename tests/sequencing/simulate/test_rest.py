@@ -281,9 +281,9 @@ def test_what_there_is_not(oven_cell: CellMaker) -> None:
     run = Run(oven_cell(2))
     with pytest.raises(BadInput, match="there is no part 3, only 1 to 2"):
         rest_of(run, Mishaps(lost=frozenset({3})))
-    with pytest.raises(BadInput, match="unknown station 'ofen' .*did you mean 'oven'"):
+    with pytest.raises(BadInput, match=r"unknown station 'ofen' .*did you mean 'oven'"):
         rest_of(run, Mishaps(closed=("ofen",)))
-    with pytest.raises(BadInput, match=r"unknown station 'ofen' .where toast 1 stands.: did you mean 'oven'"):
+    with pytest.raises(BadInput, match=r"where toast 1 stands.: did you mean 'oven'"):
         rest_of(run, Mishaps(moved={1: "ofen"}))
     with pytest.raises(BadInput, match="toast 1 moved to position 7: its routes have 0 to 2"):
         rest_of(run, Mishaps(moved={1: 7}))
