@@ -18,10 +18,11 @@ import lab.production.run
 from lab.errors import WorkFailed
 from lab.export.program import Program
 from lab.mdp import shortest_steps
-from lab.production.composer import Outcome
 from lab.production.durations import Durations
-from lab.production.report import FILES, Report, Taught, write_files
+from lab.production.outcome import Outcome
+from lab.production.report import FILES, Report, write_files
 from lab.production.run import remember, teach_all
+from lab.production.taught import Taught
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import optimum
