@@ -9,6 +9,7 @@ import typer
 from lab.cli.lessons import lesson_seat, teacher_of
 from lab.cli.options import AdvisorNames, Asked, Decide, Json, Parts, Port, Seed, ShowPage, Toasts, ToolboxPlace, Wait
 from lab.cli.output import end, show
+from lab.errors import BadInput
 
 
 def run(
@@ -79,6 +80,10 @@ def run(
             conditions = Conditions(share, seat.page, journal=journal, fault_seed=options.faults, advice=advice)
             with seat.progress:
                 report = run_task(prepared, teacher, folder, conditions)
+    except BadInput:
+        if resume is None:
+            journal.forget()
+        raise
     except KeyboardInterrupt as stopped:
         why = str(stopped) or "stopped by Ctrl-C; what was learned is kept"
         raise KeyboardInterrupt(f"{why}; go on with: lab run --resume {quote(str(folder))}") from None
