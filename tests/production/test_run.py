@@ -18,10 +18,11 @@ import lab.production.run
 from lab.errors import WorkFailed
 from lab.export.program import Program
 from lab.mdp import shortest_steps
-from lab.production.composer import Outcome
 from lab.production.durations import Durations
-from lab.production.report import FILES, Report, Taught, write_files
+from lab.production.outcome import Outcome
+from lab.production.report import FILES, Report, write_files
 from lab.production.run import remember, teach_all
+from lab.production.taught import Taught
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import optimum
@@ -43,7 +44,7 @@ RUN_FIELDS = (
     *("task", "seed", "toasts", "parts", "success", "delivered", "dropped", "failure", "retries", "skills", "sequence"),
     *("predicted_makespan_s", "measured_makespan_s", "optimal_makespan_s", "bound_s"),
     *("optimality_gap", "optimum_proven"),
-    *("camera_deviation_m", "sim_s", "skipped_s", "wall_s", "files"),
+    *("camera_deviation_m", "sim_s", "skipped_s", "faults", "outcome", "interrupted", "receipts", "wall_s", "files"),
 )
 SKILL_FIELDS = {"name", "subtask", "source", "policy", "episodes", "requests", "helped_steps", "solved"} | {
     *("reason", "from_task", "parent", "saved_episodes", "saved_helped_steps", "fitness")
