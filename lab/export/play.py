@@ -222,6 +222,7 @@ def apart(seen: Array, way: Array) -> tuple[Array, Array]:
 
     A turn counts as YAW_ARM in what is nearest.
     """
+    way = np.repeat(way, 2, axis=0) if len(way) == 1 else way
     points, line = _flat(seen), _flat(way)
     line[:, 3] += 2 * np.pi * YAW_ARM * np.round((points[0, 3] - line[0, 3]) / (2 * np.pi * YAW_ARM))
     starts, steps = line[:-1], np.diff(line, axis=0)
