@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from lab.advice.entries import Answer
 from lab.advice.panel import Panel
 from lab.learning.problem import Problem
-from lab.learning.requests import Ask, Request
+from lab.learning.requests import AdviceRequest, Ask, Request
 from lab.learning.session_events import EpisodeEnded
 from lab.mdp import FloatArray
 from lab.seat.replay_pace import ReplayPace
@@ -118,7 +118,7 @@ class LessonSeat:
     def _replay(self, request: Request, action: int | None, pace: ReplayPace) -> None:
         """Show a question with its answer, until the next one is due."""
         if self.page is not None:
-            self._set_scene()
+            self._set_scene(request)
             self._show_state(request)
             self.page.replayed(request, action)
         if self._prompt is not None:
@@ -147,7 +147,7 @@ class LessonSeat:
         """Asks at the terminal; a page shows the question, too, and may answer it there."""
         assert self._prompt is not None
         self._asked_here = True
-        self._set_scene()
+        self._set_scene(request)
         self._show_state(request)
         if self.page is not None:
             self.page.offer(request, self._prompt.answer_from_outside)
@@ -161,7 +161,7 @@ class LessonSeat:
     def _ask_page(self, request: Request) -> int | None:
         assert self.page is not None
         self._asked_here = True
-        self._set_scene()
+        self._set_scene(request)
         self._show_state(request)
         return self.page.ask(request)
 
@@ -172,9 +172,11 @@ class LessonSeat:
         if self.page is not None and self._scene is not None:
             self.page.update(self._scene.frame(request.state))
 
-    def _set_scene(self) -> None:
-        """In a run, the scene of a lesson is set up when somebody is first asked in it."""
-        if self._scene is None and self._lesson is not None and self._place is not None:
+    def _set_scene(self, request: Request) -> None:
+        """In a run, the scene of a lesson is set up when somebody is first asked in it; a question on the order needs none."""
+        if not isinstance(request, AdviceRequest):
+            self.clear_scene()
+        elif self._scene is None and self._lesson is not None and self._place is not None:
             self._show_scene(self._lesson.plan.problem)
 
     def _show_scene(self, problem: Problem | None) -> None:

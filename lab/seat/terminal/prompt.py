@@ -55,7 +55,7 @@ class TeachingPrompt:
         self._meet(request)
         if self._path.goes_on(request):
             return self._give(request, self._path.step())
-        self._drop_path(f"the learner is at {self._way(request).where(request, request.state)} now")
+        self._drop_path(f"the learner is {self._way(request).where(request, request.state)} now")
         with self._outside.question():
             if self._read_line is None:
                 self._read_line = default_reader(self._console, plain=self._plain, outside=self._outside)
