@@ -31,7 +31,11 @@ def replay(
     as_json: Json = False,
 ) -> None:
     """Show a kept teaching session again: each question, what was answered, what came of it, and what it was worth."""
+    from contextlib import nullcontext
+
     from lab.advice.entries import read_journal
+    from lab.seat.terminal.replay_keys import HELP as KEYS_HELP
+    from lab.seat.terminal.replay_keys import replay_keys
     from lab.teaching.kept_order import OrderSession, kept_order
     from lab.teaching.kept_session import KeptSession, session_rows
     from lab.teaching.lesson import replay as replay_session
@@ -51,11 +55,14 @@ def replay(
     say_read(kept, "DIR")
     try:
         with lesson_seat([] if as_json else ["terminal"], page=page, port=port, plain=plain) as seat:
-            seat.replaying(0.0 if as_json else pause)
-            if isinstance(kept, OrderSession):
-                document = _replayed(kept, seat, toolbox)
-            else:
-                document = replay_session(kept, subject_of(kept.options, kept), seat.hear)
+            pace = seat.replaying(0.0 if as_json else pause)
+            with nullcontext() if as_json else replay_keys(pace) as has_keys:
+                if has_keys:
+                    seat.progress.console.print(KEYS_HELP)
+                if isinstance(kept, OrderSession):
+                    document = _replayed(kept, seat, toolbox)
+                else:
+                    document = replay_session(kept, subject_of(kept.options, kept), seat.hear)
             seat.lesson_over(document)
             show(document, as_json, replay_summary)
             seat.stay()

@@ -47,23 +47,30 @@ def run(
     """Find or learn the skills, time them, find their best order, and carry them out in physics."""
     from dataclasses import replace
 
+    from lab.files import check_out
     from lab.production.conditions import Conditions
     from lab.production.run import run as run_task
     from lab.production.run_advice import RunAdvice
+    from lab.production.run_journal import RunJournal
     from lab.production.run_options import RunOptions, begun, gone_on
     from lab.skills.prepared_scene import prepare
+    from lab.tasks.task_file import load
     from lab.teaching.lesson_options import DEFAULT_ADVISORS
     from lab.view.summary import delivered_in_words, run_summary
 
     given = RunOptions(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order)
     if resume is None:
         options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
-        loaded, folder, journal = begun(options, out)
+        loaded = load(options.task)
     else:
-        options, loaded, folder, journal = gone_on(given, resume, out)
+        options, loaded = gone_on(given, resume, out)
+    folder = resume or out or Path(f"{loaded.name}-run")
+    check_out(folder)
     lessons = options.lessons()
+    lessons.advising()
+    prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed)
+    journal = begun(options, loaded, folder) if resume is None else RunJournal.resume(folder)
     try:
-        prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed)
         with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
             teacher = teacher_of(toolbox, lessons, seat)
             advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "")

@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import ceil, degrees, hypot, pi, radians
+from typing import Literal
 
 import numpy as np
 
@@ -118,7 +119,7 @@ class _Writer:
             unit, speed = _spoken_speed(pose - self.pose, path.speed_m_s)
             level = 0 if number == len(path.points) - 1 else THROUGH
             at = self._at(pose, joints[number + 1])
-            self.instructions.append(MoveL(at, "VR" if unit == "VR" else "V", speed, level))
+            self.instructions.append(MoveL(at, unit, speed, level))
             self.pose = pose
         self.joints = joints[-1]
 
@@ -134,7 +135,7 @@ class _Writer:
         return len(self.positions) - 1
 
 
-def _spoken_speed(step: Array, speed_m_s: float) -> tuple[str, float]:
+def _spoken_speed(step: Array, speed_m_s: float) -> tuple[Literal["V", "VR"], float]:
     """The unit and the speed of one straight piece (4,) at a speed of its way [m/s]: in mm/s, or in degrees/s of a mere turn."""
     far, turn = hypot(*step[:3]), abs(step[3])
     way = hypot(far, YAW_ARM * turn)

@@ -72,6 +72,7 @@ class MotionRecorder:
             return
         poses, blend, way, before, begun, seen = self._open
         self._open = None
+        self._driven = min(self._driven, self._steps - begun)  # a target that was set in the step of a stop is none
         if not self._driven:
             return
         first = sum(map(len, self._rows))

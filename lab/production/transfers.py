@@ -6,6 +6,7 @@ from math import hypot
 
 from lab.production.durations import TimedMove
 from lab.production.floor import Floor
+from lab.production.machine import Machine
 from lab.production.trouble import Trouble
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option, part_of
@@ -16,7 +17,17 @@ from lab.sim.scene.scene import pallet_of
 from lab.skills import Skill
 from lab.skills.skill import UPRIGHT, Status, over_everything
 from lab.skills.skillset import Carried, ways_of
-from lab.teaching.events import MachineBegan, MoveBegan, MoveMade, PartDone, SkillBegan, Tell, TroubleMet, unheard
+from lab.teaching.events import (
+    MachineBegan,
+    MoveBegan,
+    MoveMade,
+    PartDone,
+    PartLost,
+    SkillBegan,
+    Tell,
+    TroubleMet,
+    unheard,
+)
 
 ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
 DELIVERED_M = 0.02  # a part this near to its spot has been delivered
@@ -52,7 +63,7 @@ class Transfers:
     spot_of: by body, a part's or its pallet's. expected_s: by machine, when it should be done [s]. place: the station at
     whose approach the tool is; "": it is somewhere else. came_from: by part, its position before the one it is in.
     taken: spots on which something stands that belongs to nobody. finished: when a part reached the end of its route [s];
-    to_set_right: those of them that were moved there.
+    to_set_right: those of them that were moved there. spoilt: why a part was, which is brought on all the same.
     look: called while the robot waits; raises Trouble.
     """
 
@@ -68,6 +79,7 @@ class Transfers:
     taken: set[Spot] = field(default_factory=set)
     finished: dict[int, float] = field(default_factory=dict)
     to_set_right: list[int] = field(default_factory=list)
+    spoilt: dict[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.plan = Run(self.cell)  # where parts are and may go; its times are the predicted ones
@@ -111,6 +123,7 @@ class Transfers:
             if option.service_s:
                 self._serve(part, way.origin)
             move.pick_s = floor.now_s
+            self.check_window(part)
             self._take_up(name, way, spot)
         self._bring(way, spot, move)
         self._finish(decision, way, spot, move)
@@ -232,6 +245,41 @@ class Transfers:
     def _begun_s(self, name: str) -> float:
         """When the part was brought to where it is [s]."""
         return next((move.drop_s for move in reversed(self.moves) if self.name(move.part) == name), 0.0)
+
+    def machine_of(self, part: int) -> Machine | None:
+        """The machine that a part stands in, and that works on it or has done so."""
+        return next((m for m in self.floor.machines.values() if m.part == self.name(part)), None)
+
+    def left_s(self, part: int) -> float:
+        """How long until the machine of a part should be done [s]; below 0: it has been for so long, and the part must not wait
+        on without end. A spoilt part may."""
+        machine = self.machine_of(part)
+        assert machine is not None
+        left_s = self.expected_s[machine.station] - self.floor.now_s
+        self.check_window(part)
+        waits = self.cell.at_most_s(part, machine.station) is None or part in self.spoilt
+        return max(0.0, left_s) if waits else left_s
+
+    def check_window(self, part: int) -> None:
+        """Notice a part that its machine has been done with for longer than it may stay there: it is spoilt."""
+        machine = self.machine_of(part)
+        if machine is None or part in self.spoilt or machine.moves:
+            return
+        at_most_s, late_s = self.at_most_s(machine.part, machine.station), self.floor.now_s - machine.until_s
+        if at_most_s is None or late_s <= at_most_s:
+            return
+        name = self.name(part)
+        what = f"it is burnt: fetched {late_s:.1f} s after it was done, allowed are {at_most_s:g}"
+        self.spoilt[part] = f"{name} at '{machine.station}': {what}"
+        self.tell(TroubleMet(what, "brings it on, but it counts as lost", name, machine.station, self.floor.now_s))
+        self.tell(PartLost(name, what, self.floor.now_s))
+
+    def at_most_s(self, name: str, station: str) -> float | None:
+        """How long a part may stay in a machine that is done with it, by the task [s]; None: as long as it is left there."""
+        task = self.floor.skillset.task
+        routes = self.floor.scene.kind_of[name].part.routes
+        own = [s.at_most_s for route in routes for s in route if s.station == station and s.at_most_s is not None]
+        return own[0] if own else task.station(station).at_most_s
 
     def _serve(self, part: int, station: str) -> None:
         """What the robot does at a station before it takes a part out, once."""

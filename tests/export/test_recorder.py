@@ -103,6 +103,18 @@ def test_a_motion_that_is_broken_off_is_written_down_as_far_as_it_came(robot: Ro
     assert [one.complete for one in written(recorder).motions[1:]] == [True] * (after == "a motion")
 
 
+def test_a_target_that_is_set_in_the_very_step_of_a_stop_is_none(robot: Robot) -> None:
+    recorder = MotionRecorder(robot)
+    motion = robot.follow([HIGH.shifted(dy=-0.3)])
+    run(robot, islice(motion, 30))
+    next(motion)
+    robot.brake()
+    run(robot, robot.grip())
+    program = written(recorder)
+    assert program.motions[0].last == 31
+    assert program.at_s[-1] == program.carried.actions[1].at_s
+
+
 def test_a_motion_that_was_never_driven_is_none(robot: Robot) -> None:
     recorder = MotionRecorder(robot)
     motion = robot.follow([HIGH.shifted(dy=-0.3)])
@@ -121,4 +133,4 @@ def test_writing_down_changes_nothing() -> None:
             run(robot, robot.follow([HIGH.shifted(dz=-0.1), HIGH.shifted(dy=0.2)], blend=0.05))
             run(robot, robot.grip())
             joints.append(world.joints("robot", UP6.joints))
-    assert np.array_equal(*joints)
+    assert np.array_equal(joints[0], joints[1])
