@@ -220,7 +220,7 @@ class Transfers:
         self.place = ""
         why = self.floor.follow(over_everything(self.floor.bench, surveys.approach(station)))
         if why:
-            raise Trouble(why, station=station, held=True)
+            raise Trouble(why, station=station, held=self.floor.was_held)
         self.place = station
 
     def _await(self, name: str, station: str) -> None:
@@ -334,7 +334,7 @@ class Transfers:
         if hypot(tool.x - begin.x, tool.y - begin.y, tool.z - begin.z) > BEGINS_M:
             why = self.floor.follow(over_everything(self.floor.bench, begin))
             if why:
-                raise Trouble(why, name, where, held=True)
+                raise Trouble(why, name, where, held=self.floor.was_held)
 
     def _do(self, skill: Skill, name: str, where: str) -> None:
         """Carry a skill out; Trouble when it fails."""

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from lab.errors import WorkFailed
 from lab.production.composer import carry_out
 from lab.production.conditions import Conditions
 from lab.production.outcome import Outcome
@@ -69,3 +70,17 @@ def test_what_cannot_be_made_is_left_and_said(
     assert outcome.delivered == delivered
     assert said in outcome.failure
     assert outcome.verdict(NAMES).came == "stopped"
+
+
+def test_an_arm_that_cannot_pass_over_everything_stops_and_says_so(
+    run_with: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody holds it then: it is tried a few times, not for ever."""
+
+    def too_high(bench: Any, end: Any) -> Any:
+        raise WorkFailed("the tool cannot reach (0.541, -0.330, 0.460) m")
+        yield
+
+    monkeypatch.setattr("lab.production.transfers.over_everything", too_high)
+    outcome = run_with({"what": "part moved", "part": "slice 2", "by_m": [0.0, 0.08]})
+    assert "the tool cannot reach (0.541, -0.330, 0.460) m (tried 3 times)" in outcome.failure
