@@ -46,22 +46,37 @@ class Production:
         self.floor.on_tick = self.watch
 
     def carry_out(self, sequence: Sequence[int]) -> str | None:
-        """Carry the whole sequence out; None, or why not all parts were made: which, where and why."""
+        """Carry the whole sequence out; None, or why not all parts were made: which, where and why.
+
+        Where the run cannot go on by itself and somebody attends it, it waits until they have put things right.
+        """
         self.sequence = [*sequence]
         while True:
             try:
-                self.floor.between_moves()
-                self.recovery.look()
-                self.work.set_right()
-                if not self.sequence:
+                if not self._next():
                     return self.recovery.failure()
+            except RunStopped as stopped:
+                if not self.floor.controls.attended:
+                    return str(stopped)
+                self.floor.controls.protective(f"{stopped}; put it right, then go on")
+                self.floor.held()
+                self.recovery.forget()
+                self.replan("a person has put things right")
+
+    def _next(self) -> bool:
+        """The next move, or the answer to what keeps it from being made; False when nothing is left. Raises RunStopped."""
+        try:
+            self.floor.between_moves()
+            self.recovery.look()
+            self.work.set_right()
+            if self.sequence:
                 self.work.bring_on(self.sequence[0], len(self.sequence))
                 self.sequence.pop(0)
-            except Trouble as trouble:
-                try:
-                    self.recovery.answer(trouble)
-                except RunStopped as stopped:
-                    return str(stopped)
+            elif not self.recovery.find_again():
+                return False
+        except Trouble as trouble:
+            self.recovery.answer(trouble)
+        return True
 
     def replan(self, why: str) -> None:
         """Order the work that remains anew, from the state that was reached. Raises RunStopped where no order ends it."""

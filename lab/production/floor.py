@@ -59,7 +59,7 @@ class Floor:
         self.on_tick: Callable[[], None] | None = None
         self.hand: Callable[[], bool] | None = None
         self.meanwhile: Callable[[], bool] = _nothing
-        self.force_limit_n: float | None = None
+        self.pressing_n = 0.0  # allowed on top of the task's limit, so that the arm gets away from where it was stopped
         self.was_held = False  # by the operator, in the last motion
         for _ in range(SETTLE_STEPS):
             world.step()
@@ -188,12 +188,11 @@ class Floor:
 
     def _too_hard(self) -> str:
         """What the arm presses on harder than the task allows; "" for nothing."""
-        if self.force_limit_n is None or self.steps % FORCE_EVERY:
+        if self.steps % FORCE_EVERY:
             return ""
         body, force_n = self.world.pressed(NAME)
-        if force_n <= self.force_limit_n:
-            return ""
-        return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {self.force_limit_n:g}"
+        limit_n = self.scene.task.robot.stops_at_n + self.pressing_n
+        return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {limit_n:g}" if force_n > limit_n else ""
 
     # ---- skills --------------------------------------------------------------------------------------------------
 

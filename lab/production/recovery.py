@@ -5,11 +5,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from lab.errors import LabError
-from lab.production.perception import Deviation, perceive
+from lab.production.controls import StopKind
+from lab.production.perception import BELOW_M, Deviation, perceive, seen_at
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
 from lab.sim.scene.scene import pallet_of
-from lab.teaching.events import MachineFailed, MoveRetried, PartLost, TroubleMet
+from lab.skills.skill import UPRIGHT
+from lab.teaching.events import MachineFailed, MoveRetried, PartLost, RunHeld, RunWentOn, TroubleMet
 
 MAX_TRIES = 3  # what fails is tried again from the state reached, at most twice
 PAUSES_S = (0.0, 0.0, 30.0)  # before each try [s]: what disturbs may go away
@@ -37,9 +39,35 @@ class Recovery:
     back: dict[int, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     _strange: dict[str, str] = field(default_factory=dict)  # what belongs to nobody, and the station that it closes
+    _missing: set[int] = field(default_factory=set)  # parts that were given up because they cannot be taken up
     _tries: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     _first: dict[str, str] = field(default_factory=dict)
     _looked_s: float = -LOOK_S
+
+    def find_again(self) -> bool:
+        """Take parts up again that were given up because they could not be taken up, and now can; whether there are any."""
+        found = [one for one in self._missing if self._can_be_taken_up(one)]
+        for part in found:
+            self._missing.discard(part)
+            del self.lost[part]
+            name = self.work.name(part)
+            self.work.spot_of[name] = seen_at(self.work.floor, name)
+            self._tell(Trouble("it can be taken up again", name), "goes on with it")
+        if found:
+            self.replan("a part can be taken up again")
+        return bool(found)
+
+    def _can_be_taken_up(self, part: int) -> bool:
+        floor, name = self.work.floor, self.work.name(part)
+        at = seen_at(floor, name)
+        reached = floor.scene.robot.arm.inverse(floor.bench.part_pose(name)) is not None
+        return not floor.world.dark and at.z > BELOW_M and floor.bench.upright(name) >= UPRIGHT and reached
+
+    def forget(self) -> None:
+        """A person has put things right: what was out of use is used again, and tries are counted anew."""
+        self.out.clear()
+        self._tries.clear()
+        self._first.clear()
 
     def failure(self) -> str | None:
         """Why not all parts were made; None when they were."""
@@ -61,6 +89,17 @@ class Recovery:
         """Do what lets the run go on, perhaps without a part. Raises RunStopped."""
         work, floor = self.work, self.work.floor
         work.place = ""
+        floor.scene.robot.brake()
+        if not trouble.held:  # a protective stop
+            work.tell(RunHeld(StopKind.PROTECTIVE, str(trouble), "robot", floor.now_s))
+        try:
+            self._answer(trouble)
+        finally:
+            if not trouble.held:
+                work.tell(RunWentOn(floor.now_s))
+
+    def _answer(self, trouble: Trouble) -> None:
+        floor = self.work.floor
         if floor.bench.held is not None and not floor.bench.holds(floor.bench.held):
             floor.bench.held = None
         if trouble.held:
@@ -147,6 +186,7 @@ class Recovery:
         if machine is not None:
             machine.clear()
         self._lose(part, seen.words)
+        self._missing.add(part)
         self._tell_seen(seen, "leaves it")
 
     def _follow(self, part: int, seen: Deviation) -> None:

@@ -125,7 +125,7 @@ def stations(task: Task, process_s: Mapping[str, float]) -> tuple[Station, ...]:
     times = {
         s.name: s.processing_s if s.processing_s is not None else process_s.get(s.name, 0.0) for s in task.stations
     }
-    return tuple(Station(s.name, s.kind, s.capacity, times[s.name] or 0.0) for s in task.stations)
+    return tuple(Station(s.name, s.kind, s.capacity, times[s.name] or 0.0, s.at_most_s) for s in task.stations)
 
 
 def products(parts: Iterable[Part], service_s: Mapping[Pair, float] = NO_SERVICE) -> tuple[Product, ...]:
@@ -133,7 +133,9 @@ def products(parts: Iterable[Part], service_s: Mapping[Pair, float] = NO_SERVICE
 
     def route(part: Part, stages: Iterable[TaskStage]) -> Route:
         return tuple(
-            Stage(s.station, s.buffer, s.processing_s, service_s.get((part.name, s.station), 0.0), s.pallet)
+            Stage(
+                s.station, s.buffer, s.processing_s, service_s.get((part.name, s.station), 0.0), s.pallet, s.at_most_s
+            )
             for s in stages
         )
 

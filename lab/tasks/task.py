@@ -233,8 +233,9 @@ class Task(Record):
         if stage.service is not None and stage.service not in robots:
             raise unknown("service", stage.service, robots, f"processes for {where}")
         if place.kind != "machine":
-            if stage.processing_s is not None:
-                raise ValueError(f"{where}: only a machine has processing_s, it is a {place.kind}")
+            for field in ("processing_s", "at_most_s"):
+                if getattr(stage, field) is not None:
+                    raise ValueError(f"{where}: only a machine has {field}, it is a {place.kind}")
         elif place.process is not None and stage.processing_s is not None:
             raise ValueError(
                 f"{where}: processing_s = {stage.processing_s:g}, but its process '{place.process}' is learned"

@@ -148,11 +148,10 @@ class ByHand:
 
     @contextmanager
     def _careful(self) -> Iterator[None]:
-        """What the arm presses on beyond what it does already is a protective stop; jogging away from it is none."""
-        limit_n, (_, now_n) = self.floor.force_limit_n, self.floor.world.pressed(NAME)
-        own_n = FORCE_N if limit_n is None else limit_n
-        self.floor.force_limit_n = max(own_n, now_n + own_n)
+        """What the arm presses on already, where a protective stop held it, is no new one: it may be jogged away."""
+        _, now_n = self.floor.world.pressed(NAME)
+        self.floor.pressing_n = now_n if now_n > self.floor.scene.task.robot.stops_at_n else 0.0
         try:
             yield
         finally:
-            self.floor.force_limit_n = limit_n
+            self.floor.pressing_n = 0.0

@@ -20,8 +20,8 @@ class Desk:
     """
 
     def __init__(self, operation: Operation, on_done: Callable[[Done], None] = lambda done: None) -> None:
-        self.operation, self.on_done, self.busy = operation, on_done, ""
-        self.closed = False
+        self.operation, self.on_done = operation, on_done
+        self.busy, self.closed = "lays the scene out", False
         self._changed = Condition()
         operation.controls.attended = True
 
@@ -66,6 +66,19 @@ class Desk:
         self.closed = self.operation.scene.leaving = True
         self._wake()
 
+    def settle(self) -> None:
+        """Wait until all that was said is done, or waits in a pause. To be called in another thread than `serve`."""
+        with self._changed:
+            while not (self.closed or self.still):
+                self._changed.wait(0.05)
+
+    @property
+    def still(self) -> bool:
+        """Whether nothing moves before somebody says something."""
+        operation = self.operation
+        rests = operation.scene.resting and operation.controls.waits
+        return not operation.waiting and (not self.busy or rests)
+
     def _wake(self) -> None:
         with self._changed:
             self._changed.notify_all()
@@ -74,22 +87,26 @@ class Desk:
         """Carry out what is said until somebody leaves; the scene is laid out first. Raises LabError."""
         operation = self.operation
         try:
-            self.busy = "lays the scene out"
             operation.open()
             while not self.closed:
-                self.busy = ""
                 following = self._following()
-                if following is None:
-                    with self._changed:
-                        self._changed.wait(0.1)
-                    continue
-                self.busy = following[0].words
-                self.on_done(operation.do(*following))
+                if following is not None:
+                    self.on_done(operation.do(*following))
         except Left:
             pass
         finally:
             self.busy, self.closed = "", True
+            self._wake()
 
     def _following(self) -> tuple[Spoken, str] | None:
+        """The next command; None when there is none for a while."""
         waiting = self.operation.waiting
-        return waiting.popleft() if waiting else None
+        with self._changed:
+            self.busy = ""
+            if not waiting:
+                self._changed.notify_all()
+                self._changed.wait(0.1)
+            if not waiting:
+                return None
+            self.busy = waiting[0][0].words
+            return waiting.popleft()

@@ -15,22 +15,21 @@ from lab.production.floor import Floor
 from lab.production.operation.by_hand import ByHand
 from lab.production.operation.commands import Spoken
 from lab.production.operation.typed_order import checked
+from lab.production.order import OrderAdvice, ordered
 from lab.production.relearning import Relearner
 from lab.production.run import teach_all
 from lab.production.run_status import RunStatus
 from lab.production.taught import Taught, skill_row
-from lab.sequencing import find_sequence
 from lab.sequencing.cell.routes import part_of
-from lab.sequencing.methods.exact import Optimum, optimum
-from lab.sequencing.search import Reference, SequenceResult
+from lab.sequencing.methods.exact import Optimum
+from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.trial import trial_of
 from lab.tasks.fault_fields import FaultFields
-from lab.tasks.sequencing import search_for
 from lab.tasks.task import Order, Task, counts_from_word, in_words
-from lab.teaching.events import Event, PhaseBegan, PlanMade, SequenceFound, SkillReady, TroubleMet
+from lab.teaching.events import Event, PhaseBegan, PlanMade, SkillReady, TroubleMet
 from lab.teaching.lesson_plan import LessonPlan
 from lab.teaching.teacher import Teacher
 
@@ -56,7 +55,7 @@ class Plan:
 class OperatedScene:
     """One scene and all that is in it; it belongs to the thread that simulates, but for `now` and the controls.
 
-    leaving: what is under way is broken off. again: it is carried out once more, as a journal says. meanwhile: called in a
+    leaving: what is under way is broken off. resting: a pause lasts. again: it is carried out once more, as a journal says. meanwhile: called in a
     pause of the run, for what is done by hand.
     """
 
@@ -64,7 +63,7 @@ class OperatedScene:
         """Nothing is laid out before `open`. What happens is told to the teacher's listener."""
         self.task, self.order, self.seed, self.conditions = task, order, seed, conditions
         self.controls, self.journal = conditions.controls, conditions.journal
-        self.leaving = self.again = False
+        self.leaving = self.again = self.resting = False
         self.plan: Plan | None = None
         self.failure: str | None = None
         self.on_laid_out: Callable[[], None] = lambda: None
@@ -112,7 +111,7 @@ class OperatedScene:
             raise Left("the operator left")
 
     def _hand(self) -> bool:
-        self._status.now_s = self.floor.now_s
+        self._status.now_s, self.resting = self.floor.now_s, False
         self.check_leaving()
         return self.injector.tick(self.floor)
 
@@ -187,11 +186,8 @@ class OperatedScene:
 
         def deed() -> str:
             taught = teach_all(self.prepared, self.teacher, self.journal)
-            self.tell(PhaseBegan("sequence", 1))
-            settings = self.task.sequencing
-            found = find_sequence(taught.cell, settings.method, search_for(settings), self.seed)
-            proven = optimum(taught.cell)
-            self.tell(SequenceFound(found, Reference(proven.bound_s, proven.proven, "A*")))
+            chosen = ordered(taught.cell, self.task.sequencing, OrderAdvice(), self.seed, self.tell)
+            found, proven = chosen.found, chosen.proven
             if drawn:
                 self._build(
                     (

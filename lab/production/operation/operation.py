@@ -135,6 +135,7 @@ class Operation:
             return False
         following = self._following() if self.scene.again else self._said_by_hand()
         if following is None:
+            self.scene.resting = self.controls.waits
             return False
         self._inside = True
         try:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.text import Text
 
-from lab.errors import LabError, printable
+from lab.errors import printable
 from lab.production.operation.commands import COMMANDS, help_lines
 from lab.production.operation.desk import Desk
 from lab.production.operation.operation import Done
