@@ -12,6 +12,7 @@ from lab import __version__
 from lab.cli import (
     export,
     new,
+    operate,
     replay,
     run,
     see,
@@ -47,6 +48,7 @@ class Command(NamedTuple):
 
 COMMANDS = {  # what is typed after `lab` -> the command
     "run": Command(run.run, "lab run toast --toasts 3"),
+    "operate": Command(operate.operate, "lab operate toast --toasts 2"),
     "teach": Command(teach.teach, "lab teach insert --advisor terminal", "{words of teaching}"),
     "replay": Command(replay.replay, "lab replay lesson"),
     "sequence": Command(

@@ -176,7 +176,7 @@ def carry_out(
         floor.hand = lambda: injector.tick(floor)
         journal = conditions.journal
         heard: list[Event] = []
-        noted = _noting(floor, journal, heard, tell)
+        noted = noting(floor, journal, heard, tell)
         floor.tell = noted
         floor.controls = conditions.controls
         floor.stops.note = journal.note_stops
@@ -197,7 +197,7 @@ def carry_out(
         return outcome, floor.recorder.recording  # type: ignore[union-attr]
 
 
-def _noting(floor: Floor, journal: RunJournal, heard: list[Event], tell: Tell) -> Tell:
+def noting(floor: Floor, journal: RunJournal, heard: list[Event], tell: Tell) -> Tell:
     """Tells on what happens, once it is in the journal."""
 
     def noted(event: Event) -> None:

@@ -229,11 +229,7 @@ class RunJournal:
 
     def stops(self) -> list[StopsChanged]:
         """When it was stopped and went on."""
-        return [
-            StopsChanged(entry.step, tuple(Held(StopKind(kind), why, by) for kind, why, by in entry.stops))
-            for entry in self.known
-            if isinstance(entry, Stopped)
-        ]
+        return [stops_of(entry) for entry in self.known if isinstance(entry, Stopped)]
 
     def commands(self) -> list[Commanded]:
         """What the operator said."""
@@ -280,6 +276,11 @@ class RunJournal:
         """Close the file; safe to call again."""
         if self.file is not None:
             self.file.close()
+
+
+def stops_of(entry: Stopped) -> StopsChanged:
+    """A line about stops as the simulation knows them."""
+    return StopsChanged(entry.step, tuple(Held(StopKind(kind), why, by) for kind, why, by in entry.stops))
 
 
 def line_of(entry: Entry) -> str:

@@ -125,8 +125,15 @@ class Transfers:
             move.pick_s = floor.now_s
             self.check_window(part)
             self._take_up(name, way, spot)
+        else:
+            move.smooth = False  # it was taken up before this move, or before it was interrupted
         self._bring(way, spot, move)
         self._finish(decision, way, spot, move)
+
+    @property
+    def under_way(self) -> bool:
+        """Whether a move was begun and not ended."""
+        return self._under_way is not None
 
     def set_right(self) -> None:
         """Set parts that were moved at the ends of their routes onto their spots again. Raises Trouble."""
@@ -144,7 +151,7 @@ class Transfers:
         """The times of the move, which begins now or was interrupted."""
         now_s = self.floor.now_s
         if self._under_way is None or self._under_way.what != (name, way):
-            self._under_way = _UnderWay((name, way), self.place or way.origin, now_s)
+            self._under_way = _UnderWay((name, way), self.place or way.origin, now_s, now_s, now_s, now_s)
             number = len(self.moves) + 1
             self.tell(MoveBegan(number, number - 1 + ahead, name, self.place, way.origin, way.target, now_s))
         else:
