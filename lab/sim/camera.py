@@ -1,12 +1,13 @@
 """Images: an overhead camera's picture of the world, and which pixel a point of the world falls on."""
 
-from dataclasses import dataclass
-from math import tan
+from dataclasses import dataclass, replace
+from math import atan, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lab.sim.world import World
+from lab.vision import Image, Lens
 
 Array = NDArray[np.float64]
 
@@ -56,3 +57,24 @@ class Camera:
     def picture(self, world: World) -> NDArray[np.uint8]:
         """What the camera sees: (height, width, 3) uint8 RGB."""
         return world.render(self.view_matrix(), self.projection_matrix(), self.width, self.height)
+
+    # ---- as a lens in front of a sensor ----------------------------------------------------------------------------
+
+    def lens(self) -> Lens:
+        """Its focal length and middle [pixels]: no distortion."""
+        focal = self.height / 2.0 / tan(self.field_of_view_rad / 2.0)
+        return Lens((self.width, self.height), (focal, focal), (self.width / 2.0, self.height / 2.0 - 1.0))
+
+    def turn_and_shift(self) -> tuple[Array, Array]:
+        """(3, 3) and (3,) [m]: from world points to the camera's, x to the right, y down, z ahead, as OpenCV has them."""
+        ahead = np.diag([1.0, -1.0, -1.0]) @ self.view_matrix()[:3]
+        return ahead[:, :3], ahead[:, 3]
+
+    def picture_through(self, lens: Lens, world: World) -> Image:
+        """What the camera sees through a lens with distortion: a wider picture is taken and bent."""
+        width, height = lens.size
+        corners = lens.straight_points([(0, 0), (width, 0), (0, height), (width, height), (width / 2, 0), (0, height / 2)])
+        most = max(float(np.abs(corners - lens.middle).max()) / lens.focal[1], 0.01) * 1.02  # tangent of half its angle
+        side = 2 * int(np.ceil(most * lens.focal[1]))
+        wide = replace(self, field_of_view_rad=2.0 * atan(side / 2.0 / lens.focal[1]), width=side, height=side)
+        return lens.bent(wide.picture(world), wide.lens().matrix)

@@ -154,6 +154,7 @@ def camera_view(task: Task, station: str, pixels: int | None = None, layout: Lay
             "toaster": grid.marker_m[2] + MARKER_ABOVE + upper,
         },
         offsets_m={"gripper": (-models.MARKER_OUT, 0.0), "toaster": (-along, -across)},
+        radius_m=models.MARKER_RADIUS,
     )
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.vision.grid_view import Cell, GridView, Marker, View, plain_view
+from lab.vision.hidden_discs import behind_cover, calmed, hidden_part
 from lab.vision.picture_files import Image, check_picture
 
 SATURATION = 100  # of 255; wood, bread, steel and skin stay below it or have another hue
@@ -49,6 +50,7 @@ def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
     import cv2
 
     check_picture(image)
+    image = calmed(image)
     hsv = cv2.cvtColor(image, cv2.COLOR_RGB2HSV)
     colourful = image.max(axis=2) - image.min(axis=2) >= CHROMA
     markers, ignored = [], 0
@@ -60,12 +62,18 @@ def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
             area, radius = cv2.contourArea(hull), cv2.minEnclosingCircle(hull)[1]
             if area < MIN_PIXELS:
                 continue
-            if area > MAX_CELLS * view.cell_pixels or cv2.contourArea(outline) < ROUNDNESS * pi * radius**2:
+            round_enough = cv2.contourArea(outline) >= ROUNDNESS * pi * radius**2
+            if hidden_part(outline.reshape(-1, 2), area, view, kind):
+                found = behind_cover(outline.reshape(-1, 2), view, kind)
+            elif area <= MAX_CELLS * view.cell_pixels and round_enough:
+                rim = [p for p in outline if abs(cv2.pointPolygonTest(hull, tuple(map(float, p[0])), True)) < RIM]
+                found = cv2.fitEllipse(np.array(rim))[0]
+            else:
+                found = None
+            if found is None:
                 ignored += 1
                 continue
-            rim = [p for p in outline if abs(cv2.pointPolygonTest(hull, tuple(map(float, p[0])), True)) < RIM]
-            (x, y), _, _ = cv2.fitEllipse(np.array(rim))
-            pixel = (float(x), float(y))
+            pixel = (float(found[0]), float(found[1]))
             place = view.place(pixel, kind)
             markers.append(Marker(kind, pixel, place, view.cell(place)))
             if len(markers) > MAX_MARKERS:
