@@ -4,7 +4,9 @@ from collections.abc import Iterator
 from math import hypot
 from typing import TYPE_CHECKING, ClassVar
 
+from lab.sim.parts.kinds import Spot
 from lab.skills.around_part import SLOW, AroundPart
+from lab.skills.looking import FAR_M, look_at
 from lab.skills.skill import Bench, SkillFailed, over_everything
 from lab.tasks.task import Task
 
@@ -13,7 +15,6 @@ if TYPE_CHECKING:
 
 ACTIONS = ("left", "right", "backward", "forward", "down", "up", "turn right", "turn left")  # of the part's axes
 GOAL = (2, 2, 0, 2)
-FAR_M = 0.2  # [m] a tool farther from the station's approach, as when trying again, comes over everything
 
 
 class Grasp(AroundPart):
@@ -36,6 +37,7 @@ class Grasp(AroundPart):
         robot, body = bench.scene.robot, bench.scene.body_of(self.part, self.kind)
         if robot.closed:
             yield from robot.release()
+        yield from look_at(bench, self.surveys, self.station, body, self._expected())
         goal = bench.part_pose(body, self.goal_pose().yaw)
         if robot.arm.inverse(goal) is None:
             raise SkillFailed(f"{body} is out of reach at ({goal.x:.2f}, {goal.y:.2f}) m")
@@ -50,3 +52,9 @@ class Grasp(AroundPart):
         if not bench.holds(body):
             bench.held = None
             raise SkillFailed(f"{body} is not in the gripper after grasping at '{self.station}'")
+
+    def _expected(self) -> Spot:
+        """Where the part's foot should be: on the spot that it was set down on, or the station's first one."""
+        if self.spot is None:
+            return self.stands_on()
+        return self.surveys.places.raised(self.kind, self.surveys.task.station(self.station), self.spot)

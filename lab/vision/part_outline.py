@@ -21,7 +21,8 @@ COARSE_M, COARSE_RAD = 0.004, 0.05  # between the places and yaws that are tried
 FINEST_M, FINEST_RAD = 0.0001, 0.001
 KEPT = 5  # of the places tried first are followed further
 FAINT = 2.5  # of 255 a pixel: a gradient like this counts half
-SEEN = 0.55  # of the outline must be an edge of the picture, on the mean
+SEEN = 0.56  # of the outline must be an edge of the picture, on the mean
+LIKE_RAD = 0.26  # between the colour within the outline and one of the part's, as ways in RGB, at the most
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +40,14 @@ class PartSeen:
 class Outlined:
     """What is looked for: corners (n, 3) [m] of the part's hull from its foot, how high the foot is, and whether it is round.
 
-    A round part shows no yaw. `pixel_from_world` (3, 4) is the camera's.
+    A round part shows no yaw. `pixel_from_world` (3, 4) is the camera's. colours (c, 3): RGB of what is seen of the part.
     """
 
     corners: Array
     foot_m: float
     round: bool
     pixel_from_world: Array
+    colours: Array
 
     def outlines(self, poses: Array) -> Array:
         """The outlines (k, OUTLINE_POINTS, 4) of the part at `poses` (k, 3) x, y [m], yaw: pixels, and the way across it."""
@@ -73,9 +75,22 @@ def find_part(image: Image, part: Outlined, near: ArrayLike, reach_m: float, rea
         best = np.array([_finer(edges, part, pose, first, last) for pose in best])
     shares = _shares(_edges(image, FINE_PX), part.outlines(best))
     pose, share = best[int(np.argmax(shares))], float(shares.max())
-    if share < SEEN or np.abs(pose[:2] - at[:2]).max() > 1.2 * reach_m:
+    outline = part.outlines(pose[None])[0, :, :2]
+    if share < SEEN or np.abs(pose[:2] - at[:2]).max() > 1.2 * reach_m or not _coloured(image, outline, part.colours):
         return None
-    return PartSeen(float(pose[0]), float(pose[1]), float(pose[2]), share, part.outlines(pose[None])[0, :, :2])
+    return PartSeen(float(pose[0]), float(pose[1]), float(pose[2]), share, outline)
+
+
+def _coloured(image: Image, outline: Array, colours: Array) -> bool:
+    """Whether most of what lies within an outline has one of the colours, brighter or darker."""
+    import cv2
+
+    within = np.zeros(image.shape[:2], np.uint8)
+    cv2.fillPoly(within, [np.rint(outline).astype(np.int32)], 1)
+    pixels = calmed(image)[within > 0].astype(np.float64) + 1.0
+    ways = pixels / np.linalg.norm(pixels, axis=1)[:, None]
+    wanted = (colours + 1e-3) / np.linalg.norm(colours + 1e-3, axis=1)[:, None]
+    return bool(len(pixels)) and float(np.median((ways @ wanted.T).max(axis=1))) > np.cos(LIKE_RAD)
 
 
 def _steps(reach: float, step: float) -> Array:
