@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from math import hypot
 from typing import TYPE_CHECKING, ClassVar
 
-from lab.sim.parts.kinds import Spot
 from lab.skills.around_part import SLOW, AroundPart
 from lab.skills.looking import FAR_M, look_at
 from lab.skills.skill import Bench, SkillFailed, over_everything
@@ -37,7 +36,8 @@ class Grasp(AroundPart):
         robot, body = bench.scene.robot, bench.scene.body_of(self.part, self.kind)
         if robot.closed:
             yield from robot.release()
-        yield from look_at(bench, self.surveys, self.station, body, self._expected())
+        spot = self.stands_on() if bench.sight is None else bench.sight.where.get(body, self.stands_on())
+        yield from look_at(bench, self.surveys, self.station, body, spot)
         goal = bench.part_pose(body, self.goal_pose().yaw)
         if robot.arm.inverse(goal) is None:
             raise SkillFailed(f"{body} is out of reach at ({goal.x:.2f}, {goal.y:.2f}) m")
@@ -52,9 +52,3 @@ class Grasp(AroundPart):
         if not bench.holds(body):
             bench.held = None
             raise SkillFailed(f"{body} is not in the gripper after grasping at '{self.station}'")
-
-    def _expected(self) -> Spot:
-        """Where the part's foot should be: on the spot that it was set down on, or the station's first one."""
-        if self.spot is None:
-            return self.stands_on()
-        return self.surveys.places.raised(self.kind, self.surveys.task.station(self.station), self.spot)

@@ -23,7 +23,7 @@ from lab.tasks.task import Task
 from lab.tasks.task_fields import CameraGrid, Obstacle
 from lab.tasks.task_file import load
 from lab.vision import Image, Lens, View, read_picture, see, write_picture
-from lab.vision.calibration import Calibration, Mat, calibrate
+from lab.vision.calibration import PRINTED, Calibration, Mat, calibrate
 from lab.vision.photo_effects import drawn_lens, hide, spoiled
 
 MOST_PICTURES = 100_000
@@ -37,8 +37,6 @@ OFF_M, OFF_RAD = 0.008, 0.02  # standard deviation of where the camera really ha
 COVER_REACH = 4.8  # times a marker's radius in the picture, from its middle, are free of other markers
 DRAWS = 400
 INDEX = "pictures.json"
-_TABLE_RGB = (219, 217, 212)
-_PIXELS_A_METRE = 2000.0  # of the mat that is photographed
 
 
 @dataclass(frozen=True)
@@ -62,12 +60,13 @@ def make_pictures(
     if folder.exists():
         raise BadInput(f"{folder}: it is there already: wanted a new folder for the pictures")
     task = load(task_name)
-    station = _station(task)
+    station = grid_station(task)
     rng = np.random.default_rng([seed, 0])
     camera = _hung(task, rng)
     lens = drawn_lens(rng, camera.lens())
-    mat = _mat(task)
+    mat = mat_of(task)
     folder.mkdir(parents=True)
+    write_picture(folder / "mat.png", mat.printed(PRINTED))
     for number in range(MATS):
         image = spoiled(_mat_picture(mat, camera, lens, number, rng), rng, strength)
         write_picture(folder / f"mat-{number + 1}.png", image)
@@ -124,7 +123,7 @@ def one_picture(
 # ---- the camera and its mat ----------------------------------------------------------------------------------------
 
 
-def _station(task: Task) -> str:
+def grid_station(task: Task) -> str:
     for station in task.stations:
         if station.grid is not None:
             return station.name
@@ -143,7 +142,7 @@ def _hung(task: Task, rng: np.random.Generator) -> Camera:
     return Camera(eye, target, up, task.camera.field_of_view_rad, pixels, pixels)
 
 
-def _mat(task: Task) -> Mat:
+def mat_of(task: Task) -> Mat:
     """The mat that fills most of the task's overhead picture, its middle beneath the camera."""
     assert task.camera is not None
     x, y, z = task.camera.position_m
@@ -155,7 +154,6 @@ def _mat(task: Task) -> Mat:
 
 def _mat_picture(mat: Mat, camera: Camera, lens: Lens, number: int, rng: np.random.Generator) -> Image:
     """The mat on the table (number 0), or held up tilted, as the camera sees it."""
-    import cv2
     from scipy.spatial.transform import Rotation
 
     turn, shift = camera.turn_and_shift()
@@ -163,15 +161,7 @@ def _mat_picture(mat: Mat, camera: Camera, lens: Lens, number: int, rng: np.rand
         tilt = Rotation.from_rotvec(rng.uniform(-MAT_TILT, MAT_TILT, 3)).as_matrix()
         middle = np.array([*mat.middle_m, 0.0])
         turn, shift = turn @ tilt, shift + turn @ (middle - tilt @ middle)
-    side = round(1.4 * max(lens.size))
-    pinhole = np.array([[lens.focal[0], 0, side / 2], [0, lens.focal[1], side / 2], [0, 0, 1.0]])
-    length, width = mat.size_m
-    x, y, step = mat.middle_m[0] - length / 2, mat.middle_m[1] + width / 2, 1 / _PIXELS_A_METRE
-    world_from_mat = np.array([[step, 0, x + step / 2], [0, -step, y - step / 2], [0, 0, 0], [0, 0, 1.0]])
-    way = pinhole @ np.column_stack([turn, shift]) @ world_from_mat
-    printed = mat.printed(_PIXELS_A_METRE)
-    wide: Any = cv2.warpPerspective(printed, way, (side, side), flags=cv2.INTER_AREA, borderValue=_TABLE_RGB)
-    return lens.bent(np.asarray(wide, dtype=np.uint8), pinhole)
+    return mat.photographed(lens, turn, shift)
 
 
 # ---- one scene -----------------------------------------------------------------------------------------------------
@@ -240,81 +230,6 @@ def _apart(discs: list[tuple[float, float, float]]) -> bool:
 
 def _disc(camera: Camera, lens: Lens, at: tuple[float, float, float]) -> tuple[float, float, float]:
     """Where the lens shows a marker, and how large [pixels]."""
-    import cv2
-
-    turn, shift = camera.turn_and_shift()
     rim = np.array([at, (at[0] + models.MARKER_RADIUS, *at[1:])])
-    seen, _ = cv2.projectPoints(rim, cv2.Rodrigues(turn)[0], shift, lens.matrix, np.array(lens.distortion))
-    (x, y), (u, v) = seen.reshape(-1, 2)
+    (x, y), (u, v) = lens.projected(rim, *camera.turn_and_shift())
     return float(x), float(y), float(np.hypot(u - x, v - y))
-
-
-# ---- read back -----------------------------------------------------------------------------------------------------
-
-
-def calibrated_view(task: Task, station: str, calibration: Calibration) -> View:
-    """How a calibrated camera's straightened picture maps to a station's grid."""
-    return replace(camera_view(task, station), pixel_from_world=calibration.pixel_from_world)
-
-
-def score_pictures(
-    folder: Path, calibration: Calibration | None = None, *, tell: Callable[[int], None] = lambda n: None
-) -> dict[str, Any]:
-    """Read every picture of a folder that `make_pictures` made, and compare with what each shows.
-
-    The camera is calibrated with the folder's pictures of the mat unless a calibration is given. A grid is exact when
-    start, goal and obstacles are all right and nothing else is seen. BadInput for a folder without an index.
-    """
-    try:
-        record = json.loads((folder / INDEX).read_bytes())
-        task, station = load(record["task"]), str(record["station"])
-        count, mats = int(record["pictures"]), int(record["mats"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise BadInput(f"{folder / INDEX}: wanted the index that `lab see --make` writes: {error}") from None
-    if calibration is None:
-        names = [folder / f"mat-{number + 1}.png" for number in range(mats)]
-        calibration = calibrate([(str(name), read_picture(name)) for name in names], _mat(task))
-    view, lens = calibrated_view(task, station, calibration), calibration.lens
-    wrong: list[dict[str, str]] = []
-    errors: list[float] = []
-    for number, image, truth in _kept(folder, count):
-        reason, off = _compared(lens.straightened(image), view, truth)
-        errors += off
-        if reason:
-            wrong.append({"picture": f"{number:05}.png", "reason": reason})
-        tell(number)
-    exact = count - len(wrong)
-    return {
-        "pictures": count,
-        "exact": exact,
-        "exact_percent": 100.0 * exact / count,
-        "marker_mean_m": float(np.mean(errors)) if errors else None,
-        "marker_max_m": float(np.max(errors)) if errors else None,
-        "calibration_residual_px": calibration.residual_px,
-        "wrong": wrong,
-    }
-
-
-def _kept(folder: Path, count: int) -> Iterator[tuple[int, Image, dict[str, Any]]]:
-    for number in range(1, count + 1):
-        try:
-            truth = json.loads((folder / f"{number:05}.json").read_bytes())
-        except (OSError, ValueError) as error:
-            raise BadInput(f"{folder / f'{number:05}.json'}: {error}") from None
-        yield number, read_picture(folder / f"{number:05}.png"), truth
-
-
-def _compared(straight: Image, view: View, truth: dict[str, Any]) -> tuple[str, list[float]]:
-    """Why what is read differs from the truth, "" when it does not; and how far off each marker was seen [m]."""
-    try:
-        seen = see(straight, view)
-    except LabError as error:
-        return str(error), []
-    off = []
-    for marker in truth["markers"]:
-        dx, dy = view.offsets_m.get(marker["kind"], (0.0, 0.0))
-        x, y = marker["world_m"][0] + dx, marker["world_m"][1] + dy
-        off.append(min(hypot(m.world_m[0] - x, m.world_m[1] - y) for m in seen.markers if m.kind == marker["kind"]))
-    record = seen.to_json()
-    different = [name for name in ("start", "goal", "obstacles") if record[name] != truth[name]]
-    return "; ".join(f"{name} {record[name]}, is {truth[name]}" for name in different), off

@@ -44,9 +44,7 @@ class Sight:
         """The tool pose that holds a part where it is known to be; what is in the gripper is where the gripper is."""
         kind = self.scene.kind_of[body]
         if body == held:
-            tool = self.scene.robot.tool()
-            self.where[body] = kind.foot_at(tool)
-            return tool
+            return self.scene.robot.tool()
         if body not in self.where:
             raise SkillFailed(f"{body} has not been seen yet")
         pose = kind.held_at(self.where[body])

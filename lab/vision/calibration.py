@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.errors import BadInput, WorkFailed
+from lab.errors import BadInput, WorkFailed, counted
 from lab.files import write_whole
 from lab.vision.lens import TERMS, Lens
 from lab.vision.picture_files import Image, check_picture
@@ -22,6 +22,8 @@ LEAST_MARKERS = 4  # of the mat, to be seen in each picture
 FEW = 3  # pictures: from fewer the focal length is taken as given, and neither middle nor p1 p2 are looked for
 UNSURE = 0.05  # of the focal length: a larger standard deviation tells nothing
 MAX_BYTES = 100_000
+PRINTED = 2000.0  # pixels a metre of a mat that is photographed
+TABLE_RGB = (219, 217, 212)
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,21 @@ class Mat:
         length, width = self.size_m
         x, y = self.middle_m[0] - length / 2, self.middle_m[1] + width / 2
         return np.column_stack([x + on_board[:, 0], y - on_board[:, 1], np.zeros(len(on_board))])
+
+    def photographed(self, lens: Lens, turn: Array, shift: Array) -> Image:
+        """What a lens shows of the mat, which lies where it should; `turn` (3, 3), `shift` (3,) [m]: world to camera."""
+        import cv2
+
+        side, ahead = round(1.4 * max(lens.size)), lens.focal
+        pinhole = np.array([[ahead[0], 0, side / 2], [0, ahead[1], side / 2], [0, 0, 1.0]])
+        (length, width), step = self.size_m, 1 / PRINTED
+        x, y = self.middle_m[0] - length / 2, self.middle_m[1] + width / 2
+        world_from_mat = np.array([[step, 0, x + step / 2], [0, -step, y - step / 2], [0, 0, 0], [0, 0, 1.0]])
+        way = pinhole @ np.column_stack([turn, shift]) @ world_from_mat
+        wide: Any = cv2.warpPerspective(
+            self.printed(PRINTED), way, (side, side), flags=cv2.INTER_AREA, borderValue=TABLE_RGB
+        )
+        return lens.bent(np.asarray(wide, dtype=np.uint8), pinhole)
 
     def found(self, image: Image, where: str = "picture") -> tuple[Array, Array]:
         """World points (n, 3) [m] and pixels (n, 2) of the markers' corners; BadInput names how many markers were seen."""
@@ -125,7 +142,7 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
     In the first picture the mat lies where `mat` says; the others show it tilted, anywhere. angle_rad: the field of view across
     the picture's height, as its maker states; needed with fewer than 3 pictures: then focal length and middle are not
     looked for, only k1 and k2. k3 is left 0: k2 covers for it within a field of view of about 1 rad.
-    Raises BadInput for pictures without the mat or of unlike sizes, WorkFailed where the focal length cannot be told.
+    Raises BadInput for too few pictures, without the mat, or of unlike sizes, WorkFailed where the focal length cannot be told.
     """
     import cv2
 
@@ -135,7 +152,12 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
         raise BadInput(f"pictures of {len(sizes)} sizes: {sorted(sizes)}: wanted one camera's")
     size = sizes.pop()
     flags = cv2.CALIB_FIX_K3 | cv2.CALIB_FIX_ASPECT_RATIO | cv2.CALIB_USE_INTRINSIC_GUESS
-    known = len(pictures) < FEW and angle_rad is not None
+    known = len(pictures) < FEW
+    if known and angle_rad is None:
+        raise BadInput(
+            f"{counted(len(pictures), 'picture')} of the mat: wanted {FEW} or more, tilted in all but the first, or the task with the "
+            "camera's field of view (--task)"
+        )
     if known:
         flags |= cv2.CALIB_FIX_FOCAL_LENGTH | cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_ZERO_TANGENT_DIST
     start = pinhole(size, radians(45) if angle_rad is None else angle_rad)
@@ -152,7 +174,7 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
         )
     k1, k2, p1, p2, k3 = (float(one) for one in np.ravel(terms)[:5])
     lens = Lens(size, (matrix[0, 0], matrix[1, 1]), (matrix[0, 2], matrix[1, 2]), (k1, k2, p1, p2, k3))
-    words = f"{len(pictures)} picture{'s' * (len(pictures) > 1)} of a mat of {mat.columns} x {mat.rows} ArUco markers"
+    words = f"{counted(len(pictures), 'picture')} of a mat of {mat.columns} x {mat.rows} ArUco markers"
     return _placed(lens, turns[0], shifts[0], float(residual), sum(len(p) for p in pixels), words)
 
 
@@ -195,6 +217,21 @@ def _placed(lens: Lens, turn: Array, shift: Array, residual: float, points: int,
         points,
         method,
     )
+
+
+def drawn(image: Image, calibration: Calibration, mat: Mat | None = None) -> Image:
+    """A copy of a picture with where the calibration has the mat's corners (green), the lens's middle."""
+    import cv2
+
+    canvas = np.array(image)
+    lens = calibration.lens
+    if mat is not None:
+        corners = np.concatenate([np.asarray(one, dtype=np.float64) for one in mat.board.getObjPoints()])
+        for x, y in lens.projected(mat.world(corners), calibration.turn, calibration.shift):
+            cv2.drawMarker(canvas, (round(x), round(y)), (0, 200, 0), cv2.MARKER_CROSS, 9, 1, cv2.LINE_AA)
+    x, y = lens.middle
+    cv2.drawMarker(canvas, (round(x), round(y)), (220, 30, 30), cv2.MARKER_TILTED_CROSS, 21, 2, cv2.LINE_AA)
+    return np.asarray(canvas, dtype=np.uint8)
 
 
 # ---- files ---------------------------------------------------------------------------------------------------------

@@ -47,6 +47,14 @@ class Lens:
         middle = ((self.middle[0] + 0.5) * x - 0.5, (self.middle[1] + 0.5) * y - 0.5)
         return Lens(size, (self.focal[0] * x, self.focal[1] * y), middle, self.distortion)
 
+    def projected(self, points: ArrayLike, turn: ArrayLike, shift: ArrayLike) -> Array:
+        """The pixels (n, 2) of world points (n, 3) [m]; `turn` (3, 3) and `shift` (3,) take them to the camera's axes."""
+        import cv2
+
+        rotation = cv2.Rodrigues(np.asarray(turn, dtype=np.float64))[0]
+        world, to = np.asarray(points, dtype=np.float64), np.asarray(shift, dtype=np.float64)
+        return np.asarray(cv2.projectPoints(world, rotation, to, self.matrix, np.array(self.distortion))[0]).reshape(-1, 2)
+
     def straight_points(self, pixels: ArrayLike) -> Array:
         """Where pixels (n, 2) of a picture are in the straightened one."""
         return self._onto(np.asarray(pixels, dtype=np.float64), self.matrix)

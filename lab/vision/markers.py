@@ -158,8 +158,11 @@ def _outside(marker: Marker, view: View) -> str:
     )
 
 
-def draw(image: Image, grid: GridView) -> Image:
-    """A copy of the picture (H, W, 3) with the grid's lines, start, goal, obstacles and the markers' centres on it."""
+def draw(image: Image, grid: GridView, outlines: Sequence[Sequence[Sequence[float]]] = ()) -> Image:
+    """A copy of the picture (H, W, 3) with the grid's lines, start, goal, obstacles and the markers' centres on it.
+
+    outlines: of parts, each (n, 2) pixels, drawn in orange.
+    """
     import cv2
 
     check_picture(image)
@@ -182,6 +185,8 @@ def draw(image: Image, grid: GridView) -> Image:
         cv2.polylines(canvas, [corners(0, j, rows, 1)], True, (255, 255, 255), thin, cv2.LINE_AA)
     for cell, kind in ((grid.start, "gripper"), (grid.goal, "toaster")):
         cv2.polylines(canvas, [corners(*cell, 1, 1)], True, MARKERS[kind].rgb, 3 * thin, cv2.LINE_AA)
+    for outline in outlines:
+        cv2.polylines(canvas, [np.rint(outline).astype(np.int32)], True, (255, 120, 0), thin, cv2.LINE_AA)
     for marker in grid.markers:
         at = (round(marker.pixel[0]), round(marker.pixel[1]))
         cv2.drawMarker(canvas, at, (0, 0, 0), cv2.MARKER_CROSS, 10 * thin, thin)

@@ -22,7 +22,7 @@ FINEST_M, FINEST_RAD = 0.0001, 0.001
 KEPT = 5  # of the places tried first are followed further
 FAINT = 2.5  # of 255 a pixel: a gradient like this counts half
 SEEN = 0.56  # of the outline must be an edge of the picture, on the mean
-LIKE_RAD = 0.26  # between the colour within the outline and one of the part's, as ways in RGB, at the most
+LIKE_RAD = 0.11  # between the colour within the outline and one of the part's, as ways in RGB, at the most
 
 
 @dataclass(frozen=True, eq=False)
