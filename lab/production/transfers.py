@@ -356,7 +356,7 @@ class Transfers:
         scene, name = self.floor.scene, self.name(part)
         spot = self.spot_of[name]
         for body, own in zip(scene.bodies_of(name, comes_as(scene.kind_of[name].part)), self._stack(part), strict=True):
-            if not self.floor.bench.stands(body, spot, DELIVERED_M):
+            if not self.floor.bench.stands(body, spot, DELIVERED_M, truly=True):
                 return False
             spot = spot.raised(own.shape.height_m)
         return True

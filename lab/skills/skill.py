@@ -17,6 +17,7 @@ from lab.sim.frames import Body
 from lab.sim.parts.kinds import Kind, Spot, on_its_pallet
 from lab.sim.scene.blocked_cells import FINGERS_OFF_M
 from lab.sim.scene.scene import Scene, pallet_of
+from lab.skills.sight import Sight, SkillFailed
 from lab.skills.state_words import away_in_words, size_in_words
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Stage
@@ -42,19 +43,27 @@ class Status(Enum):
     FAILURE = "failure"
 
 
-class SkillFailed(Exception):
-    """A skill noticed that it did not do what it is for; the text says why."""
-
-
 @dataclass
 class Bench:
     """The cell in which skills are carried out, and the body that the robot holds: a part, or a pallet."""
 
     scene: Scene
     held: str | None = None
+    sight: Sight | None = None  # what was seen by the camera in the hand, where the task says so
+
+    def __post_init__(self) -> None:
+        if self.scene.task.perception == "camera":
+            self.sight = Sight(self.scene)
 
     def part_pose(self, body: str, like: float = 0.0) -> ToolPose:
-        """The tool pose that would hold a part where it is now; of the yaws that do, the one nearest to `like` [rad]."""
+        """The tool pose that would hold a part where it is, as far as is known; of its yaws the nearest to `like` [rad].
+
+        Known is, with the camera, where it was seen or set down last; SkillFailed for a part that was never seen.
+        """
+        return self.true_pose(body, like) if self.sight is None else self.sight.pose(body, like, self.held)
+
+    def true_pose(self, body: str, like: float = 0.0) -> ToolPose:
+        """As `part_pose`, by the simulator."""
         position, turn = self.scene.world.pose(body)
         kind = self.scene.kind_of[body]
         yaw = 2.0 * atan2(float(turn[2]), float(turn[3]))
@@ -88,18 +97,21 @@ class Bench:
         """Which body of part `name` does not stand on what it is carried on, as when a pallet was jolted; "": none."""
         below, *riders = self.scene.bodies_of(name, kind)
         for body in riders:
-            at, under = self.part_pose(body), self.part_pose(below)
+            at, under = self.true_pose(body), self.true_pose(below)
             if self.upright(body) < UPRIGHT or hypot(at.x - under.x, at.y - under.y) > LOST_M or at.z < under.z:
                 return body
             below = body
         return ""
 
-    def stands(self, body: str, spot: Spot, within: float) -> bool:
-        """Whether the part stands upright within `within` [m] of a spot."""
+    def stands(self, body: str, spot: Spot, within: float, *, truly: bool = False) -> bool:
+        """Whether the part stands upright within `within` [m] of a spot, as far as is known, or truly.
+
+        What the camera has found by its outline stands upright: a part that lies has another one.
+        """
         foot = self.scene.kind_of[body].held_at(spot)
-        at = self.part_pose(body, foot.yaw)
+        at = self.true_pose(body, foot.yaw) if truly else self.part_pose(body, foot.yaw)
         near = hypot(at.x - foot.x, at.y - foot.y) < within and abs(at.z - foot.z) < 0.006
-        return near and self.upright(body) > UPRIGHT
+        return near and (self.upright(body) > UPRIGHT or not (truly or self.sight is None))
 
 
 @dataclass(frozen=True, eq=False)

@@ -298,3 +298,24 @@ def grid_summary(seen: Mapping[str, Any]) -> RenderableType:
     blocked, markers = counted(len(seen["obstacles"]), "cell"), counted(len(seen["markers"]), "marker")
     found = f"{ends}, {blocked} with obstacles, {markers}"
     return Group(*map(Text, turned), Text(found))
+
+
+def pictures_summary(record: Mapping[str, Any]) -> RenderableType:
+    """The end of `lab see --calibrate`, `--make` and `--score`: one line a figure."""
+    if "lens" in record:
+        lens, (x, y, z) = record["lens"], record["eye_m"]
+        bends = ", ".join(f"{name} {value:+.4f}" for name, value in lens["distortion"].items())
+        lines = [
+            f"lens: focal length {lens['focal'][0]:.1f} pixels, middle ({lens['middle'][0]:.1f}, {lens['middle'][1]:.1f}), {bends}",
+            f"camera at ({x:.3f}, {y:.3f}, {z:.3f}) m; residual {record['residual_px']:.2f} pixels "
+            f"over {record['points']} points, from {record['method']}",
+        ]
+    elif "exact" in record:
+        lines = [f"{record['exact']} of {record['pictures']} grids exact ({record['exact_percent']:.1f} %)"]
+        if record["marker_mean_m"] is not None:
+            mean, most = 1e3 * record["marker_mean_m"], 1e3 * record["marker_max_m"]
+            lines.append(f"markers seen {mean:.1f} mm off on average, {most:.1f} mm at the most")
+        lines += [f"{one['picture']}: {one['reason']}" for one in record["wrong"]]
+    else:
+        lines = [f"{counted(record['pictures'], 'picture')} of '{record['task']}' and {record['mats']} of the mat made"]
+    return Group(*map(Text, [*lines, *(f"{name}: {path}" for name, path in record.get("files", {}).items())]))
