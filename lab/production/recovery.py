@@ -50,6 +50,7 @@ class Recovery:
         for part in found:
             self._missing.discard(part)
             del self.lost[part]
+            self.work.left_lying.discard(self.work.name(part))
             name = self.work.name(part)
             self.work.spot_of[name] = seen_at(self.work.floor, name)
             self._tell(Trouble("it can be taken up again", name), "goes on with it")
@@ -239,6 +240,7 @@ class Recovery:
 
     def _lose(self, part: int, why: str) -> None:
         self.lost[part] = why
+        self.work.left_lying.add(self.work.name(part))
         self.work.finished.pop(part, None)
         self.work.to_set_right = [one for one in self.work.to_set_right if one != part]
         self.work.tell(PartLost(self.work.name(part), why, self.work.floor.now_s))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import hypot
+from math import cos, hypot, sin
 
 from lab.production.durations import TimedMove
 from lab.production.floor import Floor
@@ -32,6 +32,7 @@ from lab.teaching.events import (
 ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
 DELIVERED_M = 0.02  # a part this near to its spot has been delivered
 BEGINS_M = 0.05  # a tool this near to where a skill begins need not be brought there
+FREE_M = 0.005  # around a part where it is set down, of what lies about
 PATIENCE, PATIENCE_S = (
     1.0,
     10.0,
@@ -63,7 +64,7 @@ class Transfers:
     spot_of: by body, a part's or its pallet's. expected_s: by machine, when it should be done [s]. place: the station at
     whose approach the tool is; "": it is somewhere else. came_from: by part, its position before the one it is in.
     taken: spots on which something stands that belongs to nobody. finished: when a part reached the end of its route [s];
-    to_set_right: those of them that were moved there. spoilt: why a part was, which is brought on all the same.
+    to_set_right: those of them that were moved there. left_lying: parts that were given up. spoilt: why a part was, which is brought on all the same.
     look: called while the robot waits; raises Trouble.
     """
 
@@ -79,6 +80,7 @@ class Transfers:
     taken: set[Spot] = field(default_factory=set)
     finished: dict[int, float] = field(default_factory=dict)
     to_set_right: list[int] = field(default_factory=list)
+    left_lying: set[str] = field(default_factory=set)
     spoilt: dict[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -198,11 +200,27 @@ class Transfers:
             return self.spot_of[pallet_of(name)]
         own = scene.bodies_of(name, way.kind)
         taken = [spot for body, spot in self.spot_of.items() if body not in own] + [*self.taken]
-        free = (s for s in scene.places.spots(scene.task.station(way.target)) if s not in taken)
-        spot = next(free, None)
-        if spot is None:
-            raise Trouble(f"no spot of '{way.target}' is free", name, way.target, final=True)
-        return spot
+        spots = [s for s in scene.places.spots(scene.task.station(way.target)) if s not in taken]
+        blocked = ""
+        for spot in spots:
+            blocked = self._blocked_by(spot, name, way)
+            if not blocked:
+                return spot
+        why = f": {blocked} is there" if blocked else ""
+        raise Trouble(f"no spot of '{way.target}' is free{why}", name, way.target, final=True)
+
+    def _blocked_by(self, spot: Spot, name: str, way: Carried) -> str:
+        """Which of the parts that were given up lies where a part is to be set down; "" for none."""
+        scene, shape = self.floor.scene, self.floor.scene.kinds[way.kind].shape
+        half = max(abs(shape.low[0]), abs(shape.high[0])), max(abs(shape.low[1]), abs(shape.high[1]))
+        c, s = abs(cos(spot.yaw)), abs(sin(spot.yaw))
+        x, y = c * half[0] + s * half[1] + FREE_M, s * half[0] + c * half[1] + FREE_M
+        for body in self.left_lying:
+            low, high = scene.world.bounds(body)
+            aside = low[0] > spot.x + x or high[0] < spot.x - x or low[1] > spot.y + y or high[1] < spot.y - y
+            if not aside and high[2] > spot.z and body != name:
+                return body
+        return ""
 
     # ---- what a move is made of ------------------------------------------------------------------------------------
 
