@@ -62,10 +62,10 @@ class Transfers:
     """Parts being brought on upon a floor: where they are, which spots are taken, when machines should be done.
 
     spot_of: by body, a part's or its pallet's. expected_s: by machine, when it should be done [s]. place: the station at
-    whose approach the tool is; "": it is somewhere else. came_from: by part, its position before the one it is in.
-    taken: spots on which something stands that belongs to nobody. finished: when a part reached the end of its route [s];
-    to_set_right: those of them that were moved there. left_lying: parts that were given up. spoilt: why a part was, which is brought on all the same.
-    look: called while the robot waits; raises Trouble.
+    whose approach the tool is; "": it is somewhere else. came_from: by part, its position before the one it is in. taken:
+    spots on which something stands that belongs to nobody. finished: when a part reached the end of its route [s].
+    to_set_right: those of them that were moved there. left_lying: parts that were given up. spoilt: why a part was, which
+    is brought on all the same. look: called while the robot waits; raises Trouble.
     """
 
     floor: Floor

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 from lab.sim.arms.kinematics import ToolPose
 from lab.skills.around_part import SLOW, AroundPart
 from lab.skills.looking import FAR_M, look_at
-from lab.skills.skill import Bench, SkillFailed, over_everything
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import Bench, over_everything
 from lab.skills.state_words import plain
 from lab.tasks.task import Task
 

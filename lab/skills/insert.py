@@ -15,7 +15,8 @@ from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.kinds import Spot
 from lab.skills.looking import look_at
 from lab.skills.place import let_go, release_pose
-from lab.skills.skill import Bench, Photo, Skill, SkillFailed, learned_path, no_way, over_everything
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import Bench, Photo, Skill, learned_path, no_way, over_everything
 from lab.skills.state_words import plain
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Task

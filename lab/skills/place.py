@@ -12,7 +12,8 @@ from lab.sim.scene.scene import pallet_of
 from lab.skills.around_part import SLOW, AroundPart
 from lab.skills.camera_grids import RELEASE_ABOVE
 from lab.skills.looking import look_at
-from lab.skills.skill import Bench, SkillFailed
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import Bench
 from lab.skills.state_words import plain
 from lab.tasks.task import Task
 
