@@ -26,11 +26,17 @@ FORCE_EVERY = 4  # physics steps between two looks at what presses on the arm
 DISTURBED_S = 2.0  # after a hand has reached into the scene, all of it is simulated for so long
 
 
+def _nothing() -> bool:
+    """Nobody does anything by hand."""
+    return False
+
+
 class Floor:
     """A scene in which skills are carried out: one clock, the robot's skill and the machines' processes side by side.
 
     controls: what stops it and sets its pace; stops: when they did, for the journal. on_tick: called after each physics
-    step; hand: called before each, to reach into the scene as a fault does, and says whether it did.
+    step; hand: called before each, to reach into the scene as a fault does, and says whether it did. meanwhile: called while
+    a pause lasts, for what the operator does by hand, and says whether that was anything.
     """
 
     def __init__(
@@ -52,7 +58,8 @@ class Floor:
         self.tell: Tell = unheard
         self.on_tick: Callable[[], None] | None = None
         self.hand: Callable[[], bool] | None = None
-        self.force_limit_n: float | None = None
+        self.meanwhile: Callable[[], bool] = _nothing
+        self.pressing_n = 0.0  # allowed on top of the task's limit, so that the arm gets away from where it was stopped
         self.was_held = False  # by the operator, in the last motion
         for _ in range(SETTLE_STEPS):
             world.step()
@@ -162,9 +169,9 @@ class Floor:
         """Wait as long as there is a pause, without any time going by; again: the move is not over."""
         if not again:
             self.controls.move_ended()
-        while self.stops.look(self.steps, self.controls) and self.stops.pauses(self.controls):
+        while self.stops.look(self.steps, self.controls) and (self.meanwhile() or self.stops.pauses(self.controls)):
             self._tell_held()
-            self.controls.wait(0.1)
+            self.controls.wait(0.0 if self.stops.folding else 0.1)
         self._tell_held()
         self._paced = (0.0, 0.0, 0.0)
 
@@ -181,12 +188,11 @@ class Floor:
 
     def _too_hard(self) -> str:
         """What the arm presses on harder than the task allows; "" for nothing."""
-        if self.force_limit_n is None or self.steps % FORCE_EVERY:
+        if self.steps % FORCE_EVERY:
             return ""
         body, force_n = self.world.pressed(NAME)
-        if force_n <= self.force_limit_n:
-            return ""
-        return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {self.force_limit_n:g}"
+        limit_n = self.scene.task.robot.stops_at_n + self.pressing_n
+        return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {limit_n:g}" if force_n > limit_n else ""
 
     # ---- skills --------------------------------------------------------------------------------------------------
 

@@ -5,11 +5,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from lab.errors import LabError
-from lab.production.perception import Deviation, perceive
+from lab.production.controls import StopKind
+from lab.production.perception import BELOW_M, Deviation, perceive, seen_at
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
 from lab.sim.scene.scene import pallet_of
-from lab.teaching.events import MachineFailed, MoveRetried, PartLost, TroubleMet
+from lab.skills.skill import UPRIGHT
+from lab.teaching.events import MachineFailed, MoveRetried, PartLost, RunHeld, RunWentOn, TroubleMet
 
 MAX_TRIES = 3  # what fails is tried again from the state reached, at most twice
 PAUSES_S = (0.0, 0.0, 30.0)  # before each try [s]: what disturbs may go away
@@ -37,13 +39,41 @@ class Recovery:
     back: dict[int, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     _strange: dict[str, str] = field(default_factory=dict)  # what belongs to nobody, and the station that it closes
+    _missing: set[int] = field(default_factory=set)  # parts that were given up because they cannot be taken up
     _tries: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     _first: dict[str, str] = field(default_factory=dict)
     _looked_s: float = -LOOK_S
 
+    def find_again(self) -> bool:
+        """Take parts up again that were given up because they could not be taken up, and now can; whether there are any."""
+        found = [one for one in self._missing if self._can_be_taken_up(one)]
+        for part in found:
+            self._missing.discard(part)
+            del self.lost[part]
+            self.work.left_lying.discard(self.work.name(part))
+            name = self.work.name(part)
+            self.work.spot_of[name] = seen_at(self.work.floor, name)
+            self._tell(Trouble("it can be taken up again", name), "goes on with it")
+        if found:
+            self.replan("a part can be taken up again")
+        return bool(found)
+
+    def _can_be_taken_up(self, part: int) -> bool:
+        floor, name = self.work.floor, self.work.name(part)
+        at = seen_at(floor, name)
+        reached = floor.scene.robot.arm.inverse(floor.bench.part_pose(name)) is not None
+        return not floor.world.dark and at.z > BELOW_M and floor.bench.upright(name) >= UPRIGHT and reached
+
+    def forget(self) -> None:
+        """A person has put things right: what was out of use is used again, and tries are counted anew."""
+        self.out.clear()
+        self._tries.clear()
+        self._first.clear()
+
     def failure(self) -> str | None:
         """Why not all parts were made; None when they were."""
-        return "; ".join(dict.fromkeys(self.lost[part] for part in sorted(self.lost))) or None
+        why = self.work.spoilt | self.lost
+        return "; ".join(dict.fromkeys(why[part] for part in sorted(why))) or None
 
     def look(self) -> None:
         """See, once a second, whether all is where it should be. Raises Trouble."""
@@ -61,6 +91,17 @@ class Recovery:
         """Do what lets the run go on, perhaps without a part. Raises RunStopped."""
         work, floor = self.work, self.work.floor
         work.place = ""
+        floor.scene.robot.brake()
+        if not trouble.held:  # a protective stop
+            work.tell(RunHeld(StopKind.PROTECTIVE, str(trouble), "robot", floor.now_s))
+        try:
+            self._answer(trouble)
+        finally:
+            if not trouble.held:
+                work.tell(RunWentOn(floor.now_s))
+
+    def _answer(self, trouble: Trouble) -> None:
+        floor = self.work.floor
         if floor.bench.held is not None and not floor.bench.holds(floor.bench.held):
             floor.bench.held = None
         if trouble.held:
@@ -141,19 +182,20 @@ class Recovery:
 
     def _leave(self, part: int, seen: Deviation) -> None:
         """A part that cannot be taken up is left; where it lies in a machine, that is closed."""
-        machine = next((m for m in self.work.floor.machines.values() if m.part == self.work.name(part)), None)
+        machine = self.work.machine_of(part)
         if machine is not None and seen.sort == "part fallen":
             self.out[machine.station] = f"{seen.name} lies in '{machine.station}'"
         if machine is not None:
             machine.clear()
         self._lose(part, seen.words)
+        self._missing.add(part)
         self._tell_seen(seen, "leaves it")
 
     def _follow(self, part: int, seen: Deviation) -> None:
         """A part that was moved is taken up where it stands; out of its machine before that was done, it goes back there."""
         assert seen.at is not None
         work, name = self.work, self.work.name(part)
-        machine = next((m for m in work.floor.machines.values() if m.part == name), None)
+        machine = work.machine_of(part)
         answer = "takes it up there"
         if machine is not None:
             before = work.came_from.get(name)
@@ -198,6 +240,7 @@ class Recovery:
 
     def _lose(self, part: int, why: str) -> None:
         self.lost[part] = why
+        self.work.left_lying.add(self.work.name(part))
         self.work.finished.pop(part, None)
         self.work.to_set_right = [one for one in self.work.to_set_right if one != part]
         self.work.tell(PartLost(self.work.name(part), why, self.work.floor.now_s))

@@ -16,9 +16,10 @@ from lab.production.relearning import Relearner
 from lab.production.report import Report, write_files
 from lab.production.run_journal import DurationsKept, RunEnded, RunJournal
 from lab.production.taught import Taught, skill_row
+from lab.sequencing.simulate.run import simulate
 from lab.skills.prepared_scene import Prepared
 from lab.skills.trial import trial_of
-from lab.teaching.events import MoveTimed, PhaseBegan, RecordSkipped, ScenePrepared, SkillReady
+from lab.teaching.events import MoveTimed, PhaseBegan, PlanMade, RecordSkipped, ScenePrepared, SkillReady
 from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.teaching.teacher import Teacher
 
@@ -96,7 +97,10 @@ def run(prepared: Prepared, teacher: Teacher, out: Path, conditions: Conditions 
     advice, people = conditions.advice, teacher.advising.people
     whose = OrderAdvice() if advice is None else advice.order(people, taught.durations.to_json())
     order = ordered(taught.cell, prepared.task.sequencing, whose, prepared.seed, teacher.tell)
+    planned = simulate(taught.cell, order.found.sequence)
+    gap, proven = order.proven.gap(order.found.cost), order.proven.proven
     teacher.tell(PhaseBegan("carry out", len(order.found.sequence)))
+    teacher.tell(PlanMade(planned, len(order.found.sequence), gap, proven, 0.0))
     faults = prepared.task.faults
     if conditions.fault_seed is not None:
         faults += draw(prepared.task, prepared.order, conditions.fault_seed, order.found.cost)

@@ -33,9 +33,10 @@ class Station:
 class Stage:
     """A step of a route: the station to reach, and the buffer before it for when it is full (None: no buffer).
 
-    processing_s, at_most_s: this product's time there, and until when it is to be picked (None: the station's). service_s: what the robot has to do there before it
-    can take the part out, such as vacuuming a mill [s]. pallet: the part is lifted off its pallet for this machine; the
-    pallet stays at the station before, and has to be brought to the station after before the part can leave.
+    processing_s: this product's time there, and at_most_s, how long after it a part may stay (None: the station's). service_s:
+    what the robot has to do there before it can take the part out, such as vacuuming a mill [s]. pallet: the part is lifted
+    off its pallet for this machine; the pallet stays at the station before, and has to be brought to the station after before
+    the part can leave.
     """
 
     station: str

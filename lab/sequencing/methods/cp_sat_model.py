@@ -202,7 +202,9 @@ class Model:
             inside = holds[self.cell.begin_at[part]]
             if brings or inside:
                 visit = Visit(part, station, *self._visit(brings, takes, inside))
-                size = self.model.new_int_var(0, 2 * self._longest + 2, "stay") if inside else self._moment("stay")
+                size = self.model.new_int_var(
+                    0, 2 * self._longest + 2, "stay"
+                )  # with the change after it, and before 0
                 least.append(self._least(brings, takes) + change * visit.here)
                 self.model.add(size >= least[-1])
                 span = visit.begin, size, visit.leave + change, visit.here
