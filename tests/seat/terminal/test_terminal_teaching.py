@@ -150,7 +150,7 @@ def test_ctrl_c_in_a_terminal_loses_nothing(terminal: Callable[..., Terminal], t
     (row,) = Toolbox(tmp_path / "toolbox").list()
     assert row["episodes"] == 1
     assert row["helped_steps"] == 6  # advice counts once its episode is over
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["maze.txt", "toast-run", "toolbox"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["maze.txt", "toolbox"]
 
 
 def test_ctrl_c_between_episodes(terminal: Callable[..., Terminal], tmp_path: Path) -> None:
