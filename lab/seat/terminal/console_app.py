@@ -57,6 +57,7 @@ class OperatorConsole:
     def __init__(self, desk: Desk, keys: "Input | None" = None, screen: "Output | None" = None) -> None:
         self._desk = desk
         self._log: list[tuple[str, str]] = []
+        self._answer = 0  # lines of the log that the last command was answered with
         self._error: BaseException | None = None
         desk.operation.on_done = self._done
         self._app = self._made(keys, screen)
@@ -92,6 +93,7 @@ class OperatorConsole:
     def say(self, line: str) -> None:
         """Take a typed line, or the words of a key."""
         word = line.split()[0].lower() if line.split() else ""
+        before = len(self._log)
         match word:
             case "":
                 return
@@ -103,6 +105,7 @@ class OperatorConsole:
                 self._log += [(text, "") for text in plain_lines(self._desk.now())]
             case _:
                 self._desk.say(line)
+        self._answer = len(self._log) - before
         del self._log[:-MOST_LOG]
 
     def _done(self, done: Done) -> None:
@@ -205,14 +208,14 @@ class OperatorConsole:
             -self._log_room(height) :
         ]
         hints = [Text(hint, "dim") for hint in HINTS]
-        room = height - len(hints) - len(told)
+        room = max(height - len(hints) - len(told), 0)
         lines = view(self._desk.now(), self._desk.busy, width, room)
         lines += [Text()] * (room - len(lines))
         return _ansi([*lines, *told, *hints], width)
 
     def _log_room(self, height: int) -> int:
-        """Lines for what came of the last commands: more of a long answer where there is room for it."""
-        return LOG_LINES if height < 30 else 2 * LOG_LINES
+        """Lines for what came of the last commands: all of a long answer until something else is said."""
+        return max(LOG_LINES, min(self._answer, height - len(HINTS)))
 
 
 def _ansi(lines: list[Text], width: int) -> str:
