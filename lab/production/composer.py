@@ -77,6 +77,7 @@ class Production:
                 return False
         except Trouble as trouble:
             self.recovery.answer(trouble)
+        self.floor.controls.move_ended()
         return True
 
     def replan(self, why: str) -> None:

@@ -163,13 +163,11 @@ class Floor:
             self.tick()
             if not self.stops.folding:
                 self.controls.wait(TIME_STEP)
-        self.between_moves(again=True)
+        self.between_moves()
         return why
 
-    def between_moves(self, *, again: bool = False) -> None:
-        """Wait as long as there is a pause, without any time going by; again: the move is not over."""
-        if not again:
-            self.controls.move_ended()
+    def between_moves(self) -> None:
+        """Wait as long as there is a pause, without any time going by."""
         while self.stops.look(self.steps, self.controls) and (self.meanwhile() or self.stops.pauses(self.controls)):
             self._tell_held()
             self.controls.wait(0.0 if self.stops.folding else 0.1)

@@ -1,10 +1,9 @@
 """Where commands are said while another thread simulates: stops act at once, the rest is carried out in its turn."""
 
-from collections.abc import Callable
 from threading import Condition
 
 from lab.errors import BadInput, LabError
-from lab.production.controls import StopKind
+from lab.production.controls import RESET_FIRST, StopKind
 from lab.production.operation.commands import Spoken, spoken
 from lab.production.operation.operated_scene import Left
 from lab.production.operation.operation import OPERATOR, Done, Operation
@@ -16,11 +15,11 @@ AT_WORK = "the robot is at work: pause first"
 class Desk:
     """`say` may be called in any thread, `serve` in the one that simulates; somebody is there to go on after a stop.
 
-    busy: the command under way, "" for none. on_done: called, in any thread, with what came of a command.
+    busy: the command under way, "" for none. What came of commands is told by the operation's `on_done`.
     """
 
-    def __init__(self, operation: Operation, on_done: Callable[[Done], None] = lambda done: None) -> None:
-        self.operation, self.on_done = operation, on_done
+    def __init__(self, operation: Operation) -> None:
+        self.operation = operation
         self.busy, self.closed = "lays the scene out", False
         self._changed = Condition()
         operation.controls.attended = True
@@ -39,7 +38,7 @@ class Desk:
                     self._begin(by)
                 self._wake()
             elif said.how == "by hand" and self.busy and not self._rests:
-                raise BadInput(AT_WORK)
+                raise BadInput(RESET_FIRST if self.operation.controls.holds_arm else AT_WORK)
             elif said.how == "console":
                 raise BadInput(f"{said.word}: it is said to a console, not to the run")
             else:
@@ -47,8 +46,7 @@ class Desk:
                 self._wake()
                 return None
         except LabError as error:
-            done = Done(line, refused=str(error))
-        self.on_done(done)
+            return self.operation.refuse(line, str(error), by)
         return done
 
     @property
@@ -91,7 +89,7 @@ class Desk:
             while not self.closed:
                 following = self._following()
                 if following is not None:
-                    self.on_done(operation.do(*following))
+                    operation.do(*following)
         except Left:
             pass
         finally:

@@ -55,8 +55,8 @@ class Plan:
 class OperatedScene:
     """One scene and all that is in it; it belongs to the thread that simulates, but for `now` and the controls.
 
-    leaving: what is under way is broken off. resting: a pause lasts. again: it is carried out once more, as a journal says. meanwhile: called in a
-    pause of the run, for what is done by hand.
+    leaving: what is under way is broken off. resting: a pause lasts. again: it is carried out once more, as a journal says.
+    meanwhile: called in a pause of the run, for what is done by hand.
     """
 
     def __init__(self, task: Task, order: Order, seed: int, teacher: Teacher, conditions: Conditions) -> None:
@@ -186,6 +186,7 @@ class OperatedScene:
 
         def deed() -> str:
             taught = teach_all(self.prepared, self.teacher, self.journal)
+            self.tell(PhaseBegan("sequence", 1))
             chosen = ordered(taught.cell, self.task.sequencing, OrderAdvice(), self.seed, self.tell)
             found, proven = chosen.found, chosen.proven
             if drawn:
@@ -274,7 +275,6 @@ class OperatedScene:
                 self._tell_plan("")
             self.held_first()
             self.failure = production.carry_out(production.sequence)
-            self.tell(PhaseBegan("idle", 0))
             if self.failure is not None:
                 raise WorkFailed(self.failure)
             return f"{len(production.work.finished)} of {len(self.prepared.order)} parts made"

@@ -7,7 +7,7 @@ options and seed give the same scene again, bit for bit. The steps are counted f
 
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from lab.errors import LabError, WorkFailed
@@ -43,7 +43,8 @@ class Done:
 class Operation:
     """What the operator does in one scene; all but `at_once` and `now` belongs to the thread that simulates.
 
-    waiting: commands that were said in other threads, and by whom (see `Desk`).
+    waiting: commands that were said in other threads, and by whom (see `Desk`). done: what came of all that was said;
+    on_done: called with each, in the thread in which it was done.
     """
 
     def __init__(self, task: Task, order: Order, seed: int, teacher: Teacher, conditions: Conditions) -> None:
@@ -53,6 +54,7 @@ class Operation:
         self.controls, self._journal = conditions.controls, conditions.journal
         self.waiting: deque[tuple[Spoken, str]] = deque()
         self.done: list[Done] = []
+        self.on_done: Callable[[Done], None] = lambda done: None
         self._began = time.perf_counter()
         self._script = deque[Stopped | Commanded]()  # of a journal, what is still to be done again
         self._inside = False  # a pause, carrying a command out
@@ -123,9 +125,15 @@ class Operation:
         self.scene.tell(OperatorActed(done.words, by, floor.now_s, done.refused))
         return self._kept(done) if done.refused else done
 
+    def refuse(self, words: str, why: str, by: str = OPERATOR) -> Done:
+        """What is said is not begun: in any thread."""
+        self.scene.tell(OperatorActed(words, by, self.scene.now().now_s, why))
+        return self._kept(Done(words, refused=why))
+
     def _kept(self, done: Done) -> Done:
         with self.scene.lock:
             self.done.append(done)
+        self.on_done(done)
         return done
 
     def _meanwhile(self) -> bool:

@@ -1,6 +1,6 @@
 """The operator's console at a terminal: a live panel, keys that act at once, and a line for commands."""
 
-from collections.abc import Callable
+import sys
 from io import StringIO
 from threading import Thread
 from typing import TYPE_CHECKING
@@ -13,6 +13,7 @@ from lab.production.operation.commands import COMMANDS, help_lines
 from lab.production.operation.desk import Desk
 from lab.production.operation.operation import Done
 from lab.seat.terminal.console_view import plain_lines, view
+from lab.seat.terminal.screen import folded
 
 if TYPE_CHECKING:
     from prompt_toolkit.application import Application
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 STEP_MM, TURN_DEGREES = 10, 15
 ESCAPE_S = 0.025  # after Esc, until it is no arrow key's beginning
 REFRESH_S = 0.2
-MOST_LOG, LOG_LINES = 200, 5
+MOST_LOG, LOG_LINES = 200, 6
 STOPS = ("escape", "c-x")  # whatever is typed
 KEYS = {  # on an empty line
     " ": "pause, go on",
@@ -44,9 +45,10 @@ KEYS = {  # on an empty line
     "g": "grasp",
 }
 HINTS = (
-    "Esc or Ctrl-X stop | space pause, go | s step | r reset | : command | Ctrl-C leave",
-    f"arrows x y, PgUp PgDn z: jog {STEP_MM} mm | [ ] turn | o open | c close | h home | g grasp",
+    "Esc ^X stop | space pause, go | s step | r reset | a command, or help | ^C leave",
+    f"arrows PgUp PgDn jog {STEP_MM} mm | [ ] turn | o open | c close | h home | g grasp",
 )
+LETTER_S = 0.4  # a letter that nothing follows for so long is a key, else a command's first letter
 
 
 class OperatorConsole:
@@ -55,8 +57,9 @@ class OperatorConsole:
     def __init__(self, desk: Desk, keys: "Input | None" = None, screen: "Output | None" = None) -> None:
         self._desk = desk
         self._log: list[tuple[str, str]] = []
+        self._answer = 0  # lines of the log that the last command was answered with
         self._error: BaseException | None = None
-        desk.on_done = self._done
+        desk.operation.on_done = self._done
         self._app = self._made(keys, screen)
 
     def run(self) -> None:
@@ -90,6 +93,7 @@ class OperatorConsole:
     def say(self, line: str) -> None:
         """Take a typed line, or the words of a key."""
         word = line.split()[0].lower() if line.split() else ""
+        before = len(self._log)
         match word:
             case "":
                 return
@@ -101,6 +105,7 @@ class OperatorConsole:
                 self._log += [(text, "") for text in plain_lines(self._desk.now())]
             case _:
                 self._desk.say(line)
+        self._answer = len(self._log) - before
         del self._log[:-MOST_LOG]
 
     def _done(self, done: Done) -> None:
@@ -122,6 +127,7 @@ class OperatorConsole:
         from prompt_toolkit.formatted_text import ANSI
         from prompt_toolkit.layout import BufferControl, FormattedTextControl, HSplit, Layout, Window
         from prompt_toolkit.layout.processors import BeforeInput
+        from prompt_toolkit.output import create_output
 
         def entered(buffer: "Buffer") -> bool:
             self.say(buffer.text.removeprefix(":"))
@@ -135,7 +141,7 @@ class OperatorConsole:
             key_bindings=self._bindings(line),
             full_screen=True,
             input=keys,
-            output=screen,
+            output=screen or create_output(stdout=sys.stderr),  # stdout is for the document
             refresh_interval=REFRESH_S,
         )
         app.ttimeoutlen = app.timeoutlen = ESCAPE_S
@@ -147,13 +153,29 @@ class OperatorConsole:
 
         bindings, is_empty = KeyBindings(), Condition(lambda: not line.text)
 
-        def bind(key: str, act: Callable[[], None]) -> None:
+        def bind(key: str, words: str) -> None:
+            def act() -> None:
+                if key == " ":
+                    self._pause()
+                else:
+                    self.say(words)
+
+            def alone() -> None:
+                if line.text == key:
+                    line.reset()
+                    act()
+
             @bindings.add(key, filter=is_empty)
-            def _act(event: KeyPressEvent) -> None:
-                act()
+            def _pressed(event: KeyPressEvent) -> None:
+                if not key.isalpha() or len(key) > 1:
+                    act()
+                    return
+                line.insert_text(key)
+                assert event.app.loop is not None
+                event.app.loop.call_later(LETTER_S, alone)
 
         for key, words in KEYS.items():
-            bind(key, self._pause if key == " " else lambda words=words: self.say(words))  # type: ignore[misc]
+            bind(key, words)
         for key in STOPS:
 
             @bindings.add(key, eager=True)
@@ -181,16 +203,19 @@ class OperatorConsole:
     def _drawn(self) -> str:
         size = self._app.output.get_size()
         width, height = size.columns, size.rows - 1
-        told = [Text(printable(text), style) for text, style in self._log[-self._log_room(height) :]]
+        log = self._log[-self._log_room(height) :]
+        told = [line for text, style in log for line in folded([printable(text)], width, style)][
+            -self._log_room(height) :
+        ]
         hints = [Text(hint, "dim") for hint in HINTS]
-        room = height - len(hints) - len(told)
+        room = max(height - len(hints) - len(told), 0)
         lines = view(self._desk.now(), self._desk.busy, width, room)
         lines += [Text()] * (room - len(lines))
         return _ansi([*lines, *told, *hints], width)
 
     def _log_room(self, height: int) -> int:
-        """Lines for what came of the last commands: more of a long answer where there is room for it."""
-        return LOG_LINES if height < 30 else 2 * LOG_LINES
+        """Lines for what came of the last commands: all of a long answer until something else is said."""
+        return max(LOG_LINES, min(self._answer, height - len(HINTS)))
 
 
 def _ansi(lines: list[Text], width: int) -> str:

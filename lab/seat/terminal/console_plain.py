@@ -28,7 +28,7 @@ class PlainConsole:
         self._desk, self._write = desk, write
         self._bad: Done | None = None
         self._error: Exception | None = None
-        desk.on_done = self._done
+        desk.operation.on_done = self._done
 
     def run(self, lines: Iterable[str]) -> Done | None:
         """The command that was refused or failed, None when all went well. Raises what the simulation raised."""

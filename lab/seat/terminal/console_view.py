@@ -26,7 +26,7 @@ SIGNS = {  # in the chart, an activity's kind
     "blocked": ":",
     "store": " ",
 }
-LEGEND = "# carries  - goes empty  . waits  = in process  : done, not fetched"
+LEGEND = "# carries  - empty  . waits  = in process  : not fetched"
 NOTICE = "Simulated: not a safety function."
 WAITS = "nothing is under way"
 TROUBLES, LEAST_CHART = 3, 20
@@ -34,7 +34,7 @@ TROUBLES, LEAST_CHART = 3, 20
 
 def view(status: RunStatus, busy: str, width: int, height: int) -> list[Text]:
     """The panel in so many columns and lines, what matters most first; busy: the command under way, "" for none."""
-    lines = [_head(status), *_robot(status, busy), *_machines(status, width), *_parts(status.parts, width)]
+    lines = [*_head(status), *_robot(status, busy), *_machines(status, width), *_parts(status.parts, width)]
     lines += _troubles(status, width)
     chart = _chart(status, width)
     if len(lines) + len(chart) > height:
@@ -47,7 +47,7 @@ def _cut(line: Text, width: int) -> Text:
     return line
 
 
-def _head(status: RunStatus) -> Text:
+def _head(status: RunStatus) -> list[Text]:
     held = status.held
     if held is None:
         state = Text("running" if status.words else "ready", "bold green")
@@ -55,7 +55,7 @@ def _head(status: RunStatus) -> Text:
         word, style = HELDS[held.kind]
         state = Text.assemble((f" {word} ", style), f" {held.why}".rstrip(), (f" ({AFTER[held.kind]})", "dim"))
     speed = "max" if status.speed is None else f"{status.speed:g}x"
-    return Text.assemble(state, f"  {status.now_s:.1f} s  speed {speed}  ", (NOTICE, "dim"))
+    return [state, Text.assemble(f"{status.now_s:.1f} s, speed {speed}  ", (NOTICE, "dim"))]
 
 
 def _robot(status: RunStatus, busy: str) -> list[Text]:
@@ -143,7 +143,7 @@ def row_of(activities: Iterable[Activity], room: int, end_s: float) -> str:
 
 def plain_lines(status: RunStatus) -> list[str]:
     """Where a run stands in sentences, for a pipe and for screen readers."""
-    lines = [_head(status).plain, *(line.plain.strip() for line in _robot(status, ""))]
+    lines = [*(line.plain.strip() for line in _head(status)), *(line.plain.strip() for line in _robot(status, ""))]
     lines += [f"machine {m.station}: {m.light}{_with(m, status)}" for m in status.machines]
     lines += [f"part {part.name}: {part.state}{_where(part)}" for part in status.parts]
     return lines + [line.plain.strip() for line in _troubles(status, 200)[1:]]
