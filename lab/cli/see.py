@@ -58,7 +58,8 @@ def see(
         ),
     ] = None,
     make: Annotated[
-        int | None, typer.Option("--make", help="Make so many pictures of a task's scenes with known truth, into --out.")
+        int | None,
+        typer.Option("--make", help="Make so many pictures of a task's scenes with known truth, into --out."),
     ] = None,
     score: Annotated[
         bool, typer.Option("--score", help="Read the pictures of a folder that --make made; how many are exact.")
@@ -109,7 +110,12 @@ def scored(folder: Path, calibration: Path | None) -> dict[str, Any]:
 
 
 def calibrate_camera(
-    images: list[Path], task: str | None, known: Path | None, corners: str | None, out: Path | None, overlay: Path | None
+    images: list[Path],
+    task: str | None,
+    known: Path | None,
+    corners: str | None,
+    out: Path | None,
+    overlay: Path | None,
 ) -> dict[str, Any]:
     """The camera's lens and place, the document of `lab see --calibrate --json`.
 
@@ -142,7 +148,9 @@ def _from_corners(corners: str, task: str | None, image: "Image", known: "Calibr
 
     number = r"-?\d+(?:\.\d+)?"
     if not re.fullmatch(rf"\s*{number},{number}(?:\s+{number},{number}){{3}}\s*", corners):
-        raise BadInput(f"'{corners[:80]}' (--corners): wanted the pixels of four corners, such as 60,580 580,580 580,60 60,60")
+        raise BadInput(
+            f"'{corners[:80]}' (--corners): wanted the pixels of four corners, such as 60,580 580,580 580,60 60,60"
+        )
     if task is None:
         raise BadInput("--corners: goes with --task, which says where the grid's corners are on the table")
     pixels = [(float(x), float(y)) for x, y in (pair.split(",") for pair in corners.split())]
@@ -187,7 +195,9 @@ def see_picture(
         if known is not None:
             camera = replace(camera, pixel_from_world=known.pixel_from_world)
     seen = see(picture, camera, shape=shape, where=str(image))
-    parts = parts_seen(load(task), picture, camera) if out is not None and task is not None and camera is not None else []
+    parts = (
+        parts_seen(load(task), picture, camera) if out is not None and task is not None and camera is not None else []
+    )
     if out is not None:
         write_picture(out, draw(picture, seen, [part["outline_px"] for part in parts]))
     return seen.to_json() | {"parts": parts, "files": {} if out is None else {"picture": str(out)}}

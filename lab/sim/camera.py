@@ -75,7 +75,9 @@ class Camera:
     def picture_through(self, lens: Lens, world: World) -> Image:
         """What the camera sees through a lens with distortion: a wider picture is taken and bent."""
         width, height = lens.size
-        corners = lens.straight_points([(0, 0), (width, 0), (0, height), (width, height), (width / 2, 0), (0, height / 2)])
+        corners = lens.straight_points(
+            [(0, 0), (width, 0), (0, height), (width, height), (width / 2, 0), (0, height / 2)]
+        )
         most = max(float(np.abs(corners - lens.middle).max()) / lens.focal[1], 0.01) * 1.02  # tangent of half its angle
         side = 2 * int(np.ceil(most * lens.focal[1]))
         wide = Camera(self.eye, self.target, self.up, 2.0 * atan(side / 2.0 / lens.focal[1]), side, side)
@@ -84,7 +86,10 @@ class Camera:
 
 @dataclass(frozen=True)
 class TableCamera(Camera):
-    """A camera in a real room: a calibrated lens, uneven light, blur and noise of some `strength`; its pictures come straightened."""
+    """A camera in a real room: a calibrated lens; uneven light, blur and noise of some `strength`.
+
+    Its pictures come straightened.
+    """
 
     calibration: Calibration | None = None
     strength: float = 0.0

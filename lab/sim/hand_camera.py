@@ -15,7 +15,9 @@ from lab.sim.parts.part_shape import PartShape
 from lab.sim.urdf_reader import rotation
 
 AHEAD_M = 0.085  # along the tool's x axis
-UP_M = 0.1137  # above the finger tips; odd, for TinyRenderer takes minutes where a corner lies in the camera's very plane
+UP_M = (
+    0.1137  # above the finger tips; odd, for TinyRenderer takes minutes where a corner lies in the camera's very plane
+)
 ANGLE_RAD = radians(75.0)
 PIXELS = 480
 _ROUND = 48  # sides of a cylinder's hull

@@ -29,7 +29,9 @@ CLEARANCE_M = 0.006  # between a carried part and an obstacle in its way
 _GRIPPER_HALF_M = 0.055  # as high as the fingers, the gripper is wider than a slice
 SEEN_WITHIN_M = 0.008  # the camera must see the gripper this near to where the grid says it is
 CHECK_PIXELS = 320  # a side of the pictures taken on the way
-CORRECTED_M = 0.002  # from here on the tool is moved by what the camera sees it off, where parts are located by the camera
+CORRECTED_M = (
+    0.002  # from here on the tool is moved by what the camera sees it off, where parts are located by the camera
+)
 STRAYED_M = 0.03  # and up to here
 IN_SLOT_M = 0.008
 _SLOW = 0.6
@@ -183,7 +185,9 @@ class Insert(Skill):
         yield from bench.scene.robot.follow([pose.shifted(*self._off)], slow=_SLOW)
         self._check_camera(bench, pose.x, pose.y)
         if self.deviations_m[-1] > SEEN_WITHIN_M:
-            raise SkillFailed(f"the camera sees the gripper {self.deviations_m[-1]:.3f} m off its cell, corrected as it was")
+            raise SkillFailed(
+                f"the camera sees the gripper {self.deviations_m[-1]:.3f} m off its cell, corrected as it was"
+            )
 
     def _check_camera(self, bench: Bench, x: float, y: float) -> None:
         """Compare where the camera sees the gripper with where the grid has it."""

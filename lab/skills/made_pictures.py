@@ -1,8 +1,8 @@
 """Pictures as a real overhead camera would take them, with known truth beside them; and how many are read back exactly."""
 
 import json
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import combinations
 from math import hypot
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lab.errors import BadInput, LabError, WorkFailed
+from lab.errors import BadInput, WorkFailed
 from lab.files import write_whole
 from lab.sim import models
 from lab.sim.arms.kinematics import ToolPose
@@ -22,8 +22,8 @@ from lab.skills.camera_grids import camera_view, settings_of
 from lab.tasks.task import Task
 from lab.tasks.task_fields import CameraGrid, Obstacle
 from lab.tasks.task_file import load
-from lab.vision import Image, Lens, View, read_picture, see, write_picture
-from lab.vision.calibration import PRINTED, Calibration, Mat, calibrate
+from lab.vision import Image, Lens, write_picture
+from lab.vision.calibration import PRINTED, Mat
 from lab.vision.photo_effects import drawn_lens, hide, spoiled
 
 MOST_PICTURES = 100_000
@@ -49,7 +49,13 @@ class Placed:
 
 
 def make_pictures(
-    task_name: str, count: int, folder: Path, seed: int, strength: float = 1.0, *, tell: Callable[[int], None] = lambda n: None
+    task_name: str,
+    count: int,
+    folder: Path,
+    seed: int,
+    strength: float = 1.0,
+    *,
+    tell: Callable[[int], None] = lambda n: None,
 ) -> dict[str, Any]:
     """Make `count` pictures of a task's grid and some of the mat in a new folder; the record that is kept in its index.
 
@@ -75,7 +81,14 @@ def make_pictures(
         write_picture(folder / f"{number:05}.png", image)
         write_whole(folder / f"{number:05}.json", json.dumps(truth).encode())
         tell(number)
-    record = {"task": task_name, "station": station, "pictures": count, "mats": MATS, "seed": seed, "strength": strength}
+    record = {
+        "task": task_name,
+        "station": station,
+        "pictures": count,
+        "mats": MATS,
+        "seed": seed,
+        "strength": strength,
+    }
     write_whole(folder / INDEX, (json.dumps(record, indent=1) + "\n").encode())
     return record
 
@@ -174,7 +187,10 @@ def _drawn(task: Task, station: str, rng: np.random.Generator) -> Placed:
 
     def somewhere() -> tuple[float, float]:
         cell = [int(rng.integers(1, count - 1)) for count in grid.shape]
-        x, y = (o + (i + 0.5) * grid.cell_m + rng.uniform(-WITHIN_M, WITHIN_M) for o, i in zip(grid.origin_m, cell, strict=True))
+        x, y = (
+            o + (i + 0.5) * grid.cell_m + rng.uniform(-WITHIN_M, WITHIN_M)
+            for o, i in zip(grid.origin_m, cell, strict=True)
+        )
         return float(x), float(y)
 
     def apart(at: tuple[float, float], others: list[tuple[float, float]], far: float) -> bool:

@@ -22,6 +22,7 @@ from lab.vision.part_outline import Outlined, find_part
 
 PART_REACH_M, PART_REACH_RAD = 0.03, 0.2  # around a station's spots
 
+
 def calibrated_view(task: Task, station: str, calibration: Calibration) -> View:
     """How a calibrated camera's straightened picture maps to a station's grid."""
     return replace(camera_view(task, station), pixel_from_world=calibration.pixel_from_world)
@@ -99,9 +100,7 @@ def parts_seen(task: Task, image: Image, view: View) -> list[dict[str, Any]]:
             colours = np.array([look.rgba[:3] for look in kind.shape.looks])
             for spot in places.spots(station):
                 foot = places.raised(kind.name, station, spot)
-                part = Outlined(
-                    seen_corners(kind.shape), foot.z, not kind.grip.period, view.pixel_from_world, colours
-                )
+                part = Outlined(seen_corners(kind.shape), foot.z, not kind.grip.period, view.pixel_from_world, colours)
                 near = np.array([foot.x, foot.y, foot.yaw])
                 outline = part.outlines(near[None])[0, :, :2]
                 if outline.min() < 0 or (outline.max(axis=0) > (width - 1, height - 1)).any():

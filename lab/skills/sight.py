@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from lab.errors import WorkFailed
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.hand_camera import hand_camera, seen_corners
 from lab.sim.parts.kinds import Spot, comes_as
@@ -15,10 +16,6 @@ from lab.vision.photo_effects import spoiled
 
 ABOVE_M = 0.16  # from the grasp up to where the tool looks from, at least
 REACHES = ((0.03, 0.2), (0.07, 0.4))  # [m], [rad] around where a part should be; the second when it is not in the first
-
-
-class SkillFailed(Exception):
-    """A skill noticed that it did not do what it is for; the text says why."""
 
 
 class Sight:
@@ -46,7 +43,7 @@ class Sight:
         if body == held:
             return self.scene.robot.tool()
         if body not in self.where:
-            raise SkillFailed(f"{body} has not been seen yet")
+            raise WorkFailed(f"{body} has not been seen yet")
         pose = kind.held_at(self.where[body])
         return replace(pose, yaw=kind.turned_like(pose.yaw, like))
 

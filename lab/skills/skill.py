@@ -17,7 +17,7 @@ from lab.sim.frames import Body
 from lab.sim.parts.kinds import Kind, Spot, on_its_pallet
 from lab.sim.scene.blocked_cells import FINGERS_OFF_M
 from lab.sim.scene.scene import Scene, pallet_of
-from lab.skills.sight import Sight, SkillFailed
+from lab.skills.sight import Sight
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Stage
 from lab.vision import GridView
@@ -42,6 +42,10 @@ class Status(Enum):
     FAILURE = "failure"
 
 
+class SkillFailed(Exception):
+    """A skill noticed that it did not do what it is for; the text says why."""
+
+
 @dataclass
 class Bench:
     """The cell in which skills are carried out, and the body that the robot holds: a part, or a pallet."""
@@ -57,7 +61,7 @@ class Bench:
     def part_pose(self, body: str, like: float = 0.0) -> ToolPose:
         """The tool pose that would hold a part where it is, as far as is known; of its yaws the nearest to `like` [rad].
 
-        Known is, with the camera, where it was seen or set down last; SkillFailed for a part that was never seen.
+        Known is, with the camera, where it was seen or set down last; WorkFailed for a part that was never seen.
         """
         return self.true_pose(body, like) if self.sight is None else self.sight.pose(body, like, self.held)
 

@@ -53,7 +53,8 @@ class Lens:
 
         rotation = cv2.Rodrigues(np.asarray(turn, dtype=np.float64))[0]
         world, to = np.asarray(points, dtype=np.float64), np.asarray(shift, dtype=np.float64)
-        return np.asarray(cv2.projectPoints(world, rotation, to, self.matrix, np.array(self.distortion))[0]).reshape(-1, 2)
+        seen, _ = cv2.projectPoints(world, rotation, to, self.matrix, np.array(self.distortion))
+        return np.asarray(seen, dtype=np.float64).reshape(-1, 2)
 
     def straight_points(self, pixels: ArrayLike) -> Array:
         """Where pixels (n, 2) of a picture are in the straightened one."""
@@ -79,9 +80,7 @@ class Lens:
         width, height = self.size
         pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2)
         there = self._onto(pixels.astype(np.float64), pinhole).reshape(height, width, 2).astype(np.float32)
-        bent: Any = cv2.remap(
-            wide, there[..., 0], there[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-        )
+        bent: Any = cv2.remap(wide, there[..., 0], there[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(bent, dtype=np.uint8)
 
     def _onto(self, pixels: Array, matrix: Array) -> Array:
