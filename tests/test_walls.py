@@ -16,15 +16,15 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors",),
-    ("lab.files", "lab.mdp"),
+    ("lab.files", "lab.mdp", "lab.statistics"),
     ("lab.learning", "lab.vision"),
     ("lab.sequencing", "lab.toolbox"),
     ("lab.advice", "lab.tasks"),
     ("lab.sim",),
-    ("lab.skills", "lab.view"),
+    ("lab.skills", "lab.view", "lab.export"),
     ("lab.teaching",),
-    ("lab.studies",),
-    ("lab.production", "lab.seat", "lab.gym"),
+    ("lab.production",),
+    ("lab.studies", "lab.seat", "lab.gym"),
     ("lab.cli",),
 )
 ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it

@@ -2,12 +2,12 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from errno import EINVAL
-from functools import cache
 from pathlib import Path
 from typing import Any
 
+from lab.advice.json_lines import EntryKinds
 from lab.errors import BadInput
 from lab.learning.session_events import (
     AdviceEnded,
@@ -96,40 +96,17 @@ KINDS: dict[str, type[Any]] = {
     "readmitted": AdvisorReadmitted,
     "closed": Closed,
 }
-_KIND_OF = {kind: name for name, kind in KINDS.items()}
+_LINES = EntryKinds(KINDS)
 
 
 def line_of(entry: Entry) -> str:
     """An entry as one line of JSON, without the line's end."""
-    return json.dumps({"kind": _KIND_OF[type(entry)], **asdict(entry)}, allow_nan=False)
-
-
-@cache
-def _reader(kind: str) -> Any:
-    from pydantic import ConfigDict, TypeAdapter
-
-    model = KINDS[kind]
-    strict = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
-    return TypeAdapter(type(model.__name__, (model,), {"__pydantic_config__": strict, "__doc__": model.__doc__}))
+    return _LINES.line_of(entry)
 
 
 def entry_of(line: str) -> Entry:
     """What a line holds. Raises ValueError for anything but an entry."""
-    try:
-        record = json.loads(line)
-    except RecursionError:
-        raise ValueError("nested too deeply") from None
-    kind = record.pop("kind", None) if isinstance(record, dict) else None
-    if kind not in KINDS:
-        raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
-    from pydantic import ValidationError
-
-    try:
-        found = _reader(kind).validate_json(json.dumps(record))
-    except ValidationError as error:
-        wrong = [f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors(include_url=False)]
-        raise ValueError(f"{kind}: {'; '.join(wrong)}") from None
-    entry: Entry = KINDS[kind](**{name: getattr(found, name) for name in found.__dataclass_fields__})
+    entry: Entry = _LINES.entry_of(line.encode(), MAX_LINE_BYTES)
     return entry
 
 
@@ -199,9 +176,7 @@ def read_journal(folder: Path, where: str) -> Read:
     entries: list[Entry] = []
     for number, line in enumerate(raw[:whole].split(b"\n")[:-1], start=1):
         try:
-            if len(line) > MAX_LINE_BYTES:
-                raise ValueError(f"{len(line)} bytes long, allowed {MAX_LINE_BYTES}")
-            entries.append(entry_of(line.decode("utf-8")))
+            entries.append(_LINES.entry_of(line, MAX_LINE_BYTES))
         except ValueError as error:
             if number == 1:
                 _refuse_schema(line, path, where)

@@ -5,12 +5,11 @@ on after a break, or to take an answer back, the session is run again from its b
 people, and everything else that it tells is held against what was written.
 """
 
-import fcntl
-import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lab.advice.entries import FILE, Answer, Closed, Entry, Read, Session, Undone, line_of, read_journal, undoable
+from lab.advice.json_lines import AppendedFile
 from lab.errors import BadInput, WorkFailed
 from lab.learning.requests import AdvisorLeft, Ask, Request, allowed_words
 from lab.learning.session_events import EpisodeEnded
@@ -36,7 +35,7 @@ class Journal:
     entries: list[Entry] = field(default_factory=list)
     read_only: bool = False
     _at: int = 0
-    _file: int | None = None
+    _file: AppendedFile | None = None
     _unsafe: bool = False  # a person has said something that the disk may not have
 
     @classmethod
@@ -46,14 +45,13 @@ class Journal:
         journal = cls(path)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            journal._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, 0o644)
+            journal._file = AppendedFile.new(path)
         except FileExistsError:
             raise BadInput(
                 f"'{folder}' holds a session already: go on with it (--resume {folder}), or choose another folder"
             ) from None
         except OSError as error:
             raise BadInput(f"journal '{path}' cannot be written: {error.strerror or error}") from error
-        journal._lock()
         journal._write(session)
         return journal
 
@@ -65,13 +63,12 @@ class Journal:
         """
         journal = cls(found.path)
         try:
-            journal._file = os.open(found.path, os.O_WRONLY | os.O_APPEND)
-            journal._lock()
+            journal._file = AppendedFile.again(found.path)
             now = read_journal(found.path, "--resume")
             if now.session != found.session:
                 raise BadInput(f"journal '{found.path}': it was another session's when it was first read")
             now.check_goes_on()
-            os.ftruncate(journal._file, now.whole_bytes)
+            journal._file.cut(now.whole_bytes)
         except OSError as error:
             journal.close()
             raise BadInput(f"journal '{found.path}' cannot be written: {error.strerror or error}") from error
@@ -80,15 +77,6 @@ class Journal:
             raise
         journal.entries = now.effective()
         return journal
-
-    def _lock(self) -> None:
-        """Raises BadInput when another command is writing the journal."""
-        assert self._file is not None
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self.close()
-            raise BadInput(f"journal '{self.path}': another command is writing it: wait until that has ended") from None
 
     @property
     def folding(self) -> bool:
@@ -173,20 +161,15 @@ class Journal:
     def _write(self, entry: Entry) -> None:
         if self._file is None:
             return
-        line = (line_of(entry) + "\n").encode()
-        try:
-            while line:
-                line = line[os.write(self._file, line) :]
-            if self._unsafe and isinstance(entry, EpisodeEnded):
-                os.fsync(self._file)  # a person's words are dear, and waiting for the disk at each of them is slow
-                self._unsafe = False
-        except OSError as error:
-            raise WorkFailed(f"journal '{self.path}' cannot be written: {error.strerror or error}") from error
+        self._file.write(line_of(entry))
+        if self._unsafe and isinstance(entry, EpisodeEnded):
+            self._file.sync()  # a person's words are dear, and waiting for the disk at each of them is slow
+            self._unsafe = False
 
     def close(self) -> None:
         """Closes the file; safe to call again."""
         if self._file is not None:
-            os.close(self._file)
+            self._file.close()
             self._file = None
 
 

@@ -1,6 +1,7 @@
 """`lab run`: the main job."""
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -8,10 +9,13 @@ import typer
 from lab.cli.lessons import lesson_seat, teacher_of
 from lab.cli.options import AdvisorNames, Asked, Decide, Json, Parts, Port, Seed, ShowPage, Toasts, ToolboxPlace, Wait
 from lab.cli.output import end, show
+from lab.errors import BadInput
 
 
 def run(
-    task: Annotated[str, typer.Argument(help="A task that ships, or a .toml file.")] = "toast",
+    task: Annotated[
+        str | None, typer.Argument(help="A task that ships, or a .toml file.", show_default="toast")
+    ] = None,
     toasts: Toasts = None,
     parts: Parts = None,
     advisor: AdvisorNames = None,
@@ -25,8 +29,17 @@ def run(
         int,
         typer.Option("--override", min=10, max=100, help="The arm's speed override [%]; the next plan knows of it."),
     ] = 100,
+    faults: Annotated[
+        int | None, typer.Option("--faults", min=0, help="Draw faults for the run with this seed; default: none.")
+    ] = None,
+    order: Annotated[
+        str | None, typer.Option("--order", help="The order of the moves by part numbers, such as 1,2,1,1,2,2.")
+    ] = None,
     seed: Seed = 0,
     toolbox: ToolboxPlace = None,
+    resume: Annotated[
+        Path | None, typer.Option("--resume", help="Go on with the run in this folder, as it was begun.")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures, replay and JSON; default: TASK-run.")
     ] = None,
@@ -35,34 +48,50 @@ def run(
     """Find or learn the skills, time them, find their best order, and carry them out in physics."""
     from dataclasses import replace
 
-    from lab.advice.advisors import PEOPLE
     from lab.files import check_out
+    from lab.production.conditions import Conditions
     from lab.production.run import run as run_task
+    from lab.production.run_advice import RunAdvice
+    from lab.production.run_journal import RunJournal
+    from lab.production.run_options import RunOptions, begun, gone_on
     from lab.skills.prepared_scene import prepare
-    from lab.tasks import task_file as taskfile
-    from lab.teaching.kept_session import kept_by
-    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
+    from lab.tasks.task_file import load
+    from lab.teaching.lesson_options import DEFAULT_ADVISORS
     from lab.view.summary import delivered_in_words, run_summary
 
-    loaded = taskfile.load(task)
-    folder = out or Path(f"{loaded.name}-run")
+    given = RunOptions(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order)
+    if resume is None:
+        options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
+        loaded = load(options.task)
+    else:
+        options, loaded = gone_on(given, resume, out)
+    folder = resume or out or Path(f"{loaded.name}-run")
     check_out(folder)
-    names = tuple(advisor or DEFAULT_ADVISORS)
-    options = LessonOptions(
-        task=task, advisors=names, asked=asked, decide=decide, seed=seed, toasts=toasts, parts=parts
-    )
-    options.advising()
-    prepared = prepare(loaded, loaded.ordered(toasts, parts), seed)
-    with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
-        teacher = teacher_of(toolbox, options, seat)
-        if any(name in PEOPLE for name in options.advisors):
-            teacher = replace(teacher, keep=kept_by(teacher.toolbox, options))
-        try:
+    lessons = options.lessons()
+    lessons.advising()
+    prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed)
+    journal = begun(options, loaded, folder) if resume is None else RunJournal.resume(folder)
+    try:
+        with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
+            teacher = teacher_of(toolbox, lessons, seat)
+            advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "")
+            teacher = replace(teacher, keep=advice.keep)
+            share = options.override / 100
+            conditions = Conditions(share, seat.page, journal=journal, fault_seed=options.faults, advice=advice)
             with seat.progress:
-                report = run_task(prepared, teacher, folder, override=override / 100, viewer=seat.page)
-        except KeyboardInterrupt as stopped:
-            raise KeyboardInterrupt(str(stopped) or "stopped by Ctrl-C; what was learned is kept") from None
+                report = run_task(prepared, teacher, folder, conditions)
+    except BadInput:
+        if resume is None:
+            journal.forget()
+        raise
+    except KeyboardInterrupt as stopped:
+        why = str(stopped) or "stopped by Ctrl-C; what was learned is kept"
+        raise KeyboardInterrupt(f"{why}; go on with: lab run --resume {quote(str(folder))}") from None
+    finally:
+        journal.close()
     document = report.to_json()
     show(document, as_json, run_summary)
+    if report.outcome.interrupted:
+        raise KeyboardInterrupt(f"stopped by Ctrl-C; go on with: lab run --resume {quote(str(folder))}")
     if not report.success:
         end(report.outcome.failure or delivered_in_words(document["delivered"], document["parts"]), 1)

@@ -46,7 +46,7 @@ def _planned(cell: Cell, method: str, search: Search, found: SequenceResult, see
 
 
 def _mean(values: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, Any]:
-    from lab.studies.statistics import interval
+    from lab.statistics import interval
 
     mean, low, high = interval(values)
     return {"mean": mean, "ci95": [low, high]}

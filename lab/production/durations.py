@@ -52,7 +52,7 @@ class Durations:
     service_s: Mapping[Pair, float] = field(default_factory=dict)
     sim_s: float = 0.0
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, dict[str, float]]:
         """Plain dicts: 'origin > target' or 'origin > target with kind' -> seconds."""
         return {
             "empty_s": {_word(pair): seconds for pair, seconds in self.empty_s.items()},
@@ -193,6 +193,15 @@ def cell_of(task: Task, durations: Durations, order: Order) -> Cell:
     return Cell(places, products(wanted, durations.service_s), order, tables[0], tables[1], task.robot.start)
 
 
+def cell_without_times(task: Task, order: Order) -> Cell:
+    """The cell of a task as far as it says which moves are allowed: all take no time."""
+    places = stations(task, {})
+    no_time = np.zeros((len(places), len(places)))
+    return Cell(
+        places, products(part for part in task.made if part.name in order), order, no_time, no_time, task.robot.start
+    )
+
+
 def kept_durations(toolbox: Toolbox, key: str, skillset: SkillSet) -> Durations | None:
     """The durations kept under a key, None when there are none; BadInput for a record that does not hold them."""
     record = toolbox.load_record(RECORDS, key)
@@ -213,7 +222,7 @@ def durations_key(
     """
     code = sources(modules, DECIDED_BY_RESULT)
     decides = {
-        "task": task.model_dump(mode="json", exclude={"name", "title", "sequencing", "subtasks"}),
+        "task": task.model_dump(mode="json", exclude={"name", "title", "sequencing", "subtasks", "faults"}),
         "obstacles": layout.obstacles,
         "moves": [asdict(skillset.moves), [*skillset.legs]],
         "policies": {name: [policy.signature, _hash(policy.q.tobytes())] for name, policy in policies.items()},

@@ -53,7 +53,7 @@ class Evaluation:
 
     def facts(self) -> dict[str, Any]:
         """What a log keeps of it: how many scenes could be solved, in how many it did, and Wilson's 95 % interval."""
-        from lab.studies.statistics import proportion_interval
+        from lab.statistics import proportion_interval
 
         counting = [scene for scene in self.scenes if scene.failed_in != "scene"]
         good = [scene for scene in counting if scene.failed_in is None]

@@ -15,10 +15,11 @@ from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
-from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, SkillFailed, Status
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, Status
 from lab.skills.skillset import SkillSet
 from lab.tasks.task import Order
-from lab.teaching.events import RunHeld, RunWentOn, unheard
+from lab.teaching.events import RunHeld, RunWentOn, Tell, unheard
 
 AT_REST_STEPS = 60  # physics steps at the end of a wait that are simulated in any case
 SKIPPED_STEPS = 240  # at the most without a look at what else goes on
@@ -26,11 +27,17 @@ FORCE_EVERY = 4  # physics steps between two looks at what presses on the arm
 DISTURBED_S = 2.0  # after a hand has reached into the scene, all of it is simulated for so long
 
 
+def _nothing() -> bool:
+    """Nobody does anything by hand."""
+    return False
+
+
 class Floor:
     """A scene in which skills are carried out: one clock, the robot's skill and the machines' processes side by side.
 
     controls: what stops it and sets its pace; stops: when they did, for the journal. on_tick: called after each physics
-    step; hand: called before each, to reach into the scene as a fault does, and says whether it did.
+    step; hand: called before each, to reach into the scene as a fault does, and says whether it did. meanwhile: called while
+    a pause lasts, for what the operator does by hand, and says whether that was anything.
     """
 
     def __init__(
@@ -48,19 +55,27 @@ class Floor:
         self.scene = Scene(world, skillset.task, order, layout)
         self.bench = Bench(self.scene)
         self.machines = {s.name: Machine(s.name) for s in skillset.task.stations if s.kind == "machine"}
-        self.controls, self.stops, self.tell = Controls(), StopRecord(), unheard
+        self.controls, self.stops = Controls(), StopRecord()
+        self.tell: Tell = unheard
         self.on_tick: Callable[[], None] | None = None
         self.hand: Callable[[], bool] | None = None
-        self.force_limit_n: float | None = None
+        self.meanwhile: Callable[[], bool] = _nothing
+        self.pressing_n = 0.0  # allowed on top of the task's limit, so that the arm gets away from where it was stopped
         self.was_held = False  # by the operator, in the last motion
         for _ in range(SETTLE_STEPS):
             world.step()
-        self.recorder = Recorder(world, extras_of(self.scene, skillset), viewer) if film or viewer else None
+        self.recorder: Recorder | None = None
+        if film or viewer:
+            self.record(viewer)
         self.restart_clock()
         self.skipped_s = 0.0
         self._quiet_s = 0.0  # from when on waiting may be skipped
         self._told_held = ""
         self._paced = (0.0, 0.0, 0.0)  # speed, simulated and real time from which on it holds
+
+    def record(self, viewer: Viewer | None = None) -> None:
+        """Keep frames from now on, of all that is there; `viewer` sees them live."""
+        self.recorder = Recorder(self.world, extras_of(self.scene, self.skillset), viewer)
 
     @property
     def now_s(self) -> float:
@@ -155,9 +170,9 @@ class Floor:
         """Wait as long as there is a pause, without any time going by; again: the move is not over."""
         if not again:
             self.controls.move_ended()
-        while self.stops.look(self.steps, self.controls) and self.stops.pauses(self.controls):
+        while self.stops.look(self.steps, self.controls) and (self.meanwhile() or self.stops.pauses(self.controls)):
             self._tell_held()
-            self.controls.wait(0.1)
+            self.controls.wait(0.0 if self.stops.folding else 0.1)
         self._tell_held()
         self._paced = (0.0, 0.0, 0.0)
 
@@ -174,12 +189,11 @@ class Floor:
 
     def _too_hard(self) -> str:
         """What the arm presses on harder than the task allows; "" for nothing."""
-        if self.force_limit_n is None or self.steps % FORCE_EVERY:
+        if self.steps % FORCE_EVERY:
             return ""
         body, force_n = self.world.pressed(NAME)
-        if force_n <= self.force_limit_n:
-            return ""
-        return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {self.force_limit_n:g}"
+        limit_n = self.scene.task.robot.stops_at_n + self.pressing_n
+        return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {limit_n:g}" if force_n > limit_n else ""
 
     # ---- skills --------------------------------------------------------------------------------------------------
 
@@ -188,7 +202,10 @@ class Floor:
         skill.start(self.bench, self.skillset.policies[skill.name])
 
     def run(self, skill: Skill) -> Status:
-        """Carry one skill out to its end, or until something stops it: it has failed then."""
+        """Carry one skill out to its end, or until something stops it: it has failed then, as one that is blocked has."""
+        if why := self.skillset.blocked.get(skill.name):
+            skill.fail(why)
+            return skill.status
         self.start(skill)
         self.was_held = False
         while skill.step() is Status.RUNNING:

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from lab.errors import WorkFailed
+from lab.export.program import PROGRAM, TRAJECTORY
 from lab.files import draft
-from lab.production.composer import Outcome
-from lab.production.durations import Durations
-from lab.sequencing.cell.cell import Cell
+from lab.production.outcome import Outcome
+from lab.production.taught import Taught
 from lab.sequencing.cell.schedule import Schedule
+from lab.sequencing.cell.schedule_rows import csv_of, rows_of
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
@@ -29,18 +30,12 @@ FILES = {
     "overhead": "overhead.png",
     "replay": "replay.html",
     "sequence": "sequence.json",
+    "schedule_table": "schedule.csv",
+    "schedule": "schedule.json",
+    "program": PROGRAM,
+    "trajectory": TRAJECTORY,
     "run": "run.json",
 }
-
-
-@dataclass
-class Taught:
-    """A prepared task whose skills are all there, with the durations of its moves and the cell that they make."""
-
-    lessons: dict[str, Lesson]
-    durations: Durations
-    cell: Cell
-    durations_key: str = ""  # under which they are kept; "": they are not
 
 
 @dataclass
@@ -56,6 +51,7 @@ class Report:
     began_s: float
     wall_s: float = 0.0
     files: dict[str, str] = field(default_factory=dict)
+    receipts: dict[str, Any] | None = None
 
     @property
     def success(self) -> bool:
@@ -69,7 +65,8 @@ class Report:
 
     def to_json(self) -> dict[str, Any]:
         """The document of `lab run --json`."""
-        outcome, prepared = self.outcome, self.prepared
+        outcome, prepared, cell = self.outcome, self.prepared, self.taught.cell
+        verdict = outcome.verdict([cell.part_name(part) for part in range(1, cell.parts + 1)])
         return {
             "task": prepared.task.name,
             "seed": prepared.seed,
@@ -80,7 +77,7 @@ class Report:
             "dropped": len(outcome.dropped),
             "failure": outcome.failure,
             "retries": list(outcome.retries),
-            "skills": [_skill_row(name, lesson) for name, lesson in self.taught.lessons.items()],
+            "skills": list(self.taught.rows.values()),
             "sequence": list(self.sequenced.sequence),
             "predicted_makespan_s": self.sequenced.cost,
             "measured_makespan_s": outcome.schedule.makespan_s if self.success else None,
@@ -91,33 +88,13 @@ class Report:
             "camera_deviation_m": max(outcome.camera_deviations_m, default=None),
             "sim_s": outcome.sim_s - outcome.skipped_s + self.taught.durations.sim_s,
             "skipped_s": outcome.skipped_s,
+            "faults": [*verdict.rows],
+            "outcome": verdict.came,
+            "interrupted": outcome.interrupted,
             "wall_s": self.wall_s,
+            "receipts": self.receipts,
             "files": self.files,
         }
-
-
-def _skill_row(name: str, lesson: Lesson) -> dict[str, Any]:
-    policy, result = lesson.policy, lesson.result
-    return {
-        "name": name,
-        "subtask": policy.subtask,
-        "source": lesson.source,
-        "from_task": lesson.from_task or None,
-        "reason": lesson.reason,
-        "policy": policy.name,
-        "parent": policy.parent,
-        "saved_episodes": lesson.saved[0],
-        "saved_helped_steps": lesson.saved[1],
-        "fitness": None if lesson.fitness is None else asdict(lesson.fitness),
-        "episodes": 0 if result is None else len(result.steps),
-        "moves": 0 if result is None else int(result.visits.sum()),
-        "requests": 0 if result is None else result.requests,
-        "helped_steps": 0 if result is None else result.helped_steps,
-        "rejected_at_episode": None if result is None else result.rejected_at_episode,
-        "optimal_steps": lesson.steps[1],
-        "final_steps": lesson.steps[0],
-        "solved": policy.solved,
-    }
 
 
 def write_files(report: Report, out: Path) -> None:
@@ -144,6 +121,8 @@ def _names(report: Report) -> list[str]:
     missing = set() if report.outcome.schedule.robot else {"gantt"}
     if _photographed(report.prepared) is None:
         missing |= {"value_map", "overhead"}
+    if report.outcome.program is None:
+        missing |= {"program", "trajectory"}
     return [name for name in FILES if name not in missing]
 
 
@@ -175,6 +154,11 @@ def _draw_all(report: Report, folder: Path) -> None:
     title = f"{prepared.task.title or prepared.task.name}: {prepared.words}"
     replay_html(report.recording, paths["replay"], title=title)
     _write_json(paths["sequence"], _sequence_document(report, predicted))
+    rows = rows_of(predicted, taught.cell, "planned") + rows_of(report.outcome.schedule, taught.cell, "measured")
+    paths["schedule_table"].write_text(csv_of(rows), encoding="utf-8")
+    _write_json(paths["schedule"], {"schedule": rows})
+    if report.outcome.program is not None:
+        report.outcome.program.save(folder)
     report.wall_s = time.perf_counter() - report.began_s
     _write_json(paths["run"], report.to_json() | {"schedule": report.outcome.schedule.to_json()})
 

@@ -3,47 +3,62 @@
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from lab.errors import LabError
 from lab.production.composer import carry_out
+from lab.production.conditions import Conditions
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
-from lab.production.recorder import Viewer, show_scene
-from lab.production.report import Report, Taught, write_files
-from lab.sequencing import find_sequence
-from lab.sequencing.methods.exact import optimum
-from lab.sequencing.search import Reference
+from lab.production.faults.draw import draw
+from lab.production.order import OrderAdvice, ordered
+from lab.production.recorder import show_scene
+from lab.production.relearning import Relearner
+from lab.production.report import Report, write_files
+from lab.production.run_journal import DurationsKept, RunEnded, RunJournal
+from lab.production.taught import Taught, skill_row
+from lab.sequencing.simulate.run import simulate
 from lab.skills.prepared_scene import Prepared
 from lab.skills.trial import trial_of
-from lab.tasks.sequencing import search_for
-from lab.teaching.events import MoveTimed, PhaseBegan, RecordSkipped, SequenceFound, SkillReady
-from lab.teaching.lesson_plan import LessonPlan
+from lab.teaching.events import MoveTimed, PhaseBegan, PlanMade, RecordSkipped, ScenePrepared, SkillReady
+from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.teaching.teacher import Teacher
 
 
-def teach_all(prepared: Prepared, teacher: Teacher) -> Taught:
-    """Find or learn every skill, then find or measure the durations of every move."""
-    task, skillset = prepared.task, prepared.skillset
+def teach_all(prepared: Prepared, teacher: Teacher, journal: RunJournal | None = None) -> Taught:
+    """Find or learn every skill, then find or measure the durations of every move; what the journal holds is taken from it."""
+    task, skillset, journal = prepared.task, prepared.skillset, journal or RunJournal()
     teacher = replace(teacher, trial=trial_of(prepared))
     known, damaged = teacher.toolbox.index()
+    known = journal.known_at_first(known)
     for what in damaged:
         teacher.tell(RecordSkipped(what))
+    teacher.tell(ScenePrepared(prepared))
     teacher.tell(PhaseBegan("learn", len(prepared.problems)))
-    lessons, first = {}, dict[str, str]()  # by signature, the skill that it was first found or learned for
+    lessons, rows, first = (
+        dict[str, Lesson](),
+        dict[str, dict[str, Any]](),
+        dict[str, str](),
+    )  # by signature, the skill that it was first found or learned for
     for name, problem in prepared.problems.items():
-        settings = task.subtask(problem.subtask)
-        lesson = teacher.find_or_teach(LessonPlan(problem, settings.learner, settings.gate, task.name), known)
-        same = first.setdefault(f"{problem.subtask} {problem.mdp.signature}", name)
-        if same != name and lesson.source == "reused":  # it would have been learned only once
-            lesson = replace(lesson, reason=f"it is the same problem as '{same}'", saved=(0, 0))
+        kept, same = journal.skill(name), first.setdefault(f"{problem.subtask} {problem.mdp.signature}", name)
+        if kept is not None:
+            lesson, row = Lesson(kept.policy, "reused", reason="it was there before this run was stopped"), kept.row
+        else:
+            settings = task.subtask(problem.subtask)
+            lesson = teacher.find_or_teach(LessonPlan(problem, settings.learner, settings.gate, task.name), known)
+            if same != name and lesson.source == "reused":  # it would have been learned only once
+                lesson = replace(lesson, reason=f"it is the same problem as '{same}'", saved=(0, 0))
+            row = skill_row(name, lesson)
+            journal.keep_skill(row, lesson.policy)
         known[problem.subtask, lesson.policy.signature] = lesson.policy
         skillset.policies[name] = lesson.policy
-        lessons[name] = lesson
+        lessons[name], rows[name] = lesson, row
         teacher.tell(SkillReady(name, lesson))
-    durations, key = _durations(prepared, teacher)
-    return Taught(lessons, durations, cell_of(task, durations, prepared.order), key)
+    durations, key = _durations(prepared, teacher, journal)
+    return Taught(lessons, rows, durations, cell_of(task, durations, prepared.order), key)
 
 
-def _durations(prepared: Prepared, teacher: Teacher) -> tuple[Durations, str]:
+def _durations(prepared: Prepared, teacher: Teacher, journal: RunJournal) -> tuple[Durations, str]:
     """The durations measured earlier for exactly these policies in exactly this scene, or measured now and kept; their key.
 
     The key is "" where they cannot be kept.
@@ -51,43 +66,53 @@ def _durations(prepared: Prepared, teacher: Teacher) -> tuple[Durations, str]:
     skillset, key, kept = prepared.skillset, "", None
     try:
         key = durations_key(prepared.task, prepared.layout, skillset, skillset.policies)
+        record = journal.durations()
+        if record is not None:
+            return replace(Durations.from_json(record.times, skillset), sim_s=record.sim_s), key
         kept = kept_durations(teacher.toolbox, key, skillset)
     except LabError as error:  # then they are measured: nothing is lost but time
         teacher.tell(RecordSkipped(f"durations measured earlier: {error}"))
-    if kept is not None:
-        return kept, key
-    works = sum(bool(skills) for skills in (*skillset.processes.values(), *skillset.services.values()))
-    teacher.tell(PhaseBegan("measure", len(skillset.legs) + len(skillset.travels) + works))
-    durations = measure(prepared, lambda name, seconds: teacher.tell(MoveTimed(name, seconds)))
-    if key:
-        teacher.toolbox.save_record(RECORDS, key, durations.to_json())
-    return durations, key
+    if kept is None:
+        works = sum(bool(skills) for skills in (*skillset.processes.values(), *skillset.services.values()))
+        teacher.tell(PhaseBegan("measure", len(skillset.legs) + len(skillset.travels) + works))
+        kept = measure(prepared, lambda name, seconds: teacher.tell(MoveTimed(name, seconds)))
+        if key:
+            teacher.toolbox.save_record(RECORDS, key, kept.to_json())
+    journal.write(DurationsKept(kept.to_json(), kept.sim_s))
+    return kept, key
 
 
-def run(
-    prepared: Prepared, teacher: Teacher, out: Path, *, override: float = 1.0, viewer: Viewer | None = None
-) -> Report:
+def run(prepared: Prepared, teacher: Teacher, out: Path, conditions: Conditions | None = None) -> Report:
     """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.files.check_out`).
 
-    override: the arm's share of its speed (see `carry_out`). How long moves took is kept, and the next run plans with it.
+    How long moves took is kept, and the next run plans with it. Ctrl-C while it is carried out ends it with what came of it
+    until then; the journal goes on from there.
     """
+    conditions = conditions or Conditions()
     began = time.perf_counter() - prepared.wall_s
-    if viewer is not None:
-        show_scene(prepared.task, prepared.order, prepared.layout, viewer)
-    taught = teach_all(prepared, teacher)
+    if conditions.viewer is not None:
+        show_scene(prepared.task, prepared.order, prepared.layout, conditions.viewer)
+    taught = teach_all(prepared, teacher, conditions.journal)
     teacher.tell(PhaseBegan("sequence", 1))
-    settings = prepared.task.sequencing
-    found = find_sequence(taught.cell, settings.method, search_for(settings), prepared.seed)
-    proven = optimum(taught.cell)
-    teacher.tell(SequenceFound(found, Reference(proven.bound_s, proven.proven, "A*")))
-    teacher.tell(PhaseBegan("carry out", len(found.sequence)))
-    outcome, recording = carry_out(
-        prepared, taught.cell, found.sequence, override=override, viewer=viewer, tell=teacher.tell
-    )
-    report = Report(prepared, taught, found, proven, outcome, recording, began)
+    advice, people = conditions.advice, teacher.advising.people
+    whose = OrderAdvice() if advice is None else advice.order(people, taught.durations.to_json())
+    order = ordered(taught.cell, prepared.task.sequencing, whose, prepared.seed, teacher.tell)
+    planned = simulate(taught.cell, order.found.sequence)
+    gap, proven = order.proven.gap(order.found.cost), order.proven.proven
+    teacher.tell(PhaseBegan("carry out", len(order.found.sequence)))
+    teacher.tell(PlanMade(planned, len(order.found.sequence), gap, proven, 0.0))
+    faults = prepared.task.faults
+    if conditions.fault_seed is not None:
+        faults += draw(prepared.task, prepared.order, conditions.fault_seed, order.found.cost)
+    conditions, relearner = replace(conditions, faults=faults), Relearner(prepared, taught, teacher)
+    outcome, recording = carry_out(prepared, taught.cell, order.found.sequence, conditions, teacher.tell, relearner)
+    receipts = None if advice is None else advice.receipts(order)
+    report = Report(prepared, taught, order.found, order.proven, outcome, recording, began, receipts=receipts)
     teacher.tell(PhaseBegan("draw", 1))
     write_files(report, out)
-    remember(report, teacher)
+    if not outcome.interrupted:
+        remember(report, teacher)
+        conditions.journal.tell(RunEnded(len(outcome.delivered), outcome.failure or ""))
     return report
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from lab.errors import WorkFailed
 from lab.sim import urdf_reader
 from lab.sim.frames import Body, Frame, Pose, Rgba, Shape
-from lab.sim.mesh_file import text_corners
-from lab.sim.parts.part_shape import PartShape, visual_arrays
+from lab.sim.parts.part_body import seen_of, solid_of
+from lab.sim.parts.part_shape import PartShape
 from lab.sim.silence import silence
 
 TIME_STEP = 1.0 / 240.0  # [s]
@@ -51,6 +51,7 @@ class World:
         self._bodies: dict[str, _Entry] = {}
         self._names: dict[int, str] = {}
         self.steps = 0
+        self.dark = False  # whether cameras see nothing
         self._call("setGravity", 0, 0, -9.81)
         self._call(
             "setPhysicsEngineParameter",
@@ -155,7 +156,7 @@ class World:
         entry = _Entry(-1, True, (tuple(position), turn), looks={"": shape.looks}, turn=shape.turn)
         body = self._turned(turn, shape.turn)
         with silence():
-            solid, seen = self._solid(shape), self._seen(shape)
+            solid, seen = solid_of(self._p, self._call, shape), seen_of(self._p, self._call, shape)
             entry.number = self._call("createMultiBody", mass_kg, solid, seen, list(position), list(body))
         moments, rolling = (
             [float(f"{one * mass_kg:.12g}") for one in shape.inertia_m2],
@@ -164,34 +165,6 @@ class World:
         self._call("changeDynamics", entry.number, -1, localInertiaDiagonal=moments, rollingFriction=rolling)
         self._add(name, entry)
         self.friction(name, friction, spinning=PART_SPINNING)
-
-    def _solid(self, shape: PartShape) -> int:
-        """What physics feels of a part, in its principal axes."""
-        if shape.solid == "box":
-            return int(self._call("createCollisionShape", self._p.GEOM_BOX, halfExtents=[s / 2 for s in shape.size]))
-        if shape.solid == "cylinder":
-            diameter, height = shape.size
-            return int(self._call("createCollisionShape", self._p.GEOM_CYLINDER, radius=diameter / 2, height=height))
-        corners = shape.hull @ urdf_reader.rotation(shape.turn)  # (n, 3), from the part's axes into the principal ones
-        return int(self._call("createCollisionShape", self._p.GEOM_MESH, vertices=corners.tolist()))
-
-    def _seen(self, shape: PartShape) -> int:
-        """What cameras see of a part, in its principal axes; of meshes in text, which PyBullet cannot read, the first."""
-        back = self._p.invertTransform([0, 0, 0], list(shape.turn))[1]
-        places = [self._p.multiplyTransforms([0, 0, 0], back, look.position, look.quaternion) for look in shape.looks]
-        if (corners := text_corners(shape.looks[0].mesh)) is not None:
-            look, place = (
-                shape.looks[0],
-                dict(zip(("visualFramePosition", "visualFrameOrientation"), places[0], strict=True)),
-            )
-            corners, faces = corners * (look.size or (1.0, 1.0, 1.0)), list(range(len(corners)))
-            place |= {"vertices": corners.tolist(), "indices": faces, "rgbaColor": look.rgba}
-            return int(self._call("createVisualShape", self._p.GEOM_MESH, **place))
-        arrays = visual_arrays(shape.looks)
-        kinds = [getattr(self._p, f"GEOM_{look.kind.upper()}") for look in shape.looks]
-        at, turns = ([list(one) for one in ways] for ways in zip(*places, strict=True))  # PyBullet crashes over tuples
-        arrays |= {"shapeTypes": kinds, "visualFramePositions": at, "visualFrameOrientations": turns}
-        return int(self._call("createVisualShapeArray", **arrays))
 
     def _turned(self, turn: Position, by: Position) -> Position:
         """The turn `by` followed by `turn`, quaternions xyzw."""
@@ -217,12 +190,24 @@ class World:
         self._call("changeDynamics", number, -1, mass=mass_kg, localInertiaDiagonal=inertia)
 
     def put(self, name: str, position: Position, quaternion: Position = NO_TURN) -> None:
-        """Set a body down somewhere while the scene is built or surveyed: `position` [m], `quaternion` xyzw."""
+        """Set a body down somewhere at once, a fixed one, too: `position` [m], `quaternion` xyzw; a part then rests."""
         if not np.isfinite([*position, *quaternion]).all():
             raise WorkFailed(f"body '{name}' cannot be put at {list(position)}: not finite")
         entry = self._bodies[name]
-        turn = self._turned(quaternion, entry.turn)
-        self._call("resetBasePositionAndOrientation", entry.number, list(position), list(turn))
+        at, turn = position, self._turned(quaternion, entry.turn)
+        if not entry.moves:  # PyBullet wants to know where the centre of its base's mass comes to be
+            off = self._call("getDynamicsInfo", entry.number, -1)[3:5]
+            at, turn = self._p.multiplyTransforms(list(at), list(turn), *off)
+        self._call("resetBasePositionAndOrientation", entry.number, list(at), list(turn))
+        entry.pose = (tuple(position), tuple(quaternion))
+
+    def names(self) -> list[str]:
+        """All bodies, in the order in which they came."""
+        return list(self._bodies)
+
+    def looks(self, name: str) -> tuple[Shape, ...]:
+        """What is to be seen of a body that has no links."""
+        return self._bodies[name].looks.get("", ())
 
     def pose(self, name: str, link: str = "") -> tuple[Array, Array]:
         """Position (3,) [m] and quaternion (4,) xyzw of a body's or a link's frame in the world."""
@@ -300,6 +285,11 @@ class World:
         chosen = {"linkIndexA": first.links[link]} if link else {}
         return bool(self._call("getContactPoints", first.number, second.number, **chosen))
 
+    def bounds(self, name: str) -> tuple[Array, Array]:
+        """The lowest and the highest corner (3,) [m] of the box along the world's axes that a body fills."""
+        low, high = self._call("getAABB", self._bodies[name].number)
+        return np.array(low), np.array(high)
+
     def pressed(self, name: str) -> tuple[str, float]:
         """The body that a body pressed on most in the last step, and with which force [N]; ("", 0) when it touched none."""
         forces: dict[int, float] = {}
@@ -322,6 +312,8 @@ class World:
 
     def render(self, view: Array, projection: Array, width: int, height: int) -> NDArray[np.uint8]:
         """The picture (height, width, 3) uint8 RGB through OpenGL-style `view` and `projection` matrices, each (4, 4)."""
+        if self.dark:
+            return np.zeros((height, width, 3), np.uint8)
         _, _, pixels, _, _ = self._call(
             "getCameraImage",
             width,

@@ -15,7 +15,9 @@ from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.kinds import Spot
 from lab.skills.looking import look_at
 from lab.skills.place import let_go, release_pose
-from lab.skills.skill import Bench, Photo, Skill, SkillFailed, learned_path, no_way, over_everything
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import Bench, Photo, Skill, learned_path, no_way, over_everything
+from lab.skills.state_words import plain
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Obstacle
@@ -125,6 +127,10 @@ class Insert(Skill):
         """Over the middle of the grid's cell."""
         i, j = self.problem.mdp.state_cell(state)
         return ToolPose(*self.seen.view.centre((i, j)), self.grid.settings.height_m, 0.0)
+
+    def way_in_words(self) -> tuple[str, str]:
+        """The part comes to the machine, seen from above."""
+        return f"{plain(self.kind).capitalize()} in the fingers is", f"the slot of {plain(self.station)}"
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Cell by cell, each time seen by the camera; then above the slot, down, let go, and see that the part is in it."""

@@ -6,8 +6,8 @@ from math import hypot
 
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.kinds import Spot
-from lab.skills.sight import ABOVE_M
-from lab.skills.skill import Bench, SkillFailed, over_everything
+from lab.skills.sight import ABOVE_M, SkillFailed
+from lab.skills.skill import Bench, over_everything
 from lab.skills.surveys import Surveys
 
 FAR_M = 0.2  # [m] a tool farther from the station's approach, as when trying again, comes over everything

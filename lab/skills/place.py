@@ -12,7 +12,9 @@ from lab.sim.scene.scene import pallet_of
 from lab.skills.around_part import SLOW, AroundPart
 from lab.skills.camera_grids import RELEASE_ABOVE
 from lab.skills.looking import look_at
-from lab.skills.skill import Bench, SkillFailed
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import Bench
+from lab.skills.state_words import plain
 from lab.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -41,6 +43,10 @@ class Place(AroundPart):
     def goal_pose(self) -> ToolPose:
         """Where the tool lets go of a part held as it is to be held."""
         return super().goal_pose().shifted(dz=RELEASE_ABOVE)
+
+    def way_in_words(self) -> tuple[str, str]:
+        """The part comes to its spot."""
+        return f"{plain(self.kind).capitalize()} in the fingers is", f"its place at {plain(self.station)}"
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Go above the spot, follow the learned cells down, let go, rise, and see that the part stands."""

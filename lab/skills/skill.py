@@ -18,6 +18,7 @@ from lab.sim.parts.kinds import Kind, Spot, on_its_pallet
 from lab.sim.scene.blocked_cells import FINGERS_OFF_M
 from lab.sim.scene.scene import Scene, pallet_of
 from lab.skills.sight import Sight
+from lab.skills.state_words import away_in_words, size_in_words
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Stage
 from lab.vision import GridView
@@ -30,6 +31,8 @@ LOST_M = 0.03  # [m] a part farther than this from where the fingers hold it is 
 UPRIGHT = 0.97  # cosine of the largest tilt of a part that stands
 SETTLE_STEPS = 60  # physics steps until a new scene is at rest
 STAND_STEPS = 15  # physics steps until what was put somewhere at once is at rest
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of a way across at which it is seen whether the arm reaches it
+DOWN_M = 0.03  # [m] between two heights that are tried for it
 NOT_OFF = (0.0, 0.0, 0.0)  # of a part that stands on its spot
 
 
@@ -210,6 +213,34 @@ class Skill:
 
     # ---- what it shows -------------------------------------------------------------------------------------------
 
+    def in_words(self, state: int) -> str:
+        """Where the tool is in a state of the problem, seen from the goal, for somebody who knows no table."""
+        mdp = self.problem.mdp
+        if len(mdp.action_labels) != 2 * len(mdp.shape):
+            return f"{self.way_in_words()[0]} in state {mdp.state_label(state)}."
+        goal = mdp.state_cell(int(np.flatnonzero(mdp.goal)[0]))
+        by = [here - there for here, there in zip(mdp.state_cell(state), goal, strict=True)]
+        return away_in_words(*self.way_in_words(), by, mdp.action_labels, self.cell_steps())
+
+    def way_in_words(self) -> tuple[str, str]:
+        """What moves, with its verb, and to where: "The open fingers are", "where they close on the slice"."""
+        return "The tool is", "its goal"
+
+    def cell_steps(self) -> tuple[float, ...]:
+        """How far a cell is from the next along each axis of the problem's grid [m], about the vertical [rad]."""
+        shape = self.problem.mdp.shape
+        cells = [(0,) * len(shape), *np.eye(len(shape), dtype=int)]
+        first, *others = (self.pose(int(np.ravel_multi_index(cell, shape, mode="clip"))) for cell in cells)
+        return tuple(hypot(p.x - first.x, p.y - first.y, p.z - first.z) or abs(p.yaw - first.yaw) for p in others)
+
+    def moves_in_words(self) -> tuple[str, ...]:
+        """How far each action goes, such as "1.2 cm"."""
+        labels = self.problem.mdp.action_labels
+        if len(labels) != 2 * len(self.problem.mdp.shape):
+            return ("",) * len(labels)
+        steps = self.cell_steps()
+        return tuple(size_in_words(label, steps[action // 2]) for action, label in enumerate(labels))
+
     def show(self, bench: Bench, state: int) -> bool:
         """Put the bench into a state at once, without physics; False, and nothing moves, when the arm cannot reach it."""
         pose = self.pose(state)
@@ -307,12 +338,26 @@ class Skill:
 
 
 def over_everything(bench: Bench, end: ToolPose) -> Iterator[None]:
-    """Bring the tool from wherever it is to `end`, over all that stands in the cell: up, across, down."""
-    robot, grid = bench.scene.robot, bench.scene.task.workspace
-    high = max(end.z, grid.lower_m[2] + (grid.shape[2] - 0.5) * grid.cell_m[2])
-    tool = robot.tool()
+    """Bring the tool from wherever it is to `end`, over all that stands in the cell: up, across, down.
+
+    As high as the workspace, or as high as the arm reaches on that way.
+    """
+    robot, tool = bench.scene.robot, bench.scene.robot.tool()
+    high = _reachable_height(bench, tool, end)
     for pose in (ToolPose(tool.x, tool.y, high, end.yaw), ToolPose(end.x, end.y, high, end.yaw), end):
         yield from robot.follow([pose])
+
+
+def _reachable_height(bench: Bench, tool: ToolPose, end: ToolPose) -> float:
+    """The greatest height [m] up to the top of the workspace at which the arm reaches all of the way across to `end`."""
+    arm, grid = bench.scene.robot.arm, bench.scene.task.workspace
+    top = max(end.z, grid.lower_m[2] + (grid.shape[2] - 0.5) * grid.cell_m[2])
+    across = [tool.x + t * (end.x - tool.x) for t in SHARES], [tool.y + t * (end.y - tool.y) for t in SHARES]
+    for high in np.arange(top, max(end.z, min(tool.z, top)), -DOWN_M):
+        ways = np.array([[x, y, high, yaw] for x, y in zip(*across, strict=True) for yaw in {tool.yaw, end.yaw}])
+        if not np.isnan(arm.inverse_each(ways)[:, 0]).any():
+            return float(high)
+    return max(end.z, min(tool.z, top))
 
 
 def learned_path(policy: "Policy", mdp: TabularMDP, start: int) -> list[int]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lab.sequencing.search import SAME
-from lab.studies.statistics import interval, share, within
+from lab.statistics import interval, share, within
 
 Row = dict[str, Any]  # settings under their names, then measure, value, ci95, thesis, within
 

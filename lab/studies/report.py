@@ -12,8 +12,8 @@ from typing import Any
 
 from lab import __version__, files
 from lab.errors import BadInput, WorkFailed
+from lab.statistics import PERCENT_POINTS, RELATIVE, allowed
 from lab.studies.findings import Findings
-from lab.studies.statistics import PERCENT_POINTS, RELATIVE, allowed
 
 Row = Mapping[str, Any]  # settings under their names, and RESULTS; `lab_version` where another version measured it
 Line = tuple[tuple[str, Any], ...]  # some settings of a row

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
 from lab.errors import BadInput, counted, unknown
 from lab.files import assets_folder
+from lab.tasks.fault_fields import FaultFields
 from lab.tasks.record import Name, Record, as_tuple
 from lab.tasks.robot_fields import RobotSettings
 from lab.tasks.sequencing import Sequencing
@@ -51,6 +52,7 @@ class Task(Record):
     stations: Annotated[tuple[Station, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=MOST_THINGS)]
     processes: dict[Name, Process] = Field(default={})
     obstacles: Annotated[tuple[Obstacle, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
+    faults: Annotated[tuple[FaultFields, ...], BeforeValidator(as_tuple), Field(max_length=MOST_THINGS)] = ()
     subtasks: dict[str, Subtask] = Field(default={})
     sequencing: Sequencing = Sequencing()
     _folder: Path | None = PrivateAttr(default=None)
@@ -235,14 +237,31 @@ class Task(Record):
         if stage.service is not None and stage.service not in robots:
             raise unknown("service", stage.service, robots, f"processes for {where}")
         if place.kind != "machine":
-            if stage.processing_s is not None:
-                raise ValueError(f"{where}: only a machine has processing_s, it is a {place.kind}")
+            for field in ("processing_s", "at_most_s"):
+                if getattr(stage, field) is not None:
+                    raise ValueError(f"{where}: only a machine has {field}, it is a {place.kind}")
         elif place.process is not None and stage.processing_s is not None:
             raise ValueError(
                 f"{where}: processing_s = {stage.processing_s:g}, but its process '{place.process}' is learned"
             )
         elif place.process is None and place.processing_s is None and stage.processing_s is None:
             raise ValueError(f"machine '{place.name}' needs either processing_s or process, a sub-task to learn")
+
+    @model_validator(mode="after")
+    def _faults_known(self) -> Self:
+        machines = [place.name for place in self.stations if place.kind == "machine"]
+        for number, fault in enumerate(self.faults, start=1):
+            where = f"fault {number}"
+            stations = machines if fault.what.startswith("machine") else [place.name for place in self.stations]
+            if fault.station is not None and fault.station not in stations:
+                raise unknown("station", fault.station, stations, where)
+            if fault.obstacle is not None and fault.obstacle not in [one.name for one in self.obstacles]:
+                raise unknown("obstacle", fault.obstacle, [one.name for one in self.obstacles], where)
+            if fault.part is not None and fault.part.rpartition(" ")[0] not in [part.name for part in self.made]:
+                raise unknown("part", fault.part, [f"{part.name} 1" for part in self.made], where)
+            if fault.what == "camera blind" and self.camera is None:
+                raise ValueError(f"{where}: what = 'camera blind': the task has no [camera]")
+        return self
 
     @model_validator(mode="after")
     def _members_known(self) -> Self:

@@ -4,7 +4,7 @@ import json
 import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from shlex import quote
 from typing import Any, TypeVar
@@ -19,7 +19,7 @@ from lab.learning.problem import Problem
 from lab.mdp import FloatArray
 from lab.tasks.record import write_whole
 from lab.teaching.lesson_options import LessonOptions, SessionOptions
-from lab.teaching.lesson_plan import MAX_SESSIONS, Keep, LessonPlan
+from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.folder_place import FolderPlace
 from lab.toolbox.names import SUFFIX, default_address, slug
 from lab.toolbox.policy import Policy
@@ -162,16 +162,6 @@ def claimed(toolbox: Toolbox, name: str, make: Callable[[Path], None]) -> Path:
     raise BadInput(f"toolbox {toolbox.folder}: it holds {_MOST} sessions of '{name}': remove some")
 
 
-def kept_by(toolbox: Toolbox, options: LessonOptions) -> Keep:
-    """Keeps the journal of each lesson of a run in the toolbox; it can be replayed, gone on with, and advise again."""
-
-    def keep(plan: LessonPlan) -> Journal:
-        own = replace(options, subtask=plan.problem.name, sessions=MAX_SESSIONS)
-        return NewSession(None, toolbox, own).keep(plan)
-
-    return keep
-
-
 class KeptSession(SessionInFolder):
     """A session that was kept: to go on with it, or (`read_only`) to look at it again. Raises BadInput for none.
 
@@ -231,11 +221,16 @@ class KeptSession(SessionInFolder):
 
 def check_same(given: Any, read: Read) -> None:
     """BadInput when a command that goes on with a session names options, too, or when the session is over."""
-    for name, value in asdict(given).items():
-        if value != getattr(type(given)(), name):
-            option, folder = given.typed.get(name, f"--{name}"), read.path.parent
-            raise BadInput(f"{option} beside --resume {folder}: a session goes on as it was begun: leave it away")
+    check_alone(given, type(given)(), read.path.parent)
     read.check_goes_on()
+
+
+def check_alone(given: Any, nothing: Any, folder: Path) -> None:
+    """BadInput when options were given beside --resume; `nothing`: what they are when none is."""
+    for name, value in asdict(given).items():
+        if value != getattr(nothing, name):
+            option = given.typed.get(name, f"--{name}")
+            raise BadInput(f"{option} beside --resume {folder}: it goes on as it was begun: leave it away")
 
 
 def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:

@@ -48,6 +48,12 @@ def whole_path(name: str | None) -> str | None:
     return str(Path(name).absolute()) if name is not None and is_file else name
 
 
+def recorded_whole(advisor: str) -> str:
+    """An advisor's name; one that was recorded by the whole path of its folder."""
+    head, _, path = advisor.partition("recorded:")
+    return f"recorded:{Path(path).absolute()}" if path and not head else advisor
+
+
 @dataclass(frozen=True)
 class LessonOptions(SessionOptions):
     """The options of `lab teach` that a session depends on, by name; None or empty: not given.
@@ -98,9 +104,5 @@ class LessonOptions(SessionOptions):
     def to_json(self) -> dict[str, Any]:
         """A plain dict, files by their whole paths, so that they are found from another folder."""
 
-        def recorded(name: str) -> str:
-            head, _, path = name.partition("recorded:")
-            return f"recorded:{Path(path).absolute()}" if path and not head else name
-
         changed = {"subtask": whole_path(self.subtask), "task": whole_path(self.task)}
-        return asdict(self) | changed | {"advisors": [recorded(name) for name in self.advisors]}
+        return asdict(self) | changed | {"advisors": [recorded_whole(name) for name in self.advisors]}

@@ -140,6 +140,15 @@ class KnownPolicies(MutableMapping[Key, "Policy"]):
         found.sort(key=lambda key: str(self._rows[key]["created"]), reverse=True)
         return [(key, self._rows[key]["name"]) for key in found]
 
+    def made(self) -> dict[str, str]:
+        """When each was made, by sub-task and signature."""
+        return {" ".join(key): str(row["created"]) for key, row in self._rows.items()}
+
+    def only(self, made: Mapping[str, str]) -> "KnownPolicies":
+        """Those alone that are in such a table, and were not made anew since."""
+        rows = {key: row for key, row in self._rows.items() if made.get(" ".join(key)) == str(row["created"])}
+        return KnownPolicies(rows, self._load)
+
     def __getitem__(self, key: Key) -> "Policy":
         if key not in self._read:
             try:

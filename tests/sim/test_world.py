@@ -242,3 +242,41 @@ def test_a_ball_that_is_pushed_comes_to_rest(tmp_path: Path) -> None:
             places.append(world.pose("ball")[0])
     assert places[0][0] > 0.01
     assert places[1] == pytest.approx(places[0], abs=1e-3)
+
+
+@pytest.mark.parametrize("body", ["toaster.urdf", "applier.urdf", "a box"])
+def test_a_fixed_body_that_is_put_elsewhere_is_there_for_all(world: World, body: str) -> None:
+    """Pose, links, rays and distances: 10 cm on, all of them; PyBullet counts a URDF's place from the centre of its mass."""
+    if body == "a box":
+        world.box("it", (0.2, 0.2, 0.2), (0, 0, 0.1), WOOD)
+    else:
+        world.load("it", assets_folder() / body)
+    world.box("wall", (0.1, 2.0, 2.0), (1.0, 0, 0), WOOD)
+    (x, y, z), turn = world.pose("it")
+    before = world.nearest("it", "wall", 2.0), {name: pose[:3] for name, pose in world.frame().poses.items()}
+    world.put("it", (x + 0.1, y, z), turn)
+    world.step()
+    assert world.nearest("it", "wall", 2.0) == pytest.approx(before[0] - 0.1, abs=1e-5)
+    for name, (i, j, k) in before[1].items():
+        on = 0.1 if name != "wall" else 0.0
+        assert world.frame().poses[name][:3] == pytest.approx((i + on, j, k), abs=2e-3), name  # an unheld head sags
+
+
+def test_a_part_that_is_put_somewhere_rests_there(world: World) -> None:
+    world.load("it", SLICE, (0, 0, 2.0), fixed=False)
+    for _ in range(100):
+        world.step()
+    world.put("it", (0, 0, 1.0))
+    world.step()
+    assert world.pose("it")[0][2] == pytest.approx(1.0, abs=1e-3)  # g dt^2 = 0.17 mm of its fall
+
+
+def test_a_covered_camera_sees_black_and_then_again(world: World) -> None:
+    world.box("table", (1, 1, 0.1), (0, 0, 0), (1.0, 1.0, 1.0, 1.0))
+    camera = Camera.overhead((0, 0, 1.0), 0.5, 32)
+    seen = camera.picture(world)
+    world.dark = True
+    assert seen.any()
+    assert not camera.picture(world).any()
+    world.dark = False
+    assert (camera.picture(world) == seen).all()

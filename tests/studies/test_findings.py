@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from lab.statistics import interval, proportion_interval, within
 from lab.studies.findings import agreement, mean_row, median_row, row, share_row, those, varying_row
-from lab.studies.statistics import interval, proportion_interval, within
 
 
 def test_a_row_says_whether_it_agrees() -> None:

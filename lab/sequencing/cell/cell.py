@@ -1,7 +1,7 @@
 """A cell: stations, products with their routes, an order of parts, and one transfer robot. What is to be sequenced."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -9,8 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput, unknown
-from lab.sequencing.cell.routes import NeededMoves, Position, moves_between, positions_of
-from lab.sequencing.cell.stations import MAX_S, Arrivals, Product, Route, Station, check_layout, check_seconds, is_count
+from lab.sequencing.cell.routes import NeededMoves, Position, moves_between, open_ways, positions_of, reached_from
+from lab.sequencing.cell.stations import (
+    MAX_S,
+    Arrivals,
+    Begins,
+    Product,
+    Route,
+    Station,
+    check_layout,
+    check_seconds,
+    is_count,
+)
 
 MAX_PARTS = 200
 BUFFER_USES = ("busy", "free")
@@ -25,7 +35,9 @@ class Cell:
     row to station column, in the order of `stations`; NaN: no such move; staying takes 0 s. arrivals None: all parts
     wait at their first station, and may be taken in any order; else they come, and are taken, in their order. buffers:
     "busy", a buffer is used only when the station ahead is full; "free", the robot chooses. due_s: when each part is
-    wanted [s].
+    wanted [s]. begins: where each part is at time 0, None: all at their first stations; the makespan is then the last
+    arrival of those that are not finished yet. closed: stations to which nothing may be brought, such as a machine that is
+    out of order. `lab.sequencing.simulate.rest.rest_of` makes such a cell of a run that has come to its middle.
     Raises BadInput for what cannot be a cell, and for a missing time that a route needs (see `needed_moves`).
     Source: thesis ch. 7 (rules), tables 7.1 and 7.2 (times); App. III (pallets, arrivals, vacuuming).
     """
@@ -39,6 +51,8 @@ class Cell:
     arrivals: Arrivals | None = None
     buffers: Literal["busy", "free"] = "busy"
     due_s: tuple[float, ...] | None = None
+    begins: tuple[Begins, ...] | None = None
+    closed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_layout(self.stations, self.products)
@@ -47,6 +61,9 @@ class Cell:
         if self.buffers not in BUFFER_USES:
             raise unknown("use of buffers", self.buffers, BUFFER_USES, "cell")
         self._check_order()
+        for name in self.closed:
+            self.index(name)
+        self._check_begins()
         self._check_times()
         for field, needed in (("empty_s", self.needed.empty), ("loaded_s", self.needed.loaded)):
             object.__setattr__(self, field, _checked_table(field, getattr(self, field), self.names, needed))
@@ -83,18 +100,65 @@ class Cell:
     @cached_property
     def positions(self) -> tuple[Position, ...]:
         """Every place on a route where a part of the order may stand between two moves."""
+        shut = {self.index(name) for name in self.closed}
+        taken = [station for at in self._stay for station in at.holds]
+        shut |= {station for station in taken if taken.count(station) >= self.capacities[station]}
+        return (*open_ways(self.laid_out, shut), *self._stay)
+
+    @cached_property
+    def laid_out(self) -> tuple[Position, ...]:
+        """The positions with all their ways, whatever is closed, and none for parts that stay where they are."""
         return positions_of(self.stations, self.products, self.buffers)
 
     @cached_property
     def starts(self) -> tuple[int, ...]:
-        """The position in which each part begins, part 1 first."""
-        first = {place.product: index for index, place in reversed([*enumerate(self.positions)])}
-        return tuple(first[[product.name for product in self.products].index(name)] for name in self.order)
+        """The first position of each part's routes, part 1 first."""
+        first = {place.product: index for index, place in reversed([*enumerate(self.laid_out)])}
+        return tuple(first[product] for product in self._products)
+
+    @cached_property
+    def begin_at(self) -> tuple[int, ...]:
+        """The position in which each part begins, part 1 first: one without options where it has nothing to do."""
+        if self.begins is None:
+            return self.starts
+        stay = iter(range(len(self.laid_out), len(self.laid_out) + len(self._stay)))
+        end = {place.product: index for index, place in enumerate(self.laid_out) if not place.options}
+        return tuple(
+            end[product] if one.position is None else next(stay) if one.stays else one.position
+            for product, one in zip(self._products, self.begins, strict=True)
+        )
+
+    @cached_property
+    def begin_s(self) -> tuple[float, ...]:
+        """When each part may be picked where it begins, as far as arrivals do not say so [s]."""
+        return tuple(one.ready_s for one in self.begins) if self.begins is not None else (0.0,) * self.parts
+
+    @cached_property
+    def coming(self) -> tuple[int, ...]:
+        """The parts that begin at the start of their routes, in the order in which they come where parts arrive."""
+        return tuple(n for n, (at, start) in enumerate(zip(self.begin_at, self.starts, strict=True), 1) if at == start)
+
+    @cached_property
+    def unfinished(self) -> tuple[int, ...]:
+        """The parts for which there is something to do."""
+        return tuple(n for n, at in enumerate(self.begin_at, 1) if self.positions[at].options)
 
     @cached_property
     def needed(self) -> NeededMoves:
         """The moves that some allowed sequence may contain (see `needed_moves`)."""
-        return needed_moves(self.stations, self.products, self.robot_start, self.parts, self.buffers)
+        begins = sorted({self.begin_at[part - 1] for part in self.unfinished})
+        first = [way for at in begins for way in self.positions[at].options]
+        if self.begins is not None:
+            taken = [station for at in self.begin_at for station in self.positions[at].holds]
+            full = [taken.count(station) >= room for station, room in enumerate(self.capacities)]
+            first = [way for way in first if way.possible(full)]
+        return moves_between(self.stations, self.positions, begins, first, self.robot_start, len(self.unfinished))
+
+    @cached_property
+    def possible_moves(self) -> int:
+        """How many moves all parts may make, by all their routes."""
+        ahead = {at: reached_from(self.positions, {at}) for at in set(self.begin_at)}
+        return sum(len(self.positions[place].options) for at in self.begin_at for place in ahead[at])
 
     @cached_property
     def most_choices(self) -> int:
@@ -102,12 +166,25 @@ class Cell:
         return 1 + max(option.choice for place in self.positions for option in place.options)
 
     @cached_property
+    def has_windows(self) -> bool:
+        """Whether a part may be spoilt where it is picked too late."""
+        return any(place.at_most_s is not None for place in self.positions)
+
+    def at_most_s(self, part: int, station: str) -> float | None:
+        """How long after its processing at a station a part may be picked [s]; None: at any time."""
+        product, at = self._products[part - 1], self.index(station)
+        found = [
+            p.at_most_s for p in self.laid_out if p.product == product and at in p.holds and p.at_most_s is not None
+        ]
+        return min(found, default=None)
+
+    @cached_property
     def longest_s(self) -> float:
         """A time that no sequence exceeds: everything slowest, one after the other [s]."""
         slowest_s = sum(float(np.nanmax(table, initial=0.0)) for table in (self.empty_s, self.loaded_s))
         service_s = max((option.service_s for place in self.positions for option in place.options), default=0.0)
         process_s = sum(place.processing_s or 0.0 for place in self.positions)
-        come_s = sum(self.arrivals.interval_s) if self.arrivals else 0.0
+        come_s = (sum(self.arrivals.interval_s) if self.arrivals else 0.0) + max(0.0, *self.begin_s)
         return self.parts * (len(self.positions) * (slowest_s + service_s) + process_s) + come_s
 
     def index(self, name: str) -> int:
@@ -120,6 +197,41 @@ class Cell:
     def part_name(self, part: int) -> str:
         """What a part is called in pictures and schedules: its product and its number."""
         return f"{self.order[part - 1]} {part}"
+
+    @cached_property
+    def _products(self) -> tuple[int, ...]:
+        """The product of each part, by index."""
+        names = [product.name for product in self.products]
+        return tuple(names.index(name) for name in self.order)
+
+    @cached_property
+    def _stay(self) -> tuple[Position, ...]:
+        """A position for each part that stays where it is: it takes its room, and leads nowhere."""
+        stay = [one.position for one in self.begins or () if one.stays and one.position is not None]
+        return tuple(replace(self.laid_out[place], processing_s=0.0, options=()) for place in stay)
+
+    def _check_begins(self) -> None:
+        begins = self.begins if self.begins is not None else [Begins(start) for start in self.starts]
+        if len(begins) != self.parts:
+            raise BadInput(f"begins has {len(begins)} parts; the order has {self.parts}")
+        for part, (one, product) in enumerate(zip(begins, self._products, strict=True), 1):
+            where = f"begin of {self.part_name(part)}"
+            own = [n for n, place in enumerate(self.laid_out) if place.product == product]
+            if one.position is not None and one.position not in own:
+                raise BadInput(f"{where}: position {one.position}: its routes have {own[0]} to {own[-1]}")
+            check_seconds(f"{where}: ready_s", abs(one.ready_s))
+            if self.arrivals is not None and one.position == own[0] and one.ready_s > 0:
+                raise BadInput(f"{where}: ready_s = {one.ready_s:g}, but when it comes, the arrivals say")
+        for part, at in enumerate(self.begin_at, 1):
+            if at < len(self.laid_out) and self.laid_out[at].options and not self.positions[at].options:
+                where = f"begin of {self.part_name(part)} at '{self.names[self.positions[at].station]}'"
+                raise BadInput(f"{where}: no way that is open leads to an end of its routes, so it has to stay")
+        for station, room in zip(self.stations, self.capacities, strict=True):
+            held = sum(self.index(station.name) in self.positions[at].holds for at in self.begin_at)
+            if held > room:
+                raise BadInput(f"begins: station '{station.name}' holds {held} parts; its capacity is {room}")
+        if not self.unfinished:
+            raise BadInput("begins: no part has anything left to do")
 
     def _check_order(self) -> None:
         check_parts(len(self.order))
@@ -172,7 +284,10 @@ def needed_moves(
     may be longer than strictly needed. Raises BadInput as Cell does for stations and routes.
     """
     check_layout(stations, products)
-    return moves_between(stations, positions_of(stations, products, buffers), robot_start, parts)
+    positions = positions_of(stations, products, buffers)
+    starts = {place.product: index for index, place in reversed([*enumerate(positions)])}.values()
+    first = [way for at in starts for way in positions[at].options]
+    return moves_between(stations, positions, starts, first, robot_start, parts)
 
 
 def check_parts(parts: object) -> None:

@@ -4,7 +4,7 @@ What a route says in words (a buffer when the machine is busy, a pallet that has
 options to leave them. The simulations, the bound and the searches know these only.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from graphlib import TopologicalSorter
 from typing import Literal, TypeVar
@@ -46,7 +46,8 @@ class Position:
     """A part at `station` (index) on a route of `product` (index); `holds`: stations where it, or its pallet, takes room.
 
     processing_s: what begins when the part gets here [s]; None: nothing begins, and what was begun goes on. No options:
-    the part is finished. Ends of routes hold no room.
+    the part is finished. Ends of routes hold no room. at_most_s: how long after the processing it may be picked [s]; None:
+    at any time.
     """
 
     product: int
@@ -54,6 +55,7 @@ class Position:
     holds: tuple[int, ...]
     processing_s: float | None
     options: tuple[Option, ...]
+    at_most_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -98,17 +100,40 @@ def from_the_ends(positions: Sequence[Position], value: Callable[[int, list[Valu
     return [found[number] for number in range(len(positions))]
 
 
+def open_ways(positions: Sequence[Position], shut: Collection[int]) -> list[Position]:
+    """The positions without the ways to stations, by index, to which nothing may be brought, nor to where these end.
+
+    Where nothing is left to choose the part can go nowhere.
+    """
+    kept = [replace(at, options=tuple(way for way in at.options if way.target not in shut)) for at in positions]
+    ends = [not at.options for at in positions]
+    leads = from_the_ends(kept, lambda place, ahead: ends[place] or any(ahead))
+    return [replace(at, options=tuple(way for way in at.options if leads[way.to])) for at in kept]
+
+
+def reached_from(positions: Sequence[Position], places: Collection[int]) -> set[int]:
+    """The positions that a part in one of these may come to, its own among them."""
+    ahead = from_the_ends(positions, lambda place, after: {place}.union(*after))
+    return set[int]().union(*(ahead[place] for place in places))
+
+
 def moves_between(
-    stations: Sequence[Station], positions: Sequence[Position], robot_start: str, parts: int
+    stations: Sequence[Station],
+    positions: Sequence[Position],
+    begins: Collection[int],
+    first: Collection[Option],
+    robot_start: str,
+    parts: int,
 ) -> NeededMoves:
-    """The moves that may follow one another, and those that carry something; staying is left out."""
+    """The moves that may follow one another, and those that carry something; staying is left out.
+
+    begins: the positions in which parts begin; first: the ways that may be taken first; parts: how many have something to do.
+    """
     names = [station.name for station in stations]
-    options = [(place, option) for place in positions for option in place.options]
-    reached = {option.to for _, option in options}
-    starts = [place for index, place in enumerate(positions) if index not in reached]
+    options = [(positions[at], way) for at in sorted(reached_from(positions, begins)) for way in positions[at].options]
     loaded = dict.fromkeys((option.origin, option.target) for _, option in options)
     begin = names.index(robot_start)
-    empty = dict.fromkeys((begin, option.origin) for place in starts for option in place.options)
+    empty = dict.fromkeys((begin, option.origin) for option in first)
     for left, done in options:
         there = positions[done.to]
         empty |= dict.fromkeys((done.target, own.origin) for own in there.options)
@@ -145,13 +170,17 @@ class _Positions:
                     reach = ends[stage.station] = self._position(product, stage.station, ())
             elif stage.pallet:
                 holds = (stage.station, before.station)
-                reach = self._position(product, before.station, holds, self._processing_s(stage))
+                reach = self._position(
+                    product, before.station, holds, self._processing_s(stage), self._at_most_s(stage)
+                )
             else:
-                reach = self._position(product, stage.station, (stage.station,), self._processing_s(stage))
+                own = (stage.station,)
+                reach = self._position(product, stage.station, own, self._processing_s(stage), self._at_most_s(stage))
             self._link(leave, reach, stage, service_s)
             leave, service_s = reach, stage.service_s
             if stage.pallet and after is not None:
-                leave = self._position(product, stage.station, (stage.station, after.station), None)
+                holds = (stage.station, after.station)
+                leave = self._position(product, stage.station, holds, None, self._at_most_s(stage))
                 self._join(reach, leave, replace(self._way(after.station), waits=False, carries="pallet"))
 
     def _link(self, leave: int, reach: int, stage: Stage, service_s: float) -> None:
@@ -173,9 +202,16 @@ class _Positions:
         """An option of which only that is known yet."""
         return Option(-1, -1, -1, self._index[target], (), service_s=service_s)
 
-    def _position(self, product: int, station: str, holds: tuple[str, ...], processing_s: float | None = 0.0) -> int:
+    def _position(
+        self,
+        product: int,
+        station: str,
+        holds: tuple[str, ...],
+        processing_s: float | None = 0.0,
+        at_most_s: float | None = None,
+    ) -> int:
         held = tuple(self._index[name] for name in holds)
-        self.positions.append(Position(product, self._index[station], held, processing_s, ()))
+        self.positions.append(Position(product, self._index[station], held, processing_s, (), at_most_s))
         return len(self.positions) - 1
 
     def _join(self, leave: int, to: int, way: Option) -> None:
@@ -189,3 +225,6 @@ class _Positions:
     def _processing_s(self, stage: Stage) -> float:
         station = self._stations[self._index[stage.station]]
         return station.processing_s if stage.processing_s is None else stage.processing_s
+
+    def _at_most_s(self, stage: Stage) -> float | None:
+        return self._stations[self._index[stage.station]].at_most_s if stage.at_most_s is None else stage.at_most_s

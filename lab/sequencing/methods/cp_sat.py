@@ -14,22 +14,24 @@ from lab.sequencing.cell.objectives import MAKESPAN, check_built_in, check_objec
 from lab.sequencing.methods.cp_sat_model import Model
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.search import Search, SequenceResult, only_one
-from lab.sequencing.simulate.run import follow
+from lab.sequencing.simulate.run import Run, follow
 
 TIME_LIMIT_S = 60.0
 MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory grows with the square, to a gigabyte
 
-Status = Literal["optimal", "feasible", "unknown"]
+Status = Literal["optimal", "feasible", "unknown", "impossible"]
 _STATUS: dict[object, Status] = {
     cp_model.OPTIMAL: "optimal",
     cp_model.FEASIBLE: "feasible",
     cp_model.UNKNOWN: "unknown",
+    cp_model.INFEASIBLE: "impossible",
 }
 
 
 @dataclass(frozen=True)
 class CpSatResult:
-    """What CP-SAT found: "optimal", the cost is proven; "feasible", it lies above the bound; "unknown", nothing found.
+    """What CP-SAT found: "optimal", the cost is proven; "feasible", it lies above the bound; "unknown", nothing found;
+    "impossible", proven that there is nothing.
 
     cost: of the sequence, as the simulation has it; infinite without one. bound: no sequence costs less. rounded_s: by
     how much a time of the model differs from the cell's at the most [s]; 0 when all are whole in the model's unit, else
@@ -62,7 +64,7 @@ def cp_sat(
     check_built_in(objective, "CP-SAT")
     if not fits(cell):
         allowed = f"allowed are {MOST_MOVES}; order fewer parts"
-        raise BadInput(f"CP-SAT: the {cell.parts} parts have {possible_moves(cell)} moves to choose from; {allowed}")
+        raise BadInput(f"CP-SAT: the {cell.parts} parts have {cell.possible_moves} moves to choose from; {allowed}")
     if not (isfinite(time_limit_s) and time_limit_s > 0):
         raise BadInput(f"time limit = {time_limit_s} s: allowed are finite times above 0")
     model = Model(cell, objective, first_come(cell) if hint is None else hint)
@@ -75,9 +77,11 @@ def cp_sat(
     solver.parameters.use_dynamic_precedence_in_disjunctive = True
     solver.parameters.absolute_gap_limit = model.blur
     status = _STATUS[solver.solve(model.model)]
-    sequence = () if status == "unknown" else model.sequence(solver)
-    value = inf if status == "unknown" else cost(follow(cell, sequence), objective)
-    bound = min(value, solver.best_objective_bound * model.worth)
+    sequence = model.sequence(solver) if status in ("optimal", "feasible") else ()
+    if sequence and model.times.rounded_s and _spoils(cell, sequence):
+        status, sequence = "unknown", ()
+    value = cost(follow(cell, sequence), objective) if sequence else inf
+    bound = inf if status == "impossible" else min(value, solver.best_objective_bound * model.worth)
     return CpSatResult(status, value, bound, sequence, solver.wall_time, model.times.rounded_s)
 
 
@@ -85,17 +89,19 @@ def cp_sat_sequencer(cell: Cell, search: Search, rng: np.random.Generator) -> Se
     """CP-SAT as a sequencer: one sequence, found by the mean times within TIME_LIMIT_S; it draws nothing from `rng`."""
     search.check(cell)
     found = cp_sat(cell, search.objective)
-    return only_one(cell, search, found.sequence, found.cost, found.status != "unknown")
+    return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))
+
+
+def _spoils(cell: Cell, sequence: Sequence[int]) -> bool:
+    """Whether a part would be picked too late after all, by less than the times were rounded."""
+    run = Run(cell)
+    for decision in sequence:
+        if run.spoils(decision):
+            return True
+        run.move(decision)
+    return False
 
 
 def fits(cell: Cell) -> bool:
     """Whether the cell is not too large for a model."""
-    return possible_moves(cell) <= MOST_MOVES
-
-
-def possible_moves(cell: Cell) -> int:
-    """How many moves all parts may make, by all their routes."""
-    own = [0] * len(cell.products)
-    for place in cell.positions:
-        own[place.product] += len(place.options)
-    return sum(own[cell.positions[start].product] for start in cell.starts)
+    return cell.possible_moves <= MOST_MOVES

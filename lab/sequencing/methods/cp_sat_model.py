@@ -49,8 +49,9 @@ class Model:
     def __init__(self, cell: Cell, objective: str, hint: Sequence[int]) -> None:
         self.cell, self.model, self._ways = cell, cp_model.CpModel(), ways_of(cell)
         self.times = Times(cell, self._ways)
-        known = timed(cell, self.times, self._ways, hint)
-        self._longest = known[-1].drop if objective == MAKESPAN else longest(cell, self.times, self._ways)
+        known = timed(cell, self.times, self._ways, hint) if hint else []
+        most = longest(cell, self.times, self._ways)
+        self._longest = known[-1].drop if objective == MAKESPAN and known else most
         self._holds = [[s in place.holds for place in cell.positions] for s in range(len(cell.stations))]
         self._distances = distances(cell, self.times.per_s)
         self._tasks: list[Task] = []
@@ -69,7 +70,8 @@ class Model:
         self.worth = self._add_objective(objective)
         each = {"machine-idle": machine_places(cell), "mean-tardiness": cell.parts, "tardy-parts": 0}.get(objective, 1)
         self.blur = 2 * each * len(self._tasks) if self.times.rounded_s else 0
-        self._suggest(known)
+        if known:
+            self._suggest(known)
 
     def sequence(self, solver: cp_model.CpSolver) -> tuple[int, ...]:
         """The decisions of the solution, in the order of the robot's tour."""
@@ -103,7 +105,7 @@ class Model:
 
     def _add_part(self, part: int) -> None:
         """The part's way from its start to an end: one option of each position that it comes to."""
-        reached, own = [self.cell.starts[part]], list[Task]()
+        reached, own = [self.cell.begin_at[part]], list[Task]()
         for place in reached:
             self._come[part, place] = self._moment(f"come {part} {place}")
             for way in self._ways:
@@ -132,28 +134,35 @@ class Model:
             waits = self.model.new_bool_var("waits")
             self.model.add(begin >= ready).only_enforce_if(done)
             self.model.add(begin <= ready).only_enforce_if(done, waits)
+        at_most_s = self.cell.positions[way.place].at_most_s
+        if at_most_s is not None and ready is not None:
+            latest = ready + self.times.whole(at_most_s) - self.times.whole(way.option.service_s)
+            self.model.add(begin <= latest).only_enforce_if(done)
         return Task(part, way, done, begin, begin + self.times.work(way), waits)
 
     def _ready(self, part: int, way: Way) -> cp_model.LinearExprT | None:
         """When the part is finished, or has come; None: it always is, when the robot is there."""
         place, arrivals = way.place, self.cell.arrivals
-        if place == self.cell.starts[part]:
-            if arrivals is None:
-                return None
-            intervals = [self.times.whole(seconds) for seconds in arrivals.interval_s[: part + 1]]
-            after_pick = part > 0 and arrivals.after == "pick"
-            return self._first[part - 1] + intervals[-1] if after_pick else sum(intervals)
-        while self.cell.positions[place].processing_s is None:
-            place = next(before.place for before in self._ways if before.option.to == place)
-        process = self.times.processing(place)
-        return self._come[part, place] + process if process else None
+        begin, begin_s = self.cell.begin_at[part], self.cell.begin_s[part]
+        if place == begin and arrivals is not None and place == self.cell.starts[part]:
+            before = [other - 1 for other in self.cell.coming if other <= part]
+            intervals = [self.times.whole(arrivals.interval_s[other]) for other in (*before, part)]
+            after_pick = before and arrivals.after == "pick"
+            return self._first[before[-1]] + intervals[-1] if after_pick else sum(intervals)
+        while place != begin and self.cell.positions[place].processing_s is None:
+            place = next(way.place for way in self._ways if way.option.to == place)
+        if place == begin:
+            known = begin_s > 0 or self.cell.positions[place].at_most_s is not None
+            return self.times.whole(begin_s) if known else None
+        process, limited = self.times.processing(place), self.cell.positions[way.place].at_most_s is not None
+        return self._come[part, place] + process if process or limited else None
 
     def _add_tour(self) -> None:
         """The robot goes from move to move, in one tour from its start to the last end; time follows."""
         start, arcs = self.cell.index(self.cell.robot_start), list[tuple[int, int, cp_model.LiteralT]]()
         for number, task in enumerate(self._tasks, 1):
             arcs.append((number, number, ~task.done))
-            if task.way.place == self.cell.starts[task.part]:
+            if task.way.place == self.cell.begin_at[task.part] and self.times.known(start, task.way.option.origin):
                 arcs.append((0, number, self._arc(0, number, self.times.travel(start, task.way.option.origin), 0)))
             if not self.cell.positions[task.way.option.to].options:
                 arcs.append((number, 0, self.model.new_bool_var("last")))
@@ -185,14 +194,16 @@ class Model:
         into = [way for way in self._ways if holds[way.option.to] and not holds[way.place]]
         out = [way for way in self._ways if holds[way.place] and not holds[way.option.to]]
         ways = [self._distances[left.option.target][way.option.origin] for left in out for way in into]
-        change = min([*ways, self._longest]) if room == 1 and self.cell.parts > 1 else 0
+        change = min([*ways, self._longest]) if room == 1 and len(self.cell.unfinished) > 1 else 0
         visits, intervals, least = list[Visit](), list[cp_model.IntervalVar](), list[cp_model.LinearExpr]()
         for part in range(self.cell.parts):
             own = [task for task in self._tasks if task.part == part]
             brings, takes = [t for t in own if t.way in into], [t for t in own if t.way in out]
-            if brings:
-                visit = Visit(part, station, *self._visit(brings, takes))
-                size = self._moment("stay")
+            inside = holds[self.cell.begin_at[part]]
+            if brings or inside:
+                visit = Visit(part, station, *self._visit(brings, takes, inside))
+                # It may begin before 0, and the change after it may lie behind the end.
+                size = self.model.new_int_var(0, 2 * self._longest + 2, "stay")
                 least.append(self._least(brings, takes) + change * visit.here)
                 self.model.add(size >= least[-1])
                 span = visit.begin, size, visit.leave + change, visit.here
@@ -205,9 +216,17 @@ class Model:
             self.model.add_cumulative(intervals, [1] * len(visits), room)
         return visits
 
-    def _visit(self, brings: list[Task], takes: list[Task]) -> tuple[cp_model.IntVar, cp_model.IntVar, cp_model.IntVar]:
+    def _visit(
+        self, brings: list[Task], takes: list[Task], inside: bool
+    ) -> tuple[cp_model.IntVar, cp_model.IntVar, cp_model.IntVar]:
+        """A visit; `inside`: of a part that begins there, since before all moves, and stays if nothing takes it."""
         here, begin, leave = self.model.new_bool_var("here"), self._moment("from"), self._moment("until")
-        self.model.add(sum(task.done for task in brings) == here)
+        if inside:
+            begin = self.model.new_constant(-1)
+            self.model.add(here == 1)
+            leave = leave if takes else self.model.new_constant(self._longest + 1)
+        else:
+            self.model.add(sum(task.done for task in brings) == here)
         for task in brings:
             self.model.add(begin == task.begin).only_enforce_if(task.done)
         for task in takes:
@@ -244,7 +263,10 @@ class Model:
         due_s = cell.due_s if cell.due_s and objective in WITH_DUE_TIMES else (0.0,) * cell.parts
         latest: dict[object, int] = {}
         for part, product in enumerate(cell.order):
-            kind = None if cell.arrivals is not None else (product, due_s[part])
+            if part + 1 not in cell.unfinished:
+                continue
+            comes = cell.arrivals is not None and part + 1 in cell.coming
+            kind = None if comes else (product, due_s[part], cell.begin_at[part], cell.begin_s[part])
             if kind in latest:
                 self.model.add(self._first[part] >= self._taken[latest[kind]])
             latest[kind] = part

@@ -34,6 +34,8 @@ class Times:
                 *(way.option.service_s for way in ways),
                 *(cell.arrivals.interval_s if cell.arrivals else ()),
                 *(cell.due_s or ()),
+                *cell.begin_s,
+                *(place.at_most_s or 0.0 for place in cell.positions),
             ]
         )
         longest_s = cell.longest_s + max(cell.due_s or (0.0,))
@@ -52,6 +54,10 @@ class Times:
     def travel(self, origin: int, target: int) -> int:
         """The robot's empty way between two stations."""
         return 0 if origin == target else self.whole(float(self._cell.empty_s[origin, target]))
+
+    def known(self, origin: int, target: int) -> bool:
+        """Whether there is an empty way; there is one wherever the robot may have to go."""
+        return origin == target or not np.isnan(self._cell.empty_s[origin, target])
 
     def work(self, way: Way) -> int:
         """Service and carrying; at least a unit, so that the order of moves is the order of their times."""
@@ -74,11 +80,13 @@ class Timed(NamedTuple):
 
 def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]) -> list[Timed]:
     """A sequence with the model's times; BadInput for a decision that may not be taken, and when parts are left."""
-    run, moves = Run(cell), list[Timed]()
+    run, moves, now = Run(cell), list[Timed](), 0
+    ready, coming = [times.whole(seconds) for seconds in cell.begin_s], [part - 1 for part in cell.coming]
     intervals = [times.whole(seconds) for seconds in cell.arrivals.interval_s] if cell.arrivals else [0] * cell.parts
     clock = cell.arrivals is None or cell.arrivals.after == "clock"
-    ready = list(accumulate(intervals)) if clock else intervals
-    now = 0
+    for index, come in zip(coming, accumulate(intervals[index] for index in coming), strict=True):
+        if cell.arrivals is not None:
+            ready[index] = come if clock else intervals[index]
     for decision in sequence:
         part, option = part_of(decision, cell.parts) - 1, run.option(decision)
         place = run.locations[part]
@@ -87,8 +95,8 @@ def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]
         way = next(way for way in ways if way.place == place and way.option == option)
         begin = now + times.travel(run.robot, option.origin)
         begin = max(begin, ready[part]) if option.waits else begin
-        if place in cell.starts and not clock and part + 1 < cell.parts:
-            ready[part + 1] += begin
+        if place in cell.starts and not clock and part != coming[-1]:
+            ready[coming[coming.index(part) + 1]] += begin
         now = begin + times.work(way)
         if cell.positions[option.to].processing_s is not None:
             ready[part] = now + times.processing(option.to)
@@ -109,7 +117,8 @@ def longest(cell: Cell, times: Times, ways: Sequence[Way]) -> int:
 
     most = from_the_ends(cell.positions, longest_from)
     arrive = sum(times.whole(seconds) for seconds in cell.arrivals.interval_s) if cell.arrivals else 0
-    return arrive + sum(most[start] for start in cell.starts)
+    ready = max(0, *(times.whole(seconds) for seconds in cell.begin_s))
+    return arrive + ready + sum(most[start] for start in cell.begin_at)
 
 
 def _off_s(given: NDArray[np.float64], per_s: float) -> float:

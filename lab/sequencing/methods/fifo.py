@@ -79,10 +79,11 @@ def _waits(seen: Observed, decision: int) -> bool:
 
 def something_comes(seen: Observed) -> bool:
     """Whether an event is still to come by itself: the end of a process, or a part that is on its way."""
-    starts = seen.cell.starts
+    cell = seen.cell
+    following = None if cell.arrivals is None else cell.coming[seen.fetched : seen.fetched + 1]
     return any(
-        not ready and (location != start or part == seen.fetched)
-        for part, (ready, location, start) in enumerate(zip(seen.ready, seen.locations, starts, strict=True))
+        not ready and (location != start or following is None or part in following)
+        for part, (ready, location, start) in enumerate(zip(seen.ready, seen.locations, cell.starts, strict=True), 1)
     )
 
 

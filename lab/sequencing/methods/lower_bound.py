@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import from_the_ends
-from lab.sequencing.cell.ways import TICKS_PER_S, Way, distances, ticks, ways_of
+from lab.sequencing.cell.ways import FAR, TICKS_PER_S, Way, distances, ticks, ways_of
 from lab.sequencing.methods.robot_bound import RobotWork, least_rest
 from lab.sequencing.simulate.merged import MergedCell, MergedState
 
@@ -55,11 +55,13 @@ class LowerBound:
         self._to_end = _Spans(cell, None)
         used = sorted({station for place in cell.positions for station in place.holds})
         single = [s for s in used if cell.capacities[s] == 1 and cell.stations[s].kind == "machine"]
-        self._machines = [_MachineWork(cell, station, self._to_end) for station in single]
+        self._machines = [_MachineWork(cell, station, self._to_end) for station in single if _passed(cell, station)]
         self._after_arrival = _after_arrival(cell, self._to_end)
 
     def left(self, state: MergedState) -> int:
-        """Ticks still needed at least."""
+        """Ticks still needed at least; FAR when a part can no longer be fetched in time."""
+        if self._merged.latest and self._merged.too_late(state):
+            return FAR
         known = self._known.get(state.counts)
         if known is None:
             known = self._known[state.counts] = self._of(self._merged.counted(state.counts))
@@ -69,14 +71,15 @@ class LowerBound:
         """The bounds for counts of parts by position."""
         cell = self._cell
         there = [place for place, count in enumerate(counts) if count]
+        moving = [place for place in there if cell.positions[place].options]
         fixed = max(self._to_end.least[place] for place in there)
         terms = [
             Term(self._slots[place], -1, self._to_end.ways[place], 0)
             for place in there
-            if place in self._slots and cell.capacities[cell.positions[place].holds[0]] > 1
+            if place in self._slots and not any(cell.capacities[s] == 1 for s in cell.positions[place].holds[:1])
         ]
         for machine in self._machines:
-            inside = next((place for place in there if machine.station in cell.positions[place].holds), None)
+            inside = next((place for place in moving if machine.station in cell.positions[place].holds), None)
             more = machine.plus(counts, inside is not None)
             if inside is None:
                 fixed = max(fixed, more)
@@ -85,14 +88,19 @@ class LowerBound:
             else:
                 fixed = max(fixed, more + machine.spans.least[inside])
         rest = sum(count * each for count, each in zip(counts, self._robot.rest, strict=True))
-        waiting, latest = sum(counts[place] for place in set(cell.starts)), 0
+        waiting, latest = sum(counts[place] for place in self._merged.starts), 0
         if waiting and cell.arrivals is not None:
-            after = self._after_arrival[cell.parts - waiting]
+            after = self._after_arrival[-waiting]
             if self._merged.one_by_one:
                 terms.append(Term(len(self._slots), 0, ((0, after),), 0))
             else:
                 latest = after
         return Least(rest, self._robot.here, fixed, tuple(terms), latest)
+
+
+def _passed(cell: Cell, station: int) -> bool:
+    """Whether a part can still be brought to a station, and on from there."""
+    return any(station in cell.positions[way.option.to].holds for way in ways_of(cell) if way.option.target == station)
 
 
 class _Spans:
@@ -166,10 +174,10 @@ class _MachineWork:
 
 def _after_arrival(cell: Cell, to_end: _Spans) -> list[int]:
     """By parts fetched: ticks from the next arrival to the last end, at least; with a clock: the moment of that end."""
-    if cell.arrivals is None:
+    if cell.arrivals is None or not cell.coming:
         return []
-    intervals = ticks(cell.arrivals.interval_s)
-    alone = [min(after for _, after in to_end.ways[start]) for start in cell.starts]
+    intervals = ticks([cell.arrivals.interval_s[part - 1] for part in cell.coming])
+    alone = [min(after for _, after in to_end.ways[cell.starts[part - 1]]) for part in cell.coming]
     after, found = 0, list[int]()
     for interval, least in zip([*intervals[1:], 0][::-1], alone[::-1], strict=True):
         after = max(least, interval + after)

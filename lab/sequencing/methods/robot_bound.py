@@ -68,7 +68,7 @@ def _gaps(cell: Cell, ways: Sequence[Way]) -> dict[tuple[int, int], int]:
     empty, begin = empty_ticks(cell), cell.index(cell.robot_start)
     gaps: dict[tuple[int, int], int] = {}
     for number, way in enumerate(ways):
-        follow = [(begin, 0)] if way.place in cell.starts else []
+        follow = [(begin, 0)] if way.place in cell.begin_at else []
         follow += [(done.option.target, wait) for done in ways for wait in _waits(cell, done, way)]
         for station, wait in follow:
             gap = max(wait, empty[station][way.option.origin])
@@ -81,7 +81,7 @@ def _waits(cell: Cell, done: Way, way: Way) -> Iterator[int]:
     if follows(cell, done, way, same=True):
         process_s = cell.positions[way.place].processing_s or 0.0
         yield round(process_s * TICKS_PER_S) if way.option.waits else 0
-    if cell.parts > 1 and follows(cell, done, way, same=False):
+    if len(cell.unfinished) > 1 and follows(cell, done, way, same=False):
         yield 0
 
 
@@ -104,7 +104,7 @@ def _credits(cell: Cell, ways: Sequence[Way], gaps: dict[tuple[int, int], int]) 
     rows += [({last: 1, cell.positions[end].station: -1}, 0.0) for end in ends]
     gain: NDArray[np.float64] = np.zeros(last + 1)
     gain[:size], gain[rest:last] = -SMALL, SMALL
-    np.add.at(gain, [rest + start for start in cell.starts], 1.0)
+    np.add.at(gain, [rest + start for start in cell.begin_at if cell.positions[start].options], 1.0)
     gain[last], gain[begin] = 1.0, -1.0
     limit_s = cell.longest_s + 1.0
     fixed = {begin, *(rest + end for end in ends)}

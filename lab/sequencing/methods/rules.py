@@ -120,7 +120,8 @@ def dispatched(cell: Cell, rule: Rule, search: Search) -> SequenceResult:
 def first_come(cell: Cell) -> tuple[int, ...]:
     """A sequence that comes to its end: what is ready first goes first; when that ends in a deadlock, part after part.
 
-    One part alone never meets a full station: its routes are sound, and every station has room for one.
+    From the start one part alone never meets a full station: its routes are sound, and every station has room for one.
+    Where work begins in the middle, neither may come to its end: then it is empty.
     """
     run = Run(cell)
     ready_first = dispatch(
@@ -131,8 +132,11 @@ def first_come(cell: Cell) -> tuple[int, ...]:
     run, sequence = Run(cell), list[int]()
     for part in range(1, cell.parts + 1):
         while run.finished_s[part - 1] is None:
-            sequence.append(next(one for one in run.allowed() if part_of(one, cell.parts) == part))
-            run.move(sequence[-1])
+            own = [one for one in run.allowed() if part_of(one, cell.parts) == part]
+            if not own:
+                return ()
+            sequence.append(own[0])
+            run.move(own[0])
     return tuple(sequence)
 
 

@@ -139,7 +139,7 @@ def _episode(cell: Any, method: Any, work: Any, epsilon: float, seed: Any, learn
         moves += 1
         move(cell, run, i, seed)
         count = list_allowed(cell, run)
-    if learns and rules.learner == SRL:
+    if learns and moves > 0 and rules.learner == SRL:
         if run.whole[2] == 0:
             memory.values[row] = _log_sum(memory.values[row] + rules.end_keep, rules.end_add)
         else:

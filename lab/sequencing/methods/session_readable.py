@@ -197,7 +197,7 @@ def walk(session: _Session, times: Episode, epsilon: float, learns: bool) -> tup
         trail.append(keys[chosen])
         sequence.append(allowed[chosen])
         run.move(allowed[chosen])
-    if learns:
+    if learns and trail:
         session.learner.step(session.values, trail[-1], None, run.done)
     return run, sequence, trail
 

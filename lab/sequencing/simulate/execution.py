@@ -14,7 +14,7 @@ from lab.sequencing.cell.chance import Chance, Episode, drawn_seed
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective, cost
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.simulate.run import Run, follow, take_over
+from lab.sequencing.simulate.run import Run, take_over
 
 WAIT = 0  # the decision to stay where the robot is until something happens: a machine finishes, a part arrives
 
@@ -46,7 +46,7 @@ class Execution:
         self.sequence: list[int] = []
         # For each part: when its latest process began, and how long that takes on average; when it came to its first
         # station, and when it was picked there.
-        self._began_s, self._mean_s = [0.0] * cell.parts, [0.0] * cell.parts
+        self._began_s, self._mean_s = [0.0] * cell.parts, list(cell.begin_s)
         self._came_s, self._left_s = [0.0] * cell.parts, [0.0] * cell.parts
 
     def observe(self) -> Observed:
@@ -90,8 +90,9 @@ class Execution:
     def _coming(self, index: int) -> bool:
         """Whether the part has not even set out: where each is brought after a pick, those behind the next one."""
         arrivals = self.run.cell.arrivals
-        after_pick = arrivals is not None and arrivals.after == "pick"
-        return after_pick and self._at_start(index) and index > self.run.fetched
+        if arrivals is None or arrivals.after != "pick" or not self._at_start(index):
+            return False
+        return index + 1 > self.run.cell.coming[self.run.fetched]
 
     def _at_start(self, index: int) -> bool:
         return self.run.locations[index] == self.run.cell.starts[index]
@@ -101,7 +102,8 @@ class Execution:
         arrivals, came_s = seen.cell.arrivals, 0.0
         if arrivals is None:
             return
-        for index, mean_s in enumerate(arrivals.interval_s):
+        for index in (part - 1 for part in seen.cell.coming):
+            mean_s = arrivals.interval_s[index]
             if not self._at_start(index):
                 came_s = self._left_s[index] if arrivals.after == "pick" else self._came_s[index]
             elif seen.ready[index]:
@@ -118,13 +120,24 @@ def carry_out(cell: Cell, policy: Policy, times: Episode | None = None) -> Execu
     return execution
 
 
+def _followed(cell: Cell, sequence: Sequence[int], times: Episode) -> Run:
+    """The run of a list of decisions, to where one would pick its part too late by these times."""
+    run = Run(cell, times)
+    for decision in sequence:
+        if run.spoils(decision):
+            break
+        run.move(decision)
+    return run
+
+
 def replicate(
     cell: Cell, how: Policy | Sequence[int], chance: Chance, episodes: int, seed: int, objective: str = MAKESPAN
 ) -> NDArray[np.float64]:
     """The cost of a policy, or of a fixed list, in each of so many episodes (episodes,); in seconds, for most objectives.
 
     Episode n meets the same times whatever is carried out, and however many episodes there are: common random numbers,
-    so compare two policies by their differences. A deadlock costs `stuck_cost`. Raises BadInput for fewer than 1
+    so compare two policies by their differences. A deadlock costs `stuck_cost`, and so does a part that a list would pick
+    too late. Raises BadInput for fewer than 1
     episode, a negative seed, an objective that the cell does not allow, and a list that is not one of the cell's.
     Source: thesis App. III (50 replications).
     """
@@ -135,8 +148,8 @@ def replicate(
     rng, costs = np.random.default_rng(seed), np.empty(episodes)
     for number in range(episodes):
         times = Episode(cell, chance, drawn_seed(rng))
-        run = carry_out(cell, how, times).run if callable(how) else follow(cell, how, times)
-        if not run.done and not callable(how) and run.allowed():
+        run = carry_out(cell, how, times).run if callable(how) else _followed(cell, how, times)
+        if not run.done and not callable(how) and run.allowed() and not cell.has_windows:
             raise BadInput(f"the sequence ends after {counted(len(how), 'move')}, but not every part is finished")
         costs[number] = cost(run, objective)
     return costs

@@ -8,6 +8,7 @@ from lab.learning import splitmix
 from lab.learning.compiled import inner, lean
 from lab.sequencing.cell import chance
 from lab.sequencing.simulate.cell_arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES
+from lab.sequencing.simulate.run import SLACK_S
 
 CLOCK, PICK = ARRIVAL_CODES["clock"], ARRIVAL_CODES["pick"]
 CONSTANT, NORMAL = LAW_CODES["constant"], LAW_CODES["normal"]
@@ -48,16 +49,32 @@ def _interval(cell: Any, seed: Any, part: int) -> float:
 @lean
 def reset(cell: Any, run: Any, seed: Any) -> None:
     """`Run.__init__`, with the times of an episode's seed (uint64)."""
-    parts, came_s = len(run.locations), 0.0
+    unfinished, came_s = 0, 0.0
     for station in range(len(cell.rooms)):
         run.room[station] = cell.rooms[station]
-    for part in range(parts):
-        run.locations[part], run.ready_s[part], run.finished_s[part] = cell.starts[part], 0.0, 0.0
-        if cell.arrivals == CLOCK or (cell.arrivals == PICK and part == 0):
-            came_s += _interval(cell, seed, part)
-            run.ready_s[part] = came_s
+    for part in range(len(run.locations)):
+        place = cell.begin_at[part]
+        run.locations[part], run.ready_s[part], run.finished_s[part] = place, cell.begin_s[part], 0.0
+        run.room[cell.holds[place, 0]] -= 1
+        run.room[cell.holds[place, 1]] -= 1
+        if cell.first_option[place] < cell.first_option[place + 1]:
+            unfinished += 1
+    for i in range(len(cell.coming)):
+        if cell.arrivals == CLOCK or (cell.arrivals == PICK and i == 0):
+            came_s += _interval(cell, seed, cell.coming[i])
+            run.ready_s[cell.coming[i]] = came_s
     run.clock[0], run.clock[1], run.clock[2] = 0.0, 0.0, 0.0
-    run.whole[0], run.whole[1], run.whole[2] = cell.robot_start, 0, parts
+    run.whole[0], run.whole[1], run.whole[2] = cell.robot_start, 0, unfinished
+
+
+@inner
+def _too_late(cell: Any, run: Any, part: int, o: int) -> bool:
+    """`Run.too_late`."""
+    at_most_s = cell.at_most_s[run.locations[part]]
+    if at_most_s == np.inf or not cell.waits[o]:
+        return False
+    reach_s = run.clock[0] + cell.empty_s[run.whole[0], cell.origin[o]]
+    return bool(max(reach_s, run.ready_s[part]) + cell.service_s[o] > run.ready_s[part] + at_most_s + SLACK_S)
 
 
 @lean
@@ -66,11 +83,11 @@ def list_allowed(cell: Any, run: Any) -> int:
     parts, count = len(run.locations), 0
     for part in range(parts):
         place = run.locations[part]
-        if cell.arrivals != NO_ARRIVALS and place == cell.starts[part] and part != run.whole[1]:
+        if cell.arrivals != NO_ARRIVALS and place == cell.starts[part] and part != cell.coming[run.whole[1]]:
             continue
         for o in range(cell.first_option[place], cell.first_option[place + 1]):
             room = run.room[cell.needs[o, 0]] > 0 and run.room[cell.needs[o, 1]] > 0
-            if room and run.room[cell.if_full[o]] <= 0:
+            if room and run.room[cell.if_full[o]] <= 0 and not (cell.windows and _too_late(cell, run, part, o)):
                 run.allowed[count], run.options[count] = part + 1 + cell.choice[o] * parts, o
                 count += 1
     if cell.many:
@@ -101,8 +118,8 @@ def move(cell: Any, run: Any, i: int, seed: Any) -> None:
     drop_s = pick_s + cell.loaded_s[cell.origin[o], cell.target[o]]
     if here == cell.starts[part]:
         run.whole[1] += 1
-        following = run.whole[1]
-        if cell.arrivals == PICK and following < parts:
+        if cell.arrivals == PICK and run.whole[1] < len(cell.coming):
+            following = cell.coming[run.whole[1]]
             run.ready_s[following] = pick_s + _interval(cell, seed, following)
     run.room[cell.holds[here, 0]] += 1  # WIDTH stations, written out: a loop takes twice the time of the whole move
     run.room[cell.holds[here, 1]] += 1
@@ -143,7 +160,7 @@ def cost(cell: Any, run: Any) -> float:
 def follow(cell: Any, run: Any, sequence: Any, seed: Any) -> float:
     """The cost of a sequence of decisions with the times of an episode's seed; NaN when one of them may not be taken.
 
-    What the sequence leaves undone counts as a deadlock.
+    What the sequence leaves undone counts as a deadlock; where parts may be picked too late, so does what may not be taken.
     """
     reset(cell, run, seed)
     for decision in sequence:
@@ -151,7 +168,7 @@ def follow(cell: Any, run: Any, sequence: Any, seed: Any) -> float:
         while i < count and run.allowed[i] != decision:
             i += 1
         if i == count:
-            return float(np.nan)
+            return float(cell.stuck_cost) if cell.windows else float(np.nan)
         move(cell, run, i, seed)
     return cost(cell, run)
 

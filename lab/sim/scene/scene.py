@@ -15,6 +15,7 @@ from lab.sim.world import World
 from lab.tasks.task import Order, Task, part_name
 from lab.tasks.task_fields import CameraGrid, Obstacle, Station
 
+TABLE, MARKER = "table", " marker"  # the body that all stands on; how the names of markers end
 TABLE_RGBA = (0.86, 0.85, 0.83, 1.0)
 TABLE_M, TABLE_MIDDLE_M = (2.2, 2.9, 0.04), (0.35, 0.0, -0.02)
 MARKER_ABOVE = 0.002  # [m] a marker's centre above what it lies on
@@ -31,7 +32,7 @@ class Scene:
         arm = arm_of(task.robot, task.folder)
         self.kinds = kinds_of(task, arm.gripper)
         self.places = Places(task, self.kinds)
-        world.box("table", TABLE_M, TABLE_MIDDLE_M, TABLE_RGBA)
+        world.box(TABLE, TABLE_M, TABLE_MIDDLE_M, TABLE_RGBA)
         robot = task.robot
         self.robot = Robot(world, arm, robot.speed_m_s, robot.acceleration_m_s2, robot.grip_force_n)
         for station in task.stations:
@@ -56,7 +57,7 @@ class Scene:
             self._mark(obstacle.name, (*place, size[2] + MARKER_ABOVE), models.MARKER_GREEN)
 
     def _mark(self, name: str, at: Vector, rgba: Rgba) -> None:
-        self.world.disc(f"{name} marker", models.MARKER_RADIUS, models.MARKER_THICK, at, rgba)
+        self.world.disc(f"{name}{MARKER}", models.MARKER_RADIUS, models.MARKER_THICK, at, rgba)
 
     def add(self, name: str, kind: str, spot: Spot, off: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Stand a part called `name` on `spot`, `off` it by x, y [m] and yaw [rad]; on its pallet when the kind is so."""

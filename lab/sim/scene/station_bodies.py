@@ -30,18 +30,23 @@ Array = NDArray[np.float64]
 
 def build(world: World, station: Station, slab: tuple[Vector, Vector], folder: Path) -> None:
     """Put a station's body into the world; `slab`: size and centre [m] of one that is a slab or a box. Raises BadInput."""
-    x, y, yaw = station.pose
+    at, yaw = stands_at(station, slab)
     rgba = RGBA[station.kind] if station.color is None else (*station.color, 1.0)
     if station.stands_on in ("slab", "box"):
-        size, middle = slab
-        world.box(station.name, size, middle, rgba, yaw=yaw)
+        world.box(station.name, slab[0], at, rgba, yaw=yaw)
     else:
         path = _file(station, folder)
         if path.suffix.lower() in MESHES:
-            world.mesh(station.name, path, (x, y, 0.0), rgba, yaw=yaw)
+            world.mesh(station.name, path, at, rgba, yaw=yaw)
         else:
-            world.load(station.name, path, (x, y, 0.0), yaw)
+            world.load(station.name, path, at, yaw)
     world.friction(station.name, FRICTION[station.kind])
+
+
+def stands_at(station: Station, slab: tuple[Vector, Vector]) -> tuple[Vector, float]:
+    """Where a station's body is put [m], and how it is turned [rad]; `slab` as for `build`."""
+    x, y, yaw = station.pose
+    return (slab[1] if station.stands_on in ("slab", "box") else (x, y, 0.0)), yaw
 
 
 def check(station: Station, folder: Path) -> None:

@@ -10,10 +10,10 @@ import numpy as np
 
 from lab.advice.advisors import SKILL_TAUS
 from lab.learning.gates import GATES
+from lab.statistics import share
 from lab.studies.findings import Findings, Row, mean_row, row, share_row, those
 from lab.studies.ours.advice_budget_figures import of_ccrl, of_gates
 from lab.studies.runner import Job
-from lab.studies.statistics import share
 from lab.studies.thesis.chapter_9 import ADVISOR, EXACT, RECONSTRUCTED
 from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, measured, sessions_of
 

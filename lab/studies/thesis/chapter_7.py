@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from lab.statistics import Comparison
 from lab.studies.findings import Findings, Row, agreement, row
 from lab.studies.runner import Job
-from lab.studies.statistics import Comparison
 from lab.studies.thesis import appendix_4
 from lab.studies.thesis import chapter_7_figures as figures
 from lab.studies.thesis.chapter_7_cells import (

@@ -13,9 +13,9 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.methods.many_sessions import run_sessions
 from lab.sequencing.search import SAME, Search, SrlSettings
+from lab.statistics import Comparison, compare, part_means
 from lab.studies.findings import Row, mean_row, share_row
 from lab.studies.runner import Job, seeds_of
-from lab.studies.statistics import Comparison, compare, part_means
 from lab.studies.thesis import chapter_7_listing as listing
 from lab.studies.thesis import printed_lines
 from lab.studies.thesis.chapter_7_listing import LISTING, Reading

@@ -9,9 +9,9 @@ import numpy as np
 
 from lab.advice.advisors import SKILL_TAUS
 from lab.mdp import FloatArray
+from lab.statistics import Comparison, Range, compare, part_means, ranges, score
 from lab.studies.findings import Row, mean_row, row, share_row
 from lab.studies.runner import Job
-from lab.studies.statistics import Comparison, Range, compare, part_means, ranges, score
 from lab.studies.thesis import printed_lines
 from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, learner_of, measured
 

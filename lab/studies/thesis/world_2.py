@@ -18,8 +18,8 @@ from lab.errors import BadInput, WorkFailed
 from lab.files import check_out
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import BoolArray, FloatArray, NoPath, TabularMDP, grid, shortest_steps
+from lab.statistics import PERCENT_POINTS, RELATIVE
 from lab.studies.runner import Progress
-from lab.studies.statistics import PERCENT_POINTS, RELATIVE
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, PrintedLine, printed
 from lab.studies.thesis.chapter_9_sessions import gate_of, learned_table
 from lab.tasks.grid_world import AdvisorView, GridWorld

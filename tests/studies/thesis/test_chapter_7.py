@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from lab.statistics import compare
 from lab.studies.findings import Findings, agreement, row, those
 from lab.studies.report import write_report, write_rows
 from lab.studies.runner import Job
-from lab.studies.statistics import compare
 from lab.studies.thesis import chapter_7
 from lab.studies.thesis import chapter_7_figures as figures
 from lab.studies.thesis.chapter_7 import (

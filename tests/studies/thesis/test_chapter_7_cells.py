@@ -10,8 +10,8 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sequencing.methods.exact import optimum
+from lab.statistics import interval, proportion_interval
 from lab.studies.runner import Job
-from lab.studies.statistics import interval, proportion_interval
 from lab.studies.thesis.chapter_7_cells import (
     AS_PRINTED,
     DECAY_FACTORS,

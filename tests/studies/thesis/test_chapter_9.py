@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 
 import pytest
 
+from lab.statistics import proportion_interval
 from lab.studies.findings import Findings, agreement, those
 from lab.studies.report import write_report, write_rows
 from lab.studies.runner import STORE, Job
-from lab.studies.statistics import proportion_interval
 from lab.studies.thesis import chapter_9, chapter_9_cells
 from lab.studies.thesis.chapter_9 import READINGS, appendix_v, best_scores, figure_9_4, readings
 from lab.studies.thesis.chapter_9_cells import TABLES, appendix, table

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lab.statistics import compare, interval, proportion_interval, score
 from lab.studies.runner import Job
-from lab.studies.statistics import compare, interval, proportion_interval, score
 from lab.studies.thesis import chapter_9_cells
 from lab.studies.thesis.chapter_9_cells import (
     BETAS,

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.studies.statistics import (
+from lab.statistics import (
     FloatArray,
     allowed,
     compare,

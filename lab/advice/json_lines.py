@@ -1,0 +1,111 @@
+"""Files to which lines of JSON are appended, one entry a line: how they are written by one command at a time, and read."""
+
+import fcntl
+import json
+import os
+from collections.abc import Hashable, Mapping
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+from typing import Any, Self
+
+from lab.errors import BadInput, WorkFailed
+
+MAX_LINE_BYTES = 1 << 22
+
+
+class EntryKinds:
+    """The kinds of entries in one sort of file: dataclasses by the name that their lines bear as "kind"."""
+
+    def __init__(self, kinds: Mapping[str, type[Any]]) -> None:
+        self._kinds = dict(kinds)
+        self._name_of = {kind: name for name, kind in kinds.items()}
+
+    def line_of(self, entry: Any) -> str:
+        """An entry as one line of JSON, without the line's end."""
+        return json.dumps({"kind": self._name_of[type(entry)], **asdict(entry)}, allow_nan=False)
+
+    def entry_of(self, line: bytes, most_bytes: int = MAX_LINE_BYTES) -> Any:
+        """What a line holds. Raises ValueError for anything but an entry."""
+        from pydantic import ValidationError
+
+        if len(line) > most_bytes:
+            raise ValueError(f"{len(line)} bytes long, allowed {most_bytes}")
+        try:
+            record = json.loads(line.decode("utf-8"))
+        except RecursionError:
+            raise ValueError("nested too deeply") from None
+        kind = record.pop("kind", None) if isinstance(record, dict) else None
+        if not isinstance(kind, str) or kind not in self._kinds:
+            raise ValueError(f"kind {kind!r} is none of {', '.join(self._kinds)}")
+        model: Any = self._kinds[kind]
+        try:
+            found = _reader(model).validate_json(json.dumps(record))
+        except ValidationError as error:
+            wrong = [f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors(include_url=False)]
+            raise ValueError(f"{kind}: {'; '.join(wrong)}") from None
+        return model(**{name: getattr(found, name) for name in found.__dataclass_fields__})
+
+
+@cache
+def _reader(model: Hashable) -> Any:
+    from pydantic import ConfigDict, TypeAdapter
+
+    strict = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+    kind: Any = model
+    return TypeAdapter(type(kind.__name__, (kind,), {"__pydantic_config__": strict, "__doc__": kind.__doc__}))
+
+
+class AppendedFile:
+    """A file that one command at a time appends to: it holds the file's lock until it is closed."""
+
+    def __init__(self, path: Path, flags: int) -> None:
+        """Open it with flags beside O_APPEND. Raises OSError, and BadInput when another command is writing it."""
+        self.path = path
+        self._file: int | None = os.open(path, flags | os.O_APPEND, 0o644)
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self.close()
+            raise BadInput(f"journal '{path}': another command is writing it: wait until that has ended") from None
+
+    @classmethod
+    def new(cls, path: Path) -> Self:
+        """A file that is not there yet; FileExistsError when it is."""
+        return cls(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
+
+    @classmethod
+    def again(cls, path: Path) -> Self:
+        """A file that is there."""
+        return cls(path, os.O_WRONLY)
+
+    def cut(self, size: int) -> None:
+        """Take away all but the first `size` bytes. Raises OSError."""
+        assert self._file is not None
+        os.ftruncate(self._file, size)
+
+    def write(self, line: str) -> None:
+        """Append a line, which is safe from the death of this process then; WorkFailed when it cannot be written."""
+        if self._file is None:
+            return
+        left = (line + "\n").encode()
+        try:
+            while left:
+                left = left[os.write(self._file, left) :]
+        except OSError as error:
+            raise WorkFailed(f"journal '{self.path}' cannot be written: {error.strerror or error}") from error
+
+    def sync(self) -> None:
+        """Have what was written on the disk. Raises WorkFailed."""
+        if self._file is None:
+            return
+        try:
+            os.fsync(self._file)
+        except OSError as error:
+            raise WorkFailed(f"journal '{self.path}' cannot be written: {error.strerror or error}") from error
+
+    def close(self) -> None:
+        """Close it; safe to call again."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None

@@ -1,0 +1,26 @@
+"""Under which conditions a prepared task is carried out: at which speed, who watches and may stop it, and what is kept of it."""
+
+from dataclasses import dataclass, field
+
+from lab.production.controls import Controls
+from lab.production.recorder import Viewer
+from lab.production.run_advice import RunAdvice
+from lab.production.run_journal import RunJournal
+from lab.tasks.fault_fields import FaultFields
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """override: the share of the task's speed and acceleration with which the arm moves. viewer: who watches live.
+
+    faults: what goes wrong in it; fault_seed: draws more of that, None: nothing more. advice: who is asked, None: nobody
+    about the order.
+    """
+
+    override: float = 1.0
+    viewer: Viewer | None = None
+    controls: Controls = field(default_factory=Controls)
+    journal: RunJournal = field(default_factory=RunJournal)
+    faults: tuple[FaultFields, ...] = ()
+    fault_seed: int | None = None
+    advice: RunAdvice | None = None

@@ -1,0 +1,69 @@
+"""The faults of a run: what they need is put out of sight before it, and each strikes as soon as it can after its time."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from lab.production.faults import FAULTS
+from lab.production.faults.fault import GROUND_M, NEVER, Fault, Happened
+from lab.sim.scene.scene import Scene
+from lab.tasks.fault_fields import FaultFields
+
+if TYPE_CHECKING:
+    from lab.production.floor import Floor
+
+LOOKS_EVERY_S = 0.1  # at faults that are due and wait for their chance
+GROUND_SIZE_M, GROUND_RGBA = (6.0, 6.0, 0.02), (0.55, 0.56, 0.58, 1.0)
+GROUND = "ground"
+
+
+class Injector:
+    """Lets faults happen on a floor: deterministic, in physics alone.
+
+    happened: those that did, in their order. next_s: when the next look at them is due, in the run's time [s]; NEVER: all
+    is over.
+    """
+
+    def __init__(self, faults: Sequence[FaultFields]) -> None:
+        self.waiting: list[Fault] = [FAULTS[one.what](one, n) for n, one in enumerate(faults, start=1)]
+        self.lasting: list[Fault] = []
+        self.happened: list[Happened] = []
+        self._look_s = 0.0
+        self.next_s = self._next_s()
+
+    def prepare(self, scene: Scene) -> None:
+        """Put the ground below the table and what faults bring along; to be called before a recorder asks what there is."""
+        if self.waiting:
+            scene.world.box(GROUND, GROUND_SIZE_M, (0.35, 0.0, GROUND_M - GROUND_SIZE_M[2] / 2), GROUND_RGBA)
+            for fault in self.waiting:
+                fault.prepare(scene)
+
+    def tick(self, floor: "Floor") -> bool:
+        """To be called before each physics step; whether something in the scene was changed."""
+        now_s = floor.now_s
+        if now_s < self.next_s:
+            return False
+        over = [fault for fault in self.lasting if fault.until_s <= now_s]
+        for fault in over:
+            fault.end(floor)
+            self.lasting.remove(fault)
+        struck = False
+        if now_s >= self._look_s:
+            self._look_s = now_s + LOOKS_EVERY_S
+            due = [fault for fault in self.waiting if fault.fields.at_s <= now_s]
+            struck = sum(self._strikes(fault, floor) for fault in due) > 0
+        self.next_s = self._next_s()
+        return struck or bool(over)
+
+    def _next_s(self) -> float:
+        due = [max(fault.fields.at_s, self._look_s) for fault in self.waiting]
+        return min([*due, *(fault.until_s for fault in self.lasting)], default=NEVER)
+
+    def _strikes(self, fault: Fault, floor: "Floor") -> bool:
+        happened = fault.strikes(floor)
+        if happened is None:
+            return False
+        self.happened.append(happened)
+        self.waiting.remove(fault)
+        if fault.until_s < NEVER:
+            self.lasting.append(fault)
+        return True

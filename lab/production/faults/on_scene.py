@@ -1,0 +1,315 @@
+"""Faults that strike what stands around: machines, obstacles, stations, the camera."""
+
+from math import pi
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lab.production.faults.fault import GROUND_M, NEVER, Fault, Happened, out_of_sight
+from lab.production.faults.where import (
+    AT_STATION_M,
+    CLEAR_M,
+    UP,
+    around,
+    distance,
+    is_clear,
+    is_robot_away,
+    parts_of,
+    stack_of,
+    stand,
+)
+from lab.sim import models
+from lab.sim.scene.places import Rectangle
+from lab.sim.scene.scene import MARKER, MARKER_ABOVE, TABLE, Scene, in_grid
+from lab.sim.scene.scene_check import places_of
+from lab.tasks.task import Order, Task
+
+if TYPE_CHECKING:
+    from lab.production.floor import Floor
+
+SLOWER, OBSTACLE_M, STATION_M, BLIND_S = 1.5, 0.06, 0.02, (10.0, 60.0)
+BOX_M = (0.06, 0.06, 0.34)  # as high as the ways between stations
+BOX_RGBA = (0.75, 0.25, 0.2, 1.0)
+ROOM_M = 0.05  # that a drawn box leaves around stations
+OUT_OF_THE_WAY_M = 0.15  # of the robot, when a hand moves what is fixed
+DRAWS = 60
+
+
+def machines_of(task: Task) -> list[str]:
+    """The machines that parts are brought to."""
+    return [one.name for one in task.stations if one.kind == "machine" and task.kinds_at(one.name)]
+
+
+def one_of(names: list[str], rng: np.random.Generator) -> str:
+    """A drawn one."""
+    return names[int(rng.integers(len(names)))]
+
+
+def any_way(far_m: float, rng: np.random.Generator) -> tuple[float, float]:
+    """An offset so far in a drawn direction [m]."""
+    way = rng.uniform(0, 2 * pi)
+    return (round(far_m * float(np.cos(way)), 3), round(far_m * float(np.sin(way)), 3))
+
+
+class MachineSlow(Fault):
+    """A machine takes longer, from now on."""
+
+    what = "machine slow"
+    help = "a machine takes half as long again"
+
+    @classmethod
+    def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
+        """One of the machines."""
+        machines = machines_of(task)
+        return {"station": one_of(machines, rng), "share": SLOWER} if machines else None
+
+    def strikes(self, floor: "Floor") -> Happened:
+        """At any time."""
+        station, share = str(self.fields.station), self.fields.share or SLOWER
+        machine = floor.machine(station)
+        machine.until_s += max(0.0, machine.until_s - floor.now_s) * (share / machine.share - 1.0)
+        machine.share = share
+        words = f"'{station}' takes {share:g} times as long"
+        return Happened(self.what, words, floor.now_s, station=station)
+
+
+class MachineFails(Fault):
+    """A machine never gets done, from now on."""
+
+    what = "machine fails"
+    help = "a machine never gets done"
+
+    @classmethod
+    def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
+        """One of the machines."""
+        machines = machines_of(task)
+        return {"station": one_of(machines, rng)} if machines else None
+
+    def strikes(self, floor: "Floor") -> Happened:
+        """At any time."""
+        station = str(self.fields.station)
+        machine = floor.machine(station)
+        machine.fails = True
+        if machine.part and not machine.done(floor.now_s):
+            machine.until_s = NEVER
+        return Happened(self.what, f"'{station}' does not get done", floor.now_s, station=station)
+
+
+class ObstaclePut(Fault):
+    """A box is put on the table."""
+
+    what = "obstacle put"
+    help = "a box is put where the robot passes"
+
+    @classmethod
+    def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
+        """In the workspace, clear of stations, obstacles and the cameras' grids; None where no such place was drawn."""
+        places, grid = places_of(task), task.workspace
+        kept = [room for _, room in places.kept_free(len(order))]
+        for obstacle in task.obstacles:
+            (a, b), (x, y), (i, j, _) = obstacle.area, obstacle.position_m, obstacle.size
+            kept.append(Rectangle(x, y, a + i / 2, b + j / 2, obstacle.yaw))
+        nearest = 0.3  # [m] from the robot's foot
+        for _ in range(DRAWS):
+            x, y = (
+                round(low + float(rng.random()) * count * cell, 3)
+                for low, count, cell in zip(grid.lower_m[:2], grid.shape[:2], grid.cell_m[:2], strict=True)
+            )
+            box = Rectangle(x, y, BOX_M[0] / 2 + ROOM_M, BOX_M[1] / 2 + ROOM_M, 0.0)
+            seen = any(in_grid(one.grid, (x, y)) for one in task.stations if one.grid is not None)
+            if x * x + y * y > nearest**2 and not seen and not any(room.meets(box) for room in kept):
+                return {"at_m": (x, y)}
+        return None
+
+    @property
+    def name(self) -> str:
+        """What the box is called."""
+        return f"strange box {self.number}"
+
+    def prepare(self, scene: Scene) -> None:
+        """The box waits below the table, with a marker where a camera is to see it."""
+        size, (x, y) = self.fields.size_m or BOX_M, out_of_sight(self.number)
+        scene.world.box(self.name, size, (x, y, GROUND_M + size[2] / 2), BOX_RGBA)
+        self.marked = _in_a_grid(scene.task, self.fields.at_m or (0.0, 0.0))
+        if self.marked:
+            at = (x, y, GROUND_M + size[2] + MARKER_ABOVE)
+            scene.world.disc(f"{self.name}{MARKER}", models.MARKER_RADIUS, models.MARKER_THICK, at, models.MARKER_GREEN)
+
+    def strikes(self, floor: "Floor") -> Happened | None:
+        """Once nothing is in its place."""
+        (x, y), size, world = self.fields.at_m or (0.0, 0.0), self.fields.size_m or BOX_M, floor.world
+        before = world.pose(self.name)[0]
+        world.put(self.name, (x, y, size[2] / 2))
+        if not (is_clear(floor, [self.name], {TABLE}) and is_robot_away(floor, [self.name])):
+            world.put(self.name, before)
+            return None
+        if self.marked:
+            world.put(f"{self.name}{MARKER}", (x, y, size[2] + MARKER_ABOVE))
+        words = f"a box was put at ({x:.2f}, {y:.2f}) m"
+        return Happened(self.what, words, floor.now_s, obstacle=self.name)
+
+
+class ObstacleMoved(Fault):
+    """An obstacle is moved."""
+
+    what = "obstacle moved"
+    help = "an obstacle is moved by 6 cm"
+
+    @classmethod
+    def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
+        """One of those that the task says may stand elsewhere."""
+        names = [one.name for one in task.obstacles if max(one.area) > 0]
+        return {"obstacle": one_of(names, rng), "by_m": any_way(OBSTACLE_M, rng)} if names else None
+
+    def strikes(self, floor: "Floor") -> Happened | None:
+        """In a direction in which there is room."""
+        name, world = str(self.fields.obstacle), floor.world
+        if not is_robot_away(floor, [name], OUT_OF_THE_WAY_M):
+            return None
+        at, turn = world.pose(name)
+        for dx, dy in around(self.fields.by_m or (OBSTACLE_M, 0.0)):
+            world.put(name, (at[0] + dx, at[1] + dy, at[2]), turn)
+            if is_clear(floor, [name], {TABLE}) and is_robot_away(floor, [name], CLEAR_M):
+                _along(floor, [f"{name}{MARKER}"], dx, dy)
+                far = float(np.hypot(dx, dy))
+                return Happened(self.what, f"'{name}' was moved by {far:.2f} m", floor.now_s, obstacle=name)
+        world.put(name, at, turn)
+        return None
+
+
+class ObstacleGone(Fault):
+    """An obstacle is taken away."""
+
+    what = "obstacle gone"
+    help = "an obstacle is taken away"
+
+    @classmethod
+    def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
+        """One of those that the task says may stand elsewhere."""
+        names = [one.name for one in task.obstacles if max(one.area) > 0]
+        return {"obstacle": one_of(names, rng)} if names else None
+
+    def strikes(self, floor: "Floor") -> Happened | None:
+        """Once the robot is away."""
+        name, (x, y) = str(self.fields.obstacle), out_of_sight(self.number)
+        if not is_robot_away(floor, [name], OUT_OF_THE_WAY_M):
+            return None
+        for body in (name, f"{name}{MARKER}"):
+            if body in floor.world.names():
+                at, turn = floor.world.pose(body)
+                floor.world.put(body, (x, y, at[2] + GROUND_M), turn)
+        return Happened(self.what, f"'{name}' was taken away", floor.now_s, obstacle=name)
+
+
+class StationMoved(Fault):
+    """A machine is pushed, with all that stands in it."""
+
+    what = "station moved"
+    help = "a machine is pushed by 2 cm"
+
+    @classmethod
+    def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
+        """One of the machines that are approached through a camera's grid, or else any."""
+        machines = machines_of(task)
+        seen = [name for name in machines if task.station(name).grid is not None]
+        return {"station": one_of(seen or machines, rng), "by_m": any_way(STATION_M, rng)} if machines else None
+
+    def strikes(self, floor: "Floor") -> Happened | None:
+        """Once the robot is away, in a direction in which there is room."""
+        name, world = str(self.fields.station), floor.world
+        if not is_robot_away(floor, [name], OUT_OF_THE_WAY_M):
+            return None
+        inside = [body for part in parts_of(floor) if _is_at(floor, part, name) for body in stack_of(floor, part)]
+        at, turn = world.pose(name)
+        for dx, dy in around(self.fields.by_m or (STATION_M, 0.0)):
+            world.put(name, (at[0] + dx, at[1] + dy, at[2]), turn)
+            if is_clear(floor, [name], {TABLE, *inside}):
+                _along(floor, [f"{name}{MARKER}", *inside], dx, dy)
+                far = float(np.hypot(dx, dy))
+                return Happened(self.what, f"'{name}' was moved by {far:.3f} m", floor.now_s, station=name)
+        world.put(name, at, turn)
+        return None
+
+
+class StationFull(Fault):
+    """A part that is nobody's stands where one is to be set down."""
+
+    what = "station full"
+    help = "a part of no order stands on a station's free spot"
+
+    @classmethod
+    def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
+        """Any station but those where parts begin."""
+        begins = {task.starts(kind) for kind in order}
+        names = [one.name for one in task.stations if one.name not in begins and task.kinds_at(one.name)]
+        return {"station": one_of(names, rng)} if names else None
+
+    @property
+    def name(self) -> str:
+        """What the part is called."""
+        return f"strange part {self.number}"
+
+    def prepare(self, scene: Scene) -> None:
+        """The part waits below the table, alone in a machine and on no pallet."""
+        station = scene.task.station(str(self.fields.station))
+        self.kind = next(iter(scene.task.kinds_at(station.name))).name
+        own = scene.kinds[self.kind]
+        x, y = out_of_sight(self.number)
+        scene.world.part(
+            self.name, own.shape, own.part.mass_kg, own.part.friction, (x, y, GROUND_M + own.shape.foot_m + 0.001)
+        )
+        scene.kind_of[self.name] = own
+
+    def strikes(self, floor: "Floor") -> Happened | None:
+        """The first spot on which nothing stands."""
+        scene, station = floor.scene, floor.scene.task.station(str(self.fields.station))
+        others = [name for name in scene.kind_of if name != self.name]
+        before = floor.world.pose(self.name)
+        for spot in scene.places.spots(station):
+            stand(floor, [self.name], (spot.x, spot.y, spot.z + 0.001), spot.yaw, UP)
+            near = [floor.world.nearest(self.name, other, CLEAR_M) for other in others]
+            if min(near, default=CLEAR_M) >= CLEAR_M and is_robot_away(floor, [self.name]):
+                words = f"{self.name} was put on '{station.name}'"
+                return Happened(self.what, words, floor.now_s, self.name, station.name)
+            floor.world.put(self.name, *before)
+        return None
+
+
+class CameraBlind(Fault):
+    """A hand is before the camera."""
+
+    what = "camera blind"
+    help = "the camera sees nothing for a while"
+
+    @classmethod
+    def drawn(cls, task: Task, order: Order, rng: np.random.Generator) -> dict[str, object] | None:
+        """For 10 to 60 s."""
+        return None if task.camera is None else {"seconds": round(float(rng.uniform(*BLIND_S)), 1)}
+
+    def strikes(self, floor: "Floor") -> Happened:
+        """At any time."""
+        floor.world.dark = True
+        seconds = self.fields.seconds or BLIND_S[0]
+        self.until_s = floor.now_s + seconds
+        return Happened(self.what, f"the camera saw nothing for {seconds:g} s", floor.now_s)
+
+    def end(self, floor: "Floor") -> None:
+        """It sees again."""
+        floor.world.dark = False
+
+
+def _in_a_grid(task: Task, at: tuple[float, float]) -> bool:
+    return any(in_grid(station.grid, at) for station in task.stations if station.grid is not None)
+
+
+def _is_at(floor: "Floor", part: str, station: str) -> bool:
+    x, y, z = floor.world.pose(part)[0]
+    return part != floor.bench.held and z > -0.1 and distance(floor, station, (float(x), float(y))) < AT_STATION_M
+
+
+def _along(floor: "Floor", bodies: list[str], dx: float, dy: float) -> None:
+    """Move bodies that are there as far as what they stand on was moved."""
+    for body in bodies:
+        if body in floor.world.names():
+            (x, y, z), turn = floor.world.pose(body)
+            floor.world.put(body, (x + dx, y + dy, z), turn)

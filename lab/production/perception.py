@@ -1,0 +1,197 @@
+"""What stands where, held against what is believed: parts, obstacles, stations, and what belongs to nobody.
+
+Bodies' poses stand in for a camera that looks at the whole table: with the camera covered nothing is seen.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import atan2, cos, hypot, pi, sin
+from typing import Literal
+
+from lab.production.floor import Floor
+from lab.sim.arms.robot import NAME
+from lab.sim.parts.kinds import Spot
+from lab.sim.scene import station_bodies
+from lab.sim.scene.places import Layout
+from lab.sim.scene.scene import MARKER, TABLE
+from lab.skills.skill import UPRIGHT
+from lab.tasks.task import Task
+from lab.tasks.task_fields import Obstacle
+
+PART_M = 0.035  # a part farther than this from where it was set down was moved
+FIXED_M, FIXED_RAD = 0.006, 0.05  # and what does not move by itself
+ON_SPOT_M = 0.10  # a strange part this near to a spot of a station stands on it
+BELOW_M = -0.05  # what is below the table top is not on the table
+FELL_M = 0.02  # a part that stands so far below its spot is off it
+
+Sort = Literal[
+    "camera blind",
+    "part moved",
+    "part fallen",
+    "part gone",
+    "part out of reach",
+    "strange part",
+    "obstacle moved",
+    "obstacle gone",
+    "obstacle new",
+    "station moved",
+]
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Something that is not as it is believed to be: which body, in words, at which station ("": at none).
+
+    at: where a part's foot is seen, or a fixed body's middle, or a station's pose; by_m: how far off [m]; None, 0: it is not
+    seen at all. obstacle: of a new one, what is known of it.
+    """
+
+    sort: Sort
+    name: str
+    words: str
+    station: str = ""
+    at: Spot | None = None
+    by_m: float = 0.0
+    obstacle: Obstacle | None = None
+
+
+def perceive(floor: Floor, task: Task, layout: Layout, spot_of: Mapping[str, Spot]) -> list[Deviation]:
+    """All that is not as believed: fixed things as task and layout have them, parts on their spots, by body.
+
+    What is in the gripper is left out. The order is that of `Sort` for parts, then strange parts, obstacles and stations.
+    """
+    if floor.world.dark:
+        return [Deviation("camera blind", "", "the camera sees nothing")]
+    found = [*_parts(floor, task, spot_of), *_strange_parts(floor, task, spot_of)]
+    return [*found, *_obstacles(floor, task, layout), *_stations(floor, task)]
+
+
+def _parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot]) -> Iterator[Deviation]:
+    held = _held(floor)
+    for body, spot in spot_of.items():
+        if body in held:
+            continue
+        at, where = seen_at(floor, body), station_of(floor, task, spot)
+        station = f"'{where}'" if where else f"({spot.x:.2f}, {spot.y:.2f}) m"
+        far = hypot(at.x - spot.x, at.y - spot.y)
+        seen = f"({at.x:.2f}, {at.y:.2f}) m"
+        if at.z < BELOW_M:
+            yield Deviation("part gone", body, f"{body} is nowhere on the table", where)
+        elif floor.bench.upright(body) < UPRIGHT:
+            yield Deviation("part fallen", body, f"{body} lies on its side at {seen}", where, at, far)
+        elif far > PART_M or at.z < spot.z - FELL_M:
+            words = f"{body} is not at {station}: seen {far:.2f} m away at {seen}"
+            if floor.scene.robot.arm.inverse(floor.bench.part_pose(body)) is None:
+                yield Deviation("part out of reach", body, f"{words}, out of reach", where, at, far)
+            else:
+                yield Deviation("part moved", body, words, where, at, far)
+
+
+def _held(floor: Floor) -> set[str]:
+    """What the gripper holds, and what stands on that."""
+    held = floor.bench.held
+    if held is None:
+        return set()
+    top = floor.world.pose(held)[0]
+    near = [body for body in floor.scene.kind_of if hypot(*(floor.world.pose(body)[0] - top)[:2]) < PART_M]
+    return {held, *(body for body in near if floor.world.pose(body)[0][2] > top[2])}
+
+
+def _strange_parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot]) -> Iterator[Deviation]:
+    for body in floor.scene.kind_of:
+        at = seen_at(floor, body)
+        if body in spot_of or at.z < BELOW_M:
+            continue
+        where = station_of(floor, task, at)
+        place = f"on '{where}'" if where else f"at ({at.x:.2f}, {at.y:.2f}) m"
+        yield Deviation("strange part", body, f"a part that is not of this order stands {place}", where, at)
+
+
+def _obstacles(floor: Floor, task: Task, layout: Layout) -> Iterator[Deviation]:
+    world = floor.world
+    for obstacle, (x, y) in zip(task.obstacles, layout.obstacles, strict=True):
+        at, name = _fixed_at(floor, obstacle.name), obstacle.name
+        far = hypot(at.x - x, at.y - y)
+        if at.z < BELOW_M:
+            yield Deviation("obstacle gone", name, f"'{name}' is gone from ({x:.2f}, {y:.2f}) m")
+        elif far > FIXED_M:
+            yield Deviation(
+                "obstacle moved", name, f"'{name}' stands {far:.2f} m off where it was surveyed", "", at, far
+            )
+    stations = {one.name for one in task.stations}
+    known = {TABLE, NAME, *stations, *floor.scene.kind_of, *(one.name for one in task.obstacles)}
+    for name in world.names():
+        looks = world.looks(name)
+        if name in known or name.endswith(MARKER) or name.startswith(f"{NAME} ") or not looks or looks[0].kind != "box":
+            continue
+        at = _fixed_at(floor, name)
+        if at.z > BELOW_M:
+            length, width, height = looks[0].size
+            box = Obstacle(name=name, position_m=(at.x, at.y), size_m=(length, width, height), yaw=at.yaw)
+            words = f"something new stands at ({at.x:.2f}, {at.y:.2f}) m"
+            yield Deviation("obstacle new", name, words, "", at, 0.0, box)
+
+
+def _stations(floor: Floor, task: Task) -> Iterator[Deviation]:
+    places = floor.scene.places
+    for station in task.stations:
+        middle, yaw = station_bodies.stands_at(station, places.slab(station, len(floor.scene.order)))
+        at = _fixed_at(floor, station.name)
+        dx, dy, turn = at.x - middle[0], at.y - middle[1], (at.yaw - yaw + pi) % (2 * pi) - pi
+        far = hypot(dx, dy)
+        if far > FIXED_M or abs(turn) > FIXED_RAD:
+            x, y, own = station.pose  # it turned about the middle of its body
+            off, across = x - middle[0], y - middle[1]
+            pose = (
+                at.x + cos(turn) * off - sin(turn) * across,
+                at.y + sin(turn) * off + cos(turn) * across,
+                station.pose[2] + turn if abs(turn) > FIXED_RAD else own,
+            )
+            words = f"'{station.name}' stands {far:.3f} m off where it was surveyed"
+            yield Deviation(
+                "station moved", station.name, words, station.name, Spot(pose[0], pose[1], 0.0, pose[2]), far
+            )
+
+
+def seen_at(floor: Floor, body: str) -> Spot:
+    """Where the foot of a part is, and how it is turned."""
+    (x, y, z), turn = floor.world.pose(body)
+    foot = floor.scene.kind_of[body].shape.foot_m
+    return Spot(float(x), float(y), float(z) - foot, 2.0 * atan2(float(turn[2]), float(turn[3])))
+
+
+def _fixed_at(floor: Floor, body: str) -> Spot:
+    (x, y, z), turn = floor.world.pose(body)
+    return Spot(float(x), float(y), float(z), 2.0 * atan2(float(turn[2]), float(turn[3])))
+
+
+def station_of(floor: Floor, task: Task, at: Spot) -> str:
+    """The station that has the spot nearest to a place; "" where none is near."""
+    far, name = min(
+        (hypot(at.x - spot.x, at.y - spot.y), station.name)
+        for station in task.stations
+        for spot in floor.scene.places.spots(station)
+    )
+    return name if far < ON_SPOT_M else ""
+
+
+def scene_seen(task: Task, layout: Layout, deviations: list[Deviation]) -> tuple[Task, Layout]:
+    """The task and layout with obstacles and stations where they were seen; BadInput for what cannot be."""
+    seen = {one.name: one for one in deviations}
+    stations = []
+    for station in task.stations:
+        moved = seen.get(station.name)
+        pose = moved and moved.sort == "station moved" and moved.at and (moved.at.x, moved.at.y, moved.at.yaw)
+        stations.append(station.model_copy(update={"pose": pose}) if pose else station)
+    obstacles: list[Obstacle] = []
+    at: list[tuple[float, float]] = []
+    for obstacle, place in zip(task.obstacles, layout.obstacles, strict=True):
+        one = seen.get(obstacle.name)
+        if one is None or one.sort != "obstacle gone":
+            obstacles.append(obstacle)
+            at.append(place if one is None or one.at is None else (one.at.x, one.at.y))
+    for one in deviations:
+        if one.obstacle is not None:
+            obstacles.append(one.obstacle)
+            at.append(one.obstacle.position_m)
+    return task.changed(stations=tuple(stations), obstacles=tuple(obstacles)), Layout(tuple(at), layout.parts)

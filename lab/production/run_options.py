@@ -1,0 +1,75 @@
+"""The options of `lab run` that decide what comes of it: typed by a person, or read from the head of a run's journal."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+from annotated_types import Ge, Le
+
+from lab.errors import BadInput
+from lab.production.run_journal import RunBegan, RunJournal, read_run
+from lab.tasks.task import Task
+from lab.tasks.task_file import load
+from lab.teaching.kept_session import check_alone
+from lab.teaching.lesson_options import LessonOptions, SessionOptions, recorded_whole, whole_path
+
+
+@dataclass(frozen=True)
+class RunOptions(SessionOptions):
+    """What a run depends on, by name; None or empty: not given. override: of the arm's speed [%]; faults: their seed."""
+
+    command = "run"
+    wanted = "it is no run"
+    typed: ClassVar[Mapping[str, str]] = {"task": "TASK", "advisors": "--advisor", "asked": "--ask"}
+
+    task: str = "toast"
+    toasts: int | None = None
+    parts: str | None = None
+    advisors: tuple[str, ...] = ()
+    asked: str = "together"
+    decide: str = "trust-weighted"
+    override: Annotated[int, Ge(10), Le(100)] = 100
+    seed: Annotated[int, Ge(0)] = 0
+    faults: Annotated[int, Ge(0)] | None = None
+    order: str | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """A plain dict, files by their whole paths, so that they are found from another folder."""
+        return asdict(self) | {"task": whole_path(self.task), "advisors": [recorded_whole(a) for a in self.advisors]}
+
+    def lessons(self) -> LessonOptions:
+        """What they say of the lessons in it."""
+        return LessonOptions(
+            task=self.task,
+            advisors=self.advisors,
+            asked=self.asked,
+            decide=self.decide,
+            seed=self.seed,
+            toasts=self.toasts,
+            parts=self.parts,
+        )
+
+
+def begun(options: RunOptions, task: Task, folder: Path) -> RunJournal:
+    """The journal of a new run in its folder. BadInput when it cannot be written."""
+    return RunJournal.begin(folder, RunBegan(options.to_json(), task.name, hash_of(task)))
+
+
+def gone_on(given: RunOptions, folder: Path, out: Path | None) -> tuple[RunOptions, Task]:
+    """What the run in a folder was begun with, and its task; BadInput for options beside it, and when the task has changed."""
+    if out is not None:
+        raise BadInput(f"--out {out} beside --resume {folder}: a run goes on in its own folder: leave it away")
+    head, _, _ = read_run(folder, "--resume")
+    options = RunOptions.from_json(head.words, f"journal in '{folder}' (--resume)")
+    check_alone(given, RunOptions(task=""), folder)
+    task = load(options.task)
+    if hash_of(task) != head.task_hash:
+        raise BadInput(f"run in '{folder}' (--resume): its task '{options.task}' has changed since it was begun")
+    return options, task
+
+
+def hash_of(task: Task) -> str:
+    """What a task says, as a hash: another one is another run."""
+    return hashlib.sha256(task.model_dump_json().encode()).hexdigest()[:24]

@@ -1,0 +1,178 @@
+"""The work that remains of a run that has come to its middle, as a cell of its own: to plan anew from the state reached."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput, unknown
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import open_ways, reached_from
+from lab.sequencing.cell.stations import Begins
+from lab.sequencing.simulate.run import Run
+
+
+@dataclass(frozen=True)
+class Mishaps:
+    """What is otherwise than a run believes. Parts are numbered from 1.
+
+    lost: parts that are nowhere any more. closed: the stations to which nothing may be brought from now on; None: those of
+    before. ready_s: when a part may be picked, counted from now [s]. moved: the station at which a part stands instead, or its
+    position, where a station has several; what is done there begins now. robot: the station at which the robot is.
+    """
+
+    lost: frozenset[int] = frozenset()
+    closed: tuple[str, ...] | None = None
+    ready_s: Mapping[int, float] = field(default_factory=dict)
+    moved: Mapping[int, str | int] = field(default_factory=dict)
+    robot: str | None = None
+
+
+@dataclass(frozen=True)
+class Rest:
+    """cell: the work that remains, its decisions numbered as before; None: there is none.
+
+    stuck: the parts that cannot be finished, and why not; they stay where they are and take their room.
+    """
+
+    cell: Cell | None
+    stuck: Mapping[int, str] = field(default_factory=dict)
+
+
+NOTHING = Mishaps()
+
+
+def rest_of(run: Run, mishaps: Mishaps = NOTHING, fallback_s: float | None = None) -> Rest:
+    """What remains to be done from where a run is, as a cell whose time 0 is the run's `now_s`.
+
+    A part that stands in a closed machine can be finished only if it is done there. Lateness that was there before now does
+    not count (a due time that has passed is 0). fallback_s: what an empty way takes that the run's cell has no time for, which
+    happens where robot or parts are not where they would be; None: such a way is an error.
+    Raises BadInput for parts, stations and positions that there are not, and as Cell does.
+    """
+    cell = run.cell
+    for part in (*mishaps.lost, *mishaps.ready_s, *mishaps.moved):
+        if not 1 <= part <= cell.parts:
+            raise BadInput(f"rest of a run: there is no part {part}, only 1 to {cell.parts}")
+    robot = cell.names[run.robot] if mishaps.robot is None else mishaps.robot
+    cell.index(robot)
+    closed = cell.closed if mishaps.closed is None else mishaps.closed
+    begins = [_begin(run, part, mishaps) for part in range(1, cell.parts + 1)]
+    stuck = _stuck(cell, begins, {cell.index(name) for name in closed})
+    begins = [replace(one, stays=n in stuck) for n, one in enumerate(begins, 1)]
+    if all(one.stays or one.position is None or not cell.laid_out[one.position].options for one in begins):
+        return Rest(None, stuck)
+    arrivals, due_s = cell.arrivals, cell.due_s
+    if arrivals is not None:
+        arrivals = replace(arrivals, interval_s=_intervals_s(run, begins))
+    if due_s is not None:
+        due_s = tuple(max(0.0, one - run.now_s) for one in due_s)
+    rest = replace(
+        cell,
+        robot_start=robot,
+        begins=tuple(begins),
+        closed=closed,
+        arrivals=arrivals,
+        due_s=due_s,
+        empty_s=cell.empty_s if fallback_s is None else _filled(cell, fallback_s),
+    )
+    return Rest(rest, stuck)
+
+
+def _begin(run: Run, part: int, mishaps: Mishaps) -> Begins:
+    """Where a part is now, as it would be if nothing were closed."""
+    cell, place = run.cell, run.locations[part - 1]
+    known = cell.begins[part - 1] if cell.begins is not None else None
+    if part in mishaps.lost:
+        return Begins(None)
+    if part in mishaps.moved:
+        place = _position(cell, part, place, mishaps.moved[part])
+        return Begins(place, mishaps.ready_s.get(part, cell.laid_out[place].processing_s or 0.0))
+    if known is not None and (known.stays or known.position is None):  # nothing has been done with it
+        return replace(known, stays=False, ready_s=mishaps.ready_s.get(part, known.ready_s))
+    if not cell.laid_out[place].options:
+        return Begins(place)
+    comes = cell.arrivals is not None and place == cell.starts[part - 1]
+    ready_s = run.ready_s[part - 1] - run.now_s
+    if comes or cell.laid_out[place].at_most_s is None:
+        ready_s = 0.0 if comes else max(0.0, ready_s)
+    return Begins(place, mishaps.ready_s.get(part, ready_s))
+
+
+def _position(cell: Cell, part: int, place: int, wanted: str | int) -> int:
+    """The position that a part has at a station: of several the nearest ahead of where it is believed to be, else behind."""
+    product = cell.laid_out[cell.starts[part - 1]].product
+    own = [n for n, at in enumerate(cell.laid_out) if at.product == product]
+    if isinstance(wanted, int):
+        if wanted not in own:
+            raise BadInput(f"{cell.part_name(part)} moved to position {wanted}: its routes have {own[0]} to {own[-1]}")
+        return wanted
+    there = [n for n in own if cell.names[cell.laid_out[n].station] == wanted]
+    if not there:
+        names = dict.fromkeys(cell.names[cell.laid_out[n].station] for n in own)
+        raise unknown("station", wanted, names, f"where {cell.part_name(part)} stands")
+    here = place if place < len(cell.laid_out) else cell.starts[part - 1]
+    ahead = [n for n in there if n in reached_from(cell.laid_out, {here})]
+    behind = [n for n in there if here in reached_from(cell.laid_out, {n})]
+    return ahead[0] if ahead else behind[-1] if behind else there[0]
+
+
+def _stuck(cell: Cell, begins: Sequence[Begins], closed: set[int]) -> dict[int, str]:
+    """The parts that no open way leads to an end of their routes, and why; each takes room, which may shut out others."""
+    stuck: dict[int, str] = {}
+    shut = dict.fromkeys(closed, "out of use")
+    while True:
+        taken = [station for part in stuck for station in cell.laid_out[begins[part - 1].position or 0].holds]
+        for station in taken:
+            if taken.count(station) >= cell.capacities[station]:
+                inside = next(part for part in stuck if station in cell.laid_out[begins[part - 1].position or 0].holds)
+                shut.setdefault(station, f"taken by {cell.part_name(inside)}")
+        positions = open_ways(cell.laid_out, shut)
+        found = dict[int, str]()
+        for part, one in enumerate(begins, 1):
+            if part in stuck or one.position is None or not cell.laid_out[one.position].options:
+                continue
+            at, name = cell.laid_out[one.position], cell.names[cell.laid_out[one.position].station]
+            broken = [station for station in at.holds if station in closed]
+            if broken and one.ready_s > 0:
+                found[part] = f"{cell.part_name(part)} is not done in '{cell.names[broken[0]]}', which is out of use"
+            elif not positions[one.position].options:
+                way = ", ".join(
+                    f"'{cell.names[n]}' is {why}" for n, why in shut.items() if n in _ahead(cell, one.position)
+                )
+                found[part] = f"{cell.part_name(part)} at '{name}' has no way on: {way}"
+        if not found:
+            return stuck
+        stuck |= found
+
+
+def _ahead(cell: Cell, place: int) -> set[int]:
+    """The stations on the ways on from a position."""
+    return {way.target for at in reached_from(cell.laid_out, {place}) for way in cell.laid_out[at].options}
+
+
+def _intervals_s(run: Run, begins: Sequence[Begins]) -> tuple[float, ...]:
+    """When those come that have not been taken yet: by the clock the time from one to the next, counted from now."""
+    cell, came_s, found = run.cell, 0.0, list[float]()
+    first = True
+    for part, (one, start) in enumerate(zip(begins, cell.starts, strict=True), 1):
+        interval_s = cell.arrivals.interval_s[part - 1] if cell.arrivals else 0.0
+        if one.position != start:
+            found.append(0.0)
+            continue
+        left_s = max(0.0, run.ready_s[part - 1] - run.now_s)
+        if cell.arrivals is not None and cell.arrivals.after == "clock":
+            interval_s, came_s = left_s - came_s, left_s
+        elif first:
+            interval_s = left_s
+        found.append(interval_s)
+        first = False
+    return tuple(found)
+
+
+def _filled(cell: Cell, fallback_s: float) -> NDArray[np.float64]:
+    """The empty ways, with a time for those that have none."""
+    table = np.where(np.isnan(cell.empty_s), fallback_s, cell.empty_s)
+    np.fill_diagonal(table, 0.0)
+    return table

@@ -1,0 +1,97 @@
+"""What a task file says of a fault: what goes wrong in a run, when, and with what."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from lab.tasks.record import Name, Record, as_tuple
+
+FaultKind = Literal[
+    "part moved",
+    "part gone",
+    "part fallen",
+    "part slips",
+    "part dropped",
+    "machine slow",
+    "machine fails",
+    "obstacle put",
+    "obstacle moved",
+    "obstacle gone",
+    "station moved",
+    "station full",
+    "camera blind",
+]
+When = Literal["carried", "in machine", "standing"]
+PartName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39} [1-9][0-9]?$")]
+Place = Annotated[float, Field(ge=-10, le=10)]
+XY = Annotated[tuple[Place, Place], BeforeValidator(as_tuple)]
+Edges = Annotated[
+    tuple[
+        Annotated[float, Field(ge=0.01, le=1)],
+        Annotated[float, Field(ge=0.01, le=1)],
+        Annotated[float, Field(ge=0.01, le=1)],
+    ],
+    BeforeValidator(as_tuple),
+]
+
+NEEDS: dict[str, tuple[str, ...]] = {  # the fields that a kind of fault cannot do without
+    "machine slow": ("station",),
+    "machine fails": ("station",),
+    "obstacle put": ("at_m",),
+    "obstacle moved": ("obstacle",),
+    "obstacle gone": ("obstacle",),
+    "station moved": ("station",),
+    "station full": ("station",),
+}
+TAKES: dict[str, tuple[str, ...]] = {  # and those that it may have beside them
+    "part moved": ("part", "when", "by_m", "at_m", "turn_rad"),
+    "part gone": ("part", "when"),
+    "part fallen": ("part",),
+    "part slips": ("part", "share", "seconds"),
+    "part dropped": ("part", "by_m", "at_m"),
+    "machine slow": ("share",),
+    "machine fails": (),
+    "obstacle put": ("size_m",),
+    "obstacle moved": ("by_m",),
+    "obstacle gone": (),
+    "station moved": ("by_m",),
+    "station full": ("part",),
+    "camera blind": ("seconds",),
+}
+
+
+class FaultFields(Record):
+    """A fault: it happens as soon as it can after at_s [s] of the run.
+
+    part: which one, such as "slice 1", else the first that fits; when: only while the part is so. by_m: how far what is moved,
+    or falls, comes to be off where it was, x, y [m]; at_m: where it comes to be; turn_rad: and turned. share: of the time that
+    a machine takes, or of the friction that is left. seconds: how long it lasts. size_m: of an obstacle that is put there.
+    """
+
+    what: FaultKind
+    at_s: Annotated[float, Field(ge=0, le=86_400)] = 0.0
+    when: When | None = None
+    part: PartName | None = None
+    station: Name | None = None
+    obstacle: Name | None = None
+    by_m: XY | None = None
+    turn_rad: Annotated[float, Field(ge=-3.2, le=3.2)] = 0.0
+    share: Annotated[float, Field(ge=0, le=100)] | None = None
+    seconds: Annotated[float, Field(gt=0, le=86_400)] | None = None
+    at_m: XY | None = None
+    size_m: Edges | None = None
+
+    @model_validator(mode="after")
+    def _its_own_fields(self) -> Self:
+        needed = NEEDS.get(self.what, ())
+        for field in needed:
+            if getattr(self, field) is None:
+                raise ValueError(f"what = '{self.what}' needs {field}")
+        allowed = {"what", "at_s", *needed, *TAKES[self.what]}
+        for field in sorted(self.model_fields_set - allowed):
+            raise ValueError(f"what = '{self.what}' has no {field}: allowed are {', '.join(sorted(allowed))}")
+        if self.when == "carried" and self.what in ("part moved", "part gone"):
+            raise ValueError(
+                "when = 'carried': what is carried is dropped, or slips; wanted 'in machine' or 'standing'"
+            )
+        return self
