@@ -18,6 +18,10 @@ ABOVE_M = 0.16  # from the grasp up to where the tool looks from, at least
 REACHES = ((0.03, 0.2), (0.07, 0.4))  # [m], [rad] around where a part should be; the second when it is not in the first
 
 
+class SkillFailed(Exception):
+    """A skill noticed that it did not do what it is for; the text says why."""
+
+
 class Sight:
     """Where the foot of each part was seen or set down last; at the beginning, where the task says that it stands.
 

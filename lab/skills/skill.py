@@ -17,7 +17,7 @@ from lab.sim.frames import Body
 from lab.sim.parts.kinds import Kind, Spot, on_its_pallet
 from lab.sim.scene.blocked_cells import FINGERS_OFF_M
 from lab.sim.scene.scene import Scene, pallet_of
-from lab.skills.sight import Sight
+from lab.skills.sight import Sight, SkillFailed
 from lab.skills.state_words import away_in_words, size_in_words
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Stage
@@ -43,10 +43,6 @@ class Status(Enum):
     RUNNING = "running"
     SUCCESS = "success"
     FAILURE = "failure"
-
-
-class SkillFailed(Exception):
-    """A skill noticed that it did not do what it is for; the text says why."""
 
 
 @dataclass
