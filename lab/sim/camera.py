@@ -86,7 +86,10 @@ class Camera:
 
 @dataclass(frozen=True)
 class TableCamera(Camera):
-    """A camera in a real room: a calibrated lens, uneven light, blur and noise of some `strength`; its pictures come straightened."""
+    """A camera in a real room: a calibrated lens; uneven light, blur and noise of some `strength`.
+
+    Its pictures come straightened.
+    """
 
     calibration: Calibration | None = None
     strength: float = 0.0

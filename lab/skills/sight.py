@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from lab.errors import WorkFailed
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.hand_camera import hand_camera, seen_corners
 from lab.sim.parts.kinds import Spot, comes_as
@@ -46,7 +47,7 @@ class Sight:
         if body == held:
             return self.scene.robot.tool()
         if body not in self.where:
-            raise SkillFailed(f"{body} has not been seen yet")
+            raise WorkFailed(f"{body} has not been seen yet")
         pose = kind.held_at(self.where[body])
         return replace(pose, yaw=kind.turned_like(pose.yaw, like))
 

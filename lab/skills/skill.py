@@ -60,7 +60,7 @@ class Bench:
     def part_pose(self, body: str, like: float = 0.0) -> ToolPose:
         """The tool pose that would hold a part where it is, as far as is known; of its yaws the nearest to `like` [rad].
 
-        Known is, with the camera, where it was seen or set down last; SkillFailed for a part that was never seen.
+        Known is, with the camera, where it was seen or set down last; WorkFailed for a part that was never seen.
         """
         return self.true_pose(body, like) if self.sight is None else self.sight.pose(body, like, self.held)
 

@@ -305,8 +305,9 @@ def pictures_summary(record: Mapping[str, Any]) -> RenderableType:
     if "lens" in record:
         lens, (x, y, z) = record["lens"], record["eye_m"]
         bends = ", ".join(f"{name} {value:+.4f}" for name, value in lens["distortion"].items())
+        middle = f"({lens['middle'][0]:.1f}, {lens['middle'][1]:.1f})"
         lines = [
-            f"lens: focal length {lens['focal'][0]:.1f} pixels, middle ({lens['middle'][0]:.1f}, {lens['middle'][1]:.1f}), {bends}",
+            f"lens: focal length {lens['focal'][0]:.1f} pixels, middle {middle}, {bends}",
             f"camera at ({x:.3f}, {y:.3f}, {z:.3f}) m; residual {record['residual_px']:.2f} pixels "
             f"over {record['points']} points, from {record['method']}",
         ]

@@ -155,8 +155,8 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
     known = len(pictures) < FEW
     if known and angle_rad is None:
         raise BadInput(
-            f"{counted(len(pictures), 'picture')} of the mat: wanted {FEW} or more, tilted in all but the first, or the task with the "
-            "camera's field of view (--task)"
+            f"{counted(len(pictures), 'picture')} of the mat: wanted {FEW} or more, tilted in all but the first, "
+            "or the task with the camera's field of view (--task)"
         )
     if known:
         flags |= cv2.CALIB_FIX_FOCAL_LENGTH | cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_ZERO_TANGENT_DIST
@@ -167,11 +167,13 @@ def calibrate(pictures: Sequence[tuple[str, Image]], mat: Mat, angle_rad: float 
     residual, matrix, terms, turns, shifts, unsure = result[:6]
     if not known and not unsure.ravel()[0] < UNSURE * matrix[0, 0]:
         raise WorkFailed(
-            f"{len(pictures)} pictures: they do not tell the focal length ({matrix[0, 0]:.0f} +- {unsure.ravel()[0]:.0f} pixels): "
-            "show the mat tilted in more pictures, or give the task with the camera's field of view"
+            f"{len(pictures)} pictures: they do not tell the focal length, "
+            f"{matrix[0, 0]:.0f} +- {unsure.ravel()[0]:.0f} pixels: show the mat "
+            "tilted in more pictures"
         )
     k1, k2, p1, p2, k3 = (float(one) for one in np.ravel(terms)[:5])
-    lens = Lens(size, (matrix[0, 0], matrix[1, 1]), (matrix[0, 2], matrix[1, 2]), (k1, k2, p1, p2, k3))
+    fx, fy, cx, cy = (float(matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    lens = Lens(size, (fx, fy), (cx, cy), (k1, k2, p1, p2, k3))
     words = f"{counted(len(pictures), 'picture')} of a mat of {mat.columns} x {mat.rows} ArUco markers"
     return _placed(lens, turns[0], shifts[0], float(residual), sum(len(p) for p in pixels), words)
 
@@ -193,7 +195,10 @@ def from_corners(
         raise BadInput(f"corners {[tuple(one) for one in pixels]}: three of them lie on a line: wanted a rectangle's")
     world = np.column_stack([np.asarray(corners_m, dtype=np.float64), np.zeros(4)])
     distortion = np.array(lens.distortion)
-    _, turn, shift = cv2.solvePnP(world, seen, lens.matrix, distortion, flags=cv2.SOLVEPNP_IPPE)
+    solve: Any = cv2.solvePnP
+    _, turn, shift = solve(world, seen, lens.matrix, distortion, flags=cv2.SOLVEPNP_IPPE)
+    refine: Any = cv2.solvePnPRefineLM
+    turn, shift = refine(world, seen, lens.matrix, distortion, turn, shift)
     again, _ = cv2.projectPoints(world, turn, shift, lens.matrix, distortion)
     residual = float(np.sqrt(((again.reshape(-1, 2) - seen) ** 2).sum(axis=1).mean()))
     return _placed(lens, turn, shift, residual, 4, "four corners")

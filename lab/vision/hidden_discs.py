@@ -11,7 +11,7 @@ from lab.vision.picture_files import Image
 
 Array = NDArray[np.float64]
 
-WHOLE = 0.93  # of the area that it should have: a spot with more is taken for a whole disc
+WHOLE = 0.95  # of the area that it should have: a spot with more is taken for a whole disc
 LARGER = 1.6  # times the area that it should have: such a spot is no disc
 LEAST_ARC = 0.42  # of the circle that must be seen
 ON_ARC_PX = 0.9  # from the circle: points of the outline that are its rim
@@ -20,6 +20,7 @@ OUTSIDE = 0.04  # of the outline that may do so all the same
 SAMPLES = 28  # points of the outline of which every two give circles to try
 NOISY = 1.5  # of 255, standard deviation: a picture with more noise is smoothed
 SMOOTH_PX = 1.0
+RIM_IN_PX = 0.1  # the outline runs that much within the rim
 
 
 def calmed(image: Image) -> Image:
@@ -71,7 +72,7 @@ def behind_cover(outline: NDArray[np.int32], view: View, kind: str) -> tuple[flo
 
 def _rim(outline: NDArray[np.int32], view: View, kind: str) -> float:
     """The radius of a whole marker's outline, which runs through the middles of its outermost pixels."""
-    return max(view.radius_px(outline.mean(axis=0), kind) - 0.4, 1.0)
+    return max(view.radius_px(outline.mean(axis=0), kind) - RIM_IN_PX, 1.0)
 
 
 def _circles(points: Array, radius: float) -> Array:

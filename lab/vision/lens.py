@@ -53,9 +53,8 @@ class Lens:
 
         rotation = cv2.Rodrigues(np.asarray(turn, dtype=np.float64))[0]
         world, to = np.asarray(points, dtype=np.float64), np.asarray(shift, dtype=np.float64)
-        return np.asarray(cv2.projectPoints(world, rotation, to, self.matrix, np.array(self.distortion))[0]).reshape(
-            -1, 2
-        )
+        seen, _ = cv2.projectPoints(world, rotation, to, self.matrix, np.array(self.distortion))
+        return np.asarray(seen, dtype=np.float64).reshape(-1, 2)
 
     def straight_points(self, pixels: ArrayLike) -> Array:
         """Where pixels (n, 2) of a picture are in the straightened one."""

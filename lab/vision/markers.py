@@ -67,15 +67,15 @@ def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
                 found = behind_cover(outline.reshape(-1, 2), view, kind)
             elif area <= MAX_CELLS * view.cell_pixels and round_enough:
                 rim = [p for p in outline if abs(cv2.pointPolygonTest(hull, tuple(map(float, p[0])), True)) < RIM]
-                found = cv2.fitEllipse(np.array(rim))[0]
+                x, y = cv2.fitEllipse(np.array(rim))[0]
+                found = (float(x), float(y))
             else:
                 found = None
             if found is None:
                 ignored += 1
                 continue
-            pixel = (float(found[0]), float(found[1]))
-            place = view.place(pixel, kind)
-            markers.append(Marker(kind, pixel, place, view.cell(place)))
+            place = view.place(found, kind)
+            markers.append(Marker(kind, found, place, view.cell(place)))
             if len(markers) > MAX_MARKERS:
                 raise BadInput(f"picture: more than {MAX_MARKERS} round coloured spots: no picture of a grid")
     return tuple(sorted(markers, key=lambda m: (m.kind, m.cell, m.pixel))), ignored

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 OUTLINE_POINTS = 72
 COARSE_PX, FINE_PX = 2.0, 1.2  # standard deviations that the picture is smoothed by
 COARSE_M, COARSE_RAD = 0.004, 0.05  # between the places and yaws that are tried first
-FINEST_M, FINEST_RAD = 0.0001, 0.001
+FINEST = 7  # so often are they halved
 KEPT = 5  # of the places tried first are followed further
 FAINT = 2.5  # of 255 a pixel: a gradient like this counts half
 SEEN = 0.56  # of the outline must be an edge of the picture, on the mean
@@ -27,7 +27,7 @@ LIKE_RAD = 0.11  # between the colour within the outline and one of the part's, 
 
 @dataclass(frozen=True, eq=False)
 class PartSeen:
-    """A part's foot (x, y) [m] and yaw [rad] as seen, how much of its outline is an edge (0 to 1), and the outline (n, 2) [pixels]."""
+    """A part's foot (x, y) [m] and yaw [rad] as seen; `share`: how much of its outline (n, 2) [pixels] is an edge, 0 to 1."""
 
     x: float
     y: float
@@ -63,7 +63,7 @@ class Outlined:
 
 
 def find_part(image: Image, part: Outlined, near: ArrayLike, reach_m: float, reach_rad: float) -> PartSeen | None:
-    """The part in a straightened picture (H, W, 3), within `reach_m` and `reach_rad` of the pose `near` (x, y [m], yaw); None: not seen."""
+    """The part in a straightened picture (H, W, 3), within reach of the pose `near` (x, y [m], yaw [rad]); None: not seen."""
     check_picture(image)
     at = np.asarray(near, dtype=np.float64)
     coarse = _edges(image, COARSE_PX)
@@ -71,9 +71,10 @@ def find_part(image: Image, part: Outlined, near: ArrayLike, reach_m: float, rea
     ways = np.stack(np.meshgrid(_steps(reach_m, COARSE_M), _steps(reach_m, COARSE_M), yaws), axis=-1).reshape(-1, 3)
     shares = _shares(coarse, part.outlines(at + ways))
     best = at + ways[np.argsort(-shares)[:KEPT]]
-    for edges, first, last in ((coarse, 1, 2), (_edges(image, FINE_PX), 1, 7)):
-        best = np.array([_finer(edges, part, pose, first, last) for pose in best])
-    shares = _shares(_edges(image, FINE_PX), part.outlines(best))
+    fine = _edges(image, FINE_PX)
+    for edges, last in ((coarse, 2), (fine, FINEST)):
+        best = np.array([_finer(edges, part, pose, last) for pose in best])
+    shares = _shares(fine, part.outlines(best))
     pose, share = best[int(np.argmax(shares))], float(shares.max())
     outline = part.outlines(pose[None])[0, :, :2]
     if share < SEEN or np.abs(pose[:2] - at[:2]).max() > 1.2 * reach_m or not _coloured(image, outline, part.colours):
@@ -95,14 +96,14 @@ def _coloured(image: Image, outline: Array, colours: Array) -> bool:
 
 def _steps(reach: float, step: float) -> Array:
     count = int(np.ceil(reach / step))
-    return np.arange(-count, count + 1) * step
+    return np.asarray(np.arange(-count, count + 1) * step, dtype=np.float64)
 
 
-def _finer(edges: Array, part: Outlined, pose: Array, first: int, last: int) -> Array:
-    """The pose, moved by ever smaller steps to where the outline fits best: halved from one level to the next."""
+def _finer(edges: Array, part: Outlined, pose: Array, last: int) -> Array:
+    """The pose, moved to where the outline fits best, by steps that are halved until the level `last`."""
     turns = (0.0,) if part.round else (-1.0, 0.0, 1.0)
     ways = np.stack(np.meshgrid([-1.0, 0.0, 1.0], [-1.0, 0.0, 1.0], turns), axis=-1).reshape(-1, 3)
-    for level in range(first, last):
+    for level in range(1, last):
         step = np.array([COARSE_M, COARSE_M, COARSE_RAD]) / 2**level
         for _ in range(4):
             tried = pose + ways * step
@@ -123,7 +124,7 @@ def _edges(image: Image, smooth_px: float) -> Array:
     channel = strong.argmax(axis=2)[..., None]
     dx, dy, strong = (np.take_along_axis(one, channel, axis=2)[..., 0] for one in (dx, dy, strong))
     scale = smooth_px / (strong + FAINT)
-    return np.stack([dx * scale, dy * scale], axis=-1)
+    return np.asarray(np.stack([dx * scale, dy * scale], axis=-1), dtype=np.float64)
 
 
 def _shares(edges: Array, outlines: Array) -> Array:

@@ -70,7 +70,7 @@ def _light(shape: tuple[int, ...], rng: np.random.Generator, strength: float) ->
 def hide(
     image: Image, discs: Sequence[tuple[float, float, float]], rng: np.random.Generator
 ) -> tuple[Image, list[float]]:
-    """A copy with each disc (x, y, radius) [pixels] partly covered by something's straight edge, and how much of each, 0 to HIDDEN."""
+    """A copy with each disc (x, y, radius) [pixels] partly covered by something's straight edge, and how much of each."""
     import cv2
 
     canvas, shares = np.array(image), []
