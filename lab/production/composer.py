@@ -16,6 +16,7 @@ from lab.production.recovery import Recovery
 from lab.production.relearning import Relearner, adopt
 from lab.production.replanning import in_another, plan_again
 from lab.production.run_journal import Met, Moved, RunJournal
+from lab.production.standing import has_fallen, stands
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.cell.cell import Cell
@@ -133,15 +134,20 @@ class Production:
             for name in names:
                 self.floor.recorder.show(name)
 
+    def _stands(self, name: str) -> bool:
+        return stands(self.floor.bench, name, self.work.spot_of[name])
+
     def outcome(self, failure: str | None, interrupted: bool = False) -> Outcome:
         """What came of it."""
         work, floor = self.work, self.floor
-        delivered = tuple(part for part in sorted(work.finished) if work.stands(part) and part not in work.spoilt)
+        delivered = tuple(
+            part for part in sorted(work.finished) if part not in work.spoilt and self._stands(work.name(part))
+        )
         left = [part for part in range(1, self.cell.parts + 1) if part not in delivered]
         return Outcome(
             Schedule.from_moves(self.cell, work.moves),
             delivered,
-            tuple(part for part in left if work.has_fallen(part)),
+            tuple(part for part in left if has_fallen(floor.bench, work.name(part))),
             tuple(self.recovery.notes),
             failure,
             floor.now_s,

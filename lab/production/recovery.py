@@ -241,6 +241,7 @@ class Recovery:
     def _lose(self, part: int, why: str) -> None:
         self.lost[part] = why
         self.work.left_lying.add(self.work.name(part))
+        self.work.spot_of.pop(self.work.name(part), None)
         self.work.finished.pop(part, None)
         self.work.to_set_right = [one for one in self.work.to_set_right if one != part]
         self.work.tell(PartLost(self.work.name(part), why, self.work.floor.now_s))

@@ -2,20 +2,21 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import cos, hypot, sin
+from math import hypot
 
 from lab.production.durations import TimedMove
 from lab.production.floor import Floor
 from lab.production.machine import Machine
+from lab.production.standing import free_spot, station_near
 from lab.production.trouble import Trouble
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option, part_of
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.simulate.run import Run
-from lab.sim.parts.kinds import Kind, Spot, comes_as, on_its_pallet
+from lab.sim.parts.kinds import Spot, comes_as, on_its_pallet
 from lab.sim.scene.scene import pallet_of
 from lab.skills import Skill
-from lab.skills.skill import UPRIGHT, Status, over_everything
+from lab.skills.skill import Status, over_everything
 from lab.skills.skillset import Carried, ways_of
 from lab.teaching.events import (
     MachineBegan,
@@ -29,10 +30,7 @@ from lab.teaching.events import (
     unheard,
 )
 
-ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
-DELIVERED_M = 0.02  # a part this near to its spot has been delivered
 BEGINS_M = 0.05  # a tool this near to where a skill begins need not be brought there
-FREE_M = 0.005  # around a part where it is set down, of what lies about
 PATIENCE, PATIENCE_S = (
     1.0,
     10.0,
@@ -200,27 +198,7 @@ class Transfers:
             return self.spot_of[pallet_of(name)]
         own = scene.bodies_of(name, way.kind)
         taken = [spot for body, spot in self.spot_of.items() if body not in own] + [*self.taken]
-        spots = [s for s in scene.places.spots(scene.task.station(way.target)) if s not in taken]
-        blocked = ""
-        for spot in spots:
-            blocked = self._blocked_by(spot, name, way)
-            if not blocked:
-                return spot
-        why = f": {blocked} is there" if blocked else ""
-        raise Trouble(f"no spot of '{way.target}' is free{why}", name, way.target, final=True)
-
-    def _blocked_by(self, spot: Spot, name: str, way: Carried) -> str:
-        """Which of the parts that were given up lies where a part is to be set down; "" for none."""
-        scene, shape = self.floor.scene, self.floor.scene.kinds[way.kind].shape
-        half = max(abs(shape.low[0]), abs(shape.high[0])), max(abs(shape.low[1]), abs(shape.high[1]))
-        c, s = abs(cos(spot.yaw)), abs(sin(spot.yaw))
-        x, y = c * half[0] + s * half[1] + FREE_M, s * half[0] + c * half[1] + FREE_M
-        for body in self.left_lying:
-            low, high = scene.world.bounds(body)
-            aside = low[0] > spot.x + x or high[0] < spot.x - x or low[1] > spot.y + y or high[1] < spot.y - y
-            if not aside and high[2] > spot.z and body != name:
-                return body
-        return ""
+        return free_spot(scene, name, way, taken, self.left_lying)
 
     # ---- what a move is made of ------------------------------------------------------------------------------------
 
@@ -317,7 +295,7 @@ class Transfers:
     def _take_up(self, name: str, way: Carried, spot: Spot) -> None:
         """Take a part up: by the way of the station that it stands near to, or of its own where it stands astray."""
         bench, skillset, body = self.floor.bench, self.floor.skillset, self.floor.scene.body_of(name, way.kind)
-        near = self._near(body, way)
+        near = station_near(bench, body, way, skillset)
         if near != way.origin:
             self.over_to(near)
         self.place = ""
@@ -327,16 +305,6 @@ class Transfers:
         if near == way.origin and (machine := self.floor.machines.get(near)) is not None and machine.part == name:
             machine.clear()
         assert bench.held == body
-
-    def _near(self, body: str, way: Carried) -> str:
-        """The station of the two on a way that a part stands at; its origin when it stands at neither."""
-        scene, at = self.floor.scene, self.floor.bench.part_pose(body)
-        for station in (way.origin, way.target):
-            foots = scene.places.spots(scene.task.station(station))
-            near = any(hypot(at.x - foot.x, at.y - foot.y) < ASTRAY_M for foot in foots)
-            if near and (way.kind, station) in self.floor.skillset.picks:
-                return station
-        return way.origin
 
     def _bring(self, way: Carried, spot: Spot, move: _UnderWay) -> None:
         """Carry what is in the gripper to its target and set it down; from a station near the target, that is all."""
@@ -366,24 +334,3 @@ class Transfers:
         self.tell(SkillBegan(skill.name, skill.does(name), name, self.floor.now_s))
         if self.floor.run(skill) is not Status.SUCCESS:
             raise Trouble(skill.reason, name, where, held=self.floor.was_held, skill=skill.name)
-
-    # ---- what came of it -------------------------------------------------------------------------------------------
-
-    def stands(self, part: int) -> bool:
-        """Whether a part, and its pallet, stands where it was set down last."""
-        scene, name = self.floor.scene, self.name(part)
-        spot = self.spot_of[name]
-        for body, own in zip(scene.bodies_of(name, comes_as(scene.kind_of[name].part)), self._stack(part), strict=True):
-            if not self.floor.bench.stands(body, spot, DELIVERED_M, truly=True):
-                return False
-            spot = spot.raised(own.shape.height_m)
-        return True
-
-    def has_fallen(self, part: int) -> bool:
-        """Whether a part is neither held nor upright."""
-        bench, name = self.floor.bench, self.name(part)
-        return bench.held not in (name, pallet_of(name)) and bench.upright(name) < UPRIGHT
-
-    def _stack(self, part: int) -> list[Kind]:
-        scene = self.floor.scene
-        return scene.kinds[comes_as(scene.kind_of[self.name(part)].part)].stack()
