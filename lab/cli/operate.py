@@ -60,7 +60,7 @@ def operate(
             conditions = Conditions(1.0, seat.page, Controls(pace), journal, fault_seed=faults)
             operation = Operation(loaded, order, seed, teacher, conditions)
             try:
-                bad = _at_console(Desk(operation), live, as_json)
+                bad = _at_console(Desk(operation, attended=live), live, as_json)
             finally:
                 document = _kept(operation, folder)
                 operation.close()
