@@ -54,7 +54,7 @@ COMMANDS = {  # what is typed after `lab` -> the command
     "sequence": Command(
         sequence.sequence, "lab sequence toast --case II --toasts 4 --gantt order.svg", "{words of sequencing}"
     ),
-    "export": Command(export.export, "lab export toast-run --format jbi"),
+    "export": Command(export.export, "lab export toast-run --format jbi", "{words of exporting}"),
     "see": Command(see.see, "lab see overhead.png --task toast"),
     "view": Command(view.view, "lab view toast"),
     "new": Command(new.new, "lab new bakery --part box:0.12x0.015x0.12:2 --machine oven:60"),

@@ -58,12 +58,14 @@ def export(
         "max_deviation_rad": off.max_rad,
         "deviation_at_rest_m": off.at_rest_m,
         "deviation_at_rest_rad": off.at_rest_rad,
+        "run_off_target_m": off.run_off_m,
         "within_1_mm_and_1_degree": off.near_enough,
         "warnings": form.warnings(program),
     }
     show(document, as_json, _summary)
     if not off.near_enough:
-        end("played in physics, the tool is more than 1 mm or 1 degree off the run's", 1)
+        why = f"in the run it was itself up to {1000 * off.run_off_m:.1f} mm off where it was driven to"
+        end(f"played in physics, the tool is more than 1 mm or 1 degree off the run's; {why}", 1)
 
 
 def _written(texts: dict[str, str], folder: Path) -> list[Path]:

@@ -98,12 +98,20 @@ def _commands(program: Program, actions: Sequence[Action], transfer: Transfer | 
             if _length(poses) > STILL_M:
                 if not any(isinstance(command, Path) for command in found):
                     found.append(Joint(tuple(map(float, program.joints[action.first]))))
-                found.append(Path(straightened(poses)[1:], _speed(poses)))
+                driven = poses if action.complete else poses[:-1]
+                found.append(Path(straightened(poses)[1:], _speed(driven)))
         elif isinstance(action, Press):
             found += [Grip(action.closed), Pause(GRIP_S)]
         else:
             found.append(Pause(action.seconds))
     return tuple(found)
+
+
+def step_between(start: Array, end: Array) -> Array:
+    """From one tool pose (4,) to another: x, y, z [m], and the shorter way round [rad]."""
+    step = np.asarray(end - start)
+    step[3] = (step[3] + pi) % (2 * pi) - pi
+    return step
 
 
 def way_of(poses: Array) -> Array:

@@ -9,11 +9,12 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import ceil, degrees, hypot, pi, radians
+from typing import Literal
 
 import numpy as np
 
 from lab.errors import BadInput, counted
-from lab.export.commands import GRIP_S, Await, Command, Grip, Job, Joint, Path, Pause, jobs_of
+from lab.export.commands import GRIP_S, Await, Command, Grip, Job, Joint, Path, Pause, jobs_of, step_between
 from lab.export.inform import (
     MOST_POSITIONS,
     MOST_TEXT,
@@ -59,16 +60,16 @@ def write(program: Program, options: Options) -> dict[str, str]:
         raise BadInput(f"--positions pulse: pulses of arm '{arm.name}' are not known; known: {', '.join(PULSES)}")
     jobs = [(f"M{number:03d}", job) for number, job in enumerate(jobs_of(program), start=1)]
     master = re.sub(r"[^A-Z0-9]", "", program.carried.task.upper())[:8]
-    calls = [Call("OPEN"), *(Call(name) for name, _ in jobs)]
-    grips = {
-        name: InformJob(name, f"gripper {name.lower()}", options.date, (), (Dout(GRIPPER, on), Timer(GRIP_S)))
+    transfers = [_Writer(arm, options).job(name, job) for name, job in jobs]
+    calls = (Call("OPEN"), *(Call(name) for name, _ in jobs))
+    called = {*calls, *(step for job in transfers for step in job.instructions)}
+    grips = [
+        InformJob(name, f"gripper {name.lower()}", options.date, (), (Dout(GRIPPER, on), Timer(GRIP_S)))
         for name, on in (("OPEN", False), ("CLOSE", True))
-    }
-    made = [
-        InformJob("RUN" if _OWN.fullmatch(master) else master, program.carried.task, options.date, (), tuple(calls)),
-        *grips.values(),
-        *(_Writer(arm, options).job(name, job) for name, job in jobs),
+        if Call(name) in called
     ]
+    name = "RUN" if _OWN.fullmatch(master) else master
+    made = [InformJob(name, program.carried.task[:MOST_TEXT], options.date, (), calls), *grips, *transfers]
     return {f"{job.name}.JBI": job.text() for job in made}
 
 
@@ -115,10 +116,10 @@ class _Writer:
         poses = np.vstack([self.pose, path.points])
         joints = self.arm.inverse_path(poses, self.joints)
         for number, pose in enumerate(path.points):
-            unit, speed = _spoken_speed(pose - self.pose, path.speed_m_s)
+            unit, speed = _spoken_speed(step_between(self.pose, pose), path.speed_m_s)
             level = 0 if number == len(path.points) - 1 else THROUGH
             at = self._at(pose, joints[number + 1])
-            self.instructions.append(MoveL(at, "VR" if unit == "VR" else "V", speed, level))
+            self.instructions.append(MoveL(at, unit, speed, level))
             self.pose = pose
         self.joints = joints[-1]
 
@@ -134,7 +135,7 @@ class _Writer:
         return len(self.positions) - 1
 
 
-def _spoken_speed(step: Array, speed_m_s: float) -> tuple[str, float]:
+def _spoken_speed(step: Array, speed_m_s: float) -> tuple[Literal["V", "VR"], float]:
     """The unit and the speed of one straight piece (4,) at a speed of its way [m/s]: in mm/s, or in degrees/s of a mere turn."""
     far, turn = hypot(*step[:3]), abs(step[3])
     way = hypot(far, YAW_ARM * turn)
@@ -230,10 +231,10 @@ class _Reader:
         pose = (
             _tool(self.arm, self._joints(position, where)) if position.configuration is None else self._tool(position)
         )
-        pose[3] = self.pose[3] + _wrapped(pose[3] - self.pose[3])
-        self.speeds.append(_way_speed(pose - self.pose, step))
-        self.points.append(pose)
-        self.pose = pose
+        way = step_between(self.pose, pose)
+        self.speeds.append(_way_speed(way, step))
+        self.pose = self.pose + way
+        self.points.append(self.pose)
         if step.level == 0:
             self._stop()
 

@@ -26,7 +26,8 @@ _AT_REST_RAD = 1e-3  # between two points that are far apart in time: the arm re
 class Deviation:
     """How far the tool was off the run's at the worst [m], [rad]: along the ways, and where they end at rest.
 
-    motions: how many ways were compared, poses: at how many points of them.
+    motions: how many ways were compared, poses: at how many points of them. run_off_m: how far the run's own tool was off
+    where it was driven to, where its ways end, as when something was in its way: nothing is when the arm plays alone.
     """
 
     along_m: float
@@ -35,6 +36,7 @@ class Deviation:
     at_rest_rad: float
     motions: int
     poses: int
+    run_off_m: float
 
     @property
     def max_m(self) -> float:
@@ -72,7 +74,7 @@ def deviation(program: Program, played: "list[Command] | TimedPoints") -> Deviat
         worst = np.maximum(worst, [*along, rest[0].max(), rest[1].max()])
         poses += len(seen)
     along_m, along_rad, at_rest_m, at_rest_rad = worst.tolist()
-    return Deviation(along_m, along_rad, at_rest_m, at_rest_rad, len(motions), poses)
+    return Deviation(along_m, along_rad, at_rest_m, at_rest_rad, len(motions), poses, run_off(program))
 
 
 def signals(played: "Sequence[Command] | TimedPoints", program: Program) -> list[str]:
@@ -95,11 +97,19 @@ def signals(played: "Sequence[Command] | TimedPoints", program: Program) -> list
 
 def _compared_by_time(program: Program, played: Array) -> Deviation:
     if not len(program.seen):
-        return Deviation(0.0, 0.0, 0.0, 0.0, 0, 0)
+        return Deviation(0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
     far, turned = _gaps(program.seen, played)
     ends = [motion.seen_last - 1 for motion in program.motions if motion.complete]
     at_rest = (float(far[ends].max()), float(turned[ends].max())) if ends else (0.0, 0.0)
-    return Deviation(float(far.max()), float(turned.max()), *at_rest, len(program.motions), len(far))
+    return Deviation(float(far.max()), float(turned.max()), *at_rest, len(program.motions), len(far), run_off(program))
+
+
+def run_off(program: Program) -> float:
+    """How far the run's own tool was off where it was driven to, at the ends of its ways, at the worst [m]."""
+    ends = [motion for motion in program.motions if motion.complete]
+    wanted = [program.tools(motion.last - 1, motion.last)[0, :3] for motion in ends]
+    seen = [program.seen[motion.seen_last - 1, :3] for motion in ends]
+    return float(np.linalg.norm(np.array(wanted) - np.array(seen), axis=-1).max(initial=0.0))
 
 
 # ---- playing ------------------------------------------------------------------------------------------------------
@@ -212,6 +222,7 @@ def apart(seen: Array, way: Array) -> tuple[Array, Array]:
 
     A turn counts as YAW_ARM in what is nearest.
     """
+    way = np.repeat(way, 2, axis=0) if len(way) == 1 else way
     points, line = _flat(seen), _flat(way)
     line[:, 3] += 2 * np.pi * YAW_ARM * np.round((points[0, 3] - line[0, 3]) / (2 * np.pi * YAW_ARM))
     starts, steps = line[:-1], np.diff(line, axis=0)

@@ -27,7 +27,8 @@ Row = Annotated[int, Field(ge=0)]
 class Motion(Record):
     """The tool's way along `poses` (x, y, z [m], yaw [rad], each), rounded by `blend_m`, from rest to rest.
 
-    Rows `first` to `last` of the joints were driven, `seen_first` to `seen_last` of what was seen; complete: to the end.
+    Rows `first` to `last` of the joints were driven, `seen_first` to `seen_last` of what was seen. complete: to the end; if
+    not, it was broken off, and its last row is where the arm was when it went on.
     """
 
     what: Literal["motion"] = "motion"

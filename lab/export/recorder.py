@@ -72,18 +72,24 @@ class MotionRecorder:
             return
         poses, blend, way, before, begun, seen = self._open
         self._open = None
+        self._driven = min(self._driven, self._steps - begun)  # a target that was set in the step of a stop is none
         if not self._driven:
             return
         first = sum(map(len, self._rows))
-        self._rows.append(np.vstack([before, way.positions[: self._driven]]))
-        self._times.append(begun + np.arange(self._driven + 1.0))
+        rows, times = [before, *way.positions[: self._driven]], [*range(begun, begun + self._driven + 1)]
+        if not complete:  # it ends where the arm has come to a stop
+            self._see()
+            rows.append(self._robot.world.joints(NAME, self._robot.arm.joints))
+            times.append(self._steps)
+        self._rows.append(np.array(rows))
+        self._times.append(np.array(times, float))
         self._actions.append(
             Motion(
                 at_s=begun * TIME_STEP,
                 poses=tuple((p.x, p.y, p.z, p.yaw) for p in poses),
                 blend_m=blend,
                 first=first,
-                last=first + self._driven + 1,
+                last=first + len(rows),
                 seen_first=seen,
                 seen_last=len(self._seen),
                 complete=complete,

@@ -13,7 +13,7 @@ from math import atan2, cos, hypot, pi, sin
 import numpy as np
 
 from lab.errors import BadInput, unknown
-from lab.export.commands import Await, Command, Grip, Joint, Path, Pause, jobs_of
+from lab.export.commands import Await, Command, Grip, Joint, Path, Pause, jobs_of, step_between
 from lab.export.options import Options
 from lab.export.program import Array, Program
 from lab.sim.arms.arm import Arm
@@ -74,7 +74,9 @@ class _Writer:
             assert self.pose is not None
             for number, pose in enumerate(command.points):
                 rounded = 0.0 if number == len(command.points) - 1 else THROUGH_M
-                speeds = f"a={self.acceleration:.3f}, v={_tool_speed(pose - self.pose, command.speed_m_s):.5f}"
+                speeds = (
+                    f"a={self.acceleration:.3f}, v={_tool_speed(step_between(self.pose, pose), command.speed_m_s):.5f}"
+                )
                 self.lines.append(f"movel({self._text(pose)}, {speeds}, r={rounded:.4f})")
                 self.pose = pose
         elif isinstance(command, Grip):
@@ -188,11 +190,10 @@ class _Reader:
     def straight(self, match: "re.Match[str]") -> None:
         if self.pose is None:
             raise self._fault("a straight line before any movej has said where it begins")
-        pose = self._read_pose(match[1])
-        pose[3] = self.pose[3] + (pose[3] - self.pose[3] + pi) % (2 * pi) - pi
-        self.speeds.append(_way_speed(pose - self.pose, float(match[3])))
-        self.points.append(pose)
-        self.pose = pose
+        way = step_between(self.pose, self._read_pose(match[1]))
+        self.speeds.append(_way_speed(way, float(match[3])))
+        self.pose = self.pose + way
+        self.points.append(self.pose)
         if float(match[4]) == 0.0:
             self._stop()
 

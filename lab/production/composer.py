@@ -8,12 +8,13 @@ from lab.export.recorder import MotionRecorder
 from lab.production.conditions import Conditions
 from lab.production.faults.injector import Injector
 from lab.production.floor import Floor
+from lab.production.machine import NEVER
 from lab.production.outcome import Outcome
 from lab.production.perception import Deviation, scene_seen
-from lab.production.recorder import finish_name
+from lab.production.recorder import burnt_name, finish_name
 from lab.production.recovery import Recovery
 from lab.production.relearning import Relearner, adopt
-from lab.production.replanning import in_another, plan_again, shifted
+from lab.production.replanning import in_another, plan_again
 from lab.production.run_journal import Met, Moved, RunJournal
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
@@ -84,10 +85,7 @@ class Production:
         work, recovery, now_s = self.work, self.recovery, self.floor.now_s
         first = self.sequence[0] if self.sequence and self.floor.bench.held is not None else None
         ready_s = {
-            part: max(0.0, work.expected_s[machine.station] - now_s)
-            for machine in self.floor.machines.values()
-            for part in range(1, self.cell.parts + 1)
-            if machine.part == work.name(part)
+            part: work.left_s(part) for part in range(1, self.cell.parts + 1) if work.machine_of(part) is not None
         }
         mishaps = Mishaps(frozenset(recovery.lost), tuple(recovery.out), ready_s, dict(recovery.back))
         try:
@@ -101,7 +99,7 @@ class Production:
             raise RunStopped(f"{why}: {self.floor.bench.held} is in the gripper and cannot be brought on: take it out")
         if found.schedule is not None and found.proven is not None:
             gap = found.proven.gap(found.schedule.makespan_s)
-            plan = shifted(found.schedule, now_s)
+            plan = found.schedule.later(now_s)
             self.tell(PlanMade(plan, len(self.sequence), gap, found.proven.proven, now_s, why))
 
     def relearn(self, seen: Sequence[Deviation]) -> None:
@@ -119,9 +117,14 @@ class Production:
         for machine in floor.machines.values():
             if not machine.told and machine.done(floor.now_s):
                 machine.told = True
+                at_most_s = self.work.at_most_s(machine.part, machine.station)
+                machine.burns_s = NEVER if at_most_s is None else floor.now_s + at_most_s
                 self.tell(MachineDone(machine.station, machine.part, floor.now_s))
                 if machine.skill is None and floor.skillset.task.station(machine.station).finish is not None:
                     self._show(finish_name(machine.part, machine.station))
+            if machine.part and floor.now_s > machine.burns_s:
+                machine.burns_s = NEVER
+                self._show(burnt_name(machine.part, machine.station))
             if machine.skill is not None and machine.moves:
                 self._show(*machine.skill.shown())
 
@@ -133,7 +136,7 @@ class Production:
     def outcome(self, failure: str | None, interrupted: bool = False) -> Outcome:
         """What came of it."""
         work, floor = self.work, self.floor
-        delivered = tuple(part for part in sorted(work.finished) if work.stands(part))
+        delivered = tuple(part for part in sorted(work.finished) if work.stands(part) and part not in work.spoilt)
         left = [part for part in range(1, self.cell.parts + 1) if part not in delivered]
         return Outcome(
             Schedule.from_moves(self.cell, work.moves),
@@ -167,10 +170,10 @@ def carry_out(
         floor, injector = Floor(world, prepared.skillset, prepared.layout, prepared.order), Injector(conditions.faults)
         injector.prepare(floor.scene)
         floor.record(conditions.viewer)
-        motions = MotionRecorder(floor.scene.robot)
         floor.scene.robot.override(conditions.override)
         floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
+        motions = MotionRecorder(floor.scene.robot)  # its times begin with the floor's
         floor.hand = lambda: injector.tick(floor)
         journal = conditions.journal
         heard: list[Event] = []

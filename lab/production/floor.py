@@ -15,7 +15,8 @@ from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
 from lab.sim.world import TIME_STEP, World
 from lab.skills import Skill
-from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, SkillFailed, Status
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, Status
 from lab.skills.skillset import SkillSet
 from lab.tasks.task import Order
 from lab.teaching.events import RunHeld, RunWentOn, Tell, unheard

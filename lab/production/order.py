@@ -18,7 +18,7 @@ from lab.learning.session_events import Event as SessionEvent
 from lab.learning.settings import GateSettings
 from lab.sequencing import find_sequence
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.objectives import MAKESPAN, cost
+from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.methods.exact import Optimum, optimum
 from lab.sequencing.search import SAME, Reference, Search, SequenceResult
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 NOBODY = AdvisorName.of("none")
 KeepOrder = Callable[[Cell, str], Journal]  # given the cell and the objective
+SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
 ADVISED, GIVEN, EXACT = "advised", "given", "exact"  # by whom an order is, beside the methods' names
 
 
@@ -125,7 +126,8 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
     WorkFailed and KeyboardInterrupt.
     """
     search, proven = search_for(settings), optimum(cell)
-    known = Reference(proven.bound_s, proven.proven, "A*") if search.objective == MAKESPAN else None
+    is_timed = search.objective == MAKESPAN
+    known = Reference(proven.bound_s, proven.proven, "A*") if is_timed else reference(cell, search.objective)
     orders = dict[str, SequenceResult]()
     if advice.given:
         taken = checked_order(cell, advice.given)
@@ -135,7 +137,7 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
     if advice.advisor.row != "none" and not advice.given:
         orders[ADVISED], said = _with_advice(cell, search, advice, seed, known, tell)
     orders[settings.method] = find_sequence(cell, settings.method, search, seed)
-    if search.objective == MAKESPAN and len(orders) > 1 and proven.sequence:
+    if is_timed and len(orders) > 1 and proven.sequence:
         orders[EXACT] = SequenceResult(proven.sequence, proven.cost, (proven.cost,))
     used = GIVEN if advice.given else _cheapest(orders)
     costs = {name: order.cost for name, order in orders.items()}
@@ -143,8 +145,26 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
     if len(orders) == 1:
         return Ordered(orders[used], proven, used, costs)
     tell(OrderChosen(used, costs, search.objective))
-    worth = {"used": used, "costs": costs, "objective": search.objective, "bound": known.bound if known else None}
+    worth = {"used": used, "costs": costs, "objective": search.objective, "bound": known.bound}
     return Ordered(orders[used], proven, used, costs, worth | said)
+
+
+def reference(cell: Cell, objective: str) -> Reference:
+    """The proven optimum, or the best bound: by A* for the makespan, by CP-SAT for the other objectives."""
+    if objective == MAKESPAN:
+        from lab.sequencing.methods.exact import optimum
+
+        best = optimum(cell)
+        return Reference(best.bound_s, best.proven, "A*")
+    from lab.sequencing.methods.cp_sat import cp_sat, fits
+
+    unit = "" if objective == "tardy-parts" else " s"
+    if objective not in BUILT_IN:
+        return Reference(0.0, False, "nothing: CP-SAT has no rule for this objective", unit)
+    if not fits(cell):
+        return Reference(0.0, False, "nothing: too many moves for CP-SAT", unit)
+    opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)
+    return Reference(opinion.bound, opinion.status == "optimal", "CP-SAT", unit)
 
 
 def _cheapest(orders: Mapping[str, SequenceResult]) -> str:
@@ -154,7 +174,7 @@ def _cheapest(orders: Mapping[str, SequenceResult]) -> str:
 
 
 def _with_advice(
-    cell: Cell, search: Search, advice: OrderAdvice, seed: int, known: Reference | None, tell: Tell
+    cell: Cell, search: Search, advice: OrderAdvice, seed: int, known: Reference, tell: Tell
 ) -> "tuple[AdvisedResult, dict[str, Any]]":
     """SRL's order with advice, and its receipt; it begins again each time an answer is taken back."""
     is_person = advice.advisor.row in PEOPLE
@@ -167,7 +187,7 @@ def _with_advice(
                 break
             except Again:
                 journal.rewind()
-        bound = known.bound if known is not None and known.proven else None
+        bound = known.bound if known.proven else None
         is_best = bound is not None and found.cost <= bound + SAME
         journal.closes(Closed(search.episodes, found.cost, bound, is_best, saved_as=""))
     finally:

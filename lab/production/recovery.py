@@ -50,6 +50,7 @@ class Recovery:
         for part in found:
             self._missing.discard(part)
             del self.lost[part]
+            self.work.left_lying.discard(self.work.name(part))
             name = self.work.name(part)
             self.work.spot_of[name] = seen_at(self.work.floor, name)
             self._tell(Trouble("it can be taken up again", name), "goes on with it")
@@ -71,7 +72,8 @@ class Recovery:
 
     def failure(self) -> str | None:
         """Why not all parts were made; None when they were."""
-        return "; ".join(dict.fromkeys(self.lost[part] for part in sorted(self.lost))) or None
+        why = self.work.spoilt | self.lost
+        return "; ".join(dict.fromkeys(why[part] for part in sorted(why))) or None
 
     def look(self) -> None:
         """See, once a second, whether all is where it should be. Raises Trouble."""
@@ -180,7 +182,7 @@ class Recovery:
 
     def _leave(self, part: int, seen: Deviation) -> None:
         """A part that cannot be taken up is left; where it lies in a machine, that is closed."""
-        machine = next((m for m in self.work.floor.machines.values() if m.part == self.work.name(part)), None)
+        machine = self.work.machine_of(part)
         if machine is not None and seen.sort == "part fallen":
             self.out[machine.station] = f"{seen.name} lies in '{machine.station}'"
         if machine is not None:
@@ -193,7 +195,7 @@ class Recovery:
         """A part that was moved is taken up where it stands; out of its machine before that was done, it goes back there."""
         assert seen.at is not None
         work, name = self.work, self.work.name(part)
-        machine = next((m for m in work.floor.machines.values() if m.part == name), None)
+        machine = work.machine_of(part)
         answer = "takes it up there"
         if machine is not None:
             before = work.came_from.get(name)
@@ -238,6 +240,7 @@ class Recovery:
 
     def _lose(self, part: int, why: str) -> None:
         self.lost[part] = why
+        self.work.left_lying.add(self.work.name(part))
         self.work.finished.pop(part, None)
         self.work.to_set_right = [one for one in self.work.to_set_right if one != part]
         self.work.tell(PartLost(self.work.name(part), why, self.work.floor.now_s))

@@ -62,12 +62,3 @@ def in_another(run: Run, cell: Cell) -> Run:
         other.locations[part] = (own[part].position if own is not None and stays else place) or 0
     other.ready_s, other.robot, other.now_s = run.ready_s.copy(), run.robot, run.now_s
     return other
-
-
-def shifted(schedule: Schedule, by_s: float) -> Schedule:
-    """A schedule that begins so much later [s]."""
-    robot, machines, parts = (
-        tuple(replace(one, start_s=one.start_s + by_s, end_s=one.end_s + by_s) for one in row)
-        for row in (schedule.robot, schedule.machines, schedule.parts)
-    )
-    return replace(schedule, robot=robot, machines=machines, parts=parts, makespan_s=schedule.makespan_s + by_s)

@@ -91,8 +91,8 @@ class Report:
             "faults": [*verdict.rows],
             "outcome": verdict.came,
             "interrupted": outcome.interrupted,
-            "wall_s": self.wall_s,
             "receipts": self.receipts,
+            "wall_s": self.wall_s,
             "files": self.files,
         }
 

@@ -14,12 +14,11 @@ from lab.errors import BadInput, unknown
 from lab.learning.requests import Ask
 from lab.learning.settings import GateSettings
 from lab.production.drawn_times import stochastic
-from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session
+from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session, reference
 from lab.sequencing import SEQUENCERS, check_method, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import (
-    BUILT_IN,
     MAKESPAN,
     OBJECTIVES,
     WITH_DUE_TIMES,
@@ -36,8 +35,6 @@ from lab.tasks.task import Task
 from lab.tasks.task_file import load_any
 from lab.teaching.events import PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.teacher import Teacher
-
-SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
 
 
 @dataclass(frozen=True)
@@ -218,24 +215,6 @@ class _Heard:
     def result(self) -> SequenceResult:
         assert self.best is not None
         return SequenceResult(self.best.best, self.best.best_cost, tuple(self.costs))
-
-
-def reference(cell: Cell, objective: str) -> Reference:
-    """The proven optimum, or the best bound: by A* for the makespan, by CP-SAT for the other objectives."""
-    if objective == MAKESPAN:
-        from lab.sequencing.methods.exact import optimum
-
-        best = optimum(cell)
-        return Reference(best.bound_s, best.proven, "A*")
-    from lab.sequencing.methods.cp_sat import cp_sat, fits
-
-    unit = "" if objective == "tardy-parts" else " s"
-    if objective not in BUILT_IN:
-        return Reference(0.0, False, "nothing: CP-SAT has no rule for this objective", unit)
-    if not fits(cell):
-        return Reference(0.0, False, "nothing: too many moves for CP-SAT", unit)
-    opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)
-    return Reference(opinion.bound, opinion.status == "optimal", "CP-SAT", unit)
 
 
 def _document(

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import hypot
+from math import cos, hypot, sin
 
 from lab.production.durations import TimedMove
 from lab.production.floor import Floor
+from lab.production.machine import Machine
 from lab.production.trouble import Trouble
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option, part_of
@@ -16,11 +17,22 @@ from lab.sim.scene.scene import pallet_of
 from lab.skills import Skill
 from lab.skills.skill import UPRIGHT, Status, over_everything
 from lab.skills.skillset import Carried, ways_of
-from lab.teaching.events import MachineBegan, MoveBegan, MoveMade, PartDone, SkillBegan, Tell, TroubleMet, unheard
+from lab.teaching.events import (
+    MachineBegan,
+    MoveBegan,
+    MoveMade,
+    PartDone,
+    PartLost,
+    SkillBegan,
+    Tell,
+    TroubleMet,
+    unheard,
+)
 
 ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
 DELIVERED_M = 0.02  # a part this near to its spot has been delivered
 BEGINS_M = 0.05  # a tool this near to where a skill begins need not be brought there
+FREE_M = 0.005  # around a part where it is set down, of what lies about
 PATIENCE, PATIENCE_S = (
     1.0,
     10.0,
@@ -50,10 +62,10 @@ class Transfers:
     """Parts being brought on upon a floor: where they are, which spots are taken, when machines should be done.
 
     spot_of: by body, a part's or its pallet's. expected_s: by machine, when it should be done [s]. place: the station at
-    whose approach the tool is; "": it is somewhere else. came_from: by part, its position before the one it is in.
-    taken: spots on which something stands that belongs to nobody. finished: when a part reached the end of its route [s];
-    to_set_right: those of them that were moved there.
-    look: called while the robot waits; raises Trouble.
+    whose approach the tool is; "": it is somewhere else. came_from: by part, its position before the one it is in. taken:
+    spots on which something stands that belongs to nobody. finished: when a part reached the end of its route [s].
+    to_set_right: those of them that were moved there. left_lying: parts that were given up. spoilt: why a part was, which
+    is brought on all the same. look: called while the robot waits; raises Trouble.
     """
 
     floor: Floor
@@ -68,6 +80,8 @@ class Transfers:
     taken: set[Spot] = field(default_factory=set)
     finished: dict[int, float] = field(default_factory=dict)
     to_set_right: list[int] = field(default_factory=list)
+    left_lying: set[str] = field(default_factory=set)
+    spoilt: dict[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.plan = Run(self.cell)  # where parts are and may go; its times are the predicted ones
@@ -111,6 +125,7 @@ class Transfers:
             if option.service_s:
                 self._serve(part, way.origin)
             move.pick_s = floor.now_s
+            self.check_window(part)
             self._take_up(name, way, spot)
         else:
             move.smooth = False  # it was taken up before this move, or before it was interrupted
@@ -185,11 +200,27 @@ class Transfers:
             return self.spot_of[pallet_of(name)]
         own = scene.bodies_of(name, way.kind)
         taken = [spot for body, spot in self.spot_of.items() if body not in own] + [*self.taken]
-        free = (s for s in scene.places.spots(scene.task.station(way.target)) if s not in taken)
-        spot = next(free, None)
-        if spot is None:
-            raise Trouble(f"no spot of '{way.target}' is free", name, way.target, final=True)
-        return spot
+        spots = [s for s in scene.places.spots(scene.task.station(way.target)) if s not in taken]
+        blocked = ""
+        for spot in spots:
+            blocked = self._blocked_by(spot, name, way)
+            if not blocked:
+                return spot
+        why = f": {blocked} is there" if blocked else ""
+        raise Trouble(f"no spot of '{way.target}' is free{why}", name, way.target, final=True)
+
+    def _blocked_by(self, spot: Spot, name: str, way: Carried) -> str:
+        """Which of the parts that were given up lies where a part is to be set down; "" for none."""
+        scene, shape = self.floor.scene, self.floor.scene.kinds[way.kind].shape
+        half = max(abs(shape.low[0]), abs(shape.high[0])), max(abs(shape.low[1]), abs(shape.high[1]))
+        c, s = abs(cos(spot.yaw)), abs(sin(spot.yaw))
+        x, y = c * half[0] + s * half[1] + FREE_M, s * half[0] + c * half[1] + FREE_M
+        for body in self.left_lying:
+            low, high = scene.world.bounds(body)
+            aside = low[0] > spot.x + x or high[0] < spot.x - x or low[1] > spot.y + y or high[1] < spot.y - y
+            if not aside and high[2] > spot.z and body != name:
+                return body
+        return ""
 
     # ---- what a move is made of ------------------------------------------------------------------------------------
 
@@ -214,7 +245,7 @@ class Transfers:
         self.place = ""
         why = self.floor.follow(over_everything(self.floor.bench, surveys.approach(station)))
         if why:
-            raise Trouble(why, station=station, held=True)
+            raise Trouble(why, station=station, held=self.floor.was_held)
         self.place = station
 
     def _await(self, name: str, station: str) -> None:
@@ -239,6 +270,41 @@ class Transfers:
     def _begun_s(self, name: str) -> float:
         """When the part was brought to where it is [s]."""
         return next((move.drop_s for move in reversed(self.moves) if self.name(move.part) == name), 0.0)
+
+    def machine_of(self, part: int) -> Machine | None:
+        """The machine that a part stands in, and that works on it or has done so."""
+        return next((m for m in self.floor.machines.values() if m.part == self.name(part)), None)
+
+    def left_s(self, part: int) -> float:
+        """How long until the machine of a part should be done [s]; below 0: it has been for so long, and the part must not wait
+        on without end. A spoilt part may."""
+        machine = self.machine_of(part)
+        assert machine is not None
+        left_s = self.expected_s[machine.station] - self.floor.now_s
+        self.check_window(part)
+        waits = self.cell.at_most_s(part, machine.station) is None or part in self.spoilt
+        return max(0.0, left_s) if waits else left_s
+
+    def check_window(self, part: int) -> None:
+        """Notice a part that its machine has been done with for longer than it may stay there: it is spoilt."""
+        machine = self.machine_of(part)
+        if machine is None or part in self.spoilt or machine.moves:
+            return
+        at_most_s, late_s = self.at_most_s(machine.part, machine.station), self.floor.now_s - machine.until_s
+        if at_most_s is None or late_s <= at_most_s:
+            return
+        name = self.name(part)
+        what = f"it is burnt: fetched {late_s:.1f} s after it was done, allowed are {at_most_s:g}"
+        self.spoilt[part] = f"{name} at '{machine.station}': {what}"
+        self.tell(TroubleMet(what, "brings it on, but it counts as lost", name, machine.station, self.floor.now_s))
+        self.tell(PartLost(name, what, self.floor.now_s))
+
+    def at_most_s(self, name: str, station: str) -> float | None:
+        """How long a part may stay in a machine that is done with it, by the task [s]; None: as long as it is left there."""
+        task = self.floor.skillset.task
+        routes = self.floor.scene.kind_of[name].part.routes
+        own = [s.at_most_s for route in routes for s in route if s.station == station and s.at_most_s is not None]
+        return own[0] if own else task.station(station).at_most_s
 
     def _serve(self, part: int, station: str) -> None:
         """What the robot does at a station before it takes a part out, once."""
@@ -293,7 +359,7 @@ class Transfers:
         if hypot(tool.x - begin.x, tool.y - begin.y, tool.z - begin.z) > BEGINS_M:
             why = self.floor.follow(over_everything(self.floor.bench, begin))
             if why:
-                raise Trouble(why, name, where, held=True)
+                raise Trouble(why, name, where, held=self.floor.was_held)
 
     def _do(self, skill: Skill, name: str, where: str) -> None:
         """Carry a skill out; Trouble when it fails."""
@@ -308,7 +374,7 @@ class Transfers:
         scene, name = self.floor.scene, self.name(part)
         spot = self.spot_of[name]
         for body, own in zip(scene.bodies_of(name, comes_as(scene.kind_of[name].part)), self._stack(part), strict=True):
-            if not self.floor.bench.stands(body, spot, DELIVERED_M):
+            if not self.floor.bench.stands(body, spot, DELIVERED_M, truly=True):
                 return False
             spot = spot.raised(own.shape.height_m)
         return True

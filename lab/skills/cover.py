@@ -13,7 +13,8 @@ from lab.sim.frames import Body, Shape
 from lab.sim.parts.kinds import Kind
 from lab.sim.scene.station_bodies import HEAD_JOINTS, HEAD_LINK
 from lab.sim.world import TIME_STEP, Array
-from lab.skills.skill import Bench, Skill, SkillFailed, learned_path
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import Bench, Skill, learned_path
 from lab.skills.state_words import plain
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Task

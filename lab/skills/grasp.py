@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 from lab.sim.arms.kinematics import ToolPose
 from lab.skills.around_part import SLOW, AroundPart
-from lab.skills.skill import Bench, SkillFailed, over_everything
+from lab.skills.looking import FAR_M, look_at
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import Bench, over_everything
 from lab.skills.state_words import plain
 from lab.tasks.task import Task
 
@@ -17,7 +19,6 @@ if TYPE_CHECKING:
 ACTIONS = ("left", "right", "backward", "forward", "down", "up", "turn right", "turn left")  # of the part's axes
 GOAL = (2, 2, 0, 2)
 ASTRAY_M = 0.15  # [m] a part farther from all spots of the station is taken up over everything
-FAR_M = 0.2  # [m] a tool farther from the station's approach, as when trying again, comes over everything
 
 
 class Grasp(AroundPart):
@@ -44,6 +45,8 @@ class Grasp(AroundPart):
         robot, body = bench.scene.robot, bench.scene.body_of(self.part, self.kind)
         if robot.closed:
             yield from robot.release()
+        spot = self.stands_on() if bench.sight is None else bench.sight.where.get(body, self.stands_on())
+        yield from look_at(bench, self.surveys, self.station, body, spot)
         goal = bench.part_pose(body, self.goal_pose().yaw)
         if robot.arm.inverse(goal) is None:
             raise SkillFailed(f"{body} is out of reach at ({goal.x:.2f}, {goal.y:.2f}) m")

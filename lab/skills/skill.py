@@ -17,6 +17,7 @@ from lab.sim.frames import Body
 from lab.sim.parts.kinds import Kind, Spot, on_its_pallet
 from lab.sim.scene.blocked_cells import FINGERS_OFF_M
 from lab.sim.scene.scene import Scene, pallet_of
+from lab.skills.sight import Sight, SkillFailed
 from lab.skills.state_words import away_in_words, size_in_words
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Stage
@@ -30,6 +31,8 @@ LOST_M = 0.03  # [m] a part farther than this from where the fingers hold it is 
 UPRIGHT = 0.97  # cosine of the largest tilt of a part that stands
 SETTLE_STEPS = 60  # physics steps until a new scene is at rest
 STAND_STEPS = 15  # physics steps until what was put somewhere at once is at rest
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of a way across at which it is seen whether the arm reaches it
+DOWN_M = 0.03  # [m] between two heights that are tried for it
 NOT_OFF = (0.0, 0.0, 0.0)  # of a part that stands on its spot
 
 
@@ -42,19 +45,27 @@ class Status(Enum):
     FAILURE = "failure"
 
 
-class SkillFailed(Exception):
-    """A skill noticed that it did not do what it is for; the text says why."""
-
-
 @dataclass
 class Bench:
     """The cell in which skills are carried out, and the body that the robot holds: a part, or a pallet."""
 
     scene: Scene
     held: str | None = None
+    sight: Sight | None = None  # what was seen by the camera in the hand, where the task says so
+
+    def __post_init__(self) -> None:
+        if self.scene.task.perception == "camera":
+            self.sight = Sight(self.scene)
 
     def part_pose(self, body: str, like: float = 0.0) -> ToolPose:
-        """The tool pose that would hold a part where it is now; of the yaws that do, the one nearest to `like` [rad]."""
+        """The tool pose that would hold a part where it is, as far as is known; of its yaws the nearest to `like` [rad].
+
+        Known is, with the camera, where it was seen or set down last; WorkFailed for a part that was never seen.
+        """
+        return self.true_pose(body, like) if self.sight is None else self.sight.pose(body, like, self.held)
+
+    def true_pose(self, body: str, like: float = 0.0) -> ToolPose:
+        """As `part_pose`, by the simulator."""
         position, turn = self.scene.world.pose(body)
         kind = self.scene.kind_of[body]
         yaw = 2.0 * atan2(float(turn[2]), float(turn[3]))
@@ -88,18 +99,21 @@ class Bench:
         """Which body of part `name` does not stand on what it is carried on, as when a pallet was jolted; "": none."""
         below, *riders = self.scene.bodies_of(name, kind)
         for body in riders:
-            at, under = self.part_pose(body), self.part_pose(below)
+            at, under = self.true_pose(body), self.true_pose(below)
             if self.upright(body) < UPRIGHT or hypot(at.x - under.x, at.y - under.y) > LOST_M or at.z < under.z:
                 return body
             below = body
         return ""
 
-    def stands(self, body: str, spot: Spot, within: float) -> bool:
-        """Whether the part stands upright within `within` [m] of a spot."""
+    def stands(self, body: str, spot: Spot, within: float, *, truly: bool = False) -> bool:
+        """Whether the part stands upright within `within` [m] of a spot, as far as is known, or truly.
+
+        What the camera has found by its outline stands upright: a part that lies has another one.
+        """
         foot = self.scene.kind_of[body].held_at(spot)
-        at = self.part_pose(body, foot.yaw)
+        at = self.true_pose(body, foot.yaw) if truly else self.part_pose(body, foot.yaw)
         near = hypot(at.x - foot.x, at.y - foot.y) < within and abs(at.z - foot.z) < 0.006
-        return near and self.upright(body) > UPRIGHT
+        return near and (self.upright(body) > UPRIGHT or not (truly or self.sight is None))
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,12 +334,26 @@ class Skill:
 
 
 def over_everything(bench: Bench, end: ToolPose) -> Iterator[None]:
-    """Bring the tool from wherever it is to `end`, over all that stands in the cell: up, across, down."""
-    robot, grid = bench.scene.robot, bench.scene.task.workspace
-    high = max(end.z, grid.lower_m[2] + (grid.shape[2] - 0.5) * grid.cell_m[2])
-    tool = robot.tool()
+    """Bring the tool from wherever it is to `end`, over all that stands in the cell: up, across, down.
+
+    As high as the workspace, or as high as the arm reaches on that way.
+    """
+    robot, tool = bench.scene.robot, bench.scene.robot.tool()
+    high = _reachable_height(bench, tool, end)
     for pose in (ToolPose(tool.x, tool.y, high, end.yaw), ToolPose(end.x, end.y, high, end.yaw), end):
         yield from robot.follow([pose])
+
+
+def _reachable_height(bench: Bench, tool: ToolPose, end: ToolPose) -> float:
+    """The greatest height [m] up to the top of the workspace at which the arm reaches all of the way across to `end`."""
+    arm, grid = bench.scene.robot.arm, bench.scene.task.workspace
+    top = max(end.z, grid.lower_m[2] + (grid.shape[2] - 0.5) * grid.cell_m[2])
+    across = [tool.x + t * (end.x - tool.x) for t in SHARES], [tool.y + t * (end.y - tool.y) for t in SHARES]
+    for high in np.arange(top, max(end.z, min(tool.z, top)), -DOWN_M):
+        ways = np.array([[x, y, high, yaw] for x, y in zip(*across, strict=True) for yaw in {tool.yaw, end.yaw}])
+        if not np.isnan(arm.inverse_each(ways)[:, 0]).any():
+            return float(high)
+    return max(end.z, min(tool.z, top))
 
 
 def learned_path(policy: "Policy", mdp: TabularMDP, start: int) -> list[int]:

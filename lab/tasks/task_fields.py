@@ -32,11 +32,15 @@ class Workspace(Record):
 
 
 class CameraSettings(Record):
-    """The overhead camera: position above the table [m], field of view [rad], picture width and height [pixels]."""
+    """The overhead camera: position above the table [m], field of view [rad], picture width and height [pixels].
+
+    calibration: a file that `lab see --calibrate` wrote, which then says where the camera is, and what lens it has.
+    """
 
     position_m: Above
     field_of_view_rad: Annotated[float, Field(gt=0.01, lt=2.5)]
     pixels: Annotated[int, Field(ge=64, le=4096)] = 640
+    calibration: Annotated[str, Field(min_length=1, max_length=200)] | None = None
 
 
 class CameraGrid(Record):

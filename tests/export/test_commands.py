@@ -42,7 +42,9 @@ def test_a_half_circle_of_10_cm_is_kept_within_a_tenth_of_a_millimetre_by_few_pi
     assert np.abs(np.linalg.norm(middles, axis=1) - 0.1).max() <= WITHIN_M * 1.01
 
 
-ways = st.lists(st.tuples(*[st.floats(-1.0, 1.0)] * 3, st.floats(-3.0, 3.0)), min_size=2, max_size=12).map(np.array)
+ways: st.SearchStrategy[np.ndarray] = st.lists(
+    st.tuples(*[st.floats(-1.0, 1.0)] * 3, st.floats(-3.0, 3.0)), min_size=2, max_size=12
+).map(np.array)
 
 
 @given(ways)

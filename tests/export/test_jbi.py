@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.export import jbi
 from lab.export.commands import Await, Grip, Job, Joint, Path, Pause, jobs_of
-from lab.export.inform import Call, Comment, InformJob, MoveJ, MoveL, Position, Timer, Wait, read_job
+from lab.export.inform import Call, Comment, Dout, InformJob, MoveJ, MoveL, Position, Timer, Wait, read_job
 from lab.export.options import Options
 from lab.export.program import Program
 from lab.sim.arms.arm_models import arm_named
@@ -70,7 +70,7 @@ def test_a_way_comes_back_within_what_is_written(begin: ToolPose, end: ToolPose,
     points = np.array([[end.x, end.y, end.z, begin.yaw + turn]])
     commands = (Joint(tuple(joints.tolist())), Path(points, speed), Grip(True), Pause(0.3), Await(2, "mill"))
     options = Options("pulse" if positions == "pulse" else "rectan", DATE)
-    close = InformJob("CLOSE", "", DATE, (), (jbi.Dout(1, True), Timer(0.3)))
+    close = InformJob("CLOSE", "", DATE, (), (Dout(1, True), Timer(0.3)))
     job = jbi._Writer(UP6, options).job("M001", Job("one", commands))
     start, way, *rest = jbi.read({"a": job.text(), "b": close.text()}, UP6)
     assert rest == [Grip(True), Pause(0.3), Await(2)]

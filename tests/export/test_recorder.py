@@ -6,6 +6,9 @@ from itertools import islice
 import numpy as np
 import pytest
 
+from lab.export import FORMATS
+from lab.export.options import Options
+from lab.export.play import deviation
 from lab.export.program import Motion, Press, Program, Rest
 from lab.export.recorder import SEEN_EVERY, MotionRecorder, tips
 from lab.sim.arms.arm_models import arm_named
@@ -98,9 +101,44 @@ def test_a_motion_that_is_broken_off_is_written_down_as_far_as_it_came(robot: Ro
         run(robot, robot.follow([HIGH]))
     elif after == "a grip":
         run(robot, robot.grip())
-    motion = written(recorder).motions[0]
-    assert (motion.first, motion.last, motion.complete) == (0, 31, False)
+    program, still = written(recorder), robot.world.joints("robot", UP6.joints)
+    motion = program.motions[0]
+    assert (motion.first, motion.last, motion.complete) == (
+        0,
+        32,
+        False,
+    )  # where it began, 30 targets, where it stopped
+    assert program.at_s[31] == pytest.approx(130 * TIME_STEP)
+    if after != "a motion":
+        assert program.joints[31] == pytest.approx(still, abs=1e-4)
     assert [one.complete for one in written(recorder).motions[1:]] == [True] * (after == "a motion")
+
+
+def test_a_target_that_is_set_in_the_very_step_of_a_stop_is_none(robot: Robot) -> None:
+    recorder = MotionRecorder(robot)
+    motion = robot.follow([HIGH.shifted(dy=-0.3)])
+    run(robot, islice(motion, 30))
+    next(motion)
+    robot.brake()
+    run(robot, robot.grip())
+    program = written(recorder)
+    assert program.motions[0].last == 32
+    assert program.at_s[-2:] == pytest.approx([30 * TIME_STEP] * 2)
+    assert program.carried.actions[1].at_s == pytest.approx(30 * TIME_STEP)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_run_that_was_stopped_is_exported_with_its_stop(robot: Robot, name: str) -> None:
+    """An emergency stop at full speed; the arm stays for a while, and goes on to somewhere else."""
+    recorder = MotionRecorder(robot)
+    run(robot, islice(robot.follow([HIGH.shifted(dy=-0.4)]), 120))
+    robot.brake()
+    for _ in range(100):
+        robot.world.step()
+    run(robot, robot.follow([HIGH.shifted(dz=-0.1)]))
+    program = written(recorder)
+    off = deviation(program, FORMATS[name].read(FORMATS[name].write(program, Options()), UP6))
+    assert (off.motions, off.near_enough) == (2, True), off
 
 
 def test_a_motion_that_was_never_driven_is_none(robot: Robot) -> None:
@@ -121,4 +159,4 @@ def test_writing_down_changes_nothing() -> None:
             run(robot, robot.follow([HIGH.shifted(dz=-0.1), HIGH.shifted(dy=0.2)], blend=0.05))
             run(robot, robot.grip())
             joints.append(world.joints("robot", UP6.joints))
-    assert np.array_equal(*joints)
+    assert np.array_equal(joints[0], joints[1])

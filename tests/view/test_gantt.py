@@ -151,7 +151,7 @@ def test_until_when_toast_is_to_be_fetched_is_marked(tmp_path: Path) -> None:
     figure = Figure()
     axes = figure.add_subplot()
     (marks,) = _draw_limits(axes, Chart(limited))
-    assert marks.get_xydata().tolist() == [[limit.until_s, 2.0] for limit in limited.fetch_by]
+    assert np.array(marks.get_xydata()).tolist() == [[limit.until_s, 2.0] for limit in limited.fetch_by]
 
 
 def test_many_parts_get_a_wider_page_with_names_and_times_on_both_sides(tmp_path: Path) -> None:

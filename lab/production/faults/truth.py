@@ -37,34 +37,39 @@ class Verdict:
 
     came: Came
     rows: tuple[dict[str, Any], ...]
-    unexplained: tuple[str, ...]
+    unexplained: tuple[str, ...] = ()
     why: str = ""
 
 
 def verdict(
     happened: Sequence[Happened], heard: Sequence[Event], failure: str | None, lacking: Sequence[str]
 ) -> Verdict:
-    """heard: what the run told; lacking: the parts that do not stand at the end of their route.
+    """heard: what the run told; failure: why not all was delivered, as it says, None: all was; lacking: the parts that do not
+    stand at the end of their routes.
 
     Delivered: all parts are there, and each was finished. Stopped: some are not there, the run said why, and each reason is
-    about a fault. Else it is wrong.
+    about a fault. Else it is wrong; a run in which nothing struck may stop for reasons that nobody can check.
     """
     troubles = [event for event in heard if isinstance(event, TroubleMet)]
-    taken_out = [one for one in happened if one.undone and one.part not in lacking]
-    raw = [one.part for one in taken_out if not _begun_again(one, heard)]
     rows = tuple(_row(one, troubles) for one in happened)
     unexplained = tuple(t.what for t in troubles if not explained(t.what, happened, t.part, t.station, t.at_s))
-    if raw:
-        return Verdict("wrong", rows, unexplained, f"{raw[0]} was delivered, and its machine had not finished it")
-    if failure is None:
-        why = f"nothing was said of {', '.join(lacking)}" if lacking else ""
-        return Verdict("wrong" if lacking else "delivered", rows, unexplained, why)
-    untrue = [piece for piece in pieces(failure) if not explained(piece, happened)]
-    silent = [name for name in lacking if not happened and name not in failure]
-    why = "; ".join(
-        [*(f"no fault explains: {piece}" for piece in untrue), *(f"nothing was said of {n}" for n in silent)]
-    )
-    return Verdict("wrong" if why else "stopped", rows, unexplained, why)
+    why = "; ".join(_wrong(happened, heard, failure, lacking))
+    came: Came = "delivered" if failure is None else "stopped"
+    return Verdict("wrong" if why else came, rows, unexplained, why)
+
+
+def _wrong(
+    happened: Sequence[Happened], heard: Sequence[Event], failure: str | None, lacking: Sequence[str]
+) -> Iterator[str]:
+    """What is not true."""
+    for one in happened:
+        if one.undone and one.part not in lacking and not _begun_again(one, heard):
+            yield f"{one.part} was delivered, and '{one.station}' had not finished it"
+    if failure is None and lacking:
+        yield f"nothing was said of {', '.join(lacking)}"
+    for piece in pieces(failure or ""):
+        if happened and not explained(piece, happened):
+            yield f"no fault explains: {piece}"
 
 
 def _begun_again(one: Happened, heard: Sequence[Event]) -> bool:
@@ -98,10 +103,9 @@ def pieces(failure: str) -> Iterator[str]:
 def _row(one: Happened, troubles: Sequence[TroubleMet]) -> dict[str, Any]:
     """A fault, and the first that was told of it."""
     found = next((t for t in troubles if t.at_s >= one.at_s and _explains(one, t.what, t.part, t.station)), None)
-    row: dict[str, Any] = {"what": one.what, "at_s": round(one.at_s, 3), "words": one.words}
+    row: dict[str, Any] = {"what": one.what, "at_s": round(one.at_s, 3), "true_reason": one.words}
     return row | {
         "noticed": None if found is None else found.what,
         "noticed_s": None if found is None else round(found.at_s, 3),
         "answer": None if found is None else found.answer,
-        "true_reason": found is not None,
     }

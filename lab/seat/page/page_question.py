@@ -9,7 +9,7 @@ from lab.seat.grid_text import Marks, safe_ansi
 from lab.seat.grid_views import StateWords
 from lab.seat.page.page_grid import directions, spot
 from lab.seat.page.page_order import order_of
-from lab.seat.request_text import choice, outcome
+from lab.seat.request_text import choice, leads, outcome
 from lab.sequencing.request import SequenceRequest
 
 if TYPE_CHECKING:
@@ -50,6 +50,17 @@ def step_of(request: AdviceRequest, known: StateWords | None = None) -> Json:
         "selection": request.selection,
         "picture": picture_of(request.picture),
     }
+
+
+def said_of(request: Request, action: int | None) -> str:
+    """What was answered to a request, and what came of it where that is out of the ordinary; None: nothing was said."""
+    if isinstance(request, AdviceRequest):
+        marks, done = Marks(), request.own if action is None else action
+        where = leads(request, done)
+        move = marks.named(request.mdp, done) + (f"; that {where}" if where else "")
+    else:
+        move = f"move {request.own if action is None else action}"
+    return f"Left to the learner: it chose {move}." if action is None else f"The answer was {move}."
 
 
 def moves_of(request: AdviceRequest, sizes: Sequence[str] = ()) -> list[Json]:

@@ -123,6 +123,7 @@ class Known:
     members: list[Json] = field(default_factory=list)
     receipt: Json | None = None
     ended: str = ""
+    replay: Json | None = None  # of a session that is shown again: its pace, and what was answered last
     questions: int = 0
     version: int = 1
     versions: dict[str, int] = field(default_factory=dict)
@@ -220,6 +221,7 @@ PARTS: dict[str, Callable[[Known, float], Any]] = {
     "members": lambda known, now_s: known.members,
     "receipt": lambda known, now_s: known.receipt,
     "ended": lambda known, now_s: known.ended,
+    "replay": lambda known, now_s: known.replay,
 }
 
 

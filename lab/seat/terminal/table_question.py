@@ -75,5 +75,5 @@ class TableQuestion:
         return request.mdp.action_labels[action] if self._plain else self.named(request, action).split()[0]
 
     def where(self, request: AdviceRequest, state: int) -> str:
-        """What a state is called."""
-        return request.mdp.state_label(state)
+        """Where a state is, shortly; where that takes many words, the question has them."""
+        return f"at {request.mdp.state_label(state)}" if self.known is None else "elsewhere"

@@ -202,7 +202,8 @@ class Model:
             inside = holds[self.cell.begin_at[part]]
             if brings or inside:
                 visit = Visit(part, station, *self._visit(brings, takes, inside))
-                size = self.model.new_int_var(0, 2 * self._longest + 2, "stay") if inside else self._moment("stay")
+                # It may begin before 0, and the change after it may lie behind the end.
+                size = self.model.new_int_var(0, 2 * self._longest + 2, "stay")
                 least.append(self._least(brings, takes) + change * visit.here)
                 self.model.add(size >= least[-1])
                 span = visit.begin, size, visit.leave + change, visit.here

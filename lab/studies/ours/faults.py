@@ -103,7 +103,7 @@ def measured(job: Job, settings: Sequence[Setting]) -> dict[Setting, Ran]:
             continue  # not ours: carried out anew
         if setting in settings:
             done[setting] = ran
-    left = sorted((one for one in settings if one not in done), key=lambda one: (one.seed, one.task))
+    left = sorted((one for one in settings if one not in done), key=lambda one: (one.task, one.seed))
     job.progress(len(done), len(settings))
     for setting, ran in job.computed(carried_out, left):
         done[setting] = ran
@@ -165,26 +165,26 @@ def carried_out(setting: Setting) -> Ran:
     from lab.production.composer import carry_out
     from lab.production.conditions import Conditions
     from lab.production.faults.draw import draw
-    from lab.production.faults.truth import verdict
-    from lab.teaching.events import Event
+    from lab.production.relearning import Relearner
 
-    ready, began, heard = _ready(setting.task), time.perf_counter(), list[Event]()
+    ready, began = _ready(setting.task), time.perf_counter()
     prepared, planned_s = ready.prepared, ready.planned_s
     drawn = draw(prepared.task, prepared.order, setting.seed, planned_s)
 
     ran = Ran("wrong", "", "", [], [], [one.what for one in drawn], 0, len(prepared.order), 0.0, planned_s, 0.0)
     try:
         conditions = Conditions(faults=drawn, viewer=_Clock(LONGEST * planned_s))
-        outcome, _ = carry_out(prepared, ready.taught.cell, ready.sequence, conditions, heard.append)
+        relearner = Relearner(prepared, ready.taught, ready.teacher)
+        outcome, _ = carry_out(prepared, ready.taught.cell, ready.sequence, conditions, relearner=relearner)
     except Exception as error:  # whatever a run comes to that is no way to end one
         return replace(ran, why=f"{type(error).__name__}: {error}", wall_s=time.perf_counter() - began)
-    names = [ready.taught.cell.part_name(part) for part in range(1, len(prepared.order) + 1)]
-    lacking = [name for part, name in enumerate(names, start=1) if part not in outcome.delivered]
-    found = verdict(outcome.happened, heard, outcome.failure, lacking)
+    cell = ready.taught.cell
+    found = outcome.verdict([cell.part_name(part) for part in range(1, cell.parts + 1)])
+    vain = not outcome.happened and outcome.failure is not None  # then no reason can be true
     return replace(
         ran,
-        came=found.came,
-        why=found.why,
+        came="wrong" if vain else found.came,
+        why="it stopped, and no fault had struck" if vain else found.why,
         failure=outcome.failure or "",
         rows=[*found.rows],
         unexplained=[*found.unexplained],

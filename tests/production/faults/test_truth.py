@@ -39,24 +39,31 @@ def test_what_is_said_before_a_fault_is_not_explained_by_it() -> None:
     assert explained("it stands at (0.1, 0.8) m", [MOVED], "slice 1", at_s=11.0)
 
 
+SEEN = TroubleMet("it stands at (0.1, 0.8) m", "takes it up there", "slice 1", "plate", 12.0)
+
+
 def test_a_run_is_delivered_or_stopped_or_wrong() -> None:
-    seen = TroubleMet("it stands at (0.1, 0.8) m", "takes it up there", "slice 1", "plate", 12.0)
-    assert verdict([MOVED], [seen], None, []).came == "delivered"
+    assert verdict([MOVED], [SEEN], None, []).came == "delivered"
     assert (
-        verdict([MOVED], [seen], "slice 1 at 'plate': it is out of reach at (1.3, 1.3) m", ["slice 1"]).came
+        verdict([MOVED], [SEEN], "slice 1 at 'plate': it is out of reach at (1.3, 1.3) m", ["slice 1"]).came
         == "stopped"
     )
-    silent = verdict([MOVED], [seen], None, ["slice 2"])
-    assert (silent.came, silent.why) == ("wrong", "nothing was said of slice 2")
-    lie = verdict([MOVED], [seen], "slice 1: it lies on its side; slice 2: it lies on its side", ["slice 1", "slice 2"])
+    silent = verdict([MOVED], [SEEN], None, ["slice 1"])
+    assert (silent.came, silent.why) == ("wrong", "nothing was said of slice 1")
+    lie = verdict([MOVED], [SEEN], "slice 1: it lies on its side; slice 2: it lies on its side", ["slice 1", "slice 2"])
     assert (lie.came, lie.why) == ("wrong", "no fault explains: slice 2: it lies on its side")
 
 
+def test_a_run_in_which_nothing_struck_may_stop() -> None:
+    assert (
+        verdict([], [], "slice 1 at 'toaster': it is not done 60 s after it should be", ["slice 1"]).came == "stopped"
+    )
+
+
 def test_what_was_noticed_of_each_fault_is_told() -> None:
-    seen = TroubleMet("it stands at (0.1, 0.8) m", "takes it up there", "slice 1", "plate", 12.0)
-    moved, blind = verdict([MOVED, BLIND], [seen], None, []).rows
-    assert (moved["noticed"], moved["answer"], moved["noticed_s"]) == (seen.what, seen.answer, 12.0)
-    assert (blind["noticed"], blind["true_reason"]) == (None, False)
+    moved, blind = verdict([MOVED, BLIND], [SEEN], None, []).rows
+    assert (moved["noticed"], moved["answer"], moved["noticed_s"]) == (SEEN.what, SEEN.answer, 12.0)
+    assert (blind["noticed"], blind["true_reason"]) == (None, BLIND.words)
 
 
 def test_a_part_that_no_machine_finished_is_not_delivered() -> None:

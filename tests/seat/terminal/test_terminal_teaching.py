@@ -184,7 +184,7 @@ def test_a_run_asks_with_the_bar_out_of_the_way(terminal: Callable[..., Terminal
     assert journal.read_text().count('"kind": "answer"') == 2
     (row,) = Toolbox(tmp_path / "toolbox").list()
     assert (row["subtask"], row["helped_steps"]) == ("grasp", 0)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["maze.txt", "toolbox"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["maze.txt", "toast-run", "toolbox"]
 
 
 def test_no_colour_where_none_is_wanted(terminal: Callable[..., Terminal]) -> None:

@@ -289,3 +289,15 @@ def test_what_there_is_not(oven_cell: CellMaker) -> None:
         rest_of(run, Mishaps(moved={1: 7}))
     with pytest.raises(BadInput, match="station 'oven' holds 2 parts; its capacity is 1"):
         rest_of(run, Mishaps(moved={1: "oven", 2: "oven"}))
+
+
+def test_a_stay_as_long_as_all_the_work() -> None:
+    """2 has left the oven, which is far from everything: the model has room for the way back from there that nobody goes."""
+    stations = (*two_ovens().stations[:2], Station("shelf", "storage", 2), Station("out", "storage", 9))
+    route = (Stage("in"), Stage("left"), Stage("shelf"), Stage("out"))
+    far = 1.0 - np.eye(4)
+    far[2:, :2] = 90.0
+    cell = Cell(stations, (Product("toast", (route,)),), ("toast",) * 2, far, far, "in")
+    run = Run(cell)
+    rest = made(rest_of(run, Mishaps(moved={2: "shelf"})))
+    assert cp_sat(rest, hint=optimum(rest).sequence).cost == optimum(rest).cost

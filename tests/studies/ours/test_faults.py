@@ -32,7 +32,12 @@ def test_what_the_folder_holds_is_not_run_again(tmp_path: Path, monkeypatch: pyt
 
 def test_sessions_are_shared_out_over_the_tasks_each_with_its_seed(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Setting] = []
-    monkeypatch.setattr("lab.studies.ours.faults.carried_out", lambda setting: asked.append(setting) or RAN)
+
+    def ran(setting: Setting) -> Ran:
+        asked.append(setting)
+        return RAN
+
+    monkeypatch.setattr("lab.studies.ours.faults.carried_out", ran)
     found = faults(Job(sessions=9, seed=5), {})
     assert len({one.task for one in asked}) == 7
     assert sorted(one.seed for one in asked) == list(range(5, 14))
