@@ -223,8 +223,8 @@ class Operation:
     def report(self) -> Report | None:
         """The run as `lab run` reports it; None when no plan was made."""
         scene = self.scene
-        plan, recorder = scene.plan, scene.floor.recorder
-        if plan is None or recorder is None:
+        plan = scene.plan
+        if plan is None or (recorder := scene.floor.recorder) is None:
             return None
         left = bool(plan.production.sequence)
         why = scene.failure or ("the operator left before its end" if left else None)
