@@ -37,12 +37,14 @@ def operate(
     """Run a task by hand: order, pause, stop, jog, grasp, learn, in a live console or line by line from a pipe."""
     import sys
 
+    from lab.files import check_out
     from lab.production.conditions import Conditions
     from lab.production.controls import Controls
     from lab.production.operation.commands import spoken
     from lab.production.operation.desk import Desk
     from lab.production.operation.operation import Operation
     from lab.production.run_options import RunOptions, begun
+    from lab.tasks.task_file import load
     from lab.teaching.events import unheard
     from lab.teaching.lesson_options import DEFAULT_ADVISORS
 
@@ -50,9 +52,11 @@ def operate(
     pace = spoken(f"speed {speed or ('4' if live else 'max')}").argument
     assert not isinstance(pace, str | tuple)
     options = RunOptions(task, toasts, parts, DEFAULT_ADVISORS, seed=seed, faults=faults)
-    loaded, folder, journal = begun(options, out)
+    loaded = load(task)
+    order, folder = loaded.ordered(toasts, parts), out or Path(f"{loaded.name}-run")
+    check_out(folder)
+    journal = begun(options, loaded, folder)
     try:
-        order = loaded.ordered(toasts, parts)
         with lesson_seat(options.advisors, page=page, port=port) as seat:
             if live:
                 seat.progress.hear = unheard  # type: ignore[method-assign]  # the panel tells
@@ -60,7 +64,7 @@ def operate(
             conditions = Conditions(1.0, seat.page, Controls(pace), journal, fault_seed=faults)
             operation = Operation(loaded, order, seed, teacher, conditions)
             try:
-                bad = _at_console(Desk(operation), live, as_json)
+                bad = _at_console(Desk(operation, attended=live), live, as_json)
             finally:
                 document = _kept(operation, folder)
                 operation.close()

@@ -13,16 +13,17 @@ AT_WORK = "the robot is at work: pause first"
 
 
 class Desk:
-    """`say` may be called in any thread, `serve` in the one that simulates; somebody is there to go on after a stop.
+    """`say` may be called in any thread, `serve` in the one that simulates.
 
+    attended: somebody is there who goes on after a protective stop; without, what it stops has failed.
     busy: the command under way, "" for none. What came of commands is told by the operation's `on_done`.
     """
 
-    def __init__(self, operation: Operation) -> None:
+    def __init__(self, operation: Operation, *, attended: bool = True) -> None:
         self.operation = operation
         self.busy, self.closed = "lays the scene out", False
         self._changed = Condition()
-        operation.controls.attended = True
+        operation.controls.attended = attended
 
     def now(self) -> RunStatus:
         """Where the run stands."""
@@ -88,6 +89,7 @@ class Desk:
             operation.open()
             while not self.closed:
                 following = self._following()
+                operation.write()
                 if following is not None:
                     operation.do(*following)
         except Left:

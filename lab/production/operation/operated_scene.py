@@ -67,6 +67,7 @@ class OperatedScene:
         self.plan: Plan | None = None
         self.failure: str | None = None
         self.on_laid_out: Callable[[], None] = lambda: None
+        self.on_step: Callable[[], None] = lambda: None
         self.meanwhile: Callable[[], bool] = lambda: False
         self._world: World | None = None
         self.lock, self._status = RLock(), RunStatus.of(task, order)
@@ -81,8 +82,8 @@ class OperatedScene:
         """The floor, with nothing done on it yet."""
         self.close()
         prepared, self.plan, self.failure = self.prepared, None, None
-        self._world = World()
-        floor = self.floor = Floor(self._world, prepared.skillset, prepared.layout, prepared.order)
+        world = World()
+        floor = self.floor = Floor(world, prepared.skillset, prepared.layout, prepared.order)
         self.injector = Injector(faults)
         self.injector.prepare(floor.scene)
         floor.record(self.conditions.viewer)
@@ -94,7 +95,7 @@ class OperatedScene:
         floor.tell = noting(floor, self.journal, self.heard, self.tell)
         floor.hand, floor.meanwhile = self._hand, lambda: self.meanwhile()
         floor.controls, floor.stops.note = self.controls, self.journal.note_stops
-        self.by_hand = ByHand(floor)
+        self._world, self.by_hand = world, ByHand(floor)
         with self.lock:
             self._status = RunStatus.of(self.task, prepared.order)
         self.on_laid_out()
@@ -112,8 +113,14 @@ class OperatedScene:
 
     def _hand(self) -> bool:
         self._status.now_s, self.resting = self.floor.now_s, False
+        self.on_step()
         self.check_leaving()
         return self.injector.tick(self.floor)
+
+    @property
+    def steps(self) -> int:
+        """Physics steps since the scene was laid out."""
+        return 0 if self._world is None else self.floor.steps
 
     def tell(self, event: Event) -> None:
         """Take an event over, and tell it on."""

@@ -9,6 +9,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeGuard
 
 from lab.errors import LabError, WorkFailed
 from lab.production.conditions import Conditions
@@ -51,11 +52,13 @@ class Operation:
         """Nothing is laid out before `open`. What happens is told to the teacher's listener."""
         self.scene = OperatedScene(task, order, seed, teacher, conditions)
         self.scene.on_laid_out, self.scene.meanwhile = self._laid_out, self._meanwhile
+        self.scene.on_step = self.write
         self.controls, self._journal = conditions.controls, conditions.journal
         self.waiting: deque[tuple[Spoken, str]] = deque()
         self.done: list[Done] = []
         self.on_done: Callable[[Done], None] = lambda done: None
         self._began = time.perf_counter()
+        self._unwritten = deque[Commanded]()
         self._script = deque[Stopped | Commanded]()  # of a journal, what is still to be done again
         self._inside = False  # a pause, carrying a command out
 
@@ -65,6 +68,7 @@ class Operation:
 
     def close(self) -> None:
         """Take the scene down; safe to call again."""
+        self.write()
         self.scene.close()
 
     def now(self) -> RunStatus:
@@ -96,8 +100,7 @@ class Operation:
     def at_once(self, said: Spoken, by: str = OPERATOR) -> Done:
         """A stop, or what releases it, or the pace: in any thread, without waiting for anything."""
         why = self._pressed(said, by)
-        self.scene.tell(OperatorActed(said.words, by, self.scene.now().now_s, why))
-        return self._kept(Done(said.words, refused=why))
+        return self._aside(Done(said.words, refused=why), by)
 
     def _pressed(self, said: Spoken, by: str) -> str:
         controls = self.controls
@@ -120,6 +123,7 @@ class Operation:
     def _noted(self, done: Done, by: str) -> Done:
         """Write a command down before it takes effect, and tell it."""
         floor = self.scene.floor
+        self.write()
         if not self.scene.again:
             self._journal.write(Commanded(floor.steps, done.words, by, done.refused))
         self.scene.tell(OperatorActed(done.words, by, floor.now_s, done.refused))
@@ -127,8 +131,19 @@ class Operation:
 
     def refuse(self, words: str, why: str, by: str = OPERATOR) -> Done:
         """What is said is not begun: in any thread."""
-        self.scene.tell(OperatorActed(words, by, self.scene.now().now_s, why))
-        return self._kept(Done(words, refused=why))
+        return self._aside(Done(words, refused=why), by)
+
+    def _aside(self, done: Done, by: str) -> Done:
+        """Tell of what another thread did, or was refused; it is written by the one that simulates, as soon as it can."""
+        if not self.scene.again:
+            self._unwritten.append(Commanded(self.scene.steps, done.words, by, done.refused))
+        self.scene.tell(OperatorActed(done.words, by, self.scene.now().now_s, done.refused))
+        return self._kept(done)
+
+    def write(self) -> None:
+        """Write down what was said in other threads, in the one that simulates."""
+        while self._unwritten:
+            self._journal.write(self._unwritten.popleft())
 
     def _kept(self, done: Done) -> Done:
         with self.scene.lock:
@@ -162,9 +177,7 @@ class Operation:
 
     def repeat(self, entries: Sequence[Entry]) -> None:
         """Do again what a journal says was done. Raises WorkFailed where a command does not come at its step."""
-        self._script = deque(
-            e for e in entries if isinstance(e, Stopped) or (isinstance(e, Commanded) and not e.refused)
-        )
+        self._script = deque(entry for entry in entries if isinstance(entry, Stopped) or _is_deed(entry))
         self.scene.again = True
         self.open()
         while self._script:
@@ -210,8 +223,8 @@ class Operation:
     def report(self) -> Report | None:
         """The run as `lab run` reports it; None when no plan was made."""
         scene = self.scene
-        plan, recorder = scene.plan, scene.floor.recorder
-        if plan is None or recorder is None:
+        plan = scene.plan
+        if plan is None or (recorder := scene.floor.recorder) is None:
             return None
         left = bool(plan.production.sequence)
         why = scene.failure or ("the operator left before its end" if left else None)
@@ -224,3 +237,8 @@ class Operation:
         )
         recorder.take()
         return Report(scene.prepared, plan.taught, plan.found, plan.proven, outcome, recorder.recording, self._began)
+
+
+def _is_deed(entry: Entry) -> TypeGuard[Commanded]:
+    """Whether a line is of something that was done in its turn, or by hand: stops and the pace have lines of their own."""
+    return isinstance(entry, Commanded) and not entry.refused and spoken(entry.words).how in ("in turn", "by hand")

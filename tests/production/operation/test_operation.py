@@ -184,6 +184,27 @@ def test_an_emergency_stop_holds_the_arm_until_it_is_reset(desk: Desk) -> None:
     assert operation.done[-1].said == "1 of 1 parts made"
 
 
+def test_after_a_protective_stop_the_operator_goes_on_and_jogs_away(made: Made) -> None:
+    desk = Desk(made())
+    worker = Thread(target=desk.serve)
+    worker.start()
+    controls = desk.operation.controls
+    for _ in range(80):
+        desk.say("jog -z 10")
+        until(lambda: desk.still or controls.holds_arm)
+        if controls.holds_arm:
+            break
+    assert "the arm presses on" in desk.now().held.why  # type: ignore[union-attr]
+    assert desk.say("go").well  # type: ignore[union-attr]
+    desk.settle()
+    assert "protective stop" in desk.operation.done[-1].failed
+    desk.say("jog +z 50")
+    desk.settle()
+    assert desk.operation.done[-1].well
+    desk.leave()
+    worker.join()
+
+
 def test_a_step_is_one_move(desk: Desk, heard: list[Event]) -> None:
     desk.say("step")
     desk.settle()

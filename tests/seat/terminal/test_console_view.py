@@ -84,12 +84,9 @@ def test_it_fits_any_screen(width: int, height: int) -> None:
 
 def test_a_row_of_the_chart_by_hand() -> None:
     row = [
-        Activity("robot", kind, part, "a", "b", *s)
-        for kind, part, s in (  # type: ignore[arg-type]
-            ("empty", None, (0.0, 2.0)),
-            ("wait", 1, (2.0, 4.0)),
-            ("carry", 1, (4.0, 8.0)),
-        )
+        Activity("robot", "empty", None, "a", "b", 0.0, 2.0),
+        Activity("robot", "wait", 1, "b", "b", 2.0, 4.0),
+        Activity("robot", "carry", 1, "b", "c", 4.0, 8.0),
     ]
     assert row_of(row, 10, 10.0) == "--..1###  "
 
