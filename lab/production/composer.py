@@ -70,7 +70,7 @@ class Production:
         try:
             self.floor.between_moves()
             self.recovery.look()
-            self.work.set_right()
+            self.work.put_back()
             if self.sequence:
                 self.work.bring_on(self.sequence[0], len(self.sequence))
                 self.sequence.pop(0)
@@ -88,12 +88,11 @@ class Production:
         ready_s = {
             part: work.left_s(part) for part in range(1, self.cell.parts + 1) if work.machine_of(part) is not None
         }
-        mishaps = Mishaps(frozenset(recovery.lost), tuple(recovery.out), ready_s, dict(recovery.back))
+        mishaps = Mishaps(frozenset(recovery.lost), tuple(recovery.out), ready_s)
         try:
             found = plan_again(work.plan, mishaps, first)
         except LabError as error:
             raise RunStopped(f"{why}: {error}") from None
-        recovery.back.clear()
         recovery.lose(dict(found.stuck))
         work.plan, self.sequence = found.run, [*found.sequence]
         if first is not None and first not in self.sequence:
