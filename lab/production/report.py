@@ -11,6 +11,7 @@ from lab.errors import WorkFailed
 from lab.files import draft
 from lab.production.composer import Outcome
 from lab.production.durations import Durations
+from lab.production.run_story import Storyteller
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import Optimum
@@ -49,7 +50,7 @@ class Taught:
 
 @dataclass
 class Report:
-    """What a whole run came to; `began_s` is the clock's reading (`time.perf_counter`) when it began."""
+    """What a whole run came to; `began_s` is the clock's reading (`time.perf_counter`) when it began; told: what happened in it."""
 
     prepared: Prepared
     taught: Taught
@@ -58,6 +59,7 @@ class Report:
     outcome: Outcome
     recording: Recording
     began_s: float
+    told: Storyteller = field(default_factory=Storyteller)
     wall_s: float = 0.0
     files: dict[str, str] = field(default_factory=dict)
 
@@ -179,7 +181,8 @@ def _draw_all(report: Report, folder: Path) -> None:
         )
         write_picture(paths["overhead"], photo.picture)
     title = f"{prepared.task.title or prepared.task.name}: {prepared.words}"
-    replay_html(report.recording, paths["replay"], title=title)
+    story = report.told.story(report.outcome.schedule, predicted, report.outcome.happened)
+    replay_html(report.recording, paths["replay"], title=title, story=story)
     _write_json(paths["sequence"], _sequence_document(report, predicted))
     report.wall_s = time.perf_counter() - report.began_s
     _write_json(paths["run"], report.to_json() | {"schedule": report.outcome.schedule.to_json()})

@@ -12,13 +12,14 @@ from lab.production.durations import RECORDS, Durations, cell_of, durations_key,
 from lab.production.recorder import show_scene
 from lab.production.report import Report, Taught, skill_row, write_files
 from lab.production.run_journal import DurationsKept, RunEnded, RunJournal
+from lab.production.run_story import Storyteller
 from lab.sequencing import find_sequence
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.search import Reference
 from lab.skills.prepared_scene import Prepared
 from lab.skills.trial import trial_of
 from lab.tasks.sequencing import search_for
-from lab.teaching.events import MoveTimed, PhaseBegan, RecordSkipped, SequenceFound, SkillReady
+from lab.teaching.events import Event, MoveTimed, PhaseBegan, RecordSkipped, SequenceFound, SkillReady
 from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.teaching.teacher import Teacher
 
@@ -97,8 +98,14 @@ def run(prepared: Prepared, teacher: Teacher, out: Path, conditions: Conditions 
     proven = optimum(taught.cell)
     teacher.tell(SequenceFound(found, Reference(proven.bound_s, proven.proven, "A*")))
     teacher.tell(PhaseBegan("carry out", len(found.sequence)))
-    outcome, recording = carry_out(prepared, taught.cell, found.sequence, conditions, teacher.tell)
-    report = Report(prepared, taught, found, proven, outcome, recording, began)
+    told = Storyteller()
+
+    def tell(event: Event) -> None:
+        told.hear(event)
+        teacher.tell(event)
+
+    outcome, recording = carry_out(prepared, taught.cell, found.sequence, conditions, tell)
+    report = Report(prepared, taught, found, proven, outcome, recording, began, told)
     teacher.tell(PhaseBegan("draw", 1))
     write_files(report, out)
     if not outcome.interrupted:
