@@ -1,6 +1,6 @@
 """A member of a family is one object and one row: with these alone it is offered, runs, and is held to the contract.
 
-Here stand eight members that do not ship. `add_all` is all that their authors would write beside the objects themselves.
+Here stand nine members that do not ship. `add_all` is all that their authors would write beside the objects themselves.
 """
 
 import subprocess
@@ -16,6 +16,7 @@ from lab.advice.advisors import ADVISORS, AdvisorKind, AdvisorName, Level
 from lab.cli.app import COMMANDS, Command
 from lab.cli.options import Json
 from lab.cli.output import show
+from lab.export import FORMATS, Format, trajectory_csv
 from lab.learning.gates import GATES, Gate, Steps
 from lab.learning.members import Member
 from lab.learning.requests import Advisor
@@ -102,6 +103,7 @@ ROWS: Tables = (
     (SKILLS, "dummy-skill", Return),
     (SEQUENCERS, "dummy-method", Sequencer(lambda: queued, "as fifo")),
     (STUDIES, "dummy-study", Study("A dummy", study)),
+    (FORMATS, "dummy-format", Format("as csv", trajectory_csv.write, trajectory_csv.read)),
     (COMMANDS, "dummy-command", Command(greet, "lab dummy-command you")),
 )
 
@@ -132,6 +134,7 @@ def added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("teach", ("dummy-learner: as q, but learns each step twice", "dummy-gate: asks in every other episode")),
         ("run", ("dummy-advisor",)),
         ("sequence", ("dummy-method", "dummy-method: as fifo")),
+        ("export", ("dummy-format",)),
         ("dummy-command", ("Greets somebody.", "Example: lab dummy-command you")),
         ("", ("dummy-command",)),
     ],
@@ -154,6 +157,7 @@ def test_it_is_listed(lab: Lab) -> None:
         "teach dummy-skil",
         "sequence fms --method dummy-metho",
         "study run dummy-stud",
+        "export toast-run --format dummy-forma",
     ],
 )
 def test_who_mistypes_it_is_told(lab: Lab, words: str) -> None:
@@ -188,6 +192,7 @@ CONTRACTS = (  # of a family, each run over all that its table lists
     "tests/learning/test_kernels.py",
     "tests/skills/test_skill_life.py",
     "tests/sequencing/test_sequencers.py",
+    "tests/export/test_formats.py",
     "tests/cli/test_app.py::test_every_command_has_help_with_an_example",
 )
 

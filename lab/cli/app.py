@@ -10,7 +10,9 @@ import typer
 
 from lab import __version__
 from lab.cli import (
+    export,
     new,
+    operate,
     replay,
     run,
     see,
@@ -46,11 +48,13 @@ class Command(NamedTuple):
 
 COMMANDS = {  # what is typed after `lab` -> the command
     "run": Command(run.run, "lab run toast --toasts 3"),
+    "operate": Command(operate.operate, "lab operate toast --toasts 2"),
     "teach": Command(teach.teach, "lab teach insert --advisor terminal", "{words of teaching}"),
     "replay": Command(replay.replay, "lab replay lesson"),
     "sequence": Command(
         sequence.sequence, "lab sequence toast --case II --toasts 4 --gantt order.svg", "{words of sequencing}"
     ),
+    "export": Command(export.export, "lab export toast-run --format jbi", "{words of exporting}"),
     "see": Command(see.see, "lab see overhead.png --task toast"),
     "view": Command(view.view, "lab view toast"),
     "new": Command(new.new, "lab new bakery --part box:0.12x0.015x0.12:2 --machine oven:60"),

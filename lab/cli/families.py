@@ -53,9 +53,15 @@ def _of_tasks() -> Tables:
     return {"arms": MODELS}
 
 
+def _of_export() -> Tables:
+    from lab.export import FORMATS
+
+    return {"export formats": FORMATS}
+
+
 def members(family: str) -> Mapping[str, Any] | Sequence[str]:
     """The table of a family, such as "gates", or its names; only tables are loaded that are needed to find it."""
-    for room in (_of_studies, _of_teaching, _of_sequencing, _of_tasks):
+    for room in (_of_studies, _of_teaching, _of_sequencing, _of_tasks, _of_export):
         if family in (found := room()):
             return found[family]
     raise KeyError(family)

@@ -113,6 +113,7 @@ def sequenced(
         people,
         kept.keep,
         options.parts,
+        kept.durations(),
     )
     teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
     return sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)

@@ -7,7 +7,7 @@ import typer
 
 from lab.cli.lessons import lesson_seat, say_read, sequenced, subject_of
 from lab.cli.options import Json, Plain, Port, ToolboxPlace, TrustModule
-from lab.cli.output import end, show
+from lab.cli.output import complain, end, show
 
 if TYPE_CHECKING:
     from lab.learning.requests import Request
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def replay(
     folder: Annotated[
         Path | None,
-        typer.Argument(help="The folder of a session (--out of lab teach); none: lists those in the toolbox."),
+        typer.Argument(help="The folder of a session or of a run (--out); none: lists the sessions in the toolbox."),
     ] = None,
     pause: Annotated[
         float, typer.Option("--pause", min=0.0, max=3600.0, help="Seconds between two answers; default: half a second.")
@@ -30,8 +30,13 @@ def replay(
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
-    """Show a kept teaching session again: each question, what was answered, what came of it, and what it was worth."""
+    """Show a kept teaching session, or a run, again: what was asked, answered or done, and what came of it."""
+    from contextlib import nullcontext
+
     from lab.advice.entries import read_journal
+    from lab.production.run_journal import is_run
+    from lab.seat.terminal.replay_keys import HELP as KEYS_HELP
+    from lab.seat.terminal.replay_keys import replay_keys
     from lab.teaching.kept_order import OrderSession, kept_order
     from lab.teaching.kept_session import KeptSession, session_rows
     from lab.teaching.lesson import replay as replay_session
@@ -42,6 +47,9 @@ def replay(
         rows = session_rows(Toolbox(toolbox))
         show({"sessions": rows}, as_json, lambda d: table_of(d["sessions"], ("session", "problem", "advisor", "state")))
         return
+    if is_run(folder):
+        _replay_run(folder, page, port, as_json)
+        return
     box = Toolbox(toolbox)
     kept: KeptSession | OrderSession
     if read_journal(folder, "DIR").session.command == "sequence":
@@ -51,16 +59,39 @@ def replay(
     say_read(kept, "DIR")
     try:
         with lesson_seat([] if as_json else ["terminal"], page=page, port=port, plain=plain) as seat:
-            seat.replaying(0.0 if as_json else pause)
-            if isinstance(kept, OrderSession):
-                document = _replayed(kept, seat, toolbox)
-            else:
-                document = replay_session(kept, subject_of(kept.options, kept), seat.hear)
+            pace = seat.replaying(0.0 if as_json else pause)
+            with nullcontext() if as_json else replay_keys(pace) as has_keys:
+                if has_keys:
+                    seat.progress.console.print(KEYS_HELP)
+                if isinstance(kept, OrderSession):
+                    document = _replayed(kept, seat, toolbox)
+                else:
+                    document = replay_session(kept, subject_of(kept.options, kept), seat.hear)
             seat.lesson_over(document)
             show(document, as_json, replay_summary)
             seat.stay()
     except KeyboardInterrupt:
         end("stopped by Ctrl-C", 130)
+
+
+def _replay_run(folder: Path, page: bool, port: int, as_json: bool) -> None:
+    """What was done in a run and what came of it, from its journal; on a page its film."""
+    from lab.cli.view import serve
+    from lab.production.run_journal import replayed_run
+    from lab.view.summary import run_replay_summary
+
+    document = replayed_run(folder, "DIR")
+    show(document, as_json, run_replay_summary)
+    if page:
+        try:
+            serve(
+                str(folder),
+                None,
+                port,
+                lambda url, hint: complain(f"{url}\nfrom another machine: {hint}\nCtrl-C ends it"),
+            )
+        except KeyboardInterrupt:
+            end("stopped by Ctrl-C", 130)
 
 
 def _replayed(kept: "OrderSession", seat: "LessonSeat", toolbox: str | None) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import typer
 from lab.cli.lessons import lesson_seat, teacher_of
 from lab.cli.options import AdvisorNames, Asked, Decide, Json, Parts, Port, Seed, ShowPage, Toasts, ToolboxPlace, Wait
 from lab.cli.output import end, show
+from lab.errors import BadInput
 
 
 def run(
@@ -28,6 +29,12 @@ def run(
         int,
         typer.Option("--override", min=10, max=100, help="The arm's speed override [%]; the next plan knows of it."),
     ] = 100,
+    faults: Annotated[
+        int | None, typer.Option("--faults", min=0, help="Draw faults for the run with this seed; default: none.")
+    ] = None,
+    order: Annotated[
+        str | None, typer.Option("--order", help="The order of the moves by part numbers, such as 1,2,1,1,2,2.")
+    ] = None,
     seed: Seed = 0,
     toolbox: ToolboxPlace = None,
     resume: Annotated[
@@ -41,31 +48,42 @@ def run(
     """Find or learn the skills, time them, find their best order, and carry them out in physics."""
     from dataclasses import replace
 
-    from lab.advice.advisors import PEOPLE
+    from lab.files import check_out
     from lab.production.conditions import Conditions
     from lab.production.run import run as run_task
+    from lab.production.run_advice import RunAdvice
+    from lab.production.run_journal import RunJournal
     from lab.production.run_options import RunOptions, begun, gone_on
     from lab.skills.prepared_scene import prepare
-    from lab.teaching.kept_session import kept_by
+    from lab.tasks.task_file import load
     from lab.teaching.lesson_options import DEFAULT_ADVISORS
     from lab.view.summary import delivered_in_words, run_summary
 
-    given = RunOptions(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed)
+    given = RunOptions(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order)
     if resume is None:
         options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
-        loaded, folder, journal = begun(options, out)
+        loaded = load(options.task)
     else:
-        options, loaded, folder, journal = gone_on(given, resume, out)
+        options, loaded = gone_on(given, resume, out)
+    folder = resume or out or Path(f"{loaded.name}-run")
+    check_out(folder)
     lessons = options.lessons()
+    lessons.advising()
+    prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed)
+    journal = begun(options, loaded, folder) if resume is None else RunJournal.resume(folder)
     try:
-        prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed)
         with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
             teacher = teacher_of(toolbox, lessons, seat)
-            if any(name in PEOPLE for name in options.advisors):
-                teacher = replace(teacher, keep=kept_by(teacher.toolbox, lessons))
-            conditions = Conditions(options.override / 100, seat.page, journal=journal)
+            advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "")
+            teacher = replace(teacher, keep=advice.keep)
+            share = options.override / 100
+            conditions = Conditions(share, seat.page, journal=journal, fault_seed=options.faults, advice=advice)
             with seat.progress:
                 report = run_task(prepared, teacher, folder, conditions)
+    except BadInput:
+        if resume is None:
+            journal.forget()
+        raise
     except KeyboardInterrupt as stopped:
         why = str(stopped) or "stopped by Ctrl-C; what was learned is kept"
         raise KeyboardInterrupt(f"{why}; go on with: lab run --resume {quote(str(folder))}") from None

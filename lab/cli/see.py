@@ -1,61 +1,206 @@
-"""`lab see`: picture to grid."""
+"""`lab see`: picture to grid; a camera calibrated; pictures with known truth, made and read back."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lab.cli.options import Json
+from lab.cli.options import Json, Seed
 from lab.cli.output import complain, show
 from lab.errors import BadInput
 
 if TYPE_CHECKING:
-    from lab.vision import View
+    from lab.vision import Image, View
+    from lab.vision.calibration import Calibration
+
+TASK = "toast"  # whose camera takes pictures that are made, unless another is named
 
 
 def see(
-    image: Annotated[Path, typer.Argument(help="A PNG or JPEG picture from above, with round markers.")],
+    images: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[IMAGE]...",
+            help="A PNG or JPEG picture from above, with round markers; with --calibrate several, with --score a folder.",
+        ),
+    ] = None,
     grid: Annotated[str | None, typer.Option("--grid", help="Rows x columns; default: 12x12, or the task's.")] = None,
     task: Annotated[
         str | None,
         typer.Option("--task", help="The task whose camera took it; without, the whole picture is taken for the grid."),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="A .png file for the picture with the grid drawn on it.")
+    calibration: Annotated[
+        Path | None,
+        typer.Option("--calibration", help="A file of --calibrate: the picture is straightened before it is read."),
     ] = None,
+    overlay: Annotated[
+        Path | None,
+        typer.Option("--overlay", help="A .png file for the picture with grid, markers and parts drawn on it."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="The calibration's .json file, or the folder of --make; else as --overlay."),
+    ] = None,
+    calibrated: Annotated[
+        bool,
+        typer.Option(
+            "--calibrate",
+            help="Find the camera's lens and place from pictures of the mat (ArUco 4x4_50; in the first it lies on the table).",
+        ),
+    ] = False,
+    corners: Annotated[
+        str | None,
+        typer.Option(
+            "--corners",
+            help="With --calibrate and --task: the pixels of the grid's four corners on the table, x,y x,y x,y x,y.",
+        ),
+    ] = None,
+    make: Annotated[
+        int | None,
+        typer.Option("--make", help="Make so many pictures of a task's scenes with known truth, into --out."),
+    ] = None,
+    score: Annotated[
+        bool, typer.Option("--score", help="Read the pictures of a folder that --make made; how many are exact.")
+    ] = False,
+    seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
     """Picture to grid: find the gripper (magenta), the machine's marker (cyan) and the obstacles (green)."""
-    from lab.view.summary import grid_summary
+    from lab.view.summary import grid_summary, pictures_summary
 
-    seen = see_picture(image, grid, task, out)
+    if sum((make is not None, score, calibrated)) > 1:
+        raise BadInput("--make, --score and --calibrate: wanted one of them")
+    if corners is not None and not calibrated:
+        raise BadInput("--corners: goes with --calibrate")
+    paths = images or []
+    if make is not None:
+        if paths or out is None:
+            raise BadInput("--make: wanted no picture, and --out FOLDER")
+        show(made(task or TASK, make, out, seed), as_json, pictures_summary)
+        return
+    if not paths or (len(paths) > 1 and not calibrated):
+        raise BadInput(f"{len(paths)} pictures: wanted one, such as lab see overhead.png --task toast")
+    if score:
+        show(scored(paths[0], calibration), as_json, pictures_summary)
+    elif calibrated:
+        show(calibrate_camera(paths, task, calibration, corners, out, overlay), as_json, pictures_summary)
+    else:
+        seen = see_picture(paths[0], grid, task, overlay or out, calibration)
+        if task is None:
+            shape = f"{len(seen['grid'])}x{len(seen['grid'][0])}"
+            wrong = "of a picture from a task's camera that is wrong: give --task, such as --task toast"
+            complain(f"no --task: the whole picture is taken for a grid of {shape}; {wrong}")
+        show(seen, as_json, grid_summary)
+
+
+def made(task: str, count: int, out: Path, seed: int) -> dict[str, Any]:
+    """Pictures made, the document of `lab see --make --json`."""
+    from lab.skills.made_pictures import make_pictures
+
+    return make_pictures(task, count, out, seed) | {"files": {"folder": str(out)}}
+
+
+def scored(folder: Path, calibration: Path | None) -> dict[str, Any]:
+    """Pictures read back, the document of `lab see --score --json`."""
+    from lab.skills.scored_pictures import score_pictures
+
+    return score_pictures(folder, _calibration(calibration))
+
+
+def calibrate_camera(
+    images: list[Path],
+    task: str | None,
+    known: Path | None,
+    corners: str | None,
+    out: Path | None,
+    overlay: Path | None,
+) -> dict[str, Any]:
+    """The camera's lens and place, the document of `lab see --calibrate --json`.
+
+    From pictures of the mat; or from the pixels of four corners, with the lens that is `known` or that the task states.
+    """
+    from lab.skills.made_pictures import mat_of
+    from lab.tasks.task_file import load
+    from lab.vision import read_picture, write_picture
+    from lab.vision.calibration import Mat, calibrate, drawn, write_calibration
+
+    loaded = None if task is None else load(task)
+    pictures = [(str(path), read_picture(path)) for path in images]
+    angle = None if loaded is None or loaded.camera is None else loaded.camera.field_of_view_rad
+    if corners is None:
+        found = calibrate(pictures, Mat() if loaded is None else mat_of(loaded), angle)
+    else:
+        found = _from_corners(corners, task, pictures[0][1], _calibration(known))
+    files = {}
+    if out is not None:
+        write_calibration(out, found)
+        files["calibration"] = str(out)
+    if overlay is not None:
+        write_picture(overlay, drawn(pictures[0][1], found, None if loaded is None else mat_of(loaded)))
+        files["overlay"] = str(overlay)
+    return found.to_json() | {"files": files}
+
+
+def _from_corners(corners: str, task: str | None, image: "Image", known: "Calibration | None") -> "Calibration":
+    from lab.vision.calibration import from_corners, pinhole
+
+    number = r"-?\d+(?:\.\d+)?"
+    if not re.fullmatch(rf"\s*{number},{number}(?:\s+{number},{number}){{3}}\s*", corners):
+        raise BadInput(
+            f"'{corners[:80]}' (--corners): wanted the pixels of four corners, such as 60,580 580,580 580,60 60,60"
+        )
     if task is None:
-        shape = f"{len(seen['grid'])}x{len(seen['grid'][0])}"
-        wrong = "of a picture from a task's camera that is wrong: give --task, such as --task toast"
-        complain(f"no --task: the whole picture is taken for a grid of {shape}; {wrong}")
-    show(seen, as_json, grid_summary)
+        raise BadInput("--corners: goes with --task, which says where the grid's corners are on the table")
+    pixels = [(float(x), float(y)) for x, y in (pair.split(",") for pair in corners.split())]
+    height, width = image.shape[:2]
+    view, angle = _camera(task, height, None)
+    (x, y), (i, j) = view.origin_m, view.shape
+    a, b = i * view.cell_m, j * view.cell_m
+    lens = pinhole((width, height), angle) if known is None else known.lens
+    return from_corners(lens, pixels, [(x, y), (x + a, y), (x + a, y + b), (x, y + b)])
 
 
-def see_picture(image: Path, grid: str | None, task: str | None, out: Path | None) -> dict[str, Any]:
+def _calibration(path: Path | None) -> "Calibration | None":
+    from lab.vision.calibration import read_calibration
+
+    return None if path is None else read_calibration(path)
+
+
+def see_picture(
+    image: Path, grid: str | None, task: str | None, out: Path | None, calibration: Path | None = None
+) -> dict[str, Any]:
     """A picture's markers as a grid, the document of `lab see --json`.
 
-    With a task the grid is the one of its overhead camera; without, the frame is the grid, 12 x 12 unless `grid` says so.
+    With a task the grid is the one of its overhead camera, which a calibration straightens and places; without, the frame is
+    the grid, 12 x 12 unless `grid` says so. Where the picture is drawn, parts are looked for, too.
     """
+    from lab.skills.scored_pictures import parts_seen
+    from lab.tasks.task_file import load
     from lab.vision import draw, read_picture, see, write_picture
 
     shape = _shape(grid)
     picture = read_picture(image)
-    camera = None
+    camera, known = None, _calibration(calibration)
+    if known is not None:
+        if task is None:
+            raise BadInput("--calibration: goes with --task, which says where the grid is on the table")
+        picture = known.lens.straightened(picture)
     if task is not None:
         height, width = picture.shape[:2]
         if height != width:
             raise BadInput(f"{image}: {width} x {height} pixels: the task's camera takes square pictures")
-        camera = _camera(task, height, None if grid is None else shape)
+        camera, _ = _camera(task, height, None if grid is None else shape)
+        if known is not None:
+            camera = replace(camera, pixel_from_world=known.pixel_from_world)
     seen = see(picture, camera, shape=shape, where=str(image))
+    parts = (
+        parts_seen(load(task), picture, camera) if out is not None and task is not None and camera is not None else []
+    )
     if out is not None:
-        write_picture(out, draw(picture, seen))
-    return seen.to_json() | {"files": {} if out is None else {"picture": str(out)}}
+        write_picture(out, draw(picture, seen, [part["outline_px"] for part in parts]))
+    return seen.to_json() | {"parts": parts, "files": {} if out is None else {"picture": str(out)}}
 
 
 def _shape(grid: str | None) -> tuple[int, int]:
@@ -65,17 +210,19 @@ def _shape(grid: str | None) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def _camera(task: str, pixels: int, wanted: tuple[int, int] | None) -> "View":
-    """How a task's camera with so many pixels a side sees its grid; BadInput when a grid of another shape is wanted."""
+def _camera(task: str, pixels: int, wanted: tuple[int, int] | None) -> "tuple[View, float]":
+    """How a task's camera with so many pixels a side sees its grid, and its field of view [rad]; BadInput when a grid of
+    another shape is wanted.
+    """
     from lab.skills.camera_grids import camera_view
     from lab.tasks.task_file import load
 
     loaded = load(task)
     station = next((station.name for station in loaded.stations if station.grid is not None), None)
-    if station is None:
+    if station is None or loaded.camera is None:
         raise BadInput(f"task '{task}' (--task): no station of it is approached through the camera's grid")
     camera = camera_view(loaded, station, pixels)
     if wanted is not None and wanted != camera.shape:
         own, other = (f"{shape[0]}x{shape[1]}" for shape in (camera.shape, wanted))
         raise BadInput(f"grid '{other}' (--grid): the grid of the task's camera is {own}; leave --grid away")
-    return camera
+    return camera, loaded.camera.field_of_view_rad

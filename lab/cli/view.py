@@ -60,7 +60,7 @@ def view(
         end("stopped by Ctrl-C", 130)
 
 
-def serve(what: str, asked: Asked, port: int, tell: Tell) -> None:
+def serve(what: str, asked: Asked | None, port: int, tell: Tell) -> None:
     """Serve a run's replay, a task's scene or a world on 127.0.0.1 until interrupted; `tell(url, hint)` once it is there."""
     from lab.view.meshcat import LiveView
 
@@ -73,7 +73,7 @@ def serve(what: str, asked: Asked, port: int, tell: Tell) -> None:
         with LiveView(port, replay=replay) as page:
             tell(page.url, page.hint)
             _wait()
-    with seen(what, asked) as (title, recording), LiveView(port, title=title) as live:
+    with seen(what, asked or Asked(None, None, 0)) as (title, recording), LiveView(port, title=title) as live:
         live.show(recording.bodies, recording.camera)
         live.update(recording.frames[-1])
         tell(live.url, live.hint)

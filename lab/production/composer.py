@@ -3,89 +3,113 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from lab.errors import LabError, WorkFailed
+from lab.export.recorder import MotionRecorder
 from lab.production.conditions import Conditions
-from lab.production.durations import TimedMove
-from lab.production.faults.fault import Happened
 from lab.production.faults.injector import Injector
 from lab.production.floor import Floor
-from lab.production.recorder import finish_name
+from lab.production.machine import NEVER
+from lab.production.outcome import Outcome
+from lab.production.perception import Deviation, scene_seen
+from lab.production.recorder import burnt_name, finish_name
 from lab.production.recovery import Recovery
+from lab.production.relearning import Relearner, adopt
+from lab.production.replanning import in_another, plan_again
 from lab.production.run_journal import Met, Moved, RunJournal
+from lab.production.standing import has_fallen, stands
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Schedule
-from lab.sequencing.simulate.run import branch
+from lab.sequencing.simulate.rest import Mishaps
 from lab.sim.frames import Recording
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared
-from lab.teaching.events import Event, MachineDone, MoveMade, Tell, TroubleMet, unheard
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """A run in physics: the measured schedule, which parts were delivered, retries, and why it stopped (None: it did not).
-
-    timed: how long each move took in which nothing had to be tried again. skipped_s: of sim_s, the time that passed without
-    physics, while the robot waited and nothing moved. interrupted: by Ctrl-C; all else is what came of it until then.
-    happened: the faults that struck.
-    """
-
-    schedule: Schedule
-    delivered: tuple[int, ...]
-    dropped: tuple[int, ...]
-    retries: tuple[str, ...]
-    failure: str | None
-    sim_s: float
-    camera_deviations_m: tuple[float, ...]
-    timed: tuple[TimedMove, ...] = ()
-    skipped_s: float = 0.0
-    interrupted: bool = False
-    happened: tuple[Happened, ...] = ()
+from lab.teaching.events import Event, MachineDone, MoveMade, PlanMade, Tell, TroubleMet, unheard
 
 
 @dataclass
 class Production:
-    """One sequence being carried out on a floor; sequence: the decisions still to come (see `Run`)."""
+    """One sequence being carried out on a floor.
+
+    relearner: learns what changed in the scene, None: nobody does. sequence: the decisions still to come (see `Run`).
+    """
 
     floor: Floor
     cell: Cell
     tell: Tell = unheard
+    relearner: Relearner | None = None
     sequence: list[int] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.work = Transfers(self.floor, self.cell, self.tell)
-        self.recovery = Recovery(self.work, self.replan)
+        self.recovery = Recovery(self.work, self.replan, self.relearn)
         self.work.look = self.recovery.look
         self.floor.on_tick = self.watch
 
     def carry_out(self, sequence: Sequence[int]) -> str | None:
-        """Carry the whole sequence out; None, or why not all parts were made: which, where and why."""
+        """Carry the whole sequence out; None, or why not all parts were made: which, where and why.
+
+        Where the run cannot go on by itself and somebody attends it, it waits until they have put things right.
+        """
         self.sequence = [*sequence]
         while True:
             try:
-                self.floor.between_moves()
-                self.recovery.look()
-                if not self.sequence:
+                if not self._next():
                     return self.recovery.failure()
+            except RunStopped as stopped:
+                if not self.floor.controls.attended:
+                    return str(stopped)
+                self.floor.controls.protective(f"{stopped}; put it right, then go on")
+                self.floor.held()
+                self.recovery.forget()
+                self.replan("a person has put things right")
+
+    def _next(self) -> bool:
+        """The next move, or the answer to what keeps it from being made; False when nothing is left. Raises RunStopped."""
+        try:
+            self.floor.between_moves()
+            self.recovery.look()
+            self.work.put_back()
+            if self.sequence:
                 self.work.bring_on(self.sequence[0], len(self.sequence))
                 self.sequence.pop(0)
-            except Trouble as trouble:
-                try:
-                    self.recovery.answer(trouble)
-                except RunStopped as stopped:
-                    return str(stopped)
+            elif not self.recovery.find_again():
+                return False
+        except Trouble as trouble:
+            self.recovery.answer(trouble)
+        self.floor.controls.move_ended()
+        return True
 
     def replan(self, why: str) -> None:
-        """Order the work that remains anew, from the state that was reached."""
-        left = branch(self.work.plan)
-        kept = []
-        for decision in self.sequence:
-            if part_of(decision, self.cell.parts) not in self.recovery.lost and left.option(decision) is not None:
-                left.move(decision)
-                kept.append(decision)
-        self.sequence = kept
+        """Order the work that remains anew, from the state that was reached. Raises RunStopped where no order ends it."""
+        work, recovery, now_s = self.work, self.recovery, self.floor.now_s
+        first = self.sequence[0] if self.sequence and self.floor.bench.held is not None else None
+        ready_s = {
+            part: work.left_s(part) for part in range(1, self.cell.parts + 1) if work.machine_of(part) is not None
+        }
+        mishaps = Mishaps(frozenset(recovery.lost), tuple(recovery.out), ready_s)
+        try:
+            found = plan_again(work.plan, mishaps, first)
+        except LabError as error:
+            raise RunStopped(f"{why}: {error}") from None
+        recovery.lose(dict(found.stuck))
+        work.plan, self.sequence = found.run, [*found.sequence]
+        if first is not None and first not in self.sequence:
+            raise RunStopped(f"{why}: {self.floor.bench.held} is in the gripper and cannot be brought on: take it out")
+        if found.schedule is not None and found.proven is not None:
+            gap = found.proven.gap(found.schedule.makespan_s)
+            plan = found.schedule.later(now_s)
+            self.tell(PlanMade(plan, len(self.sequence), gap, found.proven.proven, now_s, why))
+
+    def relearn(self, seen: Sequence[Deviation]) -> None:
+        """Learn what changed in the scene, and go on with that. Raises LabError where nothing can be done in it."""
+        if self.relearner is None:
+            raise WorkFailed("nobody is there to teach what changed")
+        floor, work = self.floor, self.work
+        cell = self.relearner.learn(scene_seen(floor.scene.task, floor.scene.layout, [*seen]))
+        adopt(floor, self.relearner.prepared, work.spot_of)
+        work.plan = in_another(work.plan, cell)
 
     def watch(self) -> None:
         """After each physics step: tell of machines that are done, and show what they have done to their parts."""
@@ -93,9 +117,14 @@ class Production:
         for machine in floor.machines.values():
             if not machine.told and machine.done(floor.now_s):
                 machine.told = True
+                at_most_s = self.work.at_most_s(machine.part, machine.station)
+                machine.burns_s = NEVER if at_most_s is None else floor.now_s + at_most_s
                 self.tell(MachineDone(machine.station, machine.part, floor.now_s))
                 if machine.skill is None and floor.skillset.task.station(machine.station).finish is not None:
                     self._show(finish_name(machine.part, machine.station))
+            if machine.part and floor.now_s > machine.burns_s:
+                machine.burns_s = NEVER
+                self._show(burnt_name(machine.part, machine.station))
             if machine.skill is not None and machine.moves:
                 self._show(*machine.skill.shown())
 
@@ -104,15 +133,20 @@ class Production:
             for name in names:
                 self.floor.recorder.show(name)
 
+    def _stands(self, name: str) -> bool:
+        return stands(self.floor.bench, name, self.work.spot_of[name])
+
     def outcome(self, failure: str | None, interrupted: bool = False) -> Outcome:
         """What came of it."""
         work, floor = self.work, self.floor
-        delivered = tuple(part for part in work.done() if work.stands(part))
+        delivered = tuple(
+            part for part in sorted(work.finished) if part not in work.spoilt and self._stands(work.name(part))
+        )
         left = [part for part in range(1, self.cell.parts + 1) if part not in delivered]
         return Outcome(
             Schedule.from_moves(self.cell, work.moves),
             delivered,
-            tuple(part for part in left if work.has_fallen(part)),
+            tuple(part for part in left if has_fallen(floor.bench, work.name(part))),
             tuple(self.recovery.notes),
             failure,
             floor.now_s,
@@ -129,6 +163,7 @@ def carry_out(
     sequence: Sequence[int],
     conditions: Conditions | None = None,
     tell: Tell = unheard,
+    relearner: Relearner | None = None,
 ) -> tuple[Outcome, Recording]:
     """Carry `sequence` (one decision a move, see `Run`) out in physics, from parts on their first stations to the end.
 
@@ -143,25 +178,32 @@ def carry_out(
         floor.scene.robot.override(conditions.override)
         floor.stand(prepared.surveys.approach(cell.robot_start))
         floor.restart_clock()
+        motions = MotionRecorder(floor.scene.robot)  # its times begin with the floor's
         floor.hand = lambda: injector.tick(floor)
         journal = conditions.journal
-        noted = _noting(floor, journal, tell)
+        heard: list[Event] = []
+        noted = noting(floor, journal, heard, tell)
         floor.tell = noted
         floor.controls = conditions.controls
         floor.stops.note = journal.note_stops
         floor.stops.again(journal.stops(), journal.last_step())
-        production = Production(floor, cell, noted)
+        production = Production(floor, cell, noted, relearner)
         interrupted = False
         try:
             failure = production.carry_out(sequence)
         except KeyboardInterrupt:
             failure, interrupted = "stopped by Ctrl-C", True
         floor.recorder.take()  # type: ignore[union-attr]
-        outcome = replace(production.outcome(failure, interrupted), happened=tuple(injector.happened))
+        outcome = replace(
+            production.outcome(failure, interrupted),
+            happened=tuple(injector.happened),
+            heard=tuple(heard),
+            program=motions.program(prepared.task, prepared.seed, production.work.moves, cell.part_name),
+        )
         return outcome, floor.recorder.recording  # type: ignore[union-attr]
 
 
-def _noting(floor: Floor, journal: RunJournal, tell: Tell) -> Tell:
+def noting(floor: Floor, journal: RunJournal, heard: list[Event], tell: Tell) -> Tell:
     """Tells on what happens, once it is in the journal."""
 
     def noted(event: Event) -> None:
@@ -170,6 +212,7 @@ def _noting(floor: Floor, journal: RunJournal, tell: Tell) -> Tell:
                 journal.tell(Moved(floor.steps, part, move.origin, move.target, move.pick_s, move.drop_s))
             case TroubleMet(what, answer, part, station):
                 journal.tell(Met(floor.steps, what, answer, part, station))
+        heard.append(event)
         tell(event)
 
     return noted

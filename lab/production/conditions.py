@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from lab.production.controls import Controls
 from lab.production.recorder import Viewer
+from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import RunJournal
 from lab.tasks.fault_fields import FaultFields
 
@@ -12,7 +13,8 @@ from lab.tasks.fault_fields import FaultFields
 class Conditions:
     """override: the share of the task's speed and acceleration with which the arm moves. viewer: who watches live.
 
-    faults: what goes wrong in it.
+    faults: what goes wrong in it; fault_seed: draws more of that, None: nothing more. advice: who is asked, None: nobody
+    about the order.
     """
 
     override: float = 1.0
@@ -20,3 +22,5 @@ class Conditions:
     controls: Controls = field(default_factory=Controls)
     journal: RunJournal = field(default_factory=RunJournal)
     faults: tuple[FaultFields, ...] = ()
+    fault_seed: int | None = None
+    advice: RunAdvice | None = None

@@ -1,5 +1,6 @@
 """A scene with the robot and the machines at work in it: who is where, at one clock, and what stops it."""
 
+from collections import deque
 from collections.abc import Callable, Iterator
 from math import ceil
 from time import perf_counter
@@ -13,9 +14,10 @@ from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
-from lab.sim.world import TIME_STEP, World
+from lab.sim.world import TIME_STEP, Array, World
 from lab.skills import Skill
-from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, SkillFailed, Status
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, Status
 from lab.skills.skillset import SkillSet
 from lab.tasks.task import Order
 from lab.teaching.events import RunHeld, RunWentOn, Tell, unheard
@@ -23,14 +25,21 @@ from lab.teaching.events import RunHeld, RunWentOn, Tell, unheard
 AT_REST_STEPS = 60  # physics steps at the end of a wait that are simulated in any case
 SKIPPED_STEPS = 240  # at the most without a look at what else goes on
 FORCE_EVERY = 4  # physics steps between two looks at what presses on the arm
+BACK_STEPS = 120  # physics steps of its way that the arm goes back when it was stopped by a force
 DISTURBED_S = 2.0  # after a hand has reached into the scene, all of it is simulated for so long
+
+
+def _nothing() -> bool:
+    """Nobody does anything by hand."""
+    return False
 
 
 class Floor:
     """A scene in which skills are carried out: one clock, the robot's skill and the machines' processes side by side.
 
     controls: what stops it and sets its pace; stops: when they did, for the journal. on_tick: called after each physics
-    step; hand: called before each, to reach into the scene as a fault does, and says whether it did.
+    step; hand: called before each, to reach into the scene as a fault does, and says whether it did. meanwhile: called while
+    a pause lasts, for what the operator does by hand, and says whether that was anything.
     """
 
     def __init__(
@@ -52,8 +61,10 @@ class Floor:
         self.tell: Tell = unheard
         self.on_tick: Callable[[], None] | None = None
         self.hand: Callable[[], bool] | None = None
-        self.force_limit_n: float | None = None
+        self.meanwhile: Callable[[], bool] = _nothing
+        self.pressing_n = 0.0  # allowed on top of the task's limit, so that the arm gets away from where it was stopped
         self.was_held = False  # by the operator, in the last motion
+        self._trail: deque[Array] = deque(maxlen=BACK_STEPS // FORCE_EVERY)  # the joints on the last steps of the way
         for _ in range(SETTLE_STEPS):
             world.step()
         self.recorder: Recorder | None = None
@@ -155,16 +166,14 @@ class Floor:
             self.tick()
             if not self.stops.folding:
                 self.controls.wait(TIME_STEP)
-        self.between_moves(again=True)
+        self.between_moves()
         return why
 
-    def between_moves(self, *, again: bool = False) -> None:
-        """Wait as long as there is a pause, without any time going by; again: the move is not over."""
-        if not again:
-            self.controls.move_ended()
-        while self.stops.look(self.steps, self.controls) and self.stops.pauses(self.controls):
+    def between_moves(self) -> None:
+        """Wait as long as there is a pause, without any time going by."""
+        while self.stops.look(self.steps, self.controls) and (self.meanwhile() or self.stops.pauses(self.controls)):
             self._tell_held()
-            self.controls.wait(0.1)
+            self.controls.wait(0.0 if self.stops.folding else 0.1)
         self._tell_held()
         self._paced = (0.0, 0.0, 0.0)
 
@@ -181,12 +190,20 @@ class Floor:
 
     def _too_hard(self) -> str:
         """What the arm presses on harder than the task allows; "" for nothing."""
-        if self.force_limit_n is None or self.steps % FORCE_EVERY:
+        if self.steps % FORCE_EVERY:
             return ""
+        robot = self.scene.robot
+        self._trail.append(self.world.joints(NAME, robot.arm.joints))
         body, force_n = self.world.pressed(NAME)
-        if force_n <= self.force_limit_n:
-            return ""
-        return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {self.force_limit_n:g}"
+        limit_n = self.scene.task.robot.stops_at_n + self.pressing_n
+        return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {limit_n:g}" if force_n > limit_n else ""
+
+    def _back_off(self) -> None:
+        """Go back a little on the way that led against something."""
+        while self._trail:
+            self.world.drive(NAME, self.scene.robot.arm.joints, self._trail.pop())
+            for _ in range(FORCE_EVERY):
+                self.tick()
 
     # ---- skills --------------------------------------------------------------------------------------------------
 
@@ -227,6 +244,7 @@ class Floor:
             return why
         if too_hard := self._too_hard():
             self.scene.robot.brake()
+            self._back_off()
             if self.controls.attended:
                 self.controls.protective(too_hard)
                 self.held()

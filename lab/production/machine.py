@@ -16,7 +16,7 @@ class Machine:
 
     share: of its time that it really takes; fails: it never ends: both are what a fault sets. part: what it works on, or
     has worked on, "" for none. until_s: when it is done with it by the clock [s]; of a learned process, `skill`, the
-    motion decides.
+    motion decides. burns_s: when the part is spoilt that is still in it then [s].
     """
 
     station: str
@@ -25,12 +25,13 @@ class Machine:
     part: str = ""
     until_s: float = 0.0
     skill: Skill | None = None
+    burns_s: float = NEVER
     told: bool = field(default=True, repr=False)  # that it is done
     _due: float = field(default=0.0, repr=False)  # steps of its process
 
     def begin(self, part: str, now_s: float, seconds: float, skills: Sequence[Skill] = ()) -> None:
         """Begin to work on a part: for `seconds` [s], or with the process, which `start` then carries out."""
-        self.part, self.told = part, False
+        self.part, self.told, self.burns_s = part, False, NEVER
         self.skill = skills[0].aim(part) if skills else None
         self.until_s = NEVER if self.fails else now_s + (0.0 if skills else seconds * self.share)
 

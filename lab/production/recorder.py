@@ -1,7 +1,7 @@
 """What a run looked like: frames of the world, and what a viewer shows beside the bodies: what machines have left on parts."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from lab.sim.frames import Body, Frame, Recording, Rgba, Shape
@@ -15,6 +15,7 @@ from lab.tasks.task import Order, Task
 FRAME_EVERY = 24  # physics steps: ten frames a simulated second
 RIM_M, PROUD_M = 0.022, 0.0016  # [m] that the finish of a flat part leaves free in all, and is thicker than it
 LEAST = 0.8  # of an edge is covered by it, however short that is
+BURNT: Rgba = (0.10, 0.08, 0.07, 1.0)
 LARGER = 1.01  # than another part is its finish
 
 
@@ -88,6 +89,10 @@ def extras_of(scene: Scene, skillset: SkillSet) -> dict[str, tuple[Body, ...]]:
         for station in (scene.task.station(place) for place in kind.part.places):
             if station.finish is not None:
                 bodies.append(finish_on(name, kind, station.name, (*station.finish, 1.0)))
+            if any(one is not None for one in (station.at_most_s, *_windows(kind, station.name))):
+                bodies.append(
+                    replace(finish_on(name, kind, station.name, BURNT, 2), name=burnt_name(name, station.name))
+                )
             for skill in skillset.processes[station.name]:
                 bodies += skill.on_part(name, kind)
         if bodies:
@@ -95,22 +100,34 @@ def extras_of(scene: Scene, skillset: SkillSet) -> dict[str, tuple[Body, ...]]:
     return found
 
 
+def _windows(kind: Kind, station: str) -> list[float | None]:
+    return [stage.at_most_s for route in kind.part.routes for stage in route if stage.station == station]
+
+
+def burnt_name(name: str, station: str) -> str:
+    """What the looks of a part are called that stayed in a machine for too long."""
+    return f"burnt {name} at {station}"
+
+
 def finish_name(name: str, station: str) -> str:
     """What the finish of a part is called that a machine has left on it."""
     return f"done {name} at {station}"
 
 
-def finish_on(name: str, kind: Kind, station: str, rgba: Rgba) -> Body:
-    """A part's finish: both sides of a flat part within its rim, all of another."""
+def finish_on(name: str, kind: Kind, station: str, rgba: Rgba, coat: int = 1) -> Body:
+    """A part's finish: both sides of a flat part within its rim, all of another; coat: 2 lies over 1."""
     fields = kind.part
     if fields.shape == "box" and fields.size_m is not None and min(fields.size_m) < RIM_M:
-        size = tuple(edge + PROUD_M if edge < RIM_M else max(edge - RIM_M, LEAST * edge) for edge in fields.size_m)
+        size = tuple(
+            edge + coat * PROUD_M if edge < RIM_M else max(edge - RIM_M, LEAST * edge) for edge in fields.size_m
+        )
         return Body(finish_name(name, station), (Shape("box", size, None, rgba),))
     shapes = tuple(
-        Shape(look.kind, _larger(look), look.mesh, rgba, look.position, look.quaternion) for look in kind.shape.looks
+        Shape(look.kind, _larger(look, coat), look.mesh, rgba, look.position, look.quaternion)
+        for look in kind.shape.looks
     )
     return Body(finish_name(name, station), shapes)
 
 
-def _larger(look: Shape) -> tuple[float, ...]:
-    return tuple(LARGER * size for size in (look.size or (1.0, 1.0, 1.0)))
+def _larger(look: Shape, coat: int) -> tuple[float, ...]:
+    return tuple(LARGER**coat * size for size in (look.size or (1.0, 1.0, 1.0)))

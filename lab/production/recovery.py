@@ -1,46 +1,77 @@
 """What is done about trouble: look what is where, take up again, learn again, order anew, leave a part, or stop and say why."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from math import hypot
 
+from lab.errors import LabError
+from lab.production.controls import StopKind
+from lab.production.perception import BELOW_M, Deviation, perceive, seen_at
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
-from lab.sim.parts.kinds import Spot
+from lab.sim.scene.scene import pallet_of
 from lab.skills.skill import UPRIGHT
-from lab.teaching.events import MachineFailed, MoveRetried, PartLost, TroubleMet
+from lab.teaching.events import MachineFailed, MoveRetried, PartLost, RunHeld, RunWentOn, TroubleMet
 
 MAX_TRIES = 3  # what fails is tried again from the state reached, at most twice
 PAUSES_S = (0.0, 0.0, 30.0)  # before each try [s]: what disturbs may go away
-MOVED_M = 0.035  # a part farther than this from where it was set down was moved
 LOOK_S = 1.0  # between two looks at the table
+BLIND_S = 120.0  # so long a skill waits until the camera sees again
 MOST_TROUBLES = 40  # in one run; then it is stopped
-
-Replan = Callable[[str], None]  # given why
+LOST = ("part fallen", "part gone", "part out of reach")
+FIXED = ("obstacle moved", "obstacle gone", "obstacle new", "station moved")
 
 
 @dataclass
 class Recovery:
     """The answers to trouble, for parts that are being brought on.
 
-    lost: why a part was given up, by its number. out: why a machine is not used any more. back: positions to which parts
-    fell back, by number, that the next plan has to know of.
+    replan: orders the rest of the work anew, given why. relearn: learns what changed in the scene, given what was seen.
+    lost: why a part was given up, by its number. out: why nothing is brought to a station any more.
     """
 
     work: Transfers
-    replan: Replan
+    replan: Callable[[str], None]
+    relearn: Callable[[Sequence[Deviation]], None]
     lost: dict[int, str] = field(default_factory=dict)
     out: dict[str, str] = field(default_factory=dict)
-    back: dict[int, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    _strange: dict[str, str] = field(default_factory=dict)  # what belongs to nobody, and the station that it closes
+    _missing: set[int] = field(default_factory=set)  # parts that were given up because they cannot be taken up
     _tries: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     _first: dict[str, str] = field(default_factory=dict)
     _looked_s: float = -LOOK_S
 
+    def find_again(self) -> bool:
+        """Take parts up again that were given up because they could not be taken up, and now can; whether there are any."""
+        found = [one for one in self._missing if self._can_be_taken_up(one)]
+        for part in found:
+            self._missing.discard(part)
+            del self.lost[part]
+            self.work.left_lying.discard(self.work.name(part))
+            name = self.work.name(part)
+            self.work.spot_of[name] = seen_at(self.work.floor, name)
+            self._tell(Trouble("it can be taken up again", name), "goes on with it")
+        if found:
+            self.replan("a part can be taken up again")
+        return bool(found)
+
+    def _can_be_taken_up(self, part: int) -> bool:
+        floor, name = self.work.floor, self.work.name(part)
+        at = seen_at(floor, name)
+        reached = floor.scene.robot.arm.inverse(floor.bench.part_pose(name)) is not None
+        return not floor.world.dark and at.z > BELOW_M and floor.bench.upright(name) >= UPRIGHT and reached
+
+    def forget(self) -> None:
+        """A person has put things right: what was out of use is used again, and tries are counted anew."""
+        self.out.clear()
+        self._tries.clear()
+        self._first.clear()
+
     def failure(self) -> str | None:
         """Why not all parts were made; None when they were."""
-        return "; ".join(self.lost[part] for part in sorted(self.lost)) or None
+        why = self.work.spoilt | self.lost
+        return "; ".join(dict.fromkeys(why[part] for part in sorted(why))) or None
 
     def look(self) -> None:
         """See, once a second, whether all is where it should be. Raises Trouble."""
@@ -48,8 +79,9 @@ class Recovery:
         if now_s - self._looked_s < LOOK_S:
             return
         self._looked_s = now_s
-        if found := self._deviations():
-            raise found[0]
+        found = self._deviations()
+        if found:
+            raise Trouble(found[0].words, found[0].name, found[0].station, seen=True)
 
     # ---- answers ---------------------------------------------------------------------------------------------------
 
@@ -57,6 +89,17 @@ class Recovery:
         """Do what lets the run go on, perhaps without a part. Raises RunStopped."""
         work, floor = self.work, self.work.floor
         work.place = ""
+        floor.scene.robot.brake()
+        if not trouble.held:  # a protective stop
+            work.tell(RunHeld(StopKind.PROTECTIVE, str(trouble), "robot", floor.now_s))
+        try:
+            self._answer(trouble)
+        finally:
+            if not trouble.held:
+                work.tell(RunWentOn(floor.now_s))
+
+    def _answer(self, trouble: Trouble) -> None:
+        floor = self.work.floor
         if floor.bench.held is not None and not floor.bench.holds(floor.bench.held):
             floor.bench.held = None
         if trouble.held:
@@ -64,66 +107,137 @@ class Recovery:
             return
         key = (trouble.part, trouble.station, trouble.skill)
         self._tries[key] += 1
-        tries = self._tries[key]
-        if not trouble.final and not isinstance(trouble, PartAstray):
-            skill = trouble.skill and f" '{trouble.skill}',"
-            self._note(f"{trouble.part} at '{trouble.station}',{skill} try {tries}: {trouble.what}")
         if self._tries.total() >= MOST_TROUBLES:
             raise RunStopped(f"{trouble} (after {MOST_TROUBLES} troubles)")
-        if self._see():
-            return
+        if not (trouble.final or trouble.seen):
+            skill = trouble.skill and f" '{trouble.skill}',"
+            self._note(f"{trouble.part} at '{trouble.station}',{skill} try {self._tries[key]}: {trouble.what}")
+        if floor.world.dark:
+            self._wait_for_camera(trouble)
+        elif not self._see() and not trouble.seen:
+            self._try_again(trouble, self._tries[key])
+
+    def _try_again(self, trouble: Trouble, tries: int) -> None:
+        """Nothing is to be seen that explains it: try it again, a few times, then give up."""
         first = self._first.setdefault(trouble.part, trouble.what)
         if tries >= MAX_TRIES or trouble.final:
             self._give_up(trouble, trouble.what if trouble.final else f"{first} (tried {tries} times)")
             return
         self._tell(trouble, "tries again")
         self._wait(PAUSES_S[tries])
-        machine = floor.machines.get(trouble.station)
+        machine = self.work.floor.machines.get(trouble.station)
         if machine is not None and machine.failed:
-            floor.again(machine)
+            self.work.floor.again(machine)
+
+    def _wait_for_camera(self, trouble: Trouble) -> None:
+        self._tell(trouble, "waits until the camera sees again")
+        floor = self.work.floor
+        until_s = floor.now_s + BLIND_S
+        while floor.world.dark:
+            if floor.now_s >= until_s:
+                raise RunStopped(f"{trouble}: the camera has seen nothing for {BLIND_S:.0f} s: uncover it")
+            floor.wait(min(floor.now_s + LOOK_S, until_s))
 
     def _see(self) -> bool:
-        """Look what is where, and take it into account; whether anything was not where it should be."""
+        """Look what is where, and take it into account; whether anything was not as believed."""
         found = self._deviations()
-        for trouble in found:
-            self._account(trouble)
+        for one in found:
+            self._account(one)
+        fixed = [one for one in found if one.sort in FIXED]
+        if fixed:
+            self._learn_again(fixed)
         if found:
-            self.replan(str(found[0]))
+            self.replan(found[0].words)
         return bool(found)
 
-    def _account(self, seen: "PartAstray") -> None:
-        """Believe what was seen of one part."""
-        work, part = self.work, seen.number
-        machine = next((m for m in work.floor.machines.values() if m.part == seen.part), None)
-        if seen.lost:
-            self._lose(part, str(seen), seen)
-        else:
-            before = work.came_from.get(seen.part)
-            if machine is not None and not machine.done(work.floor.now_s) and before is not None:
-                self.back[part] = before
-                self._tell(seen, "takes it up there, and brings it back to the machine")
-            else:
-                self._tell(seen, "takes it up there")
-            work.spot_of[seen.part] = seen.spot
+    def _account(self, seen: Deviation) -> None:
+        """Believe what was seen of one body."""
+        work, part = self.work, self._part_of(seen.name)
+        if seen.name in self._strange:  # it was there, and is not any more
+            self.out.pop(self._strange.pop(seen.name), None)
+            work.spot_of.pop(seen.name, None)
+        elif seen.sort == "strange part":
+            self._avoid(seen)
+        elif part is not None and seen.sort in LOST:
+            self._leave(part, seen)
+        elif part is not None and seen.sort == "part moved":
+            self._follow(part, seen)
+
+    def _avoid(self, seen: Deviation) -> None:
+        """Something stands where it does not belong: its spot is taken; where that was the only one, the station is closed."""
+        assert seen.at is not None
+        floor = self.work.floor
+        self._strange[seen.name] = ""
+        self.work.spot_of[seen.name] = seen.at
+        if seen.station:
+            spots = floor.scene.places.spots(floor.skillset.task.station(seen.station))
+            near = min(spots, key=lambda spot: (spot.x - seen.at.x) ** 2 + (spot.y - seen.at.y) ** 2)  # type: ignore[union-attr]
+            self.work.taken.add(near)
+            if len(spots) == 1:
+                self._strange[seen.name] = seen.station
+                self.out[seen.station] = seen.words
+        self._tell_seen(seen, "brings nothing there")
+
+    def _leave(self, part: int, seen: Deviation) -> None:
+        """A part that cannot be taken up is left; where it lies in a machine, that is closed."""
+        machine = self.work.machine_of(part)
+        if machine is not None and seen.sort == "part fallen":
+            self.out[machine.station] = f"{seen.name} lies in '{machine.station}'"
         if machine is not None:
             machine.clear()
+        self._lose(part, seen.words)
+        self._missing.add(part)
+        self._tell_seen(seen, "leaves it")
+
+    def _follow(self, part: int, seen: Deviation) -> None:
+        """A part that was moved is taken up where it stands; out of its machine before that was done, it is put back there."""
+        assert seen.at is not None
+        work, machine, answer = self.work, self.work.machine_of(part), "takes it up there"
+        unfinished = machine is not None and not machine.done(work.floor.now_s)
+        if unfinished or part in work.finished:
+            answer = "puts it back"
+            work.to_put_back.append(part)
+        else:
+            work.spot_of[seen.name] = seen.at
+        if machine is not None:
+            machine.clear()
+        self._tell_seen(seen, answer)
+
+    def _learn_again(self, fixed: Sequence[Deviation]) -> None:
+        """Learn what is another problem in the scene as it is now. RunStopped when nothing can be done in it."""
+        for one in fixed:
+            self._tell_seen(one, "surveys the scene again, and learns what has changed")
+        try:
+            self.relearn(fixed)
+        except LabError as error:
+            raise RunStopped(f"{fixed[0].words}: {error}") from None
 
     def _give_up(self, trouble: Trouble, why: str) -> None:
-        """Go on without a machine or without a part; RunStopped when the part is in the gripper, or there is none."""
+        """Go on without a machine or without a part; RunStopped when the part is in the gripper, or it is about none."""
         floor = self.work.floor
         text = str(Trouble(why, trouble.part, trouble.station))
-        part = self._number(trouble.part)
+        part = self._part_of(trouble.part)
         if floor.bench.held is not None or part is None:
             raise RunStopped(text)
         if (machine := floor.machines.get(trouble.station)) is not None and machine.part == trouble.part:
             self.out[trouble.station] = why
             self.work.tell(MachineFailed(trouble.station, trouble.part, why, floor.now_s))
-        self._lose(part, text, trouble)
+        self._tell(trouble, "goes on without it")
+        self._lose(part, text)
         self.replan(text)
 
-    def _lose(self, part: int, why: str, trouble: Trouble) -> None:
+    def lose(self, stuck: dict[int, str]) -> None:
+        """Give parts up that cannot be finished any more."""
+        for part, why in stuck.items():
+            if part not in self.lost:
+                self._lose(part, f"{why}: {'; '.join(self.out.values())}" if self.out else why)
+
+    def _lose(self, part: int, why: str) -> None:
         self.lost[part] = why
-        self._tell(trouble, "leaves it where it is")
+        self.work.left_lying.add(self.work.name(part))
+        self.work.spot_of.pop(self.work.name(part), None)
+        self.work.finished.pop(part, None)
+        self.work.to_put_back = [one for one in self.work.to_put_back if one != part]
         self.work.tell(PartLost(self.work.name(part), why, self.work.floor.now_s))
 
     def _wait(self, seconds: float) -> None:
@@ -132,42 +246,37 @@ class Recovery:
         while floor.now_s < until_s:
             floor.wait(until_s)
 
+    # ---- what is seen and told -------------------------------------------------------------------------------------
+
+    def _deviations(self) -> list[Deviation]:
+        """What is not as believed; of parts that were given up, and things that belong to nobody, nothing new."""
+        floor = self.work.floor
+        found = perceive(floor, floor.scene.task, floor.scene.layout, self.work.spot_of)
+        return [one for one in found if one.sort != "camera blind" and not self._is_known(one)]
+
+    def _is_known(self, one: Deviation) -> bool:
+        part = self._part_of(one.name)
+        if part is None:
+            return one.name in self._strange and one.sort != "part gone"
+        return part in self.lost or part in self.work.to_put_back
+
+    def _part_of(self, body: str) -> int | None:
+        """The number of the part that a body is, or whose pallet."""
+        for part in range(1, self.work.cell.parts + 1):
+            name = self.work.name(part)
+            if body in (name, pallet_of(name)):
+                return part
+        return None
+
     def _note(self, text: str) -> None:
         self.notes.append(text)
         self.work.tell(MoveRetried(text))
 
     def _tell(self, trouble: Trouble, answer: str) -> None:
-        self.work.tell(TroubleMet(trouble.what, answer, trouble.part, trouble.station, self.work.floor.now_s))
+        now_s = self.work.floor.now_s
+        self.work.tell(TroubleMet(trouble.what, answer, trouble.part, trouble.station, now_s))
 
-    def _number(self, name: str) -> int | None:
-        parts = range(1, self.work.cell.parts + 1)
-        return next((part for part in parts if self.work.name(part) == name), None)
-
-    # ---- what is seen ----------------------------------------------------------------------------------------------
-
-    def _deviations(self) -> list["PartAstray"]:
-        """The parts that are not where they should be, and not known to be elsewhere."""
-        work, bench, found = self.work, self.work.floor.bench, []
-        for part in range(1, work.cell.parts + 1):
-            name = work.name(part)
-            if part in self.lost or bench.held in work.floor.scene.bodies_of(name, work.comes_as(part)):
-                continue
-            spot, at = work.spot_of[name], bench.part_pose(name)
-            foot = work.floor.scene.kind_of[name].foot_at(at)
-            station = work.cell.names[work.plan.cell.positions[work.plan.locations[part - 1]].station]
-            where = f"({foot.x:.2f}, {foot.y:.2f}) m"
-            if bench.upright(name) < UPRIGHT:
-                found.append(PartAstray(f"it lies on its side at {where}", name, station, part, foot, lost=True))
-            elif hypot(foot.x - spot.x, foot.y - spot.y) > MOVED_M or foot.z < spot.z - 0.02:
-                reach = work.floor.scene.robot.arm.inverse(at) is not None and foot.z > -0.01
-                words = f"it stands at {where}" if reach else f"it is out of reach at {where}"
-                found.append(PartAstray(words, name, station, part, foot, lost=not reach))
-        return found
-
-
-class PartAstray(Trouble):
-    """A part that is not where it was set down; lost: it cannot be taken up."""
-
-    def __init__(self, what: str, part: str, station: str, number: int, spot: Spot, *, lost: bool) -> None:
-        super().__init__(what, part, station)
-        self.number, self.spot, self.lost = number, spot, lost
+    def _tell_seen(self, seen: Deviation, answer: str) -> None:
+        name = "" if self._part_of(seen.name) is None else seen.name
+        about = seen.station or ("" if name else seen.name)
+        self.work.tell(TroubleMet(seen.words, answer, name, about, self.work.floor.now_s))

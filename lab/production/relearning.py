@@ -8,7 +8,8 @@ from lab.errors import BadInput, LabError
 from lab.learning.problem import Problem
 from lab.production.durations import Durations, cell_of, measure
 from lab.production.floor import Floor
-from lab.production.report import Taught, skill_row
+from lab.production.taught import Taught, skill_row
+from lab.sequencing.cell.cell import Cell
 from lab.sim.parts.kinds import Spot
 from lab.sim.scene.places import Layout, Places
 from lab.sim.scene.scene_check import check_scene
@@ -32,6 +33,21 @@ class Relearned:
     prepared: Prepared
     taught: Taught
     again: tuple[str, ...]
+
+
+@dataclass
+class Relearner:
+    """Learns in the middle of a run what changed in its scene; prepared, taught: how they are now."""
+
+    prepared: Prepared
+    taught: Taught
+    teacher: Teacher
+
+    def learn(self, scene: tuple[Task, Layout]) -> Cell:
+        """The cell of the changed scene, once its skills are learned. Raises BadInput as `relearned` does."""
+        found = relearned(self.prepared, self.taught, scene, self.teacher)
+        self.prepared, self.taught = found.prepared, found.taught
+        return found.taught.cell
 
 
 def relearned(prepared: Prepared, taught: Taught, scene: tuple[Task, Layout], teacher: Teacher) -> Relearned:

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from lab.errors import WorkFailed
+from lab.export.program import PROGRAM, TRAJECTORY
 from lab.files import draft
-from lab.production.composer import Outcome
-from lab.production.durations import Durations
-from lab.production.run_story import Storyteller
-from lab.sequencing.cell.cell import Cell
+from lab.production.outcome import Outcome
+from lab.production.run_story import story_of
+from lab.production.taught import Taught
 from lab.sequencing.cell.schedule import Schedule
+from lab.sequencing.cell.schedule_rows import csv_of, rows_of
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
@@ -30,27 +31,17 @@ FILES = {
     "overhead": "overhead.png",
     "replay": "replay.html",
     "sequence": "sequence.json",
+    "schedule_table": "schedule.csv",
+    "schedule": "schedule.json",
+    "program": PROGRAM,
+    "trajectory": TRAJECTORY,
     "run": "run.json",
 }
 
 
 @dataclass
-class Taught:
-    """A prepared task whose skills are all there, with the durations of its moves and the cell that they make.
-
-    rows: each skill as `lab run --json` shows it. durations_key: under which they are kept; "": they are not.
-    """
-
-    lessons: dict[str, Lesson]
-    rows: dict[str, dict[str, Any]]
-    durations: Durations
-    cell: Cell
-    durations_key: str = ""
-
-
-@dataclass
 class Report:
-    """What a whole run came to; `began_s` is the clock's reading (`time.perf_counter`) when it began; told: what happened in it."""
+    """What a whole run came to; `began_s` is the clock's reading (`time.perf_counter`) when it began."""
 
     prepared: Prepared
     taught: Taught
@@ -59,9 +50,9 @@ class Report:
     outcome: Outcome
     recording: Recording
     began_s: float
-    told: Storyteller = field(default_factory=Storyteller)
     wall_s: float = 0.0
     files: dict[str, str] = field(default_factory=dict)
+    receipts: dict[str, Any] | None = None
 
     @property
     def success(self) -> bool:
@@ -75,7 +66,8 @@ class Report:
 
     def to_json(self) -> dict[str, Any]:
         """The document of `lab run --json`."""
-        outcome, prepared = self.outcome, self.prepared
+        outcome, prepared, cell = self.outcome, self.prepared, self.taught.cell
+        verdict = outcome.verdict([cell.part_name(part) for part in range(1, cell.parts + 1)])
         return {
             "task": prepared.task.name,
             "seed": prepared.seed,
@@ -97,35 +89,13 @@ class Report:
             "camera_deviation_m": max(outcome.camera_deviations_m, default=None),
             "sim_s": outcome.sim_s - outcome.skipped_s + self.taught.durations.sim_s,
             "skipped_s": outcome.skipped_s,
+            "faults": [*verdict.rows],
+            "outcome": verdict.came,
             "interrupted": outcome.interrupted,
+            "receipts": self.receipts,
             "wall_s": self.wall_s,
             "files": self.files,
         }
-
-
-def skill_row(name: str, lesson: Lesson) -> dict[str, Any]:
-    """What the document says of a skill: where it came from, why, and what it took."""
-    policy, result = lesson.policy, lesson.result
-    return {
-        "name": name,
-        "subtask": policy.subtask,
-        "source": lesson.source,
-        "from_task": lesson.from_task or None,
-        "reason": lesson.reason,
-        "policy": policy.name,
-        "parent": policy.parent,
-        "saved_episodes": lesson.saved[0],
-        "saved_helped_steps": lesson.saved[1],
-        "fitness": None if lesson.fitness is None else asdict(lesson.fitness),
-        "episodes": 0 if result is None else len(result.steps),
-        "moves": 0 if result is None else int(result.visits.sum()),
-        "requests": 0 if result is None else result.requests,
-        "helped_steps": 0 if result is None else result.helped_steps,
-        "rejected_at_episode": None if result is None else result.rejected_at_episode,
-        "optimal_steps": lesson.steps[1],
-        "final_steps": lesson.steps[0],
-        "solved": policy.solved,
-    }
 
 
 def write_files(report: Report, out: Path) -> None:
@@ -152,6 +122,8 @@ def _names(report: Report) -> list[str]:
     missing = set() if report.outcome.schedule.robot else {"gantt"}
     if _photographed(report.prepared) is None:
         missing |= {"value_map", "overhead"}
+    if report.outcome.program is None:
+        missing |= {"program", "trajectory"}
     return [name for name in FILES if name not in missing]
 
 
@@ -181,9 +153,14 @@ def _draw_all(report: Report, folder: Path) -> None:
         )
         write_picture(paths["overhead"], photo.picture)
     title = f"{prepared.task.title or prepared.task.name}: {prepared.words}"
-    story = report.told.story(report.outcome.schedule, predicted, report.outcome.happened)
+    story = story_of(report.outcome, predicted)
     replay_html(report.recording, paths["replay"], title=title, story=story)
     _write_json(paths["sequence"], _sequence_document(report, predicted))
+    rows = rows_of(predicted, taught.cell, "planned") + rows_of(report.outcome.schedule, taught.cell, "measured")
+    paths["schedule_table"].write_text(csv_of(rows), encoding="utf-8")
+    _write_json(paths["schedule"], {"schedule": rows})
+    if report.outcome.program is not None:
+        report.outcome.program.save(folder)
     report.wall_s = time.perf_counter() - report.began_s
     _write_json(paths["run"], report.to_json() | {"schedule": report.outcome.schedule.to_json()})
 

@@ -9,17 +9,17 @@ from lab.errors import LabError
 from lab.production.composer import carry_out
 from lab.production.conditions import Conditions
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
+from lab.production.faults.draw import draw
+from lab.production.order import OrderAdvice, ordered
 from lab.production.recorder import show_scene
-from lab.production.report import Report, Taught, skill_row, write_files
+from lab.production.relearning import Relearner
+from lab.production.report import Report, write_files
 from lab.production.run_journal import DurationsKept, RunEnded, RunJournal
-from lab.production.run_story import Storyteller
-from lab.sequencing import find_sequence
-from lab.sequencing.methods.exact import optimum
-from lab.sequencing.search import Reference
+from lab.production.taught import Taught, skill_row
+from lab.sequencing.simulate.run import simulate
 from lab.skills.prepared_scene import Prepared
 from lab.skills.trial import trial_of
-from lab.tasks.sequencing import search_for
-from lab.teaching.events import Event, MoveTimed, PhaseBegan, RecordSkipped, SequenceFound, SkillReady
+from lab.teaching.events import MoveTimed, PhaseBegan, PlanMade, RecordSkipped, ScenePrepared, SkillReady
 from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.teaching.teacher import Teacher
 
@@ -32,6 +32,7 @@ def teach_all(prepared: Prepared, teacher: Teacher, journal: RunJournal | None =
     known = journal.known_at_first(known)
     for what in damaged:
         teacher.tell(RecordSkipped(what))
+    teacher.tell(ScenePrepared(prepared))
     teacher.tell(PhaseBegan("learn", len(prepared.problems)))
     lessons, rows, first = (
         dict[str, Lesson](),
@@ -93,19 +94,20 @@ def run(prepared: Prepared, teacher: Teacher, out: Path, conditions: Conditions 
         show_scene(prepared.task, prepared.order, prepared.layout, conditions.viewer)
     taught = teach_all(prepared, teacher, conditions.journal)
     teacher.tell(PhaseBegan("sequence", 1))
-    settings = prepared.task.sequencing
-    found = find_sequence(taught.cell, settings.method, search_for(settings), prepared.seed)
-    proven = optimum(taught.cell)
-    teacher.tell(SequenceFound(found, Reference(proven.bound_s, proven.proven, "A*")))
-    teacher.tell(PhaseBegan("carry out", len(found.sequence)))
-    told = Storyteller()
-
-    def tell(event: Event) -> None:
-        told.hear(event)
-        teacher.tell(event)
-
-    outcome, recording = carry_out(prepared, taught.cell, found.sequence, conditions, tell)
-    report = Report(prepared, taught, found, proven, outcome, recording, began, told)
+    advice, people = conditions.advice, teacher.advising.people
+    whose = OrderAdvice() if advice is None else advice.order(people, taught.durations.to_json())
+    order = ordered(taught.cell, prepared.task.sequencing, whose, prepared.seed, teacher.tell)
+    planned = simulate(taught.cell, order.found.sequence)
+    gap, proven = order.proven.gap(order.found.cost), order.proven.proven
+    teacher.tell(PhaseBegan("carry out", len(order.found.sequence)))
+    teacher.tell(PlanMade(planned, len(order.found.sequence), gap, proven, 0.0))
+    faults = prepared.task.faults
+    if conditions.fault_seed is not None:
+        faults += draw(prepared.task, prepared.order, conditions.fault_seed, order.found.cost)
+    conditions, relearner = replace(conditions, faults=faults), Relearner(prepared, taught, teacher)
+    outcome, recording = carry_out(prepared, taught.cell, order.found.sequence, conditions, teacher.tell, relearner)
+    receipts = None if advice is None else advice.receipts(order)
+    report = Report(prepared, taught, order.found, order.proven, outcome, recording, began, receipts=receipts)
     teacher.tell(PhaseBegan("draw", 1))
     write_files(report, out)
     if not outcome.interrupted:

@@ -8,8 +8,10 @@ what was written. Skills that were learned before are taken from the run's folde
 
 import json
 import os
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from shutil import rmtree
 from typing import Any, NamedTuple
 
 from lab import __version__
@@ -17,6 +19,7 @@ from lab.advice.json_lines import AppendedFile, EntryKinds
 from lab.errors import BadInput, WorkFailed
 from lab.production.controls import Held, StopKind
 from lab.production.stop_record import StopsChanged
+from lab.sim.world import TIME_STEP
 from lab.tasks.record import write_whole
 from lab.toolbox.folder_place import FolderPlace
 from lab.toolbox.index import KnownPolicies
@@ -226,11 +229,7 @@ class RunJournal:
 
     def stops(self) -> list[StopsChanged]:
         """When it was stopped and went on."""
-        return [
-            StopsChanged(entry.step, tuple(Held(StopKind(kind), why, by) for kind, why, by in entry.stops))
-            for entry in self.known
-            if isinstance(entry, Stopped)
-        ]
+        return [stops_of(entry) for entry in self.known if isinstance(entry, Stopped)]
 
     def commands(self) -> list[Commanded]:
         """What the operator said."""
@@ -263,10 +262,25 @@ class RunJournal:
         if self.file is not None:
             self.file.write(line_of(entry))
 
+    def forget(self) -> None:
+        """Take away what a run has written that cannot be carried out."""
+        self.close()
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
+            self.path.with_name(KNOWN).unlink(missing_ok=True)
+            rmtree(self.path.with_name(SKILLS), ignore_errors=True)
+            with suppress(OSError):  # it holds something else, or was there before
+                self.path.parent.rmdir()
+
     def close(self) -> None:
         """Close the file; safe to call again."""
         if self.file is not None:
             self.file.close()
+
+
+def stops_of(entry: Stopped) -> StopsChanged:
+    """A line about stops as the simulation knows them."""
+    return StopsChanged(entry.step, tuple(Held(StopKind(kind), why, by) for kind, why, by in entry.stops))
 
 
 def line_of(entry: Entry) -> str:
@@ -305,6 +319,27 @@ def read_run(folder: Path, where: str) -> tuple[RunBegan, tuple[Entry, ...], int
     if any(isinstance(entry, RunBegan) for entry in entries[1:]):
         raise BadInput(f"journal '{path}' ({where}): a second run in one journal")
     return head, tuple(entries[1:]), whole
+
+
+def replayed_run(folder: Path, where: str) -> dict[str, Any]:
+    """The document of `lab replay --json` for a run: what was done in it and what came of it, with times [s]. BadInput."""
+    head, entries, _ = read_run(folder, where)
+    events = [json.loads(line_of(entry)) for entry in entries if not isinstance(entry, SkillKept | DurationsKept)]
+    for event in events:
+        if "step" in event:
+            event["at_s"] = event["step"] * TIME_STEP
+    ended = next((entry for entry in entries if isinstance(entry, RunEnded)), None)
+    return {
+        "run": str(folder),
+        "task": head.task,
+        "words": head.words,
+        "lab": head.lab,
+        "skills": [entry.row["name"] for entry in entries if isinstance(entry, SkillKept)],
+        "delivered": None if ended is None else ended.delivered,
+        "failure": None if ended is None else ended.failure or None,
+        "over": ended is not None,
+        "events": events,
+    }
 
 
 def is_run(folder: Path) -> bool:

@@ -9,7 +9,6 @@ from typing import Annotated, Any, ClassVar
 from annotated_types import Ge, Le
 
 from lab.errors import BadInput
-from lab.files import check_out
 from lab.production.run_journal import RunBegan, RunJournal, read_run
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
@@ -53,27 +52,22 @@ class RunOptions(SessionOptions):
         )
 
 
-def begun(options: RunOptions, out: Path | None) -> tuple[Task, Path, RunJournal]:
-    """A new run: its task, its folder and the journal there. BadInput for options that cannot be; then nothing is made."""
-    task = load(options.task)
-    folder = out or Path(f"{task.name}-run")
-    check_out(folder)
-    options.lessons().advising()
-    return task, folder, RunJournal.begin(folder, RunBegan(options.to_json(), task.name, hash_of(task)))
+def begun(options: RunOptions, task: Task, folder: Path) -> RunJournal:
+    """The journal of a new run in its folder. BadInput when it cannot be written."""
+    return RunJournal.begin(folder, RunBegan(options.to_json(), task.name, hash_of(task)))
 
 
-def gone_on(given: RunOptions, folder: Path, out: Path | None) -> tuple[RunOptions, Task, Path, RunJournal]:
-    """The run in a folder, to go on with it; BadInput for options beside it, and when its task has changed."""
+def gone_on(given: RunOptions, folder: Path, out: Path | None) -> tuple[RunOptions, Task]:
+    """What the run in a folder was begun with, and its task; BadInput for options beside it, and when the task has changed."""
     if out is not None:
         raise BadInput(f"--out {out} beside --resume {folder}: a run goes on in its own folder: leave it away")
     head, _, _ = read_run(folder, "--resume")
-    where = f"journal in '{folder}' (--resume)"
-    options = RunOptions.from_json(head.words, where)
+    options = RunOptions.from_json(head.words, f"journal in '{folder}' (--resume)")
     check_alone(given, RunOptions(task=""), folder)
     task = load(options.task)
     if hash_of(task) != head.task_hash:
         raise BadInput(f"run in '{folder}' (--resume): its task '{options.task}' has changed since it was begun")
-    return options, task, folder, RunJournal.resume(folder)
+    return options, task
 
 
 def hash_of(task: Task) -> str:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from lab.production.faults.fault import Happened
+from lab.production.outcome import Outcome
 from lab.sequencing.cell.schedule import Schedule
 from lab.teaching.events import (
     Event,
@@ -21,8 +21,8 @@ from lab.view.story import Mark, Story
 
 
 @dataclass
-class Storyteller:
-    """Hears a run's events; `story` is what has come together."""
+class _Story:
+    """What people read of a run's events."""
 
     captions: list[tuple[float, str]] = field(default_factory=list)
     marks: list[Mark] = field(default_factory=list)
@@ -53,17 +53,21 @@ class Storyteller:
             case PlanMade(at_s=at_s, why=why) if why:
                 self._say(at_s, f"A new plan: {why}")
 
-    def story(self, measured: Schedule, planned: Schedule | None, faults: tuple[Happened, ...] = ()) -> Story:
-        """The story with the schedules and the faults that struck."""
-        struck = tuple(Mark(fault.at_s, "fault", fault.words) for fault in faults)
-        return Story(measured, planned, tuple(self.captions), (*self.marks, *struck), tuple(self.begins_s))
-
     def _say(self, at_s: float, words: str) -> None:
         self.captions.append((round(at_s, 3), words))
 
     def _mark(self, mark: Mark) -> None:
         self.marks.append(mark)
         self._say(mark.at_s, mark.words)
+
+
+def story_of(outcome: Outcome, planned: Schedule | None) -> Story:
+    """What was told of a run, with the measured schedule beside the plan, and the faults that struck."""
+    found = _Story()
+    for event in outcome.heard:
+        found.hear(event)
+    struck = tuple(Mark(fault.at_s, "fault", fault.words) for fault in outcome.happened)
+    return Story(outcome.schedule, planned, tuple(found.captions), (*found.marks, *struck), tuple(found.begins_s))
 
 
 def held_words(kind: str) -> str:

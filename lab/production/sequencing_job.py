@@ -1,26 +1,24 @@
 """The order of the robot's transfers: of a task, over measured durations, or of a cell file."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from lab.advice.advising import through
-from lab.advice.advisors import PEOPLE, AdvisorName, make_advisor
+from lab.advice.advisors import PEOPLE, AdvisorName
 from lab.advice.entries import Closed
 from lab.advice.journal import Again, Journal
 from lab.errors import BadInput, unknown
 from lab.learning.requests import Ask
-from lab.learning.session_events import Event as SessionEvent
 from lab.learning.settings import GateSettings
 from lab.production.drawn_times import stochastic
+from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session, reference
 from lab.sequencing import SEQUENCERS, check_method, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import (
-    BUILT_IN,
     MAKESPAN,
     OBJECTIVES,
     WITH_DUE_TIMES,
@@ -35,23 +33,16 @@ from lab.tasks.grid_world import GridWorld
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.tasks.task import Task
 from lab.tasks.task_file import load_any
-from lab.teaching.events import ORDER, LessonEvent, PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
-from lab.teaching.lesson_sessions import TellingAdvisor
+from lab.teaching.events import PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.teacher import Teacher
-
-if TYPE_CHECKING:
-    from lab.sequencing.methods.srl_advised import AdvisedResult
-
-NOBODY = AdvisorName.of("none")
-KeepOrder = Callable[[Cell, str], Journal]  # given the cell and the objective
-SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
 
 
 @dataclass(frozen=True)
 class Wanted:
     """What `lab sequence` is asked for; None: as the file says. advisor: who may be asked which part to move next.
 
-    keep: gives the journal of what people say, by default one that is not written.
+    keep: gives the journal of what people say, by default one that is not written. durations: those of a task's moves
+    (`Durations.to_json`), None: they are measured.
     """
 
     method: str | None = None
@@ -65,6 +56,7 @@ class Wanted:
     people: Mapping[str, Ask] = field(default_factory=dict)
     keep: KeepOrder = lambda cell, objective: Journal()
     parts: str | None = None
+    durations: Mapping[str, Any] | None = None
 
 
 def sequence_named(
@@ -123,12 +115,17 @@ def ordered_cell(file: CellFile, case: str | None, toasts: int | None) -> Cell:
 
 def measured_cell(task: Task, toasts: int | None, wanted: Wanted, teacher: Teacher) -> Cell:
     """The cell of a task, once its skills are learned and their durations measured."""
+    from lab.production.durations import Durations, cell_of
     from lab.production.run import teach_all
     from lab.skills.prepared_scene import prepare
+    from lab.skills.skillset import SkillSet
 
     objective = wanted.objective or task.sequencing.objective
     if objective in WITH_DUE_TIMES:
         raise BadInput(f"objective '{objective}' (--objective) needs due times, and a task has none: use a cell file")
+    if wanted.durations is not None:
+        order = task.ordered(toasts, wanted.parts)
+        return cell_of(task, Durations.from_json(wanted.durations, SkillSet.of(task, order)), order)
     return teach_all(prepare(task, task.ordered(toasts, wanted.parts), teacher.seed), teacher).cell
 
 
@@ -178,7 +175,9 @@ def _sessions(
                     cell, method, replace(search, on_episode=heard), wanted.seed, session
                 )
             else:
-                result = _advised(cell, replace(search, on_episode=heard), wanted, session, journal, tell)
+                advice = OrderAdvice("", wanted.advisor, wanted.gate, wanted.people)
+                seeds = wanted.seed, session
+                result = advised_session(cell, replace(search, on_episode=heard), advice, seeds, journal, tell)
             found.append(result)
         except KeyboardInterrupt:
             interrupted = True
@@ -216,43 +215,6 @@ class _Heard:
     def result(self) -> SequenceResult:
         assert self.best is not None
         return SequenceResult(self.best.best, self.best.best_cost, tuple(self.costs))
-
-
-def _advised(
-    cell: Cell, search: Search, wanted: Wanted, session: int, journal: Journal | None, tell: Tell
-) -> "AdvisedResult":
-    """A session of SRL with advice."""
-    from lab.advice.order_level import OrderLevel, signature_of
-    from lab.sequencing.methods.srl_advised import advised_srl
-
-    rng, own = (np.random.default_rng([wanted.seed, stream, session]) for stream in (2, 3))
-    people, signature = through(journal, wanted.people), signature_of(cell, search.objective)
-    advisor = make_advisor(wanted.advisor, OrderLevel(cell, own, people, search.episodes, signature))
-    if advisor is not None:
-        advisor = TellingAdvisor(advisor, tell)
-
-    def hear(event: SessionEvent) -> None:
-        tell(LessonEvent(ORDER, event, True if journal is None else journal.tell(event)))
-
-    return advised_srl(cell, search, rng, GateSettings(wanted.gate, spare_best=True), advisor, hear)
-
-
-def reference(cell: Cell, objective: str) -> Reference:
-    """The proven optimum, or the best bound: by A* for the makespan, by CP-SAT for the other objectives."""
-    if objective == MAKESPAN:
-        from lab.sequencing.methods.exact import optimum
-
-        best = optimum(cell)
-        return Reference(best.bound_s, best.proven, "A*")
-    from lab.sequencing.methods.cp_sat import cp_sat, fits
-
-    unit = "" if objective == "tardy-parts" else " s"
-    if objective not in BUILT_IN:
-        return Reference(0.0, False, "nothing: CP-SAT has no rule for this objective", unit)
-    if not fits(cell):
-        return Reference(0.0, False, "nothing: too many moves for CP-SAT", unit)
-    opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)
-    return Reference(opinion.bound, opinion.status == "optimal", "CP-SAT", unit)
 
 
 def _document(

@@ -6,20 +6,31 @@ from math import hypot
 
 from lab.production.durations import TimedMove
 from lab.production.floor import Floor
+from lab.production.machine import Machine
+from lab.production.standing import free_spot, station_near
 from lab.production.trouble import Trouble
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option, part_of
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.simulate.run import Run
-from lab.sim.parts.kinds import Kind, Spot, comes_as, on_its_pallet
+from lab.sim.parts.kinds import Spot, comes_as, on_its_pallet
 from lab.sim.scene.scene import pallet_of
 from lab.skills import Skill
-from lab.skills.skill import UPRIGHT, Status, over_everything
+from lab.skills.free_way import by_free_cells
+from lab.skills.skill import Status
 from lab.skills.skillset import Carried, ways_of
-from lab.teaching.events import MachineBegan, MoveBegan, MoveMade, PartDone, SkillBegan, Tell, TroubleMet, unheard
+from lab.teaching.events import (
+    MachineBegan,
+    MoveBegan,
+    MoveMade,
+    PartDone,
+    PartLost,
+    SkillBegan,
+    Tell,
+    TroubleMet,
+    unheard,
+)
 
-ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
-DELIVERED_M = 0.02  # a part this near to its spot has been delivered
 BEGINS_M = 0.05  # a tool this near to where a skill begins need not be brought there
 PATIENCE, PATIENCE_S = (
     1.0,
@@ -33,7 +44,7 @@ def _unseen() -> None:
 
 @dataclass
 class _UnderWay:
-    """The times [s] of a move under way; smooth: nothing had to be done twice."""
+    """The times [s] of a move under way; leg: what of the carrying comes next; smooth: nothing had to be done twice."""
 
     what: tuple[str, Carried]
     start: str
@@ -41,6 +52,7 @@ class _UnderWay:
     reach_s: float = 0.0
     served_s: float = 0.0
     pick_s: float = 0.0
+    leg: int = 0
     smooth: bool = True
 
 
@@ -49,8 +61,10 @@ class Transfers:
     """Parts being brought on upon a floor: where they are, which spots are taken, when machines should be done.
 
     spot_of: by body, a part's or its pallet's. expected_s: by machine, when it should be done [s]. place: the station at
-    whose approach the tool is; "": it is somewhere else. came_from: by part, its position before the one it is in.
-    look: called while the robot waits; raises Trouble.
+    whose approach the tool is; "": it is somewhere else. taken: spots on which something stands that belongs to nobody.
+    finished: when a part reached the end of its route [s]. to_put_back: parts that were moved from where they were brought.
+    left_lying: parts that were given up. spoilt: why a part was, which is brought on all the same. look: called while the
+    robot waits; raises Trouble.
     """
 
     floor: Floor
@@ -61,13 +75,18 @@ class Transfers:
     deviations_m: list[float] = field(default_factory=list)
     expected_s: dict[str, float] = field(default_factory=dict)
     spot_of: dict[str, Spot] = field(default_factory=dict)
-    came_from: dict[str, int] = field(default_factory=dict)
+    taken: set[Spot] = field(default_factory=set)
+    finished: dict[int, float] = field(default_factory=dict)
+    to_put_back: list[int] = field(default_factory=list)
+    left_lying: set[str] = field(default_factory=set)
+    spoilt: dict[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.plan = Run(self.cell)  # where parts are and may go; its times are the predicted ones
         self.place = self.cell.robot_start
         self.look: Callable[[], None] = _unseen
         self._under_way: _UnderWay | None = None
+        self._last: dict[str, tuple[Carried, Spot, float]] = {}
         self._served: set[str] = set()  # parts for which the robot's service is done
         scene = self.floor.scene
         for number, spot in enumerate(scene.places.begins(scene.order), start=1):
@@ -104,15 +123,45 @@ class Transfers:
             if option.service_s:
                 self._serve(part, way.origin)
             move.pick_s = floor.now_s
+            self.check_window(part)
             self._take_up(name, way, spot)
-        self._bring(name, way, spot)
+        else:
+            move.smooth = False  # it was taken up before this move, or before it was interrupted
+        self._bring(way, spot, move)
         self._finish(decision, way, spot, move)
+
+    @property
+    def under_way(self) -> bool:
+        """Whether a move was begun and not ended."""
+        return self._under_way is not None
+
+    def put_back(self) -> None:
+        """Bring parts again to where they were moved from; their machines begin anew. Raises Trouble."""
+        while self.to_put_back and self.floor.bench.held in (None, self.name(self.to_put_back[0])):
+            name = self.name(self.to_put_back[0])
+            way, spot, process_s = self._last[name]
+            move = self._under_way = _UnderWay((name, way), self.place, self.floor.now_s, smooth=False)
+            if self.floor.bench.held is None:
+                self._take_up(name, way, spot)
+            self._bring(way, spot, move)
+            self._under_way = None
+            self._start_machine(name, way.target, process_s)
+            self.to_put_back.pop(0)
+
+    def _start_machine(self, name: str, station: str, process_s: float) -> None:
+        """Let the machine begin that a part has been brought to."""
+        floor = self.floor
+        self._served.discard(name)
+        self.expected_s[station] = floor.now_s + process_s
+        if station in floor.machines:
+            floor.begin(station, name, process_s)
+            self.tell(MachineBegan(station, name, floor.now_s, self.expected_s[station]))
 
     def _begin(self, name: str, way: Carried, ahead: int) -> _UnderWay:
         """The times of the move, which begins now or was interrupted."""
         now_s = self.floor.now_s
         if self._under_way is None or self._under_way.what != (name, way):
-            self._under_way = _UnderWay((name, way), self.place or way.origin, now_s)
+            self._under_way = _UnderWay((name, way), self.place or way.origin, now_s, now_s, now_s, now_s)
             number = len(self.moves) + 1
             self.tell(MoveBegan(number, number - 1 + ahead, name, self.place, way.origin, way.target, now_s))
         else:
@@ -127,17 +176,15 @@ class Transfers:
         self.place, self._under_way = way.target, None
         for body in floor.scene.bodies_of(name, way.kind):
             self.spot_of[body] = spot
-        self.came_from[name] = self.plan.locations[part - 1]
         planned = self.plan.move(decision)
         times_s = move.leave_s, move.reach_s, move.pick_s, floor.now_s, planned.process_s, move.pick_s - move.served_s
         self.moves.append(Move(part, move.start, way.origin, way.target, *times_s, planned.carries))
-        if planned.carries == "part" and way.target in floor.machines:
-            self._served.discard(name)
-            self.expected_s[way.target] = floor.now_s + planned.process_s
-            floor.begin(way.target, name, planned.process_s)
-            self.tell(MachineBegan(way.target, name, floor.now_s, self.expected_s[way.target]))
+        if planned.carries == "part":
+            self._last[name] = way, spot, planned.process_s
+            self._start_machine(name, way.target, planned.process_s)
         self.tell(MoveMade(self.moves[-1], name))
         if self.plan.finished_s[part - 1] is not None:
+            self.finished[part] = floor.now_s
             self.tell(PartDone(name, floor.now_s))
 
     # ---- ways and spots ------------------------------------------------------------------------------------------
@@ -156,17 +203,13 @@ class Transfers:
         if on_its_pallet(scene.task, way.kind, way.target):
             return self.spot_of[pallet_of(name)]
         own = scene.bodies_of(name, way.kind)
-        taken = [spot for body, spot in self.spot_of.items() if body not in own]
-        free = (s for s in scene.places.spots(scene.task.station(way.target)) if s not in taken)
-        spot = next(free, None)
-        if spot is None:
-            raise Trouble(f"no spot of '{way.target}' is free", name, way.target, final=True)
-        return spot
+        taken = [spot for body, spot in self.spot_of.items() if body not in own] + [*self.taken]
+        return free_spot(scene, name, way, taken, self.left_lying)
 
     # ---- what a move is made of ------------------------------------------------------------------------------------
 
     def _go(self, station: str, name: str, move: _UnderWay) -> None:
-        """Bring the empty gripper to a station: by the learned way, or over everything from where none leads."""
+        """Bring the empty gripper to a station: by the learned way, or by free cells from where none leads."""
         if self.place == station:
             move.reach_s = self.floor.now_s
             return
@@ -181,12 +224,12 @@ class Transfers:
         self.place, move.reach_s = station, self.floor.now_s
 
     def over_to(self, station: str) -> None:
-        """Take the tool to a station's approach over everything, from wherever it is. Raises Trouble."""
+        """Take the tool to a station's approach by free cells, from wherever it is. Raises Trouble."""
         surveys = next(iter(self.floor.skillset.skills.values())).surveys
         self.place = ""
-        why = self.floor.follow(over_everything(self.floor.bench, surveys.approach(station)))
+        why = self.floor.follow(by_free_cells(self.floor.bench, surveys, surveys.approach(station)))
         if why:
-            raise Trouble(why, station=station, held=True)
+            raise Trouble(why, station=station, held=self.floor.was_held)
         self.place = station
 
     def _await(self, name: str, station: str) -> None:
@@ -212,6 +255,41 @@ class Transfers:
         """When the part was brought to where it is [s]."""
         return next((move.drop_s for move in reversed(self.moves) if self.name(move.part) == name), 0.0)
 
+    def machine_of(self, part: int) -> Machine | None:
+        """The machine that a part stands in, and that works on it or has done so."""
+        return next((m for m in self.floor.machines.values() if m.part == self.name(part)), None)
+
+    def left_s(self, part: int) -> float:
+        """How long until the machine of a part should be done [s]; below 0: it has been for so long, and the part must not wait
+        on without end. A spoilt part may."""
+        machine = self.machine_of(part)
+        assert machine is not None
+        left_s = self.expected_s[machine.station] - self.floor.now_s
+        self.check_window(part)
+        waits = self.cell.at_most_s(part, machine.station) is None or part in self.spoilt
+        return max(0.0, left_s) if waits else left_s
+
+    def check_window(self, part: int) -> None:
+        """Notice a part that its machine has been done with for longer than it may stay there: it is spoilt."""
+        machine = self.machine_of(part)
+        if machine is None or part in self.spoilt or machine.moves:
+            return
+        at_most_s, late_s = self.at_most_s(machine.part, machine.station), self.floor.now_s - machine.until_s
+        if at_most_s is None or late_s <= at_most_s:
+            return
+        name = self.name(part)
+        what = f"it is burnt: fetched {late_s:.1f} s after it was done, allowed are {at_most_s:g}"
+        self.spoilt[part] = f"{name} at '{machine.station}': {what}"
+        self.tell(TroubleMet(what, "brings it on, but it counts as lost", name, machine.station, self.floor.now_s))
+        self.tell(PartLost(name, what, self.floor.now_s))
+
+    def at_most_s(self, name: str, station: str) -> float | None:
+        """How long a part may stay in a machine that is done with it, by the task [s]; None: as long as it is left there."""
+        task = self.floor.skillset.task
+        routes = self.floor.scene.kind_of[name].part.routes
+        own = [s.at_most_s for route in routes for s in route if s.station == station and s.at_most_s is not None]
+        return own[0] if own else task.station(station).at_most_s
+
     def _serve(self, part: int, station: str) -> None:
         """What the robot does at a station before it takes a part out, once."""
         name = self.name(part)
@@ -223,7 +301,7 @@ class Transfers:
     def _take_up(self, name: str, way: Carried, spot: Spot) -> None:
         """Take a part up: by the way of the station that it stands near to, or of its own where it stands astray."""
         bench, skillset, body = self.floor.bench, self.floor.skillset, self.floor.scene.body_of(name, way.kind)
-        near = self._near(body, way)
+        near = station_near(bench, body, way, skillset)
         if near != way.origin:
             self.over_to(near)
         self.place = ""
@@ -234,64 +312,33 @@ class Transfers:
             machine.clear()
         assert bench.held == body
 
-    def _near(self, body: str, way: Carried) -> str:
-        """The station of the two on a way that a part stands at; its origin when it stands at neither."""
-        scene, at = self.floor.scene, self.floor.bench.part_pose(body)
-        for station in (way.origin, way.target):
-            foots = scene.places.spots(scene.task.station(station))
-            near = any(hypot(at.x - foot.x, at.y - foot.y) < ASTRAY_M for foot in foots)
-            if near and (way.kind, station) in self.floor.skillset.picks:
-                return station
-        return way.origin
-
-    def _bring(self, name: str, way: Carried, spot: Spot) -> None:
+    def _bring(self, way: Carried, spot: Spot, move: _UnderWay) -> None:
         """Carry what is in the gripper to its target and set it down; from a station near the target, that is all."""
-        legs = self.floor.skillset.legs[way]
-        rest = [skill for skill in legs if skill.carries]
-        for skill in rest[-1:] if self.place == way.target else rest:
+        name, legs = move.what[0], [skill for skill in self.floor.skillset.legs[way] if skill.carries]
+        if self.place:
+            move.leg = len(legs) - 1 if self.place == way.target else 0
+        for skill in legs[move.leg :]:
             self._to_begin(skill, name, way.target)
             self.place = ""
             self._do(skill.aim(name, spot), name, way.target)
             self.deviations_m += skill.deviations_m
+            move.leg += 1
         self.place = way.target
 
     def _to_begin(self, skill: Skill, name: str, where: str) -> None:
-        """Bring the tool to where a skill begins, over everything, when it is far from there as after an interruption."""
+        """Bring the tool to where a skill begins, by free cells, when it is far from there as after an interruption."""
         begin, tool = skill.begins_at(), self.floor.scene.robot.tool()
         if begin is None or self._under_way is None or self._under_way.smooth:
             return
         if hypot(tool.x - begin.x, tool.y - begin.y, tool.z - begin.z) > BEGINS_M:
-            why = self.floor.follow(over_everything(self.floor.bench, begin))
+            why = self.floor.follow(
+                by_free_cells(self.floor.bench, skill.surveys, begin, skill.kind if skill.carries else "")
+            )
             if why:
-                raise Trouble(why, name, where, held=True)
+                raise Trouble(why, name, where, held=self.floor.was_held)
 
     def _do(self, skill: Skill, name: str, where: str) -> None:
         """Carry a skill out; Trouble when it fails."""
         self.tell(SkillBegan(skill.name, skill.does(name), name, self.floor.now_s))
         if self.floor.run(skill) is not Status.SUCCESS:
             raise Trouble(skill.reason, name, where, held=self.floor.was_held, skill=skill.name)
-
-    # ---- what came of it -------------------------------------------------------------------------------------------
-
-    def done(self) -> list[int]:
-        """The parts that reached the end of their route."""
-        return [part for part, end_s in enumerate(self.plan.finished_s, start=1) if end_s is not None]
-
-    def stands(self, part: int) -> bool:
-        """Whether a part, and its pallet, stands where it was set down last."""
-        scene, name = self.floor.scene, self.name(part)
-        spot = self.spot_of[name]
-        for body, own in zip(scene.bodies_of(name, comes_as(scene.kind_of[name].part)), self._stack(part), strict=True):
-            if not self.floor.bench.stands(body, spot, DELIVERED_M):
-                return False
-            spot = spot.raised(own.shape.height_m)
-        return True
-
-    def has_fallen(self, part: int) -> bool:
-        """Whether a part is neither held nor upright."""
-        bench, name = self.floor.bench, self.name(part)
-        return bench.held not in (name, pallet_of(name)) and bench.upright(name) < UPRIGHT
-
-    def _stack(self, part: int) -> list[Kind]:
-        scene = self.floor.scene
-        return scene.kinds[comes_as(scene.kind_of[self.name(part)].part)].stack()

@@ -17,6 +17,7 @@ from lab.learning.session_events import (
 from lab.learning.session_events import Event as SessionEvent
 from lab.mdp import TabularMDP
 from lab.seat.request_text import percent, verdict
+from lab.sequencing.cell.objectives import MAKESPAN
 from lab.teaching.events import (
     Event,
     KeptBeside,
@@ -24,6 +25,7 @@ from lab.teaching.events import (
     MoveMade,
     MoveRetried,
     MoveTimed,
+    OrderChosen,
     PhaseBegan,
     RecordSkipped,
     SequenceFound,
@@ -171,6 +173,14 @@ def sequence_parts(event: SequenceFound) -> tuple[str, str]:
     return f"parts {order}{more}:", f"{found}, {reference}"
 
 
+def chosen_text(event: OrderChosen) -> str:
+    """Which order is used, and what each that was found costs."""
+    unit = " s" if event.objective == MAKESPAN else ""
+    whose = {"advised": "srl with advice", "given": "the given order", "exact": "the exact search"}
+    worth = [f"{whose.get(by, f'{by} alone')} {cost:.1f}{unit}" for by, cost in event.costs.items()]
+    return f"orders: {', '.join(worth)}; used: {whose.get(event.used, f'{event.used} alone')}"
+
+
 def move_text(made: MoveMade) -> str:
     """What a move brought where."""
     move = made.move
@@ -197,6 +207,8 @@ def run_text(event: Event) -> str:
             return f"{event.name}: {event.seconds:.2f} s"
         case SequenceFound():
             return " ".join(sequence_parts(event))
+        case OrderChosen():
+            return chosen_text(event)
         case MoveMade():
             return f"{event.move.drop_s:.1f} s: {move_text(event)}"
         case LessonContinued(unfinished=left):

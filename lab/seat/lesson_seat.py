@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from lab.advice.entries import Answer
 from lab.advice.panel import Panel
-from lab.learning.requests import Ask, Request
+from lab.learning.problem import Problem
+from lab.learning.requests import AdviceRequest, Ask, Request
 from lab.learning.session_events import EpisodeEnded
 from lab.mdp import FloatArray
+from lab.seat.replay_pace import ReplayPace
 from lab.seat.run_progress import RunProgress
 from lab.seat.terminal.prompt import TeachingPrompt
 from lab.teaching.events import AdvisorGathered, Event, LessonBegan, LessonEvent, QuestionAnswered, ScenePrepared
@@ -18,6 +20,7 @@ from lab.teaching.kept_session import known_values, receipt_of
 if TYPE_CHECKING:
     from lab.seat.lesson_scene import LessonScene
     from lab.seat.page.teaching_page import SeatPage
+    from lab.skills import Skill
 
 WORTH_S = 2.0  # the shortest time between two receipts of one lesson
 PAGE_S = 30.0  # how long a replay waits for a browser
@@ -33,7 +36,9 @@ class LessonSeat:
     def __init__(self, progress: RunProgress, prompt: TeachingPrompt | None, page: "SeatPage | None") -> None:
         self.progress, self._prompt, self.page = progress, prompt, page
         self._scene: LessonScene | None = None
-        self._pause_s: float | None = None  # between two answers of a replay
+        self._scene_of: Problem | None = None
+        self._place: Any = None  # where lessons take place, a prepared task or another
+        self._pace: ReplayPace | None = None  # of a replay
         self._asked_here = False  # the last question was put to somebody here, and was shown
         self._shown_s = 0.0  # when the page was last shown a question that is not put to it
         self._lesson: LessonBegan | None = None
@@ -54,15 +59,28 @@ class LessonSeat:
                 self._show_answer(event.request, event.action)
             case LessonBegan():
                 self._lesson = event
+                self._about(event.plan.problem)
             case AdvisorGathered():
                 self._panel = event.advisor if isinstance(event.advisor, Panel) else None
             case ScenePrepared():
-                self._show_scene(event)
+                self._place = event.scene
+                self._show_scene(event.problem)
             case _:
                 self.progress.hear(event)
 
+    def _about(self, problem: Problem) -> None:
+        """What is learned now: who asks says it in the words of its skill, where there is one; another's scene goes."""
+        if self._scene_of not in (None, problem):
+            self.clear_scene()
+        skillset = getattr(self._place, "skillset", None)
+        skill: Skill | None = None if skillset is None else skillset.skills.get(problem.name)
+        if self._prompt is not None:
+            self._prompt.about(skill)
+        if self.page is not None:
+            self.page.about(skill)
+
     def _hear_session(self, event: LessonEvent) -> None:
-        if event.is_new or self._pause_s is not None:
+        if event.is_new or self._pace is not None:
             self.progress.hear(event)
             if self._prompt is not None:
                 self._prompt.hear(event)
@@ -88,19 +106,25 @@ class LessonSeat:
     def _show_answer(self, request: Request, action: int | None) -> None:
         """Show on the page where somebody else is asked, not oftener than it can be seen; in a replay show all."""
         asked_here, self._asked_here = self._asked_here, False
-        if self.page is not None and not asked_here:
+        if self._pace is not None:
+            self._replay(request, action, self._pace)
+        elif self.page is not None and not asked_here:
             now_s = time.monotonic()
-            if now_s - self._shown_s >= SEEN_S or self._pause_s:
+            if now_s - self._shown_s >= SEEN_S:
                 self._shown_s = now_s
                 self._show_state(request)
                 self.page.look(request)
-        if self._pause_s is None:
-            return
+
+    def _replay(self, request: Request, action: int | None, pace: ReplayPace) -> None:
+        """Show a question with its answer, until the next one is due."""
+        if self.page is not None:
+            self._set_scene(request)
+            self._show_state(request)
+            self.page.replayed(request, action)
         if self._prompt is not None:
             self._prompt.show(request)
             self._prompt.told(request, action)
-        if self._pause_s:
-            time.sleep(self._pause_s)
+        pace.wait()
 
     def lesson_over(self, document: Mapping[str, Any]) -> None:
         """The lesson, or its replay, is over: the page shows what the advice was worth."""
@@ -123,6 +147,7 @@ class LessonSeat:
         """Asks at the terminal; a page shows the question, too, and may answer it there."""
         assert self._prompt is not None
         self._asked_here = True
+        self._set_scene(request)
         self._show_state(request)
         if self.page is not None:
             self.page.offer(request, self._prompt.answer_from_outside)
@@ -136,6 +161,7 @@ class LessonSeat:
     def _ask_page(self, request: Request) -> int | None:
         assert self.page is not None
         self._asked_here = True
+        self._set_scene(request)
         self._show_state(request)
         return self.page.ask(request)
 
@@ -146,13 +172,20 @@ class LessonSeat:
         if self.page is not None and self._scene is not None:
             self.page.update(self._scene.frame(request.state))
 
-    def _show_scene(self, event: ScenePrepared) -> None:
+    def _set_scene(self, request: Request) -> None:
+        """In a run, the scene of a lesson is set up when somebody is first asked in it; a question on the order needs none."""
+        if not isinstance(request, AdviceRequest):
+            self.clear_scene()
+        elif self._scene is None and self._lesson is not None and self._place is not None:
+            self._show_scene(self._lesson.plan.problem)
+
+    def _show_scene(self, problem: Problem | None) -> None:
         self.clear_scene()
-        if self.page is None:
+        if self.page is None or problem is None:
             return
         from lab.seat.lesson_scene import lesson_scene_of
 
-        self._scene = lesson_scene_of(event.scene, event.problem)
+        self._scene, self._scene_of = lesson_scene_of(self._place, problem), problem
         if self._scene is not None:
             self.page.show(self._scene.bodies, self._scene.camera)
 
@@ -161,15 +194,17 @@ class LessonSeat:
         if self._scene is not None:
             with suppress(Exception):
                 self._scene.close()
-            self._scene = None
+            self._scene = self._scene_of = None
 
     # ---- a replay
 
-    def replaying(self, pause_s: float) -> None:
-        """A session is shown again: everything is told, `pause_s` between two answers."""
-        self._pause_s = pause_s
+    def replaying(self, pause_s: float) -> ReplayPace:
+        """A session is shown again: everything is told, `pause_s` between two answers, until it is told otherwise."""
+        self._pace = ReplayPace(pause_s)
         if self.page is not None:
+            self.page.paced(self._pace)
             self.page.wait_for_page(PAGE_S)
+        return self._pace
 
     def stay(self) -> None:
         """Keeps serving the page until Ctrl-C; returns at once when there is none."""

@@ -13,6 +13,7 @@ from lab.learning.session_events import EpisodeEnded
 from lab.learning.settings import GateSettings
 from lab.mdp import TabularMDP
 from lab.seat.grid_text import Marks, Picture, nearest_goal, points_by_name
+from lab.seat.grid_views import StateWords
 from lab.view.grid_planes import is_map
 
 GOAL, OBSTACLE, DEAD_END, NOWHERE = "to the goal", "into an obstacle", "to an end that is no goal", "nowhere"
@@ -86,9 +87,10 @@ def moves(request: AdviceRequest, marks: Marks) -> list[Text]:
     return parts
 
 
-def bars(request: AdviceRequest, marks: Marks) -> list[Text]:
-    """A line for each move: its chance as a bar and in percent, the learner's own choice marked."""
+def bars(request: AdviceRequest, marks: Marks, sizes: Sequence[str] = ()) -> list[Text]:
+    """A line for each move: its chance as a bar and in percent, the learner's own choice marked; sizes: how far each goes."""
     names = [marks.named(request.mdp, action) for action in range(request.mdp.n_actions)]
+    names = [f"{name} {size}" for name, size in zip(names, sizes, strict=True)] if sizes else names
     widest = max(map(len, names))
     lines = []
     for action, (name, chance) in enumerate(zip(names, request.chances, strict=True)):
@@ -179,17 +181,24 @@ def beyond(request: AdviceRequest, picture: Picture, brief: bool = False) -> str
     """What the picture does not show: the cells beyond it, the axes that are not drawn, where a hidden goal lies."""
     mdp = request.mdp
     cell = mdp.state_cell(request.state)
-
-    def of(axis: int) -> str:
-        return f"of {mdp.shape[axis]}" if brief else f"of 0..{mdp.shape[axis] - 1}"
-
-    said = [f"{_range(axis_name(mdp, a), low, high)} {of(a)}" for a, low, high in picture.shown]
-    parts = [f"{'' if brief else 'Shown: '}{', '.join(said)}"] if said else []
-    parts += [f"{axis_name(mdp, a)}: {cell[a]} {of(a)}" for a in range(3, len(mdp.shape))]
+    shown = shown_in_words(request, picture, brief)
+    parts = [shown] if shown else []
+    parts += [f"{axis_name(mdp, a)}: {cell[a]} {_of(mdp, a, brief)}" for a in range(3, len(mdp.shape))]
     if picture.hides_goal or len(mdp.shape) > 2:
         parts.append(f"{'' if brief else 'the '}goal {'' if brief else 'is '}{way_to_goal(request)}")
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
+def shown_in_words(request: AdviceRequest, picture: Picture, brief: bool = False) -> str:
+    """Which cells the picture shows, "" where it shows all."""
+    mdp = request.mdp
+    said = [f"{_range(axis_name(mdp, a), low, high)} {_of(mdp, a, brief)}" for a, low, high in picture.shown]
+    return f"{'' if brief else 'Shown: '}{', '.join(said)}" if said else ""
+
+
+def _of(mdp: TabularMDP, axis: int, brief: bool) -> str:
+    return f"of {mdp.shape[axis]}" if brief else f"of 0..{mdp.shape[axis] - 1}"
 
 
 def _range(name: str, low: int, high: int) -> str:
@@ -199,22 +208,25 @@ def _range(name: str, low: int, high: int) -> str:
 # ---- in plain sentences ---------------------------------------------------------------------------------------------
 
 
-def sentences(request: AdviceRequest) -> list[str]:
-    """All that the picture and the numbers show, one fact a line, without a drawing."""
+def sentences(request: AdviceRequest, known: StateWords | None = None) -> list[str]:
+    """All that the picture and the numbers show, one fact a line, without a drawing; known: what says where it is."""
     mdp = request.mdp
     cell = mdp.state_cell(request.state)
     lines = [f"Episode {request.episode}, step {request.step}."]
-    if cell:
+    if known is not None:
+        lines.append(known.in_words(request.state))
+    elif cell:
         named = [f"{axis_name(mdp, axis)} {at}" for axis, at in enumerate(cell)]
         lines.append(f"The robot is at {', '.join(named)}.")
     else:
         lines.append(f"The learner is in state {mdp.state_label(request.state)}.")
-    if mdp.coverage_shape:
+    if mdp.coverage_shape and known is None:
         covered = mdp.covered(request.state)
         lines.append(f"Covered: {int(covered.sum())} of {covered.size} cells.")
     way = way_to_goal(request)
     lines += [f"The goal lies {way}."] if way else []
-    lines += [f"{mdp.action_labels[action]}: {_next(request, action)}." for action in range(mdp.n_actions)]
+    sizes = [""] * mdp.n_actions if known is None else [f", {size}" for size in known.moves_in_words()]
+    lines += [f"{label}{sizes[action]}: {_next(request, action)}." for action, label in enumerate(mdp.action_labels)]
     chances = [f"{mdp.action_labels[action]} {percent(chance)}" for action, chance in enumerate(request.chances)]
     lines += [choice(request, WORDS_ONLY), f"Its chances: {', '.join(chances)}."]
     return [*lines, *progress(request), standing(request)]

@@ -18,6 +18,7 @@ from lab.teaching.events import (
     MoveMade,
     MoveRetried,
     MoveTimed,
+    OrderChosen,
     PhaseBegan,
     RecordSkipped,
     SequenceFound,
@@ -90,6 +91,8 @@ class RunProgress:
             case SequenceFound():
                 order, found = sequence_parts(event)
                 self._pack([Text(f"  {order}"), Text(found)], gap=" ")
+            case OrderChosen():
+                self._say(f"  {run_text(event)}")
             case MoveMade():
                 self._say(f"  {event.move.drop_s:7.1f} s  {move_text(event)}")
         if self._task is not None and isinstance(event, PARTS_DONE):

@@ -143,8 +143,9 @@ class Log:
     def found(self, cell: Cell) -> tuple[tuple[int, ...], float, tuple[float, ...]]:
         """The fields of a `SequenceResult`; WorkFailed when no sequence came to its end."""
         if not self.best:
+            why = "deadlocks" + (", or parts that would be picked too late" if cell.has_windows else "")
             raise WorkFailed(
-                f"no sequence for {cell.parts} parts came to its end in {counted(len(self.costs), 'episode')}: deadlocks"
+                f"no sequence for {cell.parts} parts came to its end in {counted(len(self.costs), 'episode')}: {why}"
             )
         return self.best, self.best_cost, tuple(self.costs)
 

@@ -1,12 +1,15 @@
 """Images: an overhead camera's picture of the world, and which pixel a point of the world falls on."""
 
-from dataclasses import dataclass
-from math import tan
+from dataclasses import dataclass, replace
+from math import atan, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lab.sim.world import World
+from lab.vision import Image, Lens
+from lab.vision.calibration import Calibration
+from lab.vision.photo_effects import spoiled
 
 Array = NDArray[np.float64]
 
@@ -56,3 +59,62 @@ class Camera:
     def picture(self, world: World) -> NDArray[np.uint8]:
         """What the camera sees: (height, width, 3) uint8 RGB."""
         return world.render(self.view_matrix(), self.projection_matrix(), self.width, self.height)
+
+    # ---- as a lens in front of a sensor ----------------------------------------------------------------------------
+
+    def lens(self) -> Lens:
+        """Its focal length and middle [pixels]: no distortion."""
+        focal = self.height / 2.0 / tan(self.field_of_view_rad / 2.0)
+        return Lens((self.width, self.height), (focal, focal), (self.width / 2.0, self.height / 2.0 - 1.0))
+
+    def turn_and_shift(self) -> tuple[Array, Array]:
+        """(3, 3) and (3,) [m]: from world points to the camera's, x to the right, y down, z ahead, as OpenCV has them."""
+        ahead = np.diag([1.0, -1.0, -1.0]) @ self.view_matrix()[:3]
+        return ahead[:, :3], ahead[:, 3]
+
+    def picture_through(self, lens: Lens, world: World) -> Image:
+        """What the camera sees through a lens with distortion: a wider picture is taken and bent."""
+        width, height = lens.size
+        corners = lens.straight_points(
+            [(0, 0), (width, 0), (0, height), (width, height), (width / 2, 0), (0, height / 2)]
+        )
+        most = max(float(np.abs(corners - lens.middle).max()) / lens.focal[1], 0.01) * 1.02  # tangent of half its angle
+        side = 2 * int(np.ceil(most * lens.focal[1]))
+        wide = Camera(self.eye, self.target, self.up, 2.0 * atan(side / 2.0 / lens.focal[1]), side, side)
+        return lens.bent(wide.picture(world), wide.lens().matrix)
+
+
+@dataclass(frozen=True)
+class TableCamera(Camera):
+    """A camera in a real room: a calibrated lens; uneven light, blur and noise of some `strength`.
+
+    Its pictures come straightened.
+    """
+
+    calibration: Calibration | None = None
+    strength: float = 0.0
+
+    @classmethod
+    def calibrated(cls, calibration: Calibration, pixels: int | None, strength: float) -> "TableCamera":
+        """The camera that a calibration found, with pictures of `pixels` a side if given."""
+        width, height = calibration.lens.size
+        if pixels is not None:
+            width, height = pixels, round(height * pixels / width)
+            calibration = replace(calibration, lens=calibration.lens.scaled((width, height)))
+        eye, turn = calibration.eye_m, np.array(calibration.turn)
+        x, y, z = (float(one) for one in np.array(eye) + turn[2])
+        up = (float(-turn[1][0]), float(-turn[1][1]), float(-turn[1][2]))
+        angle = 2.0 * atan(height / 2.0 / calibration.lens.focal[1])
+        return cls(eye, (x, y, z), up, angle, width, height, calibration, strength)
+
+    def pixel_from_world(self) -> Array:
+        """(3, 4): homogeneous pixel of the straightened picture."""
+        return super().pixel_from_world() if self.calibration is None else self.calibration.pixel_from_world
+
+    def picture(self, world: World) -> Image:
+        """What the camera saw in this physics step, straightened: (height, width, 3) uint8 RGB."""
+        rng = np.random.default_rng([world.steps])
+        if self.calibration is None:
+            return spoiled(super().picture(world), rng, self.strength)
+        lens = self.calibration.lens
+        return lens.straightened(spoiled(self.picture_through(lens, world), rng, self.strength))

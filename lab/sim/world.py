@@ -285,6 +285,11 @@ class World:
         chosen = {"linkIndexA": first.links[link]} if link else {}
         return bool(self._call("getContactPoints", first.number, second.number, **chosen))
 
+    def bounds(self, name: str) -> tuple[Array, Array]:
+        """The lowest and the highest corner (3,) [m] of the box along the world's axes that a body fills."""
+        low, high = self._call("getAABB", self._bodies[name].number)
+        return np.array(low), np.array(high)
+
     def pressed(self, name: str) -> tuple[str, float]:
         """The body that a body pressed on most in the last step, and with which force [N]; ("", 0) when it touched none."""
         forces: dict[int, float] = {}

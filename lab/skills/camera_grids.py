@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
+from lab.files import beside_or_asset
 from lab.sim import models
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.camera import Camera
+from lab.sim.camera import Camera, TableCamera
 from lab.sim.parts.kinds import Spot, beside
 from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.scene.places import Layout, Places
@@ -18,6 +19,7 @@ from lab.sim.world import World
 from lab.tasks.task import Task
 from lab.tasks.task_fields import CameraGrid, Station
 from lab.vision import View
+from lab.vision.calibration import read_calibration
 
 RELEASE_ABOVE = 0.002  # [m] a part is let go this high above its foot
 TOUCH_CLEARANCE = {True: 0.0012, False: 0.004}  # [m] near a station, by whether a part is carried
@@ -125,7 +127,13 @@ def overhead_camera(task: Task, pixels: int | None = None) -> Camera:
     """The task's overhead camera, with `pixels` a side if given; BadInput when it has none."""
     if task.camera is None:
         raise BadInput(f"task '{task.name}' has no [camera]")
-    return Camera.overhead(task.camera.position_m, task.camera.field_of_view_rad, pixels or task.camera.pixels)
+    own = task.camera
+    strength = float(task.perception == "camera")
+    if own.calibration is None:
+        camera = Camera.overhead(own.position_m, own.field_of_view_rad, pixels or own.pixels)
+        return camera if not strength else TableCamera(**vars(camera), strength=strength)
+    path = beside_or_asset(own.calibration, task.folder, f"[camera] calibration = '{own.calibration}'")
+    return TableCamera.calibrated(read_calibration(path), pixels, strength)
 
 
 def camera_view(task: Task, station: str, pixels: int | None = None, layout: Layout | None = None) -> View:
@@ -154,6 +162,7 @@ def camera_view(task: Task, station: str, pixels: int | None = None, layout: Lay
             "toaster": grid.marker_m[2] + MARKER_ABOVE + upper,
         },
         offsets_m={"gripper": (-models.MARKER_OUT, 0.0), "toaster": (-along, -across)},
+        radius_m=models.MARKER_RADIUS,
     )
 
 

@@ -13,7 +13,9 @@ from lab.sim.frames import Body, Shape
 from lab.sim.parts.kinds import Kind
 from lab.sim.scene.station_bodies import HEAD_JOINTS, HEAD_LINK
 from lab.sim.world import TIME_STEP, Array
-from lab.skills.skill import Bench, Skill, SkillFailed, learned_path
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import Bench, Skill, learned_path
+from lab.skills.state_words import plain
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Process, Stage
@@ -59,6 +61,20 @@ class Cover(Skill):
         mdp = coverage(self.shape, surveys.task.subtask(self.subtask).rewards)
         self.problem = Problem(self.name, self.subtask, mdp)
         return self.problem
+
+    def in_words(self, state: int) -> str:
+        """Over which cell the tool is, and how much is covered."""
+        mdp, (rows, columns) = self.problem.mdp, self.shape
+        row, column = mdp.state_cell(state)
+        what = f"{plain(self.kind)} in {plain(self.station)}" if self.kind else plain(self.station)
+        return (
+            f"The tool is over row {row + 1} from the top, column {column + 1} from the left, of {rows} x {columns} cells of "
+            f"{what}; {int(mdp.covered(state).sum())} of {rows * columns} cells are covered, and all are to be."
+        )
+
+    def moves_in_words(self) -> tuple[str, ...]:
+        """A cell each."""
+        return ("1 cell",) * self.problem.mdp.n_actions
 
     def _complete(self) -> None:
         """SkillFailed when a cell was missed."""

@@ -1,11 +1,17 @@
 """Grasp: the gripper comes to a part, aligns itself, closes, and lifts the part."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import hypot
 from typing import TYPE_CHECKING, ClassVar
 
+from lab.sim.arms.kinematics import ToolPose
 from lab.skills.around_part import SLOW, AroundPart
-from lab.skills.skill import Bench, SkillFailed, over_everything
+from lab.skills.free_way import by_free_cells
+from lab.skills.looking import FAR_M, look_at
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import Bench
+from lab.skills.state_words import plain
 from lab.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -13,7 +19,7 @@ if TYPE_CHECKING:
 
 ACTIONS = ("left", "right", "backward", "forward", "down", "up", "turn right", "turn left")  # of the part's axes
 GOAL = (2, 2, 0, 2)
-FAR_M = 0.2  # [m] a tool farther from the station's approach, as when trying again, comes over everything
+ASTRAY_M = 0.15  # [m] a part farther from all spots of the station is taken up over everything
 
 
 class Grasp(AroundPart):
@@ -31,22 +37,39 @@ class Grasp(AroundPart):
         """It takes parts up everywhere."""
         return cls(task, kind, station)
 
+    def way_in_words(self) -> tuple[str, str]:
+        """The fingers come to the part."""
+        return "The open fingers are", f"where they close on {plain(self.kind)}"
+
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Open, go above the part, follow the learned cells down, close, lift, and see that the part came along."""
         robot, body = bench.scene.robot, bench.scene.body_of(self.part, self.kind)
         if robot.closed:
             yield from robot.release()
+        spot = self.stands_on() if bench.sight is None else bench.sight.where.get(body, self.stands_on())
+        yield from look_at(bench, self.surveys, self.station, body, spot)
         goal = bench.part_pose(body, self.goal_pose().yaw)
         if robot.arm.inverse(goal) is None:
             raise SkillFailed(f"{body} is out of reach at ({goal.x:.2f}, {goal.y:.2f}) m")
         tool, approach = robot.tool(), self.surveys.approach(self.station)
         if tool.z < approach.z - 0.01 or hypot(tool.x - approach.x, tool.y - approach.y) > FAR_M:
-            yield from over_everything(bench, approach)
+            yield from by_free_cells(bench, self.surveys, approach)
+        astray = self._is_astray(goal)
+        if astray:
+            yield from by_free_cells(bench, self.surveys, replace(goal, z=approach.z))
         yield from self.down(bench, policy, goal)
         yield from robot.grip()
         bench.held = body
-        for pose in self.surveys.way_out(self.station, goal):
-            yield from robot.follow([pose], slow=SLOW)
+        if astray:
+            yield from by_free_cells(bench, self.surveys, approach, self.kind)
+        else:
+            for pose in self.surveys.way_out(self.station, goal):
+                yield from robot.follow([pose], slow=SLOW)
         if not bench.holds(body):
             bench.held = None
             raise SkillFailed(f"{body} is not in the gripper after grasping at '{self.station}'")
+
+    def _is_astray(self, goal: ToolPose) -> bool:
+        """Whether the part stands at none of the station's spots, but somewhere in the cell."""
+        spots = self.surveys.places.spots(self.surveys.task.station(self.station))
+        return all(hypot(goal.x - spot.x, goal.y - spot.y) > ASTRAY_M for spot in spots)

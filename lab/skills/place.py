@@ -11,7 +11,10 @@ from lab.sim.parts.kinds import Spot, on_its_pallet
 from lab.sim.scene.scene import pallet_of
 from lab.skills.around_part import SLOW, AroundPart
 from lab.skills.camera_grids import RELEASE_ABOVE
-from lab.skills.skill import Bench, SkillFailed
+from lab.skills.looking import look_at
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import Bench
+from lab.skills.state_words import plain
 from lab.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -41,6 +44,10 @@ class Place(AroundPart):
         """Where the tool lets go of a part held as it is to be held."""
         return super().goal_pose().shifted(dz=RELEASE_ABOVE)
 
+    def way_in_words(self) -> tuple[str, str]:
+        """The part comes to its spot."""
+        return f"{plain(self.kind).capitalize()} in the fingers is", f"its place at {plain(self.station)}"
+
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Go above the spot, follow the learned cells down, let go, rise, and see that the part stands."""
         body, spot = bench.held, self.stands_on()
@@ -53,6 +60,9 @@ class Place(AroundPart):
         goal = release_pose(bench, body, spot)
         yield from self.down(bench, policy, goal)
         yield from let_go(bench, self.surveys.way_out(self.station, goal))
+        yield from look_at(bench, self.surveys, self.station, body, spot)
+        if bench.sight is not None:
+            bench.sight.stands(self.part, self.kind, bench.sight.where[body])
         if not bench.stands(body, spot, NEAR_M):
             raise SkillFailed(f"{body} does not stand on '{self.station}'")
         if lost := bench.fallen_off(self.part, self.kind):

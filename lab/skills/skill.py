@@ -17,6 +17,8 @@ from lab.sim.frames import Body
 from lab.sim.parts.kinds import Kind, Spot, on_its_pallet
 from lab.sim.scene.blocked_cells import FINGERS_OFF_M
 from lab.sim.scene.scene import Scene, pallet_of
+from lab.skills.sight import Sight, SkillFailed
+from lab.skills.state_words import away_in_words, size_in_words
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Stage
 from lab.vision import GridView
@@ -41,19 +43,27 @@ class Status(Enum):
     FAILURE = "failure"
 
 
-class SkillFailed(Exception):
-    """A skill noticed that it did not do what it is for; the text says why."""
-
-
 @dataclass
 class Bench:
     """The cell in which skills are carried out, and the body that the robot holds: a part, or a pallet."""
 
     scene: Scene
     held: str | None = None
+    sight: Sight | None = None  # what was seen by the camera in the hand, where the task says so
+
+    def __post_init__(self) -> None:
+        if self.scene.task.perception == "camera":
+            self.sight = Sight(self.scene)
 
     def part_pose(self, body: str, like: float = 0.0) -> ToolPose:
-        """The tool pose that would hold a part where it is now; of the yaws that do, the one nearest to `like` [rad]."""
+        """The tool pose that would hold a part where it is, as far as is known; of its yaws the nearest to `like` [rad].
+
+        Known is, with the camera, where it was seen or set down last; WorkFailed for a part that was never seen.
+        """
+        return self.true_pose(body, like) if self.sight is None else self.sight.pose(body, like, self.held)
+
+    def true_pose(self, body: str, like: float = 0.0) -> ToolPose:
+        """As `part_pose`, by the simulator."""
         position, turn = self.scene.world.pose(body)
         kind = self.scene.kind_of[body]
         yaw = 2.0 * atan2(float(turn[2]), float(turn[3]))
@@ -87,18 +97,21 @@ class Bench:
         """Which body of part `name` does not stand on what it is carried on, as when a pallet was jolted; "": none."""
         below, *riders = self.scene.bodies_of(name, kind)
         for body in riders:
-            at, under = self.part_pose(body), self.part_pose(below)
+            at, under = self.true_pose(body), self.true_pose(below)
             if self.upright(body) < UPRIGHT or hypot(at.x - under.x, at.y - under.y) > LOST_M or at.z < under.z:
                 return body
             below = body
         return ""
 
-    def stands(self, body: str, spot: Spot, within: float) -> bool:
-        """Whether the part stands upright within `within` [m] of a spot."""
+    def stands(self, body: str, spot: Spot, within: float, *, truly: bool = False) -> bool:
+        """Whether the part stands upright within `within` [m] of a spot, as far as is known, or truly.
+
+        What the camera has found by its outline stands upright: a part that lies has another one.
+        """
         foot = self.scene.kind_of[body].held_at(spot)
-        at = self.part_pose(body, foot.yaw)
+        at = self.true_pose(body, foot.yaw) if truly else self.part_pose(body, foot.yaw)
         near = hypot(at.x - foot.x, at.y - foot.y) < within and abs(at.z - foot.z) < 0.006
-        return near and self.upright(body) > UPRIGHT
+        return near and (self.upright(body) > UPRIGHT or not (truly or self.sight is None))
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,6 +207,34 @@ class Skill:
 
     # ---- what it shows -------------------------------------------------------------------------------------------
 
+    def in_words(self, state: int) -> str:
+        """Where the tool is in a state of the problem, seen from the goal, for somebody who knows no table."""
+        mdp = self.problem.mdp
+        if len(mdp.action_labels) != 2 * len(mdp.shape):
+            return f"{self.way_in_words()[0]} in state {mdp.state_label(state)}."
+        goal = mdp.state_cell(int(np.flatnonzero(mdp.goal)[0]))
+        by = [here - there for here, there in zip(mdp.state_cell(state), goal, strict=True)]
+        return away_in_words(*self.way_in_words(), by, mdp.action_labels, self.cell_steps())
+
+    def way_in_words(self) -> tuple[str, str]:
+        """What moves, with its verb, and to where: "The open fingers are", "where they close on the slice"."""
+        return "The tool is", "its goal"
+
+    def cell_steps(self) -> tuple[float, ...]:
+        """How far a cell is from the next along each axis of the problem's grid [m], about the vertical [rad]."""
+        shape = self.problem.mdp.shape
+        cells = [(0,) * len(shape), *np.eye(len(shape), dtype=int)]
+        first, *others = (self.pose(int(np.ravel_multi_index(cell, shape, mode="clip"))) for cell in cells)
+        return tuple(hypot(p.x - first.x, p.y - first.y, p.z - first.z) or abs(p.yaw - first.yaw) for p in others)
+
+    def moves_in_words(self) -> tuple[str, ...]:
+        """How far each action goes, such as "1.2 cm"."""
+        labels = self.problem.mdp.action_labels
+        if len(labels) != 2 * len(self.problem.mdp.shape):
+            return ("",) * len(labels)
+        steps = self.cell_steps()
+        return tuple(size_in_words(label, steps[action // 2]) for action, label in enumerate(labels))
+
     def show(self, bench: Bench, state: int) -> bool:
         """Put the bench into a state at once, without physics; False, and nothing moves, when the arm cannot reach it."""
         pose = self.pose(state)
@@ -288,15 +329,6 @@ class Skill:
     def stop(self) -> None:
         """Break off; the skill can be started again."""
         self._motion, self.status = None, Status.IDLE
-
-
-def over_everything(bench: Bench, end: ToolPose) -> Iterator[None]:
-    """Bring the tool from wherever it is to `end`, over all that stands in the cell: up, across, down."""
-    robot, grid = bench.scene.robot, bench.scene.task.workspace
-    high = max(end.z, grid.lower_m[2] + (grid.shape[2] - 0.5) * grid.cell_m[2])
-    tool = robot.tool()
-    for pose in (ToolPose(tool.x, tool.y, high, end.yaw), ToolPose(end.x, end.y, high, end.yaw), end):
-        yield from robot.follow([pose])
 
 
 def learned_path(policy: "Policy", mdp: TabularMDP, start: int) -> list[int]:

@@ -17,6 +17,7 @@ from lab.toolbox.policy import Policy
 
 Pair = tuple[str, str]  # origin and target, by name
 Skills = tuple[Skill, ...]
+WINDOW_MARGIN_S = 1.0  # that is left free of a window when it is planned with
 NO_SERVICE: Mapping[tuple[str, str], float] = {}
 
 
@@ -120,12 +121,17 @@ def _legs(before: TaskStage, stage: TaskStage) -> list[Pair]:
     return [(before.station, stage.station), (before.station, stage.buffer), (stage.buffer, stage.station)]
 
 
+def planned(at_most_s: float | None) -> float | None:
+    """The window that is planned with, where a part may stay in its machine for so long [s]: moves are not timed to the last."""
+    return None if at_most_s is None else at_most_s - min(WINDOW_MARGIN_S, at_most_s / 2)
+
+
 def stations(task: Task, process_s: Mapping[str, float]) -> tuple[Station, ...]:
     """The task's stations as the sequencer knows them, with the machines' times [s] (0 where not measured yet)."""
     times = {
         s.name: s.processing_s if s.processing_s is not None else process_s.get(s.name, 0.0) for s in task.stations
     }
-    return tuple(Station(s.name, s.kind, s.capacity, times[s.name] or 0.0) for s in task.stations)
+    return tuple(Station(s.name, s.kind, s.capacity, times[s.name] or 0.0, planned(s.at_most_s)) for s in task.stations)
 
 
 def products(parts: Iterable[Part], service_s: Mapping[Pair, float] = NO_SERVICE) -> tuple[Product, ...]:
@@ -133,7 +139,14 @@ def products(parts: Iterable[Part], service_s: Mapping[Pair, float] = NO_SERVICE
 
     def route(part: Part, stages: Iterable[TaskStage]) -> Route:
         return tuple(
-            Stage(s.station, s.buffer, s.processing_s, service_s.get((part.name, s.station), 0.0), s.pallet)
+            Stage(
+                s.station,
+                s.buffer,
+                s.processing_s,
+                service_s.get((part.name, s.station), 0.0),
+                s.pallet,
+                planned(s.at_most_s),
+            )
             for s in stages
         )
 

@@ -7,7 +7,9 @@ from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.mdp import NoPath, grid
 from lab.sim.arms.kinematics import ToolPose
-from lab.skills.skill import Bench, Skill, SkillFailed, learned_path, no_way
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import Bench, Skill, learned_path, no_way
+from lab.skills.state_words import plain
 from lab.skills.surveys import Surveys, grid_of, way_to
 from lab.tasks.task import Task
 
@@ -72,6 +74,12 @@ class Transfer(Skill):
     def begins_at(self) -> ToolPose:
         """At the origin's approach."""
         return self.surveys.approach(self.origin)
+
+    def way_in_words(self) -> tuple[str, str]:
+        """The gripper goes on to where the next skill begins."""
+        what = f"The gripper with {plain(self.kind)} is" if self.carries else "The empty gripper is"
+        camera = grid_of(self.surveys.task, self.target) is not None
+        return what, f"the end of its way{', where the camera takes over' if camera else f' over {plain(self.target)}'}"
 
     def motion(self, bench: Bench, policy: "Policy") -> Iterator[None]:
         """Along the learned cells from where the tool is, then to the target's approach."""

@@ -104,6 +104,12 @@ def _grips(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return grips(job, reading)
 
 
+def _faults(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.faults import faults
+
+    return faults(job, reading)
+
+
 def _reuse(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.reuse import reuse
 
@@ -157,6 +163,7 @@ STUDIES: dict[str, Study] = {
     ),
     "appendix-iii": Study("Appendix III: a flexible manufacturing system", _appendix_iii),
     "srl-time": Study("SRL improved, beside every rival", _srl_time),
+    "faults": Study("Runs of drawn faults: delivered, stopped with a true reason, or wrong", _faults, least=1),
     "flat": Study("One flat problem, or two levels: the toast task on a small grid", _flat),
     "changed-scenes": Study(
         "Skills in changed scenes: used as they are, adapted or learned, beside learning all anew", _changed_scenes

@@ -40,16 +40,20 @@ class CellRobot(Record):
 
 
 class CellStation(Record):
-    """A place for parts: `capacity` in parts; a machine may have one processing time for all products [s]."""
+    """A place for parts: `capacity` in parts; a machine may have one processing time for all products [s].
+
+    at_most_s: how long after it a part may stay in the machine, else it is spoilt [s].
+    """
 
     name: Name
     kind: Annotated[Literal["storage", "buffer", "machine"], _known("kind", STATION_KINDS, "station")]
     capacity: Room
     processing_s: Seconds | None = None
+    at_most_s: Seconds | None = None
 
     def built(self) -> Station:
         """As the sequencer has it."""
-        return Station(self.name, self.kind, self.capacity, self.processing_s or 0.0)
+        return Station(self.name, self.kind, self.capacity, self.processing_s or 0.0, self.at_most_s)
 
 
 class CellStage(Record):
@@ -60,6 +64,7 @@ class CellStage(Record):
     processing_s: Seconds | None = None
     service_s: Seconds = 0.0
     pallet: bool = False
+    at_most_s: Seconds | None = None
 
 
 Route = Annotated[

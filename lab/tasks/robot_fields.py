@@ -18,7 +18,8 @@ class RobotSettings(Record):
     model: a name of MODELS, or the path of a URDF beside the task file; that one also needs tool_link, whose z axis points
     out of the gripper and along whose y axis its fingers close, fingers, the joints that move them, and tip_m, how far the
     finger tips are out along z [m]. nearest_m [m]: nearer to its own axis than this the tool never goes. opening_m [m]:
-    between the open fingers, by default all that the gripper has. base_up_m: its foot above the table [m].
+    between the open fingers, by default all that the gripper has. base_up_m: its foot above the table [m]. force_limit_n:
+    a protective stop holds the arm that presses on something harder [N] (see `stops_at_n`).
     """
 
     model: str = "up6"
@@ -32,6 +33,12 @@ class RobotSettings(Record):
     speed_m_s: Annotated[float, Field(ge=0.01, le=1.5)] = 0.5
     acceleration_m_s2: Annotated[float, Field(ge=0.01, le=10)] = 2.0
     grip_force_n: Annotated[float, Field(gt=0, le=100)] = 25.0  # from about 150 N on it squeezes slices out
+    force_limit_n: Annotated[float, Field(ge=10, le=5000)] | None = None
+
+    @property
+    def stops_at_n(self) -> float:
+        """The force on the arm [N] above which a protective stop holds it: closing fingers reach four times their own."""
+        return self.force_limit_n or max(150.0, 6.0 * self.grip_force_n)
 
     @property
     def is_file(self) -> bool:

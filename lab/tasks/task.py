@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
@@ -37,10 +37,14 @@ Order = tuple[str, ...]  # the kind of each part, part 1 first
 
 
 class Task(Record):
-    """A whole task file, checked."""
+    """A whole task file, checked.
+
+    perception: where parts stand is read from the simulator ("truth"), or seen by the camera in the hand ("camera").
+    """
 
     name: Name
     title: str = ""
+    perception: Literal["truth", "camera"] = "truth"
     robot: RobotSettings
     parts: Annotated[tuple[Part, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=MAX_PARTS)]
     workspace: Workspace
@@ -233,8 +237,9 @@ class Task(Record):
         if stage.service is not None and stage.service not in robots:
             raise unknown("service", stage.service, robots, f"processes for {where}")
         if place.kind != "machine":
-            if stage.processing_s is not None:
-                raise ValueError(f"{where}: only a machine has processing_s, it is a {place.kind}")
+            for field in ("processing_s", "at_most_s"):
+                if getattr(stage, field) is not None:
+                    raise ValueError(f"{where}: only a machine has {field}, it is a {place.kind}")
         elif place.process is not None and stage.processing_s is not None:
             raise ValueError(
                 f"{where}: processing_s = {stage.processing_s:g}, but its process '{place.process}' is learned"

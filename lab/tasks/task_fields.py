@@ -32,11 +32,15 @@ class Workspace(Record):
 
 
 class CameraSettings(Record):
-    """The overhead camera: position above the table [m], field of view [rad], picture width and height [pixels]."""
+    """The overhead camera: position above the table [m], field of view [rad], picture width and height [pixels].
+
+    calibration: a file that `lab see --calibrate` wrote, which then says where the camera is, and what lens it has.
+    """
 
     position_m: Above
     field_of_view_rad: Annotated[float, Field(gt=0.01, lt=2.5)]
     pixels: Annotated[int, Field(ge=64, le=4096)] = 640
+    calibration: Annotated[str, Field(min_length=1, max_length=200)] | None = None
 
 
 class CameraGrid(Record):
@@ -86,6 +90,7 @@ class Process(Record):
 class Station(Record):
     """A place where parts stand: pose x, y [m], yaw [rad]; a machine has a processing time [s] or a process to learn.
 
+    at_most_s: how long a part may stay in a machine after that before the robot takes it out, else it is spoilt [s].
     body: what stands there, "slab", "box" of `size_m`, or a URDF or mesh file; floor_m: how high parts stand on it;
     spots: where, off the pose along its axes and by yaw, instead of in rows. finish: the colour of parts done here; color:
     of a slab, box or mesh.
@@ -97,6 +102,7 @@ class Station(Record):
     capacity: Count
     processing_s: Time | None = None
     process: Name | None = None
+    at_most_s: Time | None = None
     body: Annotated[str, Field(min_length=1, max_length=200)] | None = None
     size_m: Sizes | None = None
     floor_m: Off | None = None
@@ -108,7 +114,7 @@ class Station(Record):
 
     @model_validator(mode="after")
     def _one_time(self) -> Self:
-        for field in ("processing_s", "process", "finish"):
+        for field in ("processing_s", "process", "at_most_s", "finish"):
             if self.kind != "machine" and getattr(self, field) is not None:
                 raise ValueError(f"station '{self.name}' is a {self.kind}: only a machine has {field}")
         if self.processing_s is not None and self.process is not None:
@@ -142,8 +148,8 @@ class Station(Record):
 class Stage(Record):
     """One stage of a route; with only a station it may be written as its name.
 
-    buffer: where the part waits when the station is full. processing_s: this kind's time in the machine [s]. service: a
-    process that the robot carries out before it takes the part out. pallet: the part is lifted off its pallet here.
+    buffer: where the part waits when the station is full. processing_s, at_most_s: this kind's own in the machine [s].
+    service: a process that the robot carries out before it takes the part out. pallet: the part is lifted off its pallet here.
     """
 
     station: Name
@@ -151,6 +157,7 @@ class Stage(Record):
     processing_s: Time | None = None
     service: Name | None = None
     pallet: bool = False
+    at_most_s: Time | None = None
 
 
 def _as_stage(value: object) -> object:

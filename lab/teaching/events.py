@@ -20,10 +20,13 @@ ORDER = "The order of the transfers"  # the lesson of that name in a `LessonEven
 
 @dataclass(frozen=True)
 class ScenePrepared:
-    """Where the next lesson takes place, for those who show it: a prepared task, a world, None for no place at all."""
+    """Where the next lesson takes place, for those who show it: a prepared task, a world, None for no place at all.
+
+    problem: its own; None for a task whose skills are about to be learned one after the other.
+    """
 
     scene: Any
-    problem: Problem
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True)
@@ -127,6 +130,15 @@ class SequenceFound:
 
     result: SequenceResult
     reference: Reference | None = None
+
+
+@dataclass(frozen=True)
+class OrderChosen:
+    """Which of several orders is used, and what each of them costs, by whom it is: "advised", "given", "exact", or a method."""
+
+    used: str
+    costs: dict[str, float]
+    objective: str = "makespan"
 
 
 @dataclass(frozen=True)
@@ -283,6 +295,7 @@ Event = (
     | SequencingBegan
     | EpisodeSequenced
     | SequenceFound
+    | OrderChosen
     | MoveMade
     | MoveRetried
     | PlanMade

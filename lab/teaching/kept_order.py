@@ -1,5 +1,6 @@
 """Advice on the order of the transfers, kept: its journal, and what is needed to go on with it or to look at it again."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,9 +15,12 @@ from lab.advice.journal import Journal
 from lab.advice.order_level import signature_of
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
+from lab.tasks.record import write_whole
 from lab.teaching.kept_session import SessionInFolder, check_same, claimed, kept_journal, read_session
 from lab.teaching.lesson_options import SessionOptions, whole_path
 from lab.toolbox.registry import Toolbox
+
+DURATIONS = "durations.json"  # beside the journal of a run's order
 
 
 @dataclass(frozen=True)
@@ -65,12 +69,32 @@ class OrderSession(SessionInFolder):
     """A session of `lab sequence`: a new one, or (`read`) one that is gone on with or, `read_only`, looked at again."""
 
     def __init__(
-        self, options: OrderOptions, toolbox: Toolbox, read: Read | None = None, *, read_only: bool = False
+        self,
+        options: OrderOptions,
+        toolbox: Toolbox,
+        read: Read | None = None,
+        *,
+        read_only: bool = False,
+        durations: Mapping[str, Any] | None = None,
     ) -> None:
+        """durations: those that a run plans with, of a new session; they are kept beside its journal."""
         self.options: OrderOptions = options
+        self._durations = durations
         self.read = read
         self._toolbox, self._read_only = toolbox, read_only
         self.folder = None if read is None else read.path.parent
+
+    def durations(self) -> Mapping[str, Any] | None:
+        """How long a run's moves take, in which its order was advised; None: as measured. BadInput for a damaged file."""
+        if self._durations is not None or self.folder is None or not (self.folder / DURATIONS).exists():
+            return self._durations
+        try:
+            found = json.loads((self.folder / DURATIONS).read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise BadInput(f"'{self.folder / DURATIONS}' cannot be read: {error}") from None
+        if not isinstance(found, dict):
+            raise BadInput(f"'{self.folder / DURATIONS}': it holds no durations")
+        return found
 
     def keep(self, cell: Cell, objective: str) -> Journal:
         """The journal, once the cell is known; BadInput when it is not the kept session's any more."""
@@ -78,6 +102,8 @@ class OrderSession(SessionInFolder):
         if read is None:
             name = f"order of {Path(self.options.task).stem}"
             self.folder = claimed(self._toolbox, name, Path.mkdir)
+            if self._durations is not None:
+                write_whole(self.folder / DURATIONS, json.dumps(dict(self._durations), indent=1) + "\n")
             head = Session(self.options.to_json(), name, signature, __version__, command="sequence")
             self.journal = Journal.begin(self.folder, head)
         elif read.session.signature != signature:

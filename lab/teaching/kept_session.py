@@ -4,7 +4,7 @@ import json
 import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from shlex import quote
 from typing import Any, TypeVar
@@ -19,7 +19,7 @@ from lab.learning.problem import Problem
 from lab.mdp import FloatArray
 from lab.tasks.record import write_whole
 from lab.teaching.lesson_options import LessonOptions, SessionOptions
-from lab.teaching.lesson_plan import MAX_SESSIONS, Keep, LessonPlan
+from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.folder_place import FolderPlace
 from lab.toolbox.names import SUFFIX, default_address, slug
 from lab.toolbox.policy import Policy
@@ -160,16 +160,6 @@ def claimed(toolbox: Toolbox, name: str, make: Callable[[Path], None]) -> Path:
             raise BadInput(f"toolbox {toolbox.folder}: {folder}: {error.strerror or error}") from error
         return folder
     raise BadInput(f"toolbox {toolbox.folder}: it holds {_MOST} sessions of '{name}': remove some")
-
-
-def kept_by(toolbox: Toolbox, options: LessonOptions) -> Keep:
-    """Keeps the journal of each lesson of a run in the toolbox; it can be replayed, gone on with, and advise again."""
-
-    def keep(plan: LessonPlan) -> Journal:
-        own = replace(options, subtask=plan.problem.name, sessions=MAX_SESSIONS)
-        return NewSession(None, toolbox, own).keep(plan)
-
-    return keep
 
 
 class KeptSession(SessionInFolder):

@@ -28,9 +28,10 @@ FONT_SIZES = 7.5, 6.0  # of what stands on bars, in points: the larger where it 
 def gantt(schedule: Schedule, path: Path, predicted: Schedule | None = None) -> None:
     """Parts, machines and robot over time [s], the makespan marked; `predicted` as a thin strip under each row.
 
-    PNG or SVG by the path's suffix; in an SVG each bar says what it is when pointed at. The page grows with the number
-    of moves and rows; the colour tells products apart. Raises BadInput for a schedule without activities and as all
-    plots here do: for a path that is no picture or cannot be written. Source: thesis fig. IV.1.
+    Until when parts are to be fetched from a machine is marked there. PNG or SVG by the path's suffix; in an SVG each bar
+    says what it is when pointed at. The page grows with the number of moves and rows; the colour tells products apart.
+    Raises BadInput for a schedule without activities and as all plots here do: for a path that is no picture or cannot be
+    written. Source: thesis fig. IV.1.
     """
     draw, size_inch = _drawing(schedule, predicted)
     with picture_file(path, *size_inch) as figure:
@@ -63,7 +64,8 @@ def _drawing(schedule: Schedule, predicted: Schedule | None) -> tuple[Callable[[
         lines = [_draw_end(axes, *end) for end in ends]
         last_s = max(*(bar.activity.end_s for bar in (*bars, *strips)), *(end_s for end_s, _, _ in ends))
         _dress(axes, chart, 1.01 * last_s, width_inch)
-        _legend(figure, chart, [*lines, *_draw_arrivals(axes, chart)], {bar.look for bar in bars}, width_inch)
+        marks = [*_draw_arrivals(axes, chart), *_draw_limits(axes, chart)]
+        _legend(figure, chart, [*lines, *marks], {bar.look for bar in bars}, width_inch)
         figure.draw_without_rendering()  # settles the layout, so that widths in pixels are known
         _write(axes, bars, chart)
 
@@ -111,6 +113,14 @@ def _draw_arrivals(axes: "Axes", chart: Chart) -> list["Line2D"]:
     late = [(at_s, chart.rows.index(row)) for row, at_s in came_s.items() if at_s > 0]
     look: dict[str, Any] = {"marker": 5, "color": INK, "linestyle": "none", "markersize": 6}  # 5: the tip is the place
     return axes.plot(*zip(*late, strict=True), label="arrives", **look) if late else []
+
+
+def _draw_limits(axes: "Axes", chart: Chart) -> list["Line2D"]:
+    """A mark on the machine's row until when a part is to be fetched; nothing where there is no such limit."""
+    limits, rows = chart.schedule.fetch_by, chart.rows
+    until = [(limit.until_s, rows.index(limit.station)) for limit in limits if limit.station in rows]
+    look: dict[str, Any] = {"marker": "|", "color": RED, "linestyle": "none", "markersize": 14, "markeredgewidth": 2}
+    return axes.plot(*zip(*until, strict=True), label="to be fetched until then", **look) if until else []
 
 
 def _write(axes: "Axes", bars: Sequence[Bar], chart: Chart) -> None:

@@ -1,7 +1,8 @@
 """What commands show when they are done: short rich tables and lines from plain data."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from shlex import quote
 from typing import Any
 
 from rich.console import Group, RenderableType
@@ -28,6 +29,11 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
         table.add_row("dropped", counted(report["dropped"], "part"))
     if report["failure"]:
         table.add_row("stopped", Text(report["failure"], "red"))
+    for fault in report["faults"]:
+        answer = (
+            f"noticed: {fault['noticed']}; {fault['answer']}" if fault["noticed"] else "not noticed, and no harm done"
+        )
+        table.add_row("fault", Text(f"{fault['at_s']:.1f} s: {fault['words']}; {answer}"))
     if report["retries"]:
         table.add_row("retries", Text("\n".join(report["retries"])))
     table.add_row("skills", _found(skills, report["task"]))
@@ -46,12 +52,27 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     table.add_row("makespan", text)
     proven = "proven optimum" if report["optimum_proven"] else "proven bound"
     table.add_row(proven, f"{bound}, gap {gap_of(report['optimality_gap'], 2)}")
+    for what, lines in _worth(report["receipts"] or {}):
+        table.add_row(what, Text("\n".join(lines)))
     rate = report["sim_s"] / report["wall_s"] if report["wall_s"] else 0.0
     spent = f"{report['wall_s']:.1f} s for {report['sim_s']:.0f} simulated seconds ({rate:.0f} x real time)"
     table.add_row("time", spent)
     for name, path in report["files"].items():
         table.add_row(name.replace("_", " "), Text(path))
     return table
+
+
+def _worth(receipts: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
+    """What advice was worth: of each skill that people were asked about, and of the order, beside what other orders cost."""
+    for name, worth in receipts.get("skills", {}).items():
+        yield f"advice on {name}", worth["receipt"]["lines"]
+    order = receipts.get("order")
+    if order is not None:
+        unit = " s" if order["objective"] == "makespan" else ""
+        costs = ", ".join(f"{by} {cost:.1f}{unit}" for by, cost in order["costs"].items())
+        guided = order.get("guided_best")
+        own = "" if guided is None else f"; best episode with advice {guided:.1f}{unit}"
+        yield "advice on the order", [f"{costs}; used: {order['used']}{own}", *order.get("lines", [])]
 
 
 def delivered_in_words(delivered: int, parts: Mapping[str, int]) -> str:
@@ -88,6 +109,39 @@ def replay_summary(replay: Mapping[str, Any]) -> RenderableType:
     if closed is not None:
         over = f"over after {counted(closed['episodes'], 'episode')}, {'solved' if closed['solved'] else 'not solved'}"
     return Group(*map(Text, [f"{replay['problem']} in {replay['session']}: {over}", *replay["receipt"]["lines"]]))
+
+
+def run_replay_summary(replay: Mapping[str, Any]) -> RenderableType:
+    """The text of `lab replay` for a run, from its JSON document."""
+    table = Table.grid(padding=(0, 2))
+    table.add_column(justify="right")
+    table.add_column(overflow="fold")
+    for event in replay["events"]:
+        if text := _event_text(event):
+            table.add_row(f"{event['at_s']:.1f} s" if "at_s" in event else "", Text(text))
+    over = f"not over: lab run --resume {quote(replay['run'])} goes on with it"
+    if replay["over"]:
+        over = replay["failure"] or f"all of {counted(replay['delivered'], 'part')} delivered"
+    skills = counted(len(replay["skills"]), "skill")
+    return Group(Text(f"{replay['task']} in {replay['run']}: {skills} there"), table, Text(over))
+
+
+def _event_text(event: Mapping[str, Any]) -> str:
+    """One line of a run's journal in words; "" for what is told otherwise."""
+    match event["kind"]:
+        case "moved":
+            return f"{event['part']}: {event['origin']} to {event['target']}"
+        case "met":
+            about = " at ".join(one for one in (event["part"], event["station"]) if one)
+            return f"{about}: {event['what']}: {event['answer']}"
+        case "stopped":
+            stops = [f"{kind} ({why or by})" for kind, why, by in event["stops"]]
+            return f"stopped: {', '.join(stops)}" if stops else "goes on"
+        case "commanded":
+            return f"{event['by']}: {event['words']}" + (f": refused, {event['refused']}" if event["refused"] else "")
+        case "session":
+            return f"people were asked: {event['name']}: lab replay {quote(event['folder'])}"
+    return ""
 
 
 def _found(skills: Sequence[Mapping[str, Any]], task: str) -> str:
@@ -244,3 +298,25 @@ def grid_summary(seen: Mapping[str, Any]) -> RenderableType:
     blocked, markers = counted(len(seen["obstacles"]), "cell"), counted(len(seen["markers"]), "marker")
     found = f"{ends}, {blocked} with obstacles, {markers}"
     return Group(*map(Text, turned), Text(found))
+
+
+def pictures_summary(record: Mapping[str, Any]) -> RenderableType:
+    """The end of `lab see --calibrate`, `--make` and `--score`: one line a figure."""
+    if "lens" in record:
+        lens, (x, y, z) = record["lens"], record["eye_m"]
+        bends = ", ".join(f"{name} {value:+.4f}" for name, value in lens["distortion"].items())
+        middle = f"({lens['middle'][0]:.1f}, {lens['middle'][1]:.1f})"
+        lines = [
+            f"lens: focal length {lens['focal'][0]:.1f} pixels, middle {middle}, {bends}",
+            f"camera at ({x:.3f}, {y:.3f}, {z:.3f}) m; residual {record['residual_px']:.2f} pixels "
+            f"over {record['points']} points, from {record['method']}",
+        ]
+    elif "exact" in record:
+        lines = [f"{record['exact']} of {record['pictures']} grids exact ({record['exact_percent']:.1f} %)"]
+        if record["marker_mean_m"] is not None:
+            mean, most = 1e3 * record["marker_mean_m"], 1e3 * record["marker_max_m"]
+            lines.append(f"markers seen {mean:.1f} mm off on average, {most:.1f} mm at the most")
+        lines += [f"{one['picture']}: {one['reason']}" for one in record["wrong"]]
+    else:
+        lines = [f"{counted(record['pictures'], 'picture')} of '{record['task']}' and {record['mats']} of the mat made"]
+    return Group(*map(Text, [*lines, *(f"{name}: {path}" for name, path in record.get("files", {}).items())]))

@@ -1,6 +1,7 @@
-"""Pictures to grids: the markers in a picture, the grid that they make, and picture files."""
+"""Pictures to grids and parts: calibration, the markers in a picture, the grid that they make, and picture files."""
 
 from lab.vision.grid_view import GridView, Marker, View, plain_view
+from lab.vision.lens import Lens
 from lab.vision.markers import MARKERS, draw, find_markers, locate, see
 from lab.vision.picture_files import Image, read_picture, write_picture
 
@@ -8,6 +9,7 @@ __all__ = [
     "MARKERS",
     "GridView",
     "Image",
+    "Lens",
     "Marker",
     "View",
     "draw",

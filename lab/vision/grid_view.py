@@ -26,7 +26,8 @@ class View:
     `pixel_from_world` (3, 4) takes homogeneous world points [m] to homogeneous pixels, with all of the camera's pixel
     offsets in it (`lab/sim/camera.py`). The grid has `shape` cells of `cell_m` from the corner `origin_m` on, i along x
     and j along y. By kind of marker: `heights_m` above the world's z = 0, `offsets_m` (dx, dy) from the marker to the
-    thing it stands for; 0 where a kind is missing.
+    thing it stands for; 0 where a kind is missing. `radius_m`: of every marker, so that one that is partly hidden can be found;
+    0: unknown.
     Raises BadInput when the matrix is not finite, of another shape or flat, or when the grid is empty.
     """
 
@@ -36,6 +37,7 @@ class View:
     shape: Cell
     heights_m: Mapping[str, float] = field(default_factory=dict)
     offsets_m: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    radius_m: float = 0.0
 
     def __post_init__(self) -> None:
         matrix = np.asarray(self.pixel_from_world)
@@ -61,6 +63,14 @@ class View:
         x, y, w = np.linalg.solve(pixel_from_plane, np.append(np.asarray(pixel, dtype=np.float64), 1.0))
         dx, dy = self.offsets_m.get(kind, (0.0, 0.0))
         return float(x / w) + dx, float(y / w) + dy
+
+    def radius_px(self, pixel: ArrayLike, kind: str) -> float:
+        """How large a whole marker of `kind` around `pixel` would be seen [pixels], on the mean of both axes."""
+        dx, dy = self.offsets_m.get(kind, (0.0, 0.0))
+        x, y = self.place(pixel, kind)
+        r, at = self.radius_m, np.array([x - dx, y - dy, self.heights_m.get(kind, 0.0)])
+        rim = self.pixel(at + np.array([[r, 0, 0], [-r, 0, 0], [0, r, 0], [0, -r, 0]]))
+        return float(np.linalg.norm(rim[0] - rim[1]) + np.linalg.norm(rim[2] - rim[3])) / 4
 
     def cell(self, place_m: tuple[float, float]) -> Cell:
         """The cell of a world (x, y) [m]; outside the grid its indices lie outside `shape`."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 from lab.vision.grid_view import Cell, GridView, Marker, View, plain_view
+from lab.vision.hidden_discs import behind_cover, calmed, hidden_part
 from lab.vision.picture_files import Image, check_picture
 
 SATURATION = 100  # of 255; wood, bread, steel and skin stay below it or have another hue
@@ -49,6 +50,7 @@ def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
     import cv2
 
     check_picture(image)
+    image = calmed(image)
     hsv = cv2.cvtColor(image, cv2.COLOR_RGB2HSV)
     colourful = image.max(axis=2) - image.min(axis=2) >= CHROMA
     markers, ignored = [], 0
@@ -60,14 +62,20 @@ def find_markers(image: Image, view: View) -> tuple[tuple[Marker, ...], int]:
             area, radius = cv2.contourArea(hull), cv2.minEnclosingCircle(hull)[1]
             if area < MIN_PIXELS:
                 continue
-            if area > MAX_CELLS * view.cell_pixels or cv2.contourArea(outline) < ROUNDNESS * pi * radius**2:
+            round_enough = cv2.contourArea(outline) >= ROUNDNESS * pi * radius**2
+            if hidden_part(outline.reshape(-1, 2), area, view, kind):
+                found = behind_cover(outline.reshape(-1, 2), view, kind)
+            elif area <= MAX_CELLS * view.cell_pixels and round_enough:
+                rim = [p for p in outline if abs(cv2.pointPolygonTest(hull, tuple(map(float, p[0])), True)) < RIM]
+                x, y = cv2.fitEllipse(np.array(rim))[0]
+                found = (float(x), float(y))
+            else:
+                found = None
+            if found is None:
                 ignored += 1
                 continue
-            rim = [p for p in outline if abs(cv2.pointPolygonTest(hull, tuple(map(float, p[0])), True)) < RIM]
-            (x, y), _, _ = cv2.fitEllipse(np.array(rim))
-            pixel = (float(x), float(y))
-            place = view.place(pixel, kind)
-            markers.append(Marker(kind, pixel, place, view.cell(place)))
+            place = view.place(found, kind)
+            markers.append(Marker(kind, found, place, view.cell(place)))
             if len(markers) > MAX_MARKERS:
                 raise BadInput(f"picture: more than {MAX_MARKERS} round coloured spots: no picture of a grid")
     return tuple(sorted(markers, key=lambda m: (m.kind, m.cell, m.pixel))), ignored
@@ -150,8 +158,11 @@ def _outside(marker: Marker, view: View) -> str:
     )
 
 
-def draw(image: Image, grid: GridView) -> Image:
-    """A copy of the picture (H, W, 3) with the grid's lines, start, goal, obstacles and the markers' centres on it."""
+def draw(image: Image, grid: GridView, outlines: Sequence[Sequence[Sequence[float]]] = ()) -> Image:
+    """A copy of the picture (H, W, 3) with the grid's lines, start, goal, obstacles and the markers' centres on it.
+
+    outlines: of parts, each (n, 2) pixels, drawn in orange.
+    """
     import cv2
 
     check_picture(image)
@@ -174,6 +185,8 @@ def draw(image: Image, grid: GridView) -> Image:
         cv2.polylines(canvas, [corners(0, j, rows, 1)], True, (255, 255, 255), thin, cv2.LINE_AA)
     for cell, kind in ((grid.start, "gripper"), (grid.goal, "toaster")):
         cv2.polylines(canvas, [corners(*cell, 1, 1)], True, MARKERS[kind].rgb, 3 * thin, cv2.LINE_AA)
+    for outline in outlines:
+        cv2.polylines(canvas, [np.rint(outline).astype(np.int32)], True, (255, 120, 0), thin, cv2.LINE_AA)
     for marker in grid.markers:
         at = (round(marker.pixel[0]), round(marker.pixel[1]))
         cv2.drawMarker(canvas, at, (0, 0, 0), cv2.MARKER_CROSS, 10 * thin, thin)

@@ -161,7 +161,7 @@ def test_a_failed_piece_of_work_ends_with_1(lab: Lab, monkeypatch: pytest.Monkey
     ("words", "where", "said"),
     [
         ("run", "lab.skills.prepared_scene.prepare", ""),
-        ("run", "lab.production.run.run", "; what was learned is kept"),
+        ("run", "lab.production.run.run", "; what was learned is kept; go on with: lab run --resume toast-run"),
         ("teach insert", "lab.teaching.skill_subject.load", ""),
         ("view toast", "lab.tasks.task_file.load_any", ""),
     ],

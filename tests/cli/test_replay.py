@@ -52,6 +52,7 @@ def test_ctrl_c_ends_a_replay_at_once(lab: Lab, folder: Path, monkeypatch: pytes
         if pause_s in (0.25, 3600):
             raise KeyboardInterrupt
 
+    monkeypatch.setattr("lab.seat.lesson_seat.ReplayPace.wait", lambda pace: stop(pace.pause_s))
     monkeypatch.setattr("lab.seat.lesson_seat.time.sleep", stop)
     monkeypatch.setattr("lab.seat.lesson_seat.PAGE_S", 0.0)
     for words in (["--pause", "0.25"], ["--pause", "0.25", "--page"], ["--pause", "0", "--page"]):

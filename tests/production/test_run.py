@@ -1,5 +1,6 @@
 """The main job end to end: one toast cold and warm; what a changed scene, a damaged file or Ctrl-C does to a run."""
 
+import csv
 import json
 import os
 import subprocess
@@ -15,11 +16,13 @@ import pytest
 
 import lab.production.run
 from lab.errors import WorkFailed
+from lab.export.program import Program
 from lab.mdp import shortest_steps
-from lab.production.composer import Outcome
 from lab.production.durations import Durations
-from lab.production.report import FILES, Report, Taught, write_files
+from lab.production.outcome import Outcome
+from lab.production.report import FILES, Report, write_files
 from lab.production.run import remember, teach_all
+from lab.production.taught import Taught
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import optimum
@@ -41,7 +44,7 @@ RUN_FIELDS = (
     *("task", "seed", "toasts", "parts", "success", "delivered", "dropped", "failure", "retries", "skills", "sequence"),
     *("predicted_makespan_s", "measured_makespan_s", "optimal_makespan_s", "bound_s"),
     *("optimality_gap", "optimum_proven"),
-    *("camera_deviation_m", "sim_s", "skipped_s", "wall_s", "files"),
+    *("camera_deviation_m", "sim_s", "skipped_s", "faults", "outcome", "interrupted", "receipts", "wall_s", "files"),
 )
 SKILL_FIELDS = {"name", "subtask", "source", "policy", "episodes", "requests", "helped_steps", "solved"} | {
     *("reason", "from_task", "parent", "saved_episodes", "saved_helped_steps", "fitness")
@@ -124,7 +127,8 @@ def test_every_skill_was_learned_or_adapted_or_has_the_table_of_one_that_was(col
 def test_all_files_are_there_and_whole(cold: Ran) -> None:
     files = {name: cold.folder / path for name, path in cold.document["files"].items()}
     assert {name: path.name for name, path in files.items()} == FILES
-    assert sorted(os.listdir(cold.folder / "toast-run")) == sorted(FILES.values())
+    there = {*os.listdir(cold.folder / "toast-run")} - {"run-before.jsonl"}  # a second run has put it aside
+    assert there == {*FILES.values(), "known.json", "run.jsonl", "skills"}
     for name in ("gantt", "learning_curves", "value_map", "overhead"):
         assert min(read_picture(files[name]).shape[:2]) > 200
     assert 'id="lab-data"' in files["replay"].read_text(encoding="utf-8")
@@ -139,6 +143,34 @@ def test_the_json_files_hold_the_run(cold: Ran, warm: Ran) -> None:
     assert order["sequence"] == order["optimal_sequence"] == [1, 1, 1]
     assert order["makespan_s"] == min(order["episode_makespans_s"]) == warm.document["predicted_makespan_s"]
     assert order["durations"]["process_s"].keys() == {"butter_applier"}
+
+
+def test_the_program_has_the_runs_moves_and_begins_when_it_does(cold: Ran) -> None:
+    program = Program.load(cold.folder / "toast-run")
+    carried = [(one.origin, one.target, one.waits_for) for one in program.carried.transfers]
+    assert carried == [
+        ("plate", "toaster", None),
+        ("toaster", "butter_applier", "toaster"),
+        ("butter_applier", "finished_plate", "butter_applier"),
+    ]
+    begins = [motion.at_s for motion in program.motions]
+    assert (begins[0], program.carried.transfers[0].leave_s) == (0.0, 0.0)
+    assert {one.reach_s for one in program.carried.transfers[:1]} <= set(
+        begins
+    )  # it goes on at once where it need not wait
+    assert program.carried.transfers[-1].drop_s == cold.document["measured_makespan_s"]
+
+
+def test_the_schedule_is_there_as_a_table_planned_and_measured(warm: Ran) -> None:
+    folder = warm.folder / "toast-run"
+    rows = json.loads((folder / "schedule.json").read_text(encoding="utf-8"))["schedule"]
+    for when, end_s in (("planned", "predicted_makespan_s"), ("measured", "measured_makespan_s")):
+        own = [row for row in rows if row["when"] == when]
+        assert max(row["end_s"] for row in own) == warm.document[end_s]
+        assert {row["resource"] for row in own} == {"robot", "toaster", "butter_applier"}
+    with (folder / "schedule.csv").open(encoding="utf-8", newline="") as file:
+        table = list(csv.DictReader(file))
+    assert [{name: "" if value is None else str(value) for name, value in row.items()} for row in rows] == table
 
 
 def test_progress_goes_to_stderr_in_lines_a_log_can_hold(cold: Ran) -> None:
@@ -404,7 +436,7 @@ def test_a_failed_run_says_so_and_leaves_no_old_chart(
     (out / "mine.txt").write_text("mine")
     curves = drawn(monkeypatch)
     write_files(failed, out)
-    assert sorted(failed.files) == sorted(set(FILES) - {"gantt"})
+    assert sorted(failed.files) == sorted(set(FILES) - {"gantt", "program", "trajectory"})
     assert sorted(os.listdir(out)) == sorted(["mine.txt", *map(FILES.__getitem__, failed.files)])
     assert len(curves) == len({lesson.policy.name for lesson in failed.taught.lessons.values()})
     assert {"grasp at plate, starts vary", "insert at toaster"} < set(curves)

@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 import pytest
 
 from lab.advice.advisors import AdvisorName
+from lab.production.order import reference
 from lab.production.sequencing_job import (
     Wanted,
-    reference,
     sequence_cell,
     sequence_named,
 )

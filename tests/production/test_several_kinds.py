@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import pytest
 
-from lab.production.composer import Outcome, carry_out
+from lab.production.composer import carry_out
 from lab.production.durations import Durations, cell_of, measure
+from lab.production.outcome import Outcome
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.methods.exact import optimum
 from lab.sim.frames import Recording

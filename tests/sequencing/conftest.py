@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -133,8 +134,13 @@ def all_ends(run: Run) -> Iterator[Run]:
 
 
 @st.composite
-def random_cells(draw: st.DrawFn, max_machines: int = 2, max_parts: int = 3, many: bool = False) -> Cell:
-    """A small cell whose tables hold the needed moves and nothing else; `many`: products, routes, pallets, arrivals."""
+def random_cells(
+    draw: st.DrawFn, max_machines: int = 2, max_parts: int = 3, many: bool = False, windows: bool = False
+) -> Cell:
+    """A small cell whose tables hold the needed moves and nothing else; `many`: products, routes, pallets, arrivals.
+
+    windows: parts in some machines are to be fetched in time; there may be no sequence then.
+    """
     parts = draw(st.integers(1, max_parts))
     seconds = st.one_of(st.integers(0, 20).map(float), st.floats(0, 20, allow_subnormal=False))
     stations = [Station("in", "storage", parts), Station("out", "storage", parts)]
@@ -145,6 +151,8 @@ def random_cells(draw: st.DrawFn, max_machines: int = 2, max_parts: int = 3, man
             name = f"{product}.{number}" if many else ""
             routes.append(_random_route(draw, stations, name, max_machines, seconds, many))
         products.append(Product(f"type {product}" if product else "toast", tuple(routes)))
+    if windows:
+        stations = [_with_window(draw, station, products) for station in stations]
     stations = draw(st.permutations(stations))
     buffers = draw(st.sampled_from(["busy", "free"])) if many else "busy"
     start = draw(st.sampled_from(stations)).name
@@ -164,6 +172,15 @@ def random_cells(draw: st.DrawFn, max_machines: int = 2, max_parts: int = 3, man
     due_s = tuple(1000.0 * draw(seconds) + 4000.0 for _ in order) if many else None
     tables_s = tables[0], tables[1]
     return Cell(tuple(stations), tuple(products), order, *tables_s, start, arrivals, buffers, due_s)  # type: ignore[arg-type]
+
+
+def _with_window(draw: st.DrawFn, station: Station, products: list[Product]) -> Station:
+    """A machine whose parts are to be fetched soon, or any station as it is."""
+    if station.kind != "machine" or draw(st.booleans()):
+        return station
+    stages = [stage for product in products for route in product.routes for stage in route]
+    service_s = max((stage.service_s for stage in stages if stage.station == station.name), default=0.0)
+    return replace(station, at_most_s=service_s + draw(st.sampled_from([0.0, 1.25, 3.75, 10.0, 40.0])))
 
 
 def _random_route(

@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from lab.sim.camera import Camera
+from lab.sim.camera import Camera, TableCamera
 from lab.sim.models import MARKER_GREEN, MARKER_RADIUS
 from lab.sim.world import World
+from lab.vision import Image, Lens
+from lab.vision.calibration import Calibration
 
 RNG = np.random.default_rng(3)
 SPOTS = [tuple(map(float, spot)) for spot in RNG.uniform([0.42, -0.36, 0.01], [1.18, 0.36, 0.5], (8, 3))]
@@ -56,3 +59,39 @@ def test_the_same_world_gives_the_same_picture(world: World) -> None:
     assert first.dtype == np.uint8
     assert first.shape == (64, 64, 3)
     assert np.array_equal(first, camera.picture(world))
+
+
+def calibration_of(camera: Camera, lens: Lens) -> Calibration:
+    turn, shift = camera.turn_and_shift()
+    return Calibration(lens, tuple(tuple(row) for row in turn.tolist()), tuple(shift.tolist()), 0.0, 0, "by hand")
+
+
+def test_turn_and_shift_are_those_of_the_projection() -> None:
+    camera = Camera((0.3, 0.1, 1.5), (0.5, 0.0, 0.0), (0.2, 1.0, 0.0), 0.6, 200, 160)
+    points = np.array([(0.5, 0.1, 0.0), (0.3, -0.2, 0.2)])
+    way = np.column_stack([points, np.ones(2)]) @ camera.pixel_from_world().T
+    assert camera.lens().projected(points, *camera.turn_and_shift()) == pytest.approx(way[:, :2] / way[:, 2:])
+
+
+def test_a_calibrated_camera_sees_straight_through_a_bent_lens() -> None:
+    hung = Camera((0.02, -0.01, 2.0), (0.03, 0.0, 0.0), (0.02, 1.0, 0.0), 0.4, 240, 240)
+    straight = hung.lens()
+    bent = Lens(straight.size, straight.focal, (123.0, 117.0), (-0.8, 0.0, 0.0, 0.0, 0.0))
+    camera = TableCamera.calibrated(calibration_of(hung, bent), None, 0.0)
+    at = (0.25, 0.2, 0.05)
+    with World() as world:
+        world.box("table", (3, 3, 0.02), (0, 0, -0.01), (0.8, 0.8, 0.8, 1))
+        world.disc("marker", 0.03, 0.002, at, (1, 0, 1, 1))
+        raw, picture = camera.picture_through(bent, world), camera.picture(world)
+        again, small = camera.picture(world), TableCamera.calibrated(calibration_of(hung, bent), 120, 0.0)
+    x, y, w = camera.pixel_from_world() @ (*at, 1.0)
+
+    def middle(image: Image) -> NDArray[np.float64]:
+        down, right = np.nonzero((image[..., 0] > 120) & (image[..., 1] < 60))
+        return np.array([right.mean(), down.mean()])
+
+    assert middle(picture) == pytest.approx((x / w, y / w), abs=0.7)
+    assert np.linalg.norm(middle(raw) - (x / w, y / w)) > 1.5
+    assert (picture == again).all()
+    u, v, w = small.pixel_from_world() @ (*at, 1.0)
+    assert ((u / w + 0.5) * 2, (v / w + 0.5) * 2) == pytest.approx(middle(picture) + 0.5, abs=0.8)

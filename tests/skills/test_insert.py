@@ -202,3 +202,32 @@ def test_a_cube_over_the_toaster_or_the_start_is_named(task: Task) -> None:
         BadInput, match=r"'toaster': grid\.start_m \[.*\]: cube 1 is in the way of a carried slice there$"
     ):
         Insert(task, "slice", "toaster").setup(surveyed(with_cubes(task, (x + 0.08, y))))
+
+
+@pytest.mark.parametrize("perception", ["truth", "camera"])
+def test_a_gripper_beside_its_cell_is_moved_by_what_the_camera_sees(
+    perception: str,
+    task: Task,
+    layout: Layout,
+    stage: Stage,
+    optimal: PolicyOf,
+    run: Run,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """An arm that goes 1 cm beside where it is sent, as one that was pushed: the camera sees it, and may correct it."""
+    own = Surveys(task.changed(perception=perception), ORDER, layout)
+    insert = Insert(own.task, "slice", "toaster")
+    policy = optimal(insert.setup(own))
+    bench = stage(insert)
+    robot = bench.scene.robot
+    follow = robot.follow
+    monkeypatch.setattr(robot, "follow", lambda poses, **more: follow([p.shifted(dy=0.010) for p in poses], **more))
+    status = run(insert, bench, policy)
+    assert insert.deviations_m[0] == pytest.approx(0.010, abs=0.003)
+    if perception == "truth":
+        assert status is Status.FAILURE
+        assert insert.reason == f"the camera sees the gripper {insert.deviations_m[0]:.3f} m off its cell"
+    else:
+        assert status is Status.SUCCESS, insert.reason
+        assert max(insert.deviations_m[1:]) < 0.004
+        assert bench.stands(SLICE, own.places.spots(task.station("toaster"))[0], IN_SLOT_M, truly=True)

@@ -18,7 +18,8 @@ from lab.sim.parts.kinds import Spot
 from lab.sim.scene.places import Layout
 from lab.skills import SKILLS, Skill
 from lab.skills.prepared_scene import Prepared
-from lab.skills.skill import Bench, SkillFailed, Status, learned_path, no_way
+from lab.skills.sight import SkillFailed
+from lab.skills.skill import Bench, Status, learned_path, no_way
 from lab.skills.skillset import SkillSet
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Task

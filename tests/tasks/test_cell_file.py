@@ -133,6 +133,13 @@ def test_a_small_file_is_the_cell_it_says() -> None:
     assert simulate(cell, [1, 1, 2, 2]).makespan_s == 31
 
 
+def test_parts_that_spoil_have_a_window() -> None:
+    """The shipped one: 20 s at both machines, 67 s more than without for three and for four toasts."""
+    cells = [load_cell("toast-case-1-window").cell(toasts) for toasts in (3, 4)]
+    assert [station.at_most_s for station in cells[0].stations] == [None, None, 20.0, None, 20.0, None]
+    assert [optimum(cell).cost for cell in cells] == [580.0, 730.0]
+
+
 def test_tables_may_be_written_long() -> None:
     long = OVEN.replace("in = { oven = 2 }\n", "") + "[travel.in]\noven = 2\n"
     long = edited(long, '"in", "oven", "out"', '{ station = "in" }, { station = "oven" }, "out"')

@@ -1,6 +1,7 @@
 """Gantt charts: every activity has its bar and its words, for a few toasts, for many, and for several products."""
 
 import re
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from xml.etree import ElementTree
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.figure import Figure
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
@@ -16,7 +18,7 @@ from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
 from lab.sequencing.simulate.run import Run, simulate
 from lab.view.canvas import BLUE, GREEN, ORANGE, RED, SKY
-from lab.view.gantt import gantt
+from lab.view.gantt import _draw_limits, gantt
 from lab.view.gantt_bars import WIDEST_INCH, Chart, mixed
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -137,6 +139,19 @@ def test_all_there_from_the_start_do_not_arrive(tmp_path: Path) -> None:
     texts, _ = drawn(tmp_path, schedule())
     assert "arrives" not in texts
     assert "robot carries an empty pallet" not in texts
+
+
+def test_until_when_toast_is_to_be_fetched_is_marked(tmp_path: Path) -> None:
+    """Only where there is such a limit: two toasts, a mark each, on the row of the oven."""
+    cell = ovens()
+    stations = tuple(replace(one, at_most_s=4.0 if one.name == "oven" else None) for one in cell.stations)
+    limited = simulate(replace(cell, stations=stations), [1, 2, 1, 2, 2])
+    assert "to be fetched until then" in drawn(tmp_path, limited)[0]
+    assert "to be fetched until then" not in drawn(tmp_path, schedule())[0]
+    figure = Figure()
+    axes = figure.add_subplot()
+    (marks,) = _draw_limits(axes, Chart(limited))
+    assert np.array(marks.get_xydata()).tolist() == [[limit.until_s, 2.0] for limit in limited.fetch_by]
 
 
 def test_many_parts_get_a_wider_page_with_names_and_times_on_both_sides(tmp_path: Path) -> None:

@@ -49,6 +49,8 @@ RUN: dict[str, Any] = {
     "delivered": 3,
     "dropped": 0,
     "failure": None,
+    "faults": [],
+    "receipts": None,
     "retries": [],
     "skills": [skill("learned", 30), skill("continued", 12), skill("reused")],
     "sequence": [1, 2, 1, 2],

@@ -19,7 +19,10 @@ NEVER = float("inf")
 
 @dataclass(frozen=True)
 class Happened:
-    """A fault that struck: at_s [s] of the run, what it was about ("": nothing of that sort), and the truth in words."""
+    """A fault that struck: at_s [s] of the run, what it was about ("": nothing of that sort), and the truth in words.
+
+    undone: the part was taken out of a machine that had not finished it.
+    """
 
     what: str
     words: str
@@ -27,6 +30,7 @@ class Happened:
     part: str = ""
     station: str = ""
     obstacle: str = ""
+    undone: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:

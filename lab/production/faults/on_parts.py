@@ -14,6 +14,7 @@ from lab.production.faults.where import (
     Foot,
     around,
     is_robot_away,
+    is_undone,
     put_down,
     stack_of,
     stand,
@@ -65,7 +66,8 @@ class PartMoved(Fault):
                 if put_down(floor, bodies, (float(at[0]), float(at[1])), yaw):
                     far = hypot(at[0] - x, at[1] - y)
                     words = f"{name} was moved by {far:.2f} m from '{where.station}'"
-                    return Happened(self.what, words, floor.now_s, name, where.station)
+                    undone = is_undone(floor, name)
+                    return Happened(self.what, words, floor.now_s, name, where.station, undone=undone)
         return None
 
 

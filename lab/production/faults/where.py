@@ -73,6 +73,12 @@ def whereabouts(floor: "Floor", name: str) -> Whereabouts:
     return Whereabouts("standing", station)
 
 
+def is_undone(floor: "Floor", name: str) -> bool:
+    """Whether a machine works on a part and has not finished it."""
+    own = [machine for machine in floor.machines.values() if machine.part == name]
+    return any(not machine.done(floor.now_s) for machine in own)
+
+
 def in_the_air(floor: "Floor", body: str) -> bool:
     """Whether there is nothing for 3 cm below a body."""
     scene = floor.scene

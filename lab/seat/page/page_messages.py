@@ -4,7 +4,10 @@ import json
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-MAX_CHARS = 1024
+from lab.seat.replay_pace import WORDS as REPLAY_WORDS
+
+MAX_CHARS = 4096
+MOST_MOVES = 1000  # of one path
 WORDS = ("skip", "auto", "undo", "quit")
 
 
@@ -14,11 +17,12 @@ class Refused(Exception):
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer to a question, by its number: an action, or one of WORDS."""
+    """An answer to a question, by its number: an action, one of WORDS, or the actions of a whole path."""
 
     question: int
     action: int | None = None
     word: str = ""
+    path: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -35,10 +39,17 @@ class Layer:
     layer: int | None
 
 
-def understood(message: str | bytes) -> Answer | Wish | Layer:
+@dataclass(frozen=True)
+class Pace:
+    """The page wants a session that is shown again to pause, to go on and so on: a word of `replay_pace.WORDS`."""
+
+    word: str
+
+
+def understood(message: str | bytes) -> Answer | Wish | Layer | Pace:
     """What a page says. Raises Refused for anything else."""
     if isinstance(message, bytes) or len(message) > MAX_CHARS:
-        raise Refused("That was no message of this page: text of at most 1024 characters is wanted.")
+        raise Refused(f"That was no message of this page: text of at most {MAX_CHARS} characters is wanted.")
     try:
         said = json.loads(message)
     except (ValueError, RecursionError):
@@ -50,8 +61,13 @@ def understood(message: str | bytes) -> Answer | Wish | Layer:
         case {"answer": {"question": int(number), "word": str(word), **rest}, **more} if not (rest or more):
             if not isinstance(number, bool) and word in WORDS:
                 return Answer(number, None, word)
+        case {"answer": {"question": int(number), "path": list(path), **rest}, **more} if not (rest or more):
+            if not isinstance(number, bool) and 0 < len(path) <= MOST_MOVES and all(type(move) is int for move in path):
+                return Answer(number, path[0], path=tuple(path))
         case {"seat": "take" | "give" as wish, **more} if not more:
             return Wish(wish)
+        case {"replay": str(word), **more} if not more and word in REPLAY_WORDS:
+            return Pace(word)
         case {"layer": int() | None as layer, **more} if not more and not isinstance(layer, bool):
             return Layer(layer)
     raise Refused("That was no message of this page: it is ignored.")

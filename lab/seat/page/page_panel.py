@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from lab.learning.requests import AdviceRequest, Request
-from lab.seat.page.page_messages import Answer, Chair, Layer, Refused, Wish, understood
+from lab.seat.grid_text import ARROWS, direction_of
+from lab.seat.page.page_messages import Answer, Chair, Layer, Pace, Refused, Wish, understood
 from lab.seat.page.page_state import PARTS, Known, Pending, layer_of
 
 SLICE_EVERY_S = 0.1  # a layer's values are sent at most ten times a second,
@@ -35,7 +36,7 @@ class SeatPanel:
     """What is known, who has the seat, the question that waits, and its answer; `lock` guards all of it.
 
     on_word: told, in the server's thread, in a word of the terminal what was answered to a question that nobody waits
-    for here.
+    for here. on_pace: told in a word how a session that is shown again is to go on.
     """
 
     files: Sequence[Path] = tuple(
@@ -52,6 +53,7 @@ class SeatPanel:
         self.known = Known(title)
         self.chair = Chair()
         self.on_word: Callable[[str], None] | None = None
+        self.on_pace: Callable[[str], None] | None = None
         self._answer: Answer | None = None
         self._ended = False
         self._pages: dict[int, _Seen] = {}
@@ -130,10 +132,15 @@ class SeatPanel:
         if word and self.on_word is not None:
             self.on_word(word)
 
-    def _do(self, page: int, meant: Answer | Wish | Layer) -> str:
+    def _do(self, page: int, meant: Answer | Wish | Layer | Pace) -> str:
         """The terminal's word for the answer to a question that was only offered, "" for everything else."""
         if isinstance(meant, Layer):
             self._pages[page].layer, self._pages[page].layer_version = meant.layer, 0
+            return ""
+        if isinstance(meant, Pace):
+            if self.on_pace is None:
+                raise Refused("Nothing is shown again here.")
+            self.on_pace(meant.word)
             return ""
         if isinstance(meant, Wish):
             self.chair.wish(page, meant)
@@ -160,7 +167,9 @@ class SeatPanel:
             raise Refused("This session is only shown: it takes no answers.")
         if answer.word == "undo" and "undo" not in pending.words:
             raise Refused("Nothing of this episode can be taken back.")
-        if not answer.word and answer.action not in pending.moves:
+        if len(answer.path) > 1 and not isinstance(pending.request, AdviceRequest):
+            raise Refused("Which part moves next is said move by move.")
+        if not answer.word and not {answer.action, *answer.path} <= {*pending.moves}:
             raise Refused("There is no such move here.")
         return pending
 
@@ -226,7 +235,10 @@ def _finite(value: Any) -> Any:
 
 
 def word_of(request: Request, answer: Answer) -> str:
-    """An answer as a terminal understands it: the label of an action, the number of a move, or the word itself."""
+    """An answer as a terminal understands it: the label of an action, the number of a move, the word itself, or a path."""
     if answer.word or answer.action is None:
         return answer.word
+    if len(answer.path) > 1 and isinstance(request, AdviceRequest):
+        pointing = [direction_of(request.mdp, action) for action in answer.path]
+        return f"path {''.join(ARROWS[d] for d in pointing if d is not None)}"
     return request.mdp.action_labels[answer.action] if isinstance(request, AdviceRequest) else str(answer.action)

@@ -14,6 +14,7 @@ from lab.learning.settings import GateSettings
 from lab.learning.updates import Table
 from lab.mdp import TabularMDP
 from lab.seat.event_text import SessionText, Told
+from lab.seat.grid_views import StateWords
 from lab.seat.page.page_curve import Curve
 from lab.seat.page.page_grid import place_of, slice_of, spot
 from lab.seat.page.page_question import question_of
@@ -84,6 +85,7 @@ class ShownLesson:
     selection: str = "softmax"
     temperature: float = 1.0
     state: int | None = None  # where it was seen last
+    known: StateWords | None = None  # what says in words where that is
 
     def __post_init__(self) -> None:
         self.text.kind = self.kind
@@ -121,6 +123,7 @@ class Known:
     members: list[Json] = field(default_factory=list)
     receipt: Json | None = None
     ended: str = ""
+    replay: Json | None = None  # of a session that is shown again: its pace, and what was answered last
     questions: int = 0
     version: int = 1
     versions: dict[str, int] = field(default_factory=dict)
@@ -175,7 +178,7 @@ def _question(known: Known, now_s: float) -> Json | None:
     if pending is None:
         return None
     left_s = None if pending.until_s is None else round(max(0.0, pending.until_s - now_s), 1)
-    return question_of(pending.request) | {
+    return question_of(pending.request, known.learning.known) | {
         "number": pending.number,
         "left_s": left_s,
         "words": list(pending.words),
@@ -218,6 +221,7 @@ PARTS: dict[str, Callable[[Known, float], Any]] = {
     "members": lambda known, now_s: known.members,
     "receipt": lambda known, now_s: known.receipt,
     "ended": lambda known, now_s: known.ended,
+    "replay": lambda known, now_s: known.replay,
 }
 
 

@@ -65,7 +65,33 @@ const seatDraw = (() => {
     goalsElsewhere(pen, view, size);
     if (size >= 9) preferences(pen, view, size);
     robot(pen, view, size);
+    if (view.way.length > 1) way(pen, view.way, size);
     return size;
+  }
+
+  // A way that is drawn but not sent: a line with a head, light below so that it is seen on every colour
+  function way(pen, cells, size) {
+    const at = ([row, column]) => [(column + 0.5) * size, (row + 0.5) * size];
+    pen.save();
+    Object.assign(pen, { lineJoin: "round", lineCap: "round" });
+    for (const [colour, thick] of [["#ffffff", size / 4 + 3], ["#0072b2", size / 6 + 1]]) {
+      Object.assign(pen, { strokeStyle: colour, lineWidth: thick });
+      pen.beginPath();
+      cells.forEach((cell, k) => (k ? pen.lineTo(...at(cell)) : pen.moveTo(...at(cell))));
+      pen.stroke();
+    }
+    const [from, to] = [at(cells[cells.length - 2]), at(cells[cells.length - 1])];
+    pen.translate(...to);
+    pen.rotate(Math.atan2(to[1] - from[1], to[0] - from[0]));
+    Object.assign(pen, { fillStyle: "#0072b2", strokeStyle: "#ffffff", lineWidth: 1.5 });
+    pen.beginPath();
+    pen.moveTo(size * 0.45, 0);
+    pen.lineTo(-size * 0.15, -size * 0.32);
+    pen.lineTo(-size * 0.15, size * 0.32);
+    pen.closePath();
+    pen.fill();
+    pen.stroke();
+    pen.restore();
   }
 
   function cells(pen, { place, slice }, size) {

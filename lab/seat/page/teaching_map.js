@@ -1,22 +1,31 @@
-// The map of the teaching seat: one layer of the grid, or the environment's own drawing; looked at, pointed at, clicked.
+// The map of the teaching seat: one layer of the grid, or the environment's own drawing; looked at, clicked, drawn a way on.
 "use strict";
 
 const seatMap = (() => {
   const STEPS = [[-1, 0], [1, 0], [0, -1], [0, 1]]; // up, down, left, right
-  const HINT = "colours: what it is worth, yellow most; arrows: what it prefers";
+  const HINT = "colours: worth; arrows: what it prefers; drag from R to draw a way";
   const el = (id) => document.getElementById(id);
-  let place = null, slice = null, asked = null, cell = 0, layer = null, told = { go() {}, look() {} };
+  let place = null, slice = null, asked = null, cell = 0, layer = null, told = { go() {}, look() {}, can: () => false };
+  let way = [], view = null, pen = null; // the cells of the way that is drawn, the robot's first; the pointer that draws
 
   function show(state, shown) {
     ({ place, slice } = state);
     asked = shown;
+    if (way.length && !(shown && same(shown.at, way[0]))) way = [];
     el("map").hidden = !place || !slice;
     if (el("map").hidden) return;
     const at = shown && shown.at.length ? shown.at : state.robot;
     const room = Math.min(el("map").clientWidth || 340, 440), tall = Math.max(200, Math.min(room, window.innerHeight * (window.innerWidth < 900 ? 0.36 : place.layers > 1 ? 0.4 : 0.43)));
-    cell = seatDraw.grid(el("grid"), { place, slice, robot: at, question: shown, directions: place.directions }, room, tall);
+    view = { at, room, tall };
+    paint();
     el("grid").setAttribute("aria-label", inWords(at));
     showLayers(at);
+  }
+
+  function paint() {
+    cell = seatDraw.grid(el("grid"), { place, slice, way, robot: view.at, question: asked, directions: place.directions }, view.room, view.tall);
+    el("way").hidden = way.length < 2;
+    if (way.length > 1) el("way-text").textContent = `A way of ${seatStatus.count(way.length - 1, "move")}`;
   }
 
   function inWords(at) {
@@ -57,11 +66,75 @@ const seatMap = (() => {
     el("readout").textContent = `row ${there[0] + 1}, column ${there[1] + 1}: ${worth}`;
   }
 
-  // A click beside the robot is the move there
-  function clicked(event) {
-    const there = under(event);
-    if (!there || !asked || !asked.at.length || slice.layer !== asked.at[2]) return;
-    const direction = STEPS.findIndex(([down, right]) => there[0] - asked.at[0] === down && there[1] - asked.at[1] === right);
+  // ---- a way drawn from the robot on, by mouse, finger or Shift and the arrow keys
+
+  const same = (one, other) => one.length === other.length && one.every((value, k) => value === other[k]);
+  const drawable = () => Boolean(asked && asked.kind === "step" && asked.at.length && slice && slice.layer === asked.at[2] && told.can());
+  const end = () => way[way.length - 1];
+  const mark = ([row, column]) => slice.marks[row * place.columns + column];
+
+  // One cell on, or back where the way came from; false where the grid or the way ends, or something stands
+  function step(direction) {
+    if (!drawable()) return false;
+    if (!way.length) way = [asked.at];
+    const [row, column] = end(), [down, right] = STEPS[direction], next = [row + down, column + right, asked.at[2]];
+    if (way.length > 1 && same(way[way.length - 2], next)) way.pop();
+    else if (next[0] < 0 || next[1] < 0 || next[0] >= place.rows || next[1] >= place.columns || mark(next) === "#") return false;
+    else if (way.length > 1 && mark(end()) === "G") return false;
+    else way.push(next);
+    paint();
+    return true;
+  }
+
+  // Cell by cell until the way ends under the pointer, as far as nothing stands there
+  function toward(there) {
+    for (let left = place.rows + place.columns; left > 0 && !(end()[0] === there[0] && end()[1] === there[1]); left -= 1) {
+      const down = there[0] - end()[0], right = there[1] - end()[1], upright = down < 0 ? 0 : 1, across = right < 0 ? 2 : 3;
+      const [first, second] = Math.abs(down) > Math.abs(right) ? [upright, right ? across : null] : [across, down ? upright : null];
+      if (!step(first) && (second === null || !step(second))) return;
+    }
+  }
+
+  function drop() {
+    const had = way.length > 1;
+    way = [];
+    if (view && place && slice) paint();
+    return had;
+  }
+
+  const beside = (there, from) => Math.abs(there[0] - from[0]) + Math.abs(there[1] - from[1]) <= 1;
+
+  // A way begins at the robot, or goes on at its end; elsewhere a finger scrolls the page
+  function begins(event) {
+    const there = drawable() ? under(event) : null;
+    return there && (beside(there, asked.at) || (way.length > 1 && beside(there, end()))) ? there : null;
+  }
+
+  function pressed(event) {
+    const there = event.button === 0 ? begins(event) : null;
+    if (!there) return;
+    if (way.length < 2 || !beside(there, end())) way = [asked.at];
+    pen = { id: event.pointerId, from: there, moved: false };
+    el("grid").setPointerCapture(event.pointerId);
+  }
+
+  function moved(event) {
+    readOut(event);
+    const there = pen && pen.id === event.pointerId && drawable() ? under(event) : null;
+    if (!there || (!pen.moved && same(there, pen.from))) return;
+    pen.moved = true;
+    toward(there);
+  }
+
+  // A press beside the robot that was not drawn on is the move there
+  function released(event) {
+    if (!pen || pen.id !== event.pointerId) return;
+    const { from, moved: drew } = pen;
+    pen = null;
+    if (drew || !asked || !asked.at.length) return;
+    if (way.length > 1) return toward(from);
+    way = [];
+    const direction = STEPS.findIndex(([down, right]) => from[0] - asked.at[0] === down && from[1] - asked.at[1] === right);
     if (direction >= 0) told.go(direction);
   }
 
@@ -75,13 +148,21 @@ const seatMap = (() => {
   el("layer").oninput = () => look(Number(el("layer").value));
   el("layer").onpointerup = () => el("layer").blur();
   el("layer-robot").onclick = () => look(null);
-  el("grid").onpointermove = readOut;
+  el("grid").onpointerdown = pressed;
+  el("grid").onpointermove = moved;
+  el("grid").onpointerup = released;
+  el("grid").onpointercancel = () => { pen = null; };
+  el("grid").addEventListener("touchstart", (event) => { if (event.touches.length === 1 && begins(event.touches[0])) event.preventDefault(); }, { passive: false });
+  el("readout").textContent = HINT;
   el("grid").onpointerleave = () => { el("readout").textContent = HINT; };
-  el("grid").onclick = clicked;
 
   return {
     show,
     picture,
+    step,
+    drop,
+    // the directions of the way that is drawn
+    drawn: () => way.slice(1).map(([row, column], k) => STEPS.findIndex(([down, right]) => row - way[k][0] === down && column - way[k][1] === right)),
     // whom to tell of a click and of a layer, and after a reconnection once more of the layer
     tell(listener) {
       told = listener;

@@ -12,15 +12,20 @@ from math import inf
 from typing import Any
 
 from lab.advice.journal import Undo
-from lab.errors import BadInput
+from lab.errors import BadInput, counted
 from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
 from lab.mdp import NoPath, shortest_steps
+from lab.seat.event_text import Told
+from lab.seat.grid_views import StateWords
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_messages import Answer
 from lab.seat.page.page_order import bars_of, made_until
 from lab.seat.page.page_panel import CLOSED, SeatPanel
+from lab.seat.page.page_question import said_of
 from lab.seat.page.page_run import hear_run
 from lab.seat.page.page_state import Pending, ShownLesson, standing_of
+from lab.seat.path_ahead import PathAhead
+from lab.seat.replay_pace import ReplayPace
 from lab.sequencing.request import SequenceRequest
 from lab.teaching.events import ORDER, Event, LessonBegan, LessonEvent
 from lab.teaching.lesson_plan import LessonPlan
@@ -43,6 +48,7 @@ class SeatPage(LiveView):
         super().__init__(port, title=TITLE)
         self._wait_s = wait_s
         self._panel: SeatPanel = SeatPanel(TITLE)
+        self._path = PathAhead()
 
     def close(self) -> None:
         """Stop serving; who waits for an answer learns that there is nobody any more. Safe to call again."""
@@ -57,12 +63,28 @@ class SeatPage(LiveView):
         Raises AdvisorLeft for "auto", after the time and when the page is closed, Undo when an answer is taken back, and
         KeyboardInterrupt for "quit".
         """
+        if self._path.goes_on(request):
+            self.look(request)
+            return self._path.step()
+        self._drop_path()
         pending = self._pose(request)
         try:
             answer = self._panel.wait(pending)
         finally:
             self.withdraw()
+        if answer is not None and len(answer.path) > 1 and isinstance(request, AdviceRequest):
+            self._path = PathAhead(request, answer.path)
+            return self._path.step()
         return _said(pending, answer)
+
+    def _drop_path(self) -> None:
+        """What is left of a drawn way leads elsewhere than the learner went: that is said."""
+        if left := len(self._path.left):
+            with self._panel.lock:
+                text = f"The rest of your way is dropped ({counted(left, 'move')}): the learner is elsewhere now."
+                self._panel.known.learning.notice(Told(text, "note"))
+                self._panel.known.changed("notices")
+        self._path = PathAhead()
 
     def offer(self, request: Request, on_word: Callable[[str], None] | None = None) -> None:
         """Show a question that is answered elsewhere, too; returns at once.
@@ -77,6 +99,26 @@ class SeatPage(LiveView):
         with self._panel.lock:
             self._see(request)
         self._wake()
+
+    def paced(self, pace: ReplayPace) -> None:
+        """A session is shown again: pages pause it, step through it and change its speed."""
+
+        def changed(now: Mapping[str, Any]) -> None:
+            with self._panel.lock:
+                self._panel.known.replay = {**(self._panel.known.replay or {}), **now}
+                self._panel.known.changed("replay")
+            self._wake()
+
+        pace.on_change, self._panel.on_pace = changed, pace.do
+        changed(pace.now())
+
+    def replayed(self, request: Request, action: int | None) -> None:
+        """Show a question of a session that is shown again, with what was answered; None: it was left to the learner."""
+        known = self._panel.known
+        with self._panel.lock:
+            known.replay = {**(known.replay or {}), "action": action, "said": said_of(request, action)}
+            known.changed("replay")
+        self.offer(request)
 
     def withdraw(self) -> None:
         """The question was answered elsewhere."""
@@ -140,6 +182,11 @@ class SeatPage(LiveView):
             else:  # anew, too, because an answer was taken back
                 known.receipt, known.ended = None, ""
                 known.begin(made)
+
+    def about(self, known: StateWords | None) -> None:
+        """What says in words where the learner is in the lesson that begins, None where nothing does."""
+        with self._panel.lock:
+            self._panel.known.learning.known = known
 
     # ---- what is shown beside
 

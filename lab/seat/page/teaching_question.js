@@ -5,6 +5,7 @@ const seat = (() => {
   const ARROWS = ["↑", "↓", "←", "→", "▾", "▴"], ARROW_KEYS = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight", "PageDown", "PageUp"];
   const PLACES = ["1 / 2", "3 / 2", "2 / 1", "2 / 3", "3 / 5", "1 / 5"]; // row and column of each direction's button
   const LETTERS = { y: "own", Enter: "own", s: "skip", u: "undo", w: "why", a: "auto", q: "quit" };
+  const PACES = { " ": "pause", n: "step", "-": "slower", "+": "faster", "=": "faster" };
   const SURE_MS = 3000, REFUSAL_MS = 6000, SLOW_PAUSE_MS = 600, URGENT = new Set(["question", "you", "ended"]);
   const el = (id) => document.getElementById(id);
   const state = { place: null, slice: null, work: null }, dirty = new Set(), title = document.title;
@@ -28,9 +29,10 @@ const seat = (() => {
   }
 
   const RENDERERS = [
-    [["you", "question", "lesson", "ended", "standing", "curve", "progress"], showQuestion],
+    [["you", "question", "lesson", "ended", "standing", "curve", "progress", "replay"], showQuestion],
     [["question", "lesson"], showMoves],
     [["question", "you", "lesson"], enable],
+    [["replay", "question", "ended"], showReplay],
     [["question"], () => seatMap.picture(shown)],
     [["place", "slice", "robot", "question"], () => seatMap.show(state, shown)],
   ];
@@ -56,15 +58,16 @@ const seat = (() => {
     document.body.classList.toggle("mine", Boolean(you.seat));
     document.title = `${shown && you.seat ? "● " : ""}${title}`;
     el("lesson").textContent = lesson.title || lesson.page;
-    const chair = finished ? "" : !send ? "connection lost: trying again" : you.seat ? `You answer here${you.pages > 1 ? `; ${seatStatus.count(you.pages - 1, "other page")} watching` : ""}` : you.free ? "No page answers yet" : "You are watching: another page answers";
+    const chair = finished || (send && state.replay) ? "" : !send ? "connection lost: trying again" : you.seat ? `You answer here${you.pages > 1 ? `; ${seatStatus.count(you.pages - 1, "other page")} watching` : ""}` : you.free ? "No page answers yet" : "You are watching: another page answers";
     el("chair-text").textContent = chair;
     el("chair").classList.toggle("yours", Boolean(you.seat && send));
     const button = el("chair-button");
-    button.hidden = !(send && (you.seat ? you.pages > 1 : you.free));
+    button.hidden = Boolean(state.replay) || !(send && (you.seat ? you.pages > 1 : you.free));
     button.textContent = you.seat ? "Hand over" : "Answer here";
     el("says").textContent = shown ? shown.title : state.ended || idle();
+    el("where").textContent = shown ? shown.where || "" : "";
     el("detail").textContent = shown ? detail() : "";
-    el("words").hidden = !shown;
+    el("words").hidden = !shown || Boolean(state.replay);
     el("because").hidden = !(shown && whyOpen);
     if (!shown && (state.ended || state.standing.verdict)) el("moves").hidden = true; // nothing is asked any more
     el(state.ended ? "ask" : "learning").append(el("receipt")); // at the end it is what matters
@@ -81,12 +84,23 @@ const seat = (() => {
     return `${episode}: ${why || "it works alone, and asks when it stops improving"}.`;
   }
 
-  const detail = () => `${shown.would}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered ? " The terminal asks, too." : ""}`;
+  const detail = () => `${shown.would}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered && !state.replay ? " The terminal asks, too." : ""}`;
 
   function countDown() {
     const left = until === null || !shown ? null : Math.max(0, Math.ceil((until - performance.now()) / 1000));
     el("countdown").hidden = left === null;
     if (left !== null) el("countdown").textContent = `It waits ${left} s more, then it goes on alone.`;
+  }
+
+  // A session that is shown again: what was answered, and how it goes on
+  function showReplay() {
+    const { replay } = state;
+    el("replay").hidden = !replay || Boolean(state.ended);
+    el("answered").textContent = replay && shown ? replay.said || "" : "";
+    if (!replay) return;
+    el("replay").querySelector("[data-replay=pause] span").textContent = replay.paused ? "Go on" : "Pause";
+    el("replay-speed").textContent = `${replay.speed} x${replay.paused ? ", paused" : ""}`;
+    for (const [action, button] of moveButtons) button.classList.toggle("said", Boolean(shown) && action === replay.action);
   }
 
   function showReasons() {
@@ -146,14 +160,14 @@ const seat = (() => {
       text("chance", `${move.ready_s ? `ready in ${move.ready_s} s` : "ready now"}${own ? " · ★ its choice" : ""}`);
       return;
     }
-    text("chance", `${own ? "★ " : ""}${percent(move.chance)}`);
+    text("chance", `${move.size ? `${move.size} · ` : ""}${own ? "★ " : ""}${percent(move.chance)}`);
     button.querySelector(".sure").style.width = move.chance < 0.01 ? "0" : `${100 * move.chance}%`;
-    button.setAttribute("aria-label", `${move.label}: chance ${percent(move.chance)}${own ? ", its own choice" : ""}${move.leads ? `, leads ${move.leads}` : ""}`);
+    button.setAttribute("aria-label", `${move.label}${move.size ? ` ${move.size}` : ""}: chance ${percent(move.chance)}${own ? ", its own choice" : ""}${move.leads ? `, leads ${move.leads}` : ""}`);
   }
 
   // ---- answers
 
-  const canAnswer = () => Boolean(send && state.you && state.you.seat && shown && sent !== shown.number);
+  const canAnswer = () => Boolean(send && !state.replay && state.you && state.you.seat && shown && sent !== shown.number);
 
   function enable() {
     const can = canAnswer();
@@ -180,6 +194,14 @@ const seat = (() => {
   function choose(action, event) {
     if (canAnswer() && moveButtons.has(action)) moveButtons.get(action).classList.add("said");
     answer({ action }, event);
+  }
+
+  // The whole way that is drawn on the map, as the moves that lead along it
+  function sendWay() {
+    const path = seatMap.drawn().map((direction) => shown.moves.find((one) => one.direction === direction)).filter(Boolean).map((move) => move.action);
+    seatMap.drop();
+    if (path.length === 1) choose(path[0]);
+    else if (path.length) answer({ path });
   }
 
   function go(direction) {
@@ -227,10 +249,27 @@ const seat = (() => {
     if (shown) enable();
   }
 
+  // Shift and an arrow key draw on, Enter sends what is drawn
+  function draws(event) {
+    const direction = ARROW_KEYS.indexOf(event.key);
+    if (event.shiftKey && direction >= 0 && direction < 4) return seatMap.step(direction) || true;
+    if (event.key !== "Enter" || !seatMap.drawn().length) return false;
+    sendWay();
+    return true;
+  }
+
+  const paced = (word) => send && send({ replay: word });
+
   function pressed(event) {
-    if (event.key === "Escape") event.target.blur();
-    if (event.ctrlKey || event.altKey || event.metaKey || !shown || event.target.matches("input, select, textarea")) return;
+    if (event.key === "Escape" && !seatMap.drop()) event.target.blur();
+    const pace = state.replay && !state.ended && !event.ctrlKey && !event.target.matches("input, button") ? PACES[event.key] : undefined;
+    if (pace) {
+      event.preventDefault();
+      return paced(pace);
+    }
+    if (event.ctrlKey || event.altKey || event.metaKey || !shown || state.replay || event.target.matches("input, select, textarea")) return;
     if (event.key === "Enter" && event.target.matches("button")) return; // that button's own
+    if (draws(event)) return event.preventDefault();
     const direction = ARROW_KEYS.indexOf(event.key), digit = Number.parseInt(event.key, 10) - 1;
     const word = LETTERS[event.key] || LETTERS[event.key.toLowerCase()];
     const numbered = shown.moves[digit] && shown.moves[digit].direction === null ? shown.moves[digit] : undefined;
@@ -262,6 +301,13 @@ const seat = (() => {
     if (button && event.detail) button.blur();
   });
   el("chair-button").onclick = () => send && send({ seat: state.you.seat ? "give" : "take" });
+  el("replay").addEventListener("click", (event) => {
+    const button = event.target.closest("button");
+    if (button) paced(button.dataset.replay);
+    if (button && event.detail) button.blur();
+  });
+  el("way-send").onclick = sendWay;
+  el("way-drop").onclick = () => seatMap.drop();
   window.addEventListener("resize", redraw);
   setInterval(countDown, 250);
 
@@ -271,7 +317,7 @@ const seat = (() => {
     connected(how) {
       sent = 0;
       online(how);
-      seatMap.tell({ go, look: (layer) => how({ layer }) });
+      seatMap.tell({ go, look: (layer) => how({ layer }), can: canAnswer });
     },
     lost: () => online(null),
     spare() {

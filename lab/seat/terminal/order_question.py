@@ -91,4 +91,4 @@ class OrderQuestion:
 
     def where(self, request: SequenceRequest, state: int) -> str:
         """Where the robot is."""
-        return request.run.cell.names[request.run.robot]
+        return f"at {request.run.cell.names[request.run.robot]}"

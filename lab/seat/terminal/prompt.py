@@ -14,6 +14,8 @@ from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
 from lab.learning.session_events import EpisodeEnded
 from lab.seat import request_text
 from lab.seat.event_text import SessionText
+from lab.seat.grid_views import StateWords
+from lab.seat.path_ahead import PathAhead
 from lab.seat.terminal.line_reader import Outside, ReadLine, default_reader
 from lab.seat.terminal.order_question import OrderQuestion
 from lab.seat.terminal.screen import folded, room
@@ -39,7 +41,7 @@ class TeachingPrompt:
         self._console, self._read_line, self._plain = console, read_line, plain
         self._outside: Outside = getattr(read_line, "outside", None) or Outside()
         self._done = False
-        self._path = _Path()
+        self._path = PathAhead()
         self._wall: tuple[int, int, int] | None = None  # that was said of last: episode, state, action
         self._table, self._order = TableQuestion(console, plain), OrderQuestion(console, plain)
         self._last: Request | None = None  # what was asked last
@@ -53,7 +55,7 @@ class TeachingPrompt:
         self._meet(request)
         if self._path.goes_on(request):
             return self._give(request, self._path.step())
-        self._drop_path(f"the learner is at {self._way(request).where(request, request.state)} now")
+        self._drop_path(f"the learner is {self._way(request).where(request, request.state)} now")
         with self._outside.question():
             if self._read_line is None:
                 self._read_line = default_reader(self._console, plain=self._plain, outside=self._outside)
@@ -63,6 +65,10 @@ class TeachingPrompt:
     def answer_from_outside(self, word: str) -> None:
         """Ends the question that waits with a word as if it were typed, from any thread; no effect when nothing waits."""
         self._outside.answer(word)
+
+    def about(self, known: StateWords | None) -> None:
+        """What is learned next: its states in words, None for what has none."""
+        self._table.known = known
 
     def show(self, request: Request) -> None:
         """Shows where the learner is, what it would do, and how it has been doing."""
@@ -92,7 +98,7 @@ class TeachingPrompt:
                 case int():
                     return self._give(request, answer)
                 case tuple() if isinstance(request, AdviceRequest):
-                    self._path = _Path(request, answer)
+                    self._path = PathAhead(request, answer)
                     self._say(f"A path of {counted(len(answer), 'move')}: {self._drawn(request, answer)}", "dim")
                     return self._give(request, self._path.step())
                 case "own":
@@ -146,7 +152,7 @@ class TeachingPrompt:
 
     def _drop_path(self, why: str) -> None:
         request, left = self._path.request, self._path.left
-        self._path = _Path()
+        self._path = PathAhead()
         if request is not None and left:
             self._say(f"The rest of your path is dropped ({self._drawn(request, left)}): {why}.", "yellow")
 
@@ -199,27 +205,3 @@ class TeachingPrompt:
                 self._console.print(line, no_wrap=True, crop=False, overflow="ignore")
             else:
                 self._console.print(line)
-
-
-class _Path:
-    """Moves that were typed at once, given one by one at the next questions of the episode, where they lead."""
-
-    def __init__(self, request: AdviceRequest | None = None, moves: Iterable[int] = ()) -> None:
-        self.request, self.left = request, list(moves)
-        self._state, self._step = (-1, 0) if request is None else (request.state, request.step)
-
-    def goes_on(self, request: Request) -> bool:
-        """Whether this question comes where the path leads; where no table says that, whether it is the next one."""
-        begun = self.request
-        if not self.left or begun is None or not isinstance(request, AdviceRequest):
-            return False
-        if begun.mdp is not request.mdp or begun.episode != request.episode:
-            return False
-        return request.state == self._state if request_text.is_known(request.mdp) else request.step == self._step
-
-    def step(self) -> int:
-        """The next move."""
-        assert self.request is not None
-        action = self.left.pop(0)
-        self._state, self._step = int(self.request.mdp.successor[self._state, action]), self._step + 1
-        return action

@@ -11,6 +11,8 @@ from rich.text import Text
 from lab.learning.requests import AdviceRequest
 from lab.seat import request_text
 from lab.seat.grid_text import GAP, Marks, Picture, picture_of
+from lab.seat.grid_views import StateWords, both_views
+from lab.seat.terminal.typed_answer import example, letters
 
 Parts = dict[str, list[Text]]
 BRIEF = 60  # columns; below, numbers come in fewer words
@@ -53,12 +55,19 @@ def question(request: AdviceRequest, marks: Marks, width: int) -> str:
     return next((form for form in forms if len(form) + 12 <= width), "Which way? ")
 
 
-def screen(request: AdviceRequest, marks: Marks, width: int, height: int) -> list[Text]:
-    """What the learner shows, in so many columns, and lines unless the picture is the environment's own."""
-    step, at = f"step {request.step}: at", request.mdp.state_label(request.state)
-    title = f"Episode {request.episode}, {step} {at}"
-    head = folded([title if len(title) <= width else f"{step.capitalize()} {at}"], width, "bold")
+def screen(
+    request: AdviceRequest, marks: Marks, width: int, height: int, known: StateWords | None = None
+) -> list[Text]:
+    """What the learner shows, in so many columns, and lines unless the picture is the environment's own.
+
+    known: what says in words where it is.
+    """
+    head = _head(request, width, known)
     left = height - len(head)
+    if known is not None and (views := both_views(request, marks, width, left)) is not None:
+        beside = _beside_views(request, marks, views, known, width)
+        if len(beside) <= left:
+            return head + beside
     whole = picture_of(request, marks, width, left)
     if whole is None:
         return head + _below(request, marks, None, width, left)
@@ -69,6 +78,47 @@ def screen(request: AdviceRequest, marks: Marks, width: int, height: int) -> lis
     return head + _below(request, marks, whole, width, left)
 
 
+def _head(request: AdviceRequest, width: int, known: StateWords | None) -> list[Text]:
+    """Which step it is, and where the learner is."""
+    if known is not None:
+        step = f"Episode {request.episode}, step {request.step}"
+        return folded([step], width, "bold") + folded([known.in_words(request.state)], width)
+    step, at = f"step {request.step}: at", request.mdp.state_label(request.state)
+    title = f"Episode {request.episode}, {step} {at}"
+    return folded([title if len(title) <= width else f"{step.capitalize()} {at}"], width, "bold")
+
+
+def _beside_views(request: AdviceRequest, marks: Marks, views: Picture, known: StateWords, width: int) -> list[Text]:
+    """The moves to the right of the views where there is room, else below them; what the learner says under both."""
+    panel = width - views.width - GAP
+    keys = {action: letter for letter, action in letters(request.mdp).items()}
+    moves = [
+        Text.assemble((f"{keys.get(action, ''):2}", "bold"), line)
+        for action, line in enumerate(request_text.bars(request, marks, known.moves_in_words()))
+    ]
+    ranges = request_text.shown_in_words(request, views)
+    said = folded(
+        [request_text.choice(request, marks), *request_text.progress(request), request_text.standing(request)], width
+    )
+    typed = f"Type a letter, an arrow key or a word, or several moves at once, such as {example(request.mdp)}."
+    notes = folded(filter(None, [views.legend, ranges, typed]), width, "dim")
+    if max(move.cell_len for move in moves) > panel:
+        return [*views.lines, *notes, *moves, *said]
+    return [*_joined(views.lines, moves, views.width + GAP), *notes, *said]
+
+
+def _joined(pictured: Sequence[Text], numbers: Sequence[Text], column: int) -> list[Text]:
+    """Lines of a picture, and other lines to the right of them that begin in a column."""
+    lines = []
+    for drawn, number in zip_longest(pictured, numbers):
+        left = drawn.copy() if drawn is not None else Text()
+        if number is not None:
+            left.pad_right(column - left.cell_len)
+            left.append_text(number)
+        lines.append(left)
+    return lines
+
+
 def _beside(request: AdviceRequest, marks: Marks, whole: Picture, width: int, height: int) -> list[Text]:
     """The numbers to the right of the picture, what the picture means below it."""
     panel = width - whole.width - GAP
@@ -77,13 +127,7 @@ def _beside(request: AdviceRequest, marks: Marks, whole: Picture, width: int, he
     notes = folded([whole.legend] * bool(whole.legend), width, "dim")
     picture = picture_of(request, marks, width, height - len(notes) - 1) or whole
     note = request_text.beyond(request, picture)
-    lines = []
-    for drawn, number in zip_longest(picture.lines, numbers):
-        left = drawn.copy() if drawn is not None else Text()
-        if number is not None:
-            left.pad_right(whole.width + GAP - left.cell_len)
-            left.append_text(number)
-        lines.append(left)
+    lines = _joined(picture.lines, numbers, whole.width + GAP)
     return lines + notes + folded([note] * bool(note), width)
 
 

@@ -6,6 +6,7 @@ from rich.text import Text
 from lab.learning.requests import AdviceRequest
 from lab.seat import request_text
 from lab.seat.grid_text import Marks
+from lab.seat.grid_views import StateWords
 from lab.seat.terminal.screen import folded, question, room, screen
 from lab.seat.terminal.typed_answer import Understood, explained, understand
 
@@ -23,6 +24,7 @@ class TableQuestion:
 
     def __init__(self, console: Console, plain: bool) -> None:
         self._console, self._plain = console, plain
+        self.known: StateWords | None = None  # what says in words where the learner is
         self.marks = request_text.WORDS_ONLY if plain else Marks.of(console)
 
     def subject(self, request: AdviceRequest) -> object:
@@ -37,10 +39,10 @@ class TableQuestion:
         """Where the learner is, what it would do, and how it has been doing."""
         width, height = room(self._console)
         if self._plain:
-            return [Text(), *folded(request_text.sentences(request), width)]
+            return [Text(), *folded(request_text.sentences(request, self.known), width)]
         gap = [Text()] * (height >= ROOMY)
         left = height - len(gap) - 1 - len(self.asked(request)) // width
-        return [*gap, *screen(request, self.marks, width, left)]
+        return [*gap, *screen(request, self.marks, width, left, self.known)]
 
     def understood(self, line: str, request: AdviceRequest) -> Understood:
         """What a line means; see `understand`."""
@@ -73,5 +75,5 @@ class TableQuestion:
         return request.mdp.action_labels[action] if self._plain else self.named(request, action).split()[0]
 
     def where(self, request: AdviceRequest, state: int) -> str:
-        """What a state is called."""
-        return request.mdp.state_label(state)
+        """Where a state is, shortly; where that takes many words, the question has them."""
+        return f"at {request.mdp.state_label(state)}" if self.known is None else "elsewhere"

@@ -166,6 +166,19 @@ class Cell:
         return 1 + max(option.choice for place in self.positions for option in place.options)
 
     @cached_property
+    def has_windows(self) -> bool:
+        """Whether a part may be spoilt where it is picked too late."""
+        return any(place.at_most_s is not None for place in self.positions)
+
+    def at_most_s(self, part: int, station: str) -> float | None:
+        """How long after its processing at a station a part may be picked [s]; None: at any time."""
+        product, at = self._products[part - 1], self.index(station)
+        found = [
+            p.at_most_s for p in self.laid_out if p.product == product and at in p.holds and p.at_most_s is not None
+        ]
+        return min(found, default=None)
+
+    @cached_property
     def longest_s(self) -> float:
         """A time that no sequence exceeds: everything slowest, one after the other [s]."""
         slowest_s = sum(float(np.nanmax(table, initial=0.0)) for table in (self.empty_s, self.loaded_s))
@@ -206,7 +219,7 @@ class Cell:
             own = [n for n, place in enumerate(self.laid_out) if place.product == product]
             if one.position is not None and one.position not in own:
                 raise BadInput(f"{where}: position {one.position}: its routes have {own[0]} to {own[-1]}")
-            check_seconds(f"{where}: ready_s", one.ready_s)
+            check_seconds(f"{where}: ready_s", abs(one.ready_s))
             if self.arrivals is not None and one.position == own[0] and one.ready_s > 0:
                 raise BadInput(f"{where}: ready_s = {one.ready_s:g}, but when it comes, the arrivals say")
         for part, at in enumerate(self.begin_at, 1):

@@ -46,7 +46,8 @@ class Position:
     """A part at `station` (index) on a route of `product` (index); `holds`: stations where it, or its pallet, takes room.
 
     processing_s: what begins when the part gets here [s]; None: nothing begins, and what was begun goes on. No options:
-    the part is finished. Ends of routes hold no room.
+    the part is finished. Ends of routes hold no room. at_most_s: how long after the processing it may be picked [s]; None:
+    at any time.
     """
 
     product: int
@@ -54,6 +55,7 @@ class Position:
     holds: tuple[int, ...]
     processing_s: float | None
     options: tuple[Option, ...]
+    at_most_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -168,13 +170,17 @@ class _Positions:
                     reach = ends[stage.station] = self._position(product, stage.station, ())
             elif stage.pallet:
                 holds = (stage.station, before.station)
-                reach = self._position(product, before.station, holds, self._processing_s(stage))
+                reach = self._position(
+                    product, before.station, holds, self._processing_s(stage), self._at_most_s(stage)
+                )
             else:
-                reach = self._position(product, stage.station, (stage.station,), self._processing_s(stage))
+                own = (stage.station,)
+                reach = self._position(product, stage.station, own, self._processing_s(stage), self._at_most_s(stage))
             self._link(leave, reach, stage, service_s)
             leave, service_s = reach, stage.service_s
             if stage.pallet and after is not None:
-                leave = self._position(product, stage.station, (stage.station, after.station), None)
+                holds = (stage.station, after.station)
+                leave = self._position(product, stage.station, holds, None, self._at_most_s(stage))
                 self._join(reach, leave, replace(self._way(after.station), waits=False, carries="pallet"))
 
     def _link(self, leave: int, reach: int, stage: Stage, service_s: float) -> None:
@@ -196,9 +202,16 @@ class _Positions:
         """An option of which only that is known yet."""
         return Option(-1, -1, -1, self._index[target], (), service_s=service_s)
 
-    def _position(self, product: int, station: str, holds: tuple[str, ...], processing_s: float | None = 0.0) -> int:
+    def _position(
+        self,
+        product: int,
+        station: str,
+        holds: tuple[str, ...],
+        processing_s: float | None = 0.0,
+        at_most_s: float | None = None,
+    ) -> int:
         held = tuple(self._index[name] for name in holds)
-        self.positions.append(Position(product, self._index[station], held, processing_s, ()))
+        self.positions.append(Position(product, self._index[station], held, processing_s, (), at_most_s))
         return len(self.positions) - 1
 
     def _join(self, leave: int, to: int, way: Option) -> None:
@@ -212,3 +225,6 @@ class _Positions:
     def _processing_s(self, stage: Stage) -> float:
         station = self._stations[self._index[stage.station]]
         return station.processing_s if stage.processing_s is None else stage.processing_s
+
+    def _at_most_s(self, stage: Stage) -> float | None:
+        return self._stations[self._index[stage.station]].at_most_s if stage.at_most_s is None else stage.at_most_s

@@ -1,7 +1,7 @@
 """What a run of a cell comes to: timed moves, the Schedule of robot, machines and parts that they make, and results."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
 
@@ -53,10 +53,21 @@ class Move:
 
 
 @dataclass(frozen=True)
+class FetchBy:
+    """Until when a part is to be picked at a machine where it is done at `done_s`; later it is spoilt."""
+
+    part: int
+    station: str
+    done_s: float
+    until_s: float
+
+
+@dataclass(frozen=True)
 class Schedule:
     """A timed run, predicted or measured: activities by start for the robot, the machines and the parts; seconds.
 
-    `makespan_s` is when the last part reaches the end of its route. `sequence`: the decisions (see `Run`). Raises
+    `makespan_s` is when the last part reaches the end of its route. `sequence`: the decisions (see `Run`). fetch_by: until when
+    parts are to be picked, where there is such a limit, by time; `to_json` has it only then. Raises
     BadInput for an activity that ends before it starts, times that are not finite, or an unknown kind.
     Source: fig. IV.1.
     """
@@ -66,6 +77,7 @@ class Schedule:
     parts: tuple[Activity, ...]
     makespan_s: float
     sequence: tuple[int, ...]
+    fetch_by: tuple[FetchBy, ...] = ()
 
     def __post_init__(self) -> None:
         for activity in (*self.robot, *self.machines, *self.parts):
@@ -87,13 +99,16 @@ class Schedule:
         end_s = max((move.drop_s for move in moves), default=0.0)
         parts: list[Activity] = []
         machines: list[Activity] = []
+        limits: list[FetchBy] = []
         for part in cell.unfinished:
             own = [move for move in moves if move.part == part and move.carries == "part"]
             rows = _part_activities(cell, part, own, 0.0 if came_s is None else came_s[part - 1], end_s)
             parts += rows[0]
             machines += rows[1]
+            limits += _limits(cell, part, own) if cell.has_windows else ()
         order = [move.part for move in moves] if sequence is None else sequence
-        return cls(tuple(robot), _by_start(machines), tuple(parts), end_s, tuple(order))
+        limits.sort(key=lambda limit: limit.until_s)
+        return cls(tuple(robot), _by_start(machines), tuple(parts), end_s, tuple(order), tuple(limits))
 
     def later(self, by_s: float) -> "Schedule":
         """The same so much later [s]: of what was planned anew in the middle, its times counted from the beginning."""
@@ -101,12 +116,14 @@ class Schedule:
             tuple(replace(a, start_s=a.start_s + by_s, end_s=a.end_s + by_s) for a in row)
             for row in (self.robot, self.machines, self.parts)
         ]
-        return Schedule(rows[0], rows[1], rows[2], self.makespan_s + by_s, self.sequence)
+        limits = tuple(replace(one, done_s=one.done_s + by_s, until_s=one.until_s + by_s) for one in self.fetch_by)
+        return Schedule(rows[0], rows[1], rows[2], self.makespan_s + by_s, self.sequence, limits)
 
     def to_json(self) -> dict[str, Any]:
         """Plain dicts, lists, numbers and strings, for `json.dumps`."""
         rows = {name: [asdict(a) for a in getattr(self, name)] for name in _ROWS}
-        return {"makespan_s": self.makespan_s, "sequence": list(self.sequence)} | rows
+        limits = {"fetch_by": [asdict(one) for one in self.fetch_by]} if self.fetch_by else {}
+        return {"makespan_s": self.makespan_s, "sequence": list(self.sequence)} | rows | limits
 
 
 def robot_activities(move: Move) -> list[Activity]:
@@ -144,6 +161,15 @@ def _part_activities(
             rows.append(Activity(row, "carry", part, move.origin, move.target, move.pick_s, move.drop_s))
             since_s, place, process_s = move.drop_s, move.target, move.process_s
     return _lasting(rows), _lasting(machines)
+
+
+def _limits(cell: Cell, part: int, moves: Sequence[Move]) -> Iterator[FetchBy]:
+    """Until when a part is to be picked at the machines that it begins in or is brought to."""
+    begins = cell.names[cell.positions[cell.begin_at[part - 1]].station], cell.begin_s[part - 1]
+    for station, done_s in (begins, *((move.target, move.drop_s + move.process_s) for move in moves)):
+        at_most_s = cell.at_most_s(part, station)
+        if at_most_s is not None:
+            yield FetchBy(part, station, done_s, done_s + at_most_s)
 
 
 def _lasting(activities: Iterable[Activity]) -> list[Activity]:

@@ -16,21 +16,27 @@ STATION_KINDS = ("storage", "buffer", "machine")
 
 @dataclass(frozen=True)
 class Station:
-    """A place for parts. `capacity` in parts; `processing_s` in seconds, above 0 only for machines."""
+    """A place for parts. `capacity` in parts; `processing_s` in seconds, above 0 only for machines.
+
+    at_most_s: how long after its processing a part may stay in a machine before it is picked, else it is spoilt [s]; None: as
+    long as you like.
+    """
 
     name: str
     kind: Literal["storage", "buffer", "machine"]
     capacity: int
     processing_s: float = 0.0
+    at_most_s: float | None = None
 
 
 @dataclass(frozen=True)
 class Stage:
     """A step of a route: the station to reach, and the buffer before it for when it is full (None: no buffer).
 
-    processing_s: this product's time there (None: the station's). service_s: what the robot has to do there before it
-    can take the part out, such as vacuuming a mill [s]. pallet: the part is lifted off its pallet for this machine; the
-    pallet stays at the station before, and has to be brought to the station after before the part can leave.
+    processing_s: this product's time there, and at_most_s, how long after it a part may stay (None: the station's). service_s:
+    what the robot has to do there before it can take the part out, such as vacuuming a mill [s]. pallet: the part is lifted
+    off its pallet for this machine; the pallet stays at the station before, and has to be brought to the station after before
+    the part can leave.
     """
 
     station: str
@@ -38,6 +44,7 @@ class Stage:
     processing_s: float | None = None
     service_s: float = 0.0
     pallet: bool = False
+    at_most_s: float | None = None
 
 
 Route = tuple[Stage, ...]
@@ -71,7 +78,8 @@ class Begins:
     """Where a part is when the work begins, for work that begins in the middle.
 
     position: its place on its product's routes, an index of `Cell.positions`; None: it is finished or lost, takes no room,
-    and nothing is to be done with it. ready_s: when it may be picked, counted from now [s]. stays: it cannot be finished; it
+    and nothing is to be done with it. ready_s: when it may be picked, counted from now [s]; below 0: it is done for so long,
+    which matters where it may be picked too late. stays: it cannot be finished; it
     stays there and takes its room.
     """
 
@@ -121,9 +129,16 @@ def _check_stations(stations: Sequence[Station]) -> None:
         check_seconds(f"{where}: processing_s", station.processing_s)
         if station.kind != "machine" and station.processing_s > 0:
             raise BadInput(f"{where}: processing_s = {station.processing_s}, but only a machine processes")
+        if station.at_most_s is not None:
+            check_seconds(f"{where}: at_most_s", station.at_most_s)
+            if station.kind != "machine":
+                raise BadInput(
+                    f"{where}: at_most_s = {station.at_most_s:g}, but it is a {station.kind}; only a machine has it"
+                )
 
 
 def _check_route(stations: Sequence[Station], route: Route, one_of: str) -> None:
+    known = {station.name: station for station in stations}
     kinds = {station.name: station.kind for station in stations}
     if len(route) < 2:
         raise BadInput(f"{one_of} has {len(route)} stages; it needs at least 2, a start and an end")
@@ -147,7 +162,7 @@ def _check_route(stations: Sequence[Station], route: Route, one_of: str) -> None
             raise BadInput(
                 f"{where}: '{stage.station}' is a {kinds[stage.station]}; a route starts and ends in storage"
             )
-        _check_stage(stage, kinds[stage.station], where)
+        _check_stage(stage, known[stage.station], where)
     for number, stage in enumerate(route, 1):
         if stage.pallet and not _takes_pallet(route, number - 1, kinds):
             raise BadInput(
@@ -164,13 +179,24 @@ def _takes_pallet(route: Route, number: int, kinds: Mapping[str, str]) -> bool:
     )
 
 
-def _check_stage(stage: Stage, kind: str, where: str) -> None:
-    if stage.processing_s is not None:
-        check_seconds(f"{where}: processing_s", stage.processing_s)
+def _check_stage(stage: Stage, station: Station, where: str) -> None:
+    kind, at_most_s = station.kind, station.at_most_s if stage.at_most_s is None else stage.at_most_s
+    for name, seconds in (("processing_s", stage.processing_s), ("at_most_s", stage.at_most_s)):
+        if seconds is not None:
+            check_seconds(f"{where}: {name}", seconds)
     check_seconds(f"{where}: service_s", stage.service_s)
     for name, given in (("processing_s", stage.processing_s), ("pallet", stage.pallet), ("service_s", stage.service_s)):
         if given and kind != "machine":
             raise BadInput(f"{where}: {name} = {given}, but '{stage.station}' is a {kind}; only a machine has it")
+    if stage.at_most_s is not None and kind != "machine":
+        raise BadInput(
+            f"{where}: at_most_s = {stage.at_most_s:g}, but '{stage.station}' is a {kind}; only a machine has it"
+        )
+    if at_most_s is not None and at_most_s < stage.service_s:
+        raise BadInput(
+            f"{where}: at_most_s = {at_most_s:g}, but the service before the pick takes {stage.service_s:g} s: it can never be "
+            "picked in time"
+        )
 
 
 def check_seconds(what: str, seconds: float) -> None:

@@ -14,7 +14,7 @@ from lab.sequencing.cell.objectives import MAKESPAN, check_built_in, check_objec
 from lab.sequencing.methods.cp_sat_model import Model
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.search import Search, SequenceResult, only_one
-from lab.sequencing.simulate.run import follow
+from lab.sequencing.simulate.run import Run, follow
 
 TIME_LIMIT_S = 60.0
 MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory grows with the square, to a gigabyte
@@ -77,9 +77,10 @@ def cp_sat(
     solver.parameters.use_dynamic_precedence_in_disjunctive = True
     solver.parameters.absolute_gap_limit = model.blur
     status = _STATUS[solver.solve(model.model)]
-    found = status in ("optimal", "feasible")
-    sequence = model.sequence(solver) if found else ()
-    value = cost(follow(cell, sequence), objective) if found else inf
+    sequence = model.sequence(solver) if status in ("optimal", "feasible") else ()
+    if sequence and model.times.rounded_s and _spoils(cell, sequence):
+        status, sequence = "unknown", ()
+    value = cost(follow(cell, sequence), objective) if sequence else inf
     bound = inf if status == "impossible" else min(value, solver.best_objective_bound * model.worth)
     return CpSatResult(status, value, bound, sequence, solver.wall_time, model.times.rounded_s)
 
@@ -89,6 +90,16 @@ def cp_sat_sequencer(cell: Cell, search: Search, rng: np.random.Generator) -> Se
     search.check(cell)
     found = cp_sat(cell, search.objective)
     return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))
+
+
+def _spoils(cell: Cell, sequence: Sequence[int]) -> bool:
+    """Whether a part would be picked too late after all, by less than the times were rounded."""
+    run = Run(cell)
+    for decision in sequence:
+        if run.spoils(decision):
+            return True
+        run.move(decision)
+    return False
 
 
 def fits(cell: Cell) -> bool:

@@ -134,6 +134,10 @@ class Model:
             waits = self.model.new_bool_var("waits")
             self.model.add(begin >= ready).only_enforce_if(done)
             self.model.add(begin <= ready).only_enforce_if(done, waits)
+        at_most_s = self.cell.positions[way.place].at_most_s
+        if at_most_s is not None and ready is not None:
+            latest = ready + self.times.whole(at_most_s) - self.times.whole(way.option.service_s)
+            self.model.add(begin <= latest).only_enforce_if(done)
         return Task(part, way, done, begin, begin + self.times.work(way), waits)
 
     def _ready(self, part: int, way: Way) -> cp_model.LinearExprT | None:
@@ -148,9 +152,10 @@ class Model:
         while place != begin and self.cell.positions[place].processing_s is None:
             place = next(way.place for way in self._ways if way.option.to == place)
         if place == begin:
-            return self.times.whole(begin_s) if begin_s > 0 else None
-        process = self.times.processing(place)
-        return self._come[part, place] + process if process else None
+            known = begin_s > 0 or self.cell.positions[place].at_most_s is not None
+            return self.times.whole(begin_s) if known else None
+        process, limited = self.times.processing(place), self.cell.positions[way.place].at_most_s is not None
+        return self._come[part, place] + process if process or limited else None
 
     def _add_tour(self) -> None:
         """The robot goes from move to move, in one tour from its start to the last end; time follows."""
@@ -197,7 +202,8 @@ class Model:
             inside = holds[self.cell.begin_at[part]]
             if brings or inside:
                 visit = Visit(part, station, *self._visit(brings, takes, inside))
-                size = self.model.new_int_var(0, 2 * self._longest + 2, "stay") if inside else self._moment("stay")
+                # It may begin before 0, and the change after it may lie behind the end.
+                size = self.model.new_int_var(0, 2 * self._longest + 2, "stay")
                 least.append(self._least(brings, takes) + change * visit.here)
                 self.model.add(size >= least[-1])
                 span = visit.begin, size, visit.leave + change, visit.here

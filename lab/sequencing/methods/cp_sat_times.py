@@ -35,6 +35,7 @@ class Times:
                 *(cell.arrivals.interval_s if cell.arrivals else ()),
                 *(cell.due_s or ()),
                 *cell.begin_s,
+                *(place.at_most_s or 0.0 for place in cell.positions),
             ]
         )
         longest_s = cell.longest_s + max(cell.due_s or (0.0,))

@@ -11,11 +11,11 @@ import numpy as np
 from lab.errors import WorkFailed, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN
-from lab.sequencing.cell.ways import TICKS_PER_S
+from lab.sequencing.cell.ways import FAR, TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.search import Search, SequenceResult, gap, only_one
-from lab.sequencing.simulate.merged import MergedCell, MergedState
+from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
 from lab.sequencing.simulate.run import simulate
 
 MAX_EXPANDED = 300_000
@@ -54,7 +54,7 @@ class _Search:
         # What the clock brings is no wait: it comes anyway.
         self._waits = len(self.merged.slots) + self.merged.one_by_one
         self.expanded = self.bound = self._serial = 0
-        self._fronts: dict[tuple[int, int], list[tuple[int, ...]]] = {}
+        self._fronts: dict[tuple[int, int] | MergedKey, list[tuple[int, ...]]] = {}
         self._heap: list[tuple[int, int, MergedState]] = []
         self._greedy = False
         self._reach(self.merged.start())
@@ -68,7 +68,7 @@ class _Search:
         """The first complete state; None: when `most` states were opened in all, or all there are, there was none."""
         while self._heap:
             bound, serial, state = heapq.heappop(self._heap)
-            if self._times(state) not in self._fronts[state.counts, state.robot]:
+            if self._times(state) not in self._fronts[self._group(state)]:
                 continue  # overtaken since it was queued
             self.bound = max(self.bound, bound)
             if self.merged.done(state):
@@ -92,24 +92,39 @@ class _Search:
         if self.merged.one_by_one:
             # Since when a part waits to be picked does not matter either.
             state = state._replace(waits=(*state.waits[:-1], tuple([max(at, state.now) for at in state.waits[-1][:1]])))
+        left = self._least.left(state)
+        if left >= FAR:
+            return
         times = self._times(state)
-        front = self._fronts.setdefault((state.counts, state.robot), [])
+        front = self._fronts.setdefault(self._group(state), [])
         if any(all(map(le, other, times)) for other in front):
             return
         front[:] = [other for other in front if not all(map(le, times, other))]
         front.append(times)
         # Of equally promising states the newest comes first, hence the falling serial number.
         self._serial -= 1
-        left = self._least.left(state)
         heapq.heappush(self._heap, (left if self._greedy else state.now + left, self._serial, state))
 
+    def _group(self, state: MergedState) -> tuple[int, int] | MergedKey:
+        """What states have in common that are compared by their times."""
+        return self.merged.key(state) if self.merged.latest else (state.counts, state.robot)
+
     def _times(self, state: MergedState) -> tuple[int, ...]:
-        """Now and all that is waited for: of states with equal counts and robot, one that is nowhere later is no worse."""
+        """Now and all that is waited for: of states with equal counts and robot, one that is nowhere later is no worse.
+
+        Where a part may be picked too late, what is earlier may be worse: then only states that differ in nothing but now are
+        compared.
+        """
+        if self.merged.latest:
+            return (state.now,)
         return (state.now, *chain.from_iterable(state.waits[: self._waits]))
 
 
 def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     """The shortest makespan of the cell and a sequence that reaches it, alike parts numbered first in, first out.
+
+    Of all sequences, each carried out as early as it can be (see `Run`). Where parts may be picked too late, a robot that
+    waited on purpose before it brings a part might do better; that is not looked for.
 
     States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
     optimal; a deadlock leads nowhere. After `max_expanded` states it gives up and opens as many again, nearest to the end

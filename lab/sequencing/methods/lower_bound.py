@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import from_the_ends
-from lab.sequencing.cell.ways import TICKS_PER_S, Way, distances, ticks, ways_of
+from lab.sequencing.cell.ways import FAR, TICKS_PER_S, Way, distances, ticks, ways_of
 from lab.sequencing.methods.robot_bound import RobotWork, least_rest
 from lab.sequencing.simulate.merged import MergedCell, MergedState
 
@@ -59,7 +59,9 @@ class LowerBound:
         self._after_arrival = _after_arrival(cell, self._to_end)
 
     def left(self, state: MergedState) -> int:
-        """Ticks still needed at least."""
+        """Ticks still needed at least; FAR when a part can no longer be fetched in time."""
+        if self._merged.latest and self._merged.too_late(state):
+            return FAR
         known = self._known.get(state.counts)
         if known is None:
             known = self._known[state.counts] = self._of(self._merged.counted(state.counts))

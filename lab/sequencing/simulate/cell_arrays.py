@@ -28,7 +28,8 @@ class CellArrays(NamedTuple):
 
     first_option (P + 1,): where the options of each position begin. holds (P, 2), needs (O, 2) and if_full (O,):
     stations; where there are fewer, S stands for one with endless room and S + 1 for one that is always full.
-    begins (P,): whether a processing begins there. rooms (S + 2,): room for parts. empty_s, loaded_s (S, S) [s];
+    begins (P,): whether a processing begins there. at_most_s (P,): how long after it a part may be picked; inf: at any time;
+    windows: whether there is such a limit. rooms (S + 2,): room for parts. empty_s, loaded_s (S, S) [s];
     starts, begin_at (K,): the first position of a part's routes, and the one in which it begins; begin_s (K,): when it may be
     picked there [s]; coming (C,): the parts, from 0, that begin at a start.
     interval_s, due_s (K,) [s]. many: whether a part may have several choices. The codes are those of this module.
@@ -38,6 +39,7 @@ class CellArrays(NamedTuple):
     holds: Ints
     begins: Flags
     processing_s: Floats
+    at_most_s: Floats
     choice: Ints
     to: Ints
     origin: Ints
@@ -57,6 +59,7 @@ class CellArrays(NamedTuple):
     due_s: Floats
     robot_start: int
     many: bool
+    windows: bool
     arrivals: int
     machines: int
     objective: int
@@ -96,6 +99,7 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
         holds=_padded([place.holds for place in places], size),
         begins=np.array([place.processing_s is not None for place in places]),
         processing_s=np.array([place.processing_s or 0.0 for place in places]),
+        at_most_s=np.array([np.inf if place.at_most_s is None else place.at_most_s for place in places]),
         choice=np.array([option.choice for option in options]),
         to=np.array([option.to for option in options]),
         origin=np.array([option.origin for option in options]),
@@ -115,6 +119,7 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
         due_s=np.array(cell.due_s or (0.0,) * cell.parts, np.float64),
         robot_start=cell.index(cell.robot_start),
         many=cell.most_choices > 1,
+        windows=cell.has_windows,
         arrivals=ARRIVAL_CODES[cell.arrivals.after] if cell.arrivals else NO_ARRIVALS,
         machines=machine_places(cell),
         objective=OBJECTIVE_CODES[objective],

@@ -8,6 +8,7 @@ from lab.learning import splitmix
 from lab.learning.compiled import inner, lean
 from lab.sequencing.cell import chance
 from lab.sequencing.simulate.cell_arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES
+from lab.sequencing.simulate.run import SLACK_S
 
 CLOCK, PICK = ARRIVAL_CODES["clock"], ARRIVAL_CODES["pick"]
 CONSTANT, NORMAL = LAW_CODES["constant"], LAW_CODES["normal"]
@@ -66,6 +67,16 @@ def reset(cell: Any, run: Any, seed: Any) -> None:
     run.whole[0], run.whole[1], run.whole[2] = cell.robot_start, 0, unfinished
 
 
+@inner
+def _too_late(cell: Any, run: Any, part: int, o: int) -> bool:
+    """`Run.too_late`."""
+    at_most_s = cell.at_most_s[run.locations[part]]
+    if at_most_s == np.inf or not cell.waits[o]:
+        return False
+    reach_s = run.clock[0] + cell.empty_s[run.whole[0], cell.origin[o]]
+    return bool(max(reach_s, run.ready_s[part]) + cell.service_s[o] > run.ready_s[part] + at_most_s + SLACK_S)
+
+
 @lean
 def list_allowed(cell: Any, run: Any) -> int:
     """`Run.allowed`: how many decisions may be taken now; they stand in run.allowed, what they mean in run.options."""
@@ -76,7 +87,7 @@ def list_allowed(cell: Any, run: Any) -> int:
             continue
         for o in range(cell.first_option[place], cell.first_option[place + 1]):
             room = run.room[cell.needs[o, 0]] > 0 and run.room[cell.needs[o, 1]] > 0
-            if room and run.room[cell.if_full[o]] <= 0:
+            if room and run.room[cell.if_full[o]] <= 0 and not (cell.windows and _too_late(cell, run, part, o)):
                 run.allowed[count], run.options[count] = part + 1 + cell.choice[o] * parts, o
                 count += 1
     if cell.many:
@@ -149,7 +160,7 @@ def cost(cell: Any, run: Any) -> float:
 def follow(cell: Any, run: Any, sequence: Any, seed: Any) -> float:
     """The cost of a sequence of decisions with the times of an episode's seed; NaN when one of them may not be taken.
 
-    What the sequence leaves undone counts as a deadlock.
+    What the sequence leaves undone counts as a deadlock; where parts may be picked too late, so does what may not be taken.
     """
     reset(cell, run, seed)
     for decision in sequence:
@@ -157,7 +168,7 @@ def follow(cell: Any, run: Any, sequence: Any, seed: Any) -> float:
         while i < count and run.allowed[i] != decision:
             i += 1
         if i == count:
-            return float(np.nan)
+            return float(cell.stuck_cost) if cell.windows else float(np.nan)
         move(cell, run, i, seed)
     return cost(cell, run)
 

@@ -2,13 +2,13 @@
 
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import accumulate
+from itertools import accumulate, chain
 from typing import NamedTuple
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import entry
-from lab.sequencing.cell.ways import TICKS_PER_S, Way, empty_ticks, ticks, ways_of
-from lab.sequencing.simulate.run import Run
+from lab.sequencing.cell.ways import TICKS_PER_S, Way, distances, empty_ticks, ticks, ways_of
+from lab.sequencing.simulate.run import SLACK_S, Run
 
 _BITS = 8  # a count in the code of all counts; MAX_PARTS fits
 _LOW = (1 << _BITS) - 1
@@ -20,10 +20,11 @@ Who = tuple[tuple[int, ...], ...]
 class MergedState(NamedTuple):
     """Between two moves, in ticks: how many parts stand in each position, the robot's station, what is waited for.
 
-    Of the parts of one product in one position the first that is ready goes first. waits: by slot (see `MergedCell`),
-    when each part there is finished, ascending, never before `now`; where parts arrive, the last slot has when each
-    comes that has not been fetched. who: by position, the parts on their way, each in the order of its waits; None:
-    nobody asks. `way` and `part` (0: nobody asks) led here from `parent`.
+    Of the parts of one product in one position the first that is ready, and not too late, goes first. waits: by slot (see
+    `MergedCell`), when each part there is finished, ascending, never before `now` unless it may be picked too late; where
+    parts arrive, the last slot has when each comes that has not been fetched. who: by position, the parts on their way, each
+    in the order of its waits; None: nobody asks. `way`, `part` (0: nobody asks) and `nth`, which of its position's parts from 0,
+    led here from `parent`.
     """
 
     now: int
@@ -34,6 +35,7 @@ class MergedState(NamedTuple):
     way: Way | None = None
     part: int = 0
     parent: "MergedState | None" = None
+    nth: int = 0
 
 
 class MergedCell:
@@ -41,7 +43,7 @@ class MergedCell:
 
     slots: by position where something is waited for, where the states have it in `waits`. process: what begins in each
     position [ticks]; None: nothing does. starts, ends: where parts begin and finish. one_by_one: each sets out when the
-    one before is picked.
+    one before is picked. latest: by position, how long a part may be finished before it is too late to pick it [ticks].
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -50,7 +52,11 @@ class MergedCell:
         process = [place.processing_s for place in cell.positions]
         self.process = [None if seconds is None else round(seconds * TICKS_PER_S) for seconds in process]
         later = {cell.begin_at[part - 1] for part in cell.unfinished if cell.begin_s[part - 1] > 0}
+        limits = {n: place.at_most_s for n, place in enumerate(cell.positions) if place.at_most_s is not None}
+        self.latest = {n: round((at_most_s + SLACK_S) * TICKS_PER_S) for n, at_most_s in limits.items()}
+        later |= set(self.latest)
         timed = [n for n, seconds in enumerate(process) if seconds is None or seconds > 0 or n in later]
+        self._past = [-1 - self.latest[n] if n in self.latest else 0 for n in timed]  # what is too late is too late
         self.slots = {place: slot for slot, place in enumerate(timed)}
         intervals_s = [cell.arrivals.interval_s[part - 1] for part in cell.coming] if cell.arrivals is not None else []
         self._intervals = ticks(intervals_s)
@@ -61,6 +67,7 @@ class MergedCell:
         for way in ways_of(cell):
             self._ways[way.place].append(way)
         self._known: dict[int, Choices] = {}
+        self._fetching = self._times_to_fetch() if self.latest else {}
 
     def start(self, *, named: bool = False) -> MergedState:
         """Where all begins; `named`: parts are told from one another."""
@@ -80,7 +87,8 @@ class MergedCell:
         for place, parts in enumerate(who):
             if not (self._intervals and place in self.starts):  # these come in their order
                 parts.sort(key=lambda part: ready[part - 1])
-        waits = [tuple([max(ready[part - 1], now) for part in who[place]]) for place in self.slots]
+        past = zip(self.slots, self._past, strict=True)
+        waits = [tuple([max(ready[part - 1], now + least) for part in who[place]]) for place, least in past]
         if self._intervals:
             waits.append(tuple(ready[part - 1] for part in sorted(n for place in self.starts for n in who[place])))
         return MergedState(now, self._code_of(run.locations), run.robot, tuple(waits), tuple(map(tuple, who)))
@@ -108,26 +116,37 @@ class MergedCell:
     def key(self, state: MergedState) -> MergedKey:
         """All that the future depends on when parts are alike: counts, robot, how long there is still to wait."""
         now = state.now
-        return state.counts, state.robot, tuple([max(at - now, 0) for row in state.waits for at in row])
+        if not self.latest:
+            return state.counts, state.robot, tuple([max(at - now, 0) for row in state.waits for at in row])
+        rows = zip(state.waits, chain(self._past, [0]), strict=False)  # the last: of arrivals, where there are
+        return state.counts, state.robot, tuple([max(at - now, least) for row, least in rows for at in row])
 
     def choices(self, state: MergedState) -> Choices:
         """The ways that may be taken now: one an option of a position, since its parts are alike."""
         known = self._known.get(state.counts)
         if known is None:
             known = self._known[state.counts] = self._allowed(self.counted(state.counts))
+        if self.latest:
+            return {at: way for at, way in known.items() if self._in_time(state, way)}
         return known
 
     def successors(self, state: MergedState) -> Iterator[MergedState]:
-        """The states after each of them."""
+        """The states after each of them; where parts may be too late, by each that is not: to wait for a later one may help."""
         for way in self.choices(state).values():
-            yield self.after(state, way)
+            for nth in self._in_time(state, way) if self.latest else (0,):
+                yield self.after(state, way, nth=nth)
 
-    def after(self, state: MergedState, way: Way, part: int = 0) -> MergedState:
-        """The state after a way that may be taken, by the first part that is ready or, where they are named, by `part`."""
+    def after(self, state: MergedState, way: Way, part: int = 0, nth: int = -1) -> MergedState:
+        """The state after a way that may be taken, by the first part that is ready and not too late.
+
+        Or by the `nth` from 0 of those in that position, or, where they are named, by `part`.
+        """
         place, option, work = way
-        waits, who, first = list(state.waits), state.who, 0
+        waits, who, first = list(state.waits), state.who, nth
+        if nth < 0:
+            first = self._in_time(state, way)[0] if self.latest else 0
         if who is not None:
-            first = who[place].index(part) if part else 0
+            first = who[place].index(part) if part else first
             part = who[place][first]
         ready, slot, starts = 0, self.slots.get(place), bool(self._intervals) and place in self.starts
         if slot is not None:
@@ -145,13 +164,14 @@ class MergedCell:
             waits[slot] = (*there[:behind], at, *there[behind:])
         coming = waits.pop() if self._intervals else None
         # A part that finished earlier is ready now: forgetting since when lets more states be equal.
-        rows = [tuple([max(tick, now) for tick in row]) if row else () for row in waits]
+        past = zip(waits, self._past, strict=True)
+        rows = [tuple([max(tick, now + least) for tick in row]) if row else () for row, least in past]
         if coming is not None:
             pick = now - self._loaded[option.origin][option.target]
             rows.append(self._left_to_come(coming, self.fetched(state), pick) if starts else coming)
         named = None if who is None else self._moved(who, way, first, behind)
         counts = state.counts + (1 << _BITS * option.to) - (1 << _BITS * place)
-        return MergedState(now, counts, option.target, tuple(rows), named, way, part, state)
+        return MergedState(now, counts, option.target, tuple(rows), named, way, part, state, first)
 
     def waited(self, state: MergedState, ahead: MergedState) -> int:
         """How long the robot waited in the move from a state to the one ahead of it."""
@@ -165,15 +185,34 @@ class MergedCell:
 
     def decisions(self, state: MergedState) -> tuple[int, ...]:
         """All entries from the start to a state in which parts need not be named."""
-        ways, named = list[Way](), self.start(named=True)
+        steps, named = list[tuple[Way, int]](), self.start(named=True)
         while state.way is not None and state.parent is not None:
-            ways.append(state.way)
+            steps.append((state.way, state.nth))
             state = state.parent
         found = []
-        for way in reversed(ways):
-            named = self.after(named, way)
+        for way, nth in reversed(steps):
+            named = self.after(named, way, nth=nth)
             found.append(self.decision(named))
         return tuple(found)
+
+    def too_late(self, state: MergedState) -> bool:
+        """Whether a part can no longer be fetched in time, whichever way the robot takes."""
+        for place, least in self._fetching.items():
+            there = state.waits[self.slots[place]]
+            if there and state.now + least[state.robot] > there[0] + self.latest[place]:
+                return True
+        return False
+
+    def _in_time(self, state: MergedState, way: Way) -> list[int]:
+        """Which of the parts in a way's position, from 0, would be picked in time; one of those that are alike in all."""
+        place, option, work = way
+        there = state.waits[self.slots[place]] if place in self.slots else (0,)
+        differ = [nth for nth, ready in enumerate(there) if nth == 0 or ready != there[nth - 1]]
+        if place not in self.latest or not option.waits:
+            return differ
+        service = work - self._loaded[option.origin][option.target]
+        reach, latest = state.now + self._empty[state.robot][option.origin], self.latest[place]
+        return [nth for nth in differ if max(reach, there[nth]) + service <= there[nth] + latest]
 
     def _code_of(self, locations: Sequence[int]) -> int:
         return self.code([locations.count(place) for place in range(len(self._ways))])
@@ -193,6 +232,17 @@ class MergedCell:
             for way in self._ways[place]
             if way.option.possible(full)
         }
+
+    def _times_to_fetch(self) -> dict[int, list[int]]:
+        """By position where parts may be too late and by the robot's station: the least time until one is picked [ticks]."""
+        far, found = distances(self.cell), dict[int, list[int]]()
+        for place in self.latest:
+            out = [way for way in self._ways[place] if way.option.waits]
+            service = [way.work - self._loaded[way.option.origin][way.option.target] for way in out]
+            pairs = list(zip(out, service, strict=True))
+            if pairs:
+                found[place] = [min(row[way.option.origin] + more for way, more in pairs) for row in far]
+        return found
 
     def _left_to_come(self, coming: tuple[int, ...], fetched: int, pick: int) -> tuple[int, ...]:
         """When parts come once the first of them is picked: then the next one sets out, where they are brought so."""

@@ -94,7 +94,9 @@ def _begin(run: Run, part: int, mishaps: Mishaps) -> Begins:
     if not cell.laid_out[place].options:
         return Begins(place)
     comes = cell.arrivals is not None and place == cell.starts[part - 1]
-    ready_s = 0.0 if comes else max(0.0, run.ready_s[part - 1] - run.now_s)
+    ready_s = run.ready_s[part - 1] - run.now_s
+    if comes or cell.laid_out[place].at_most_s is None:
+        ready_s = 0.0 if comes else max(0.0, ready_s)
     return Begins(place, mishaps.ready_s.get(part, ready_s))
 
 

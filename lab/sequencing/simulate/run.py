@@ -8,13 +8,17 @@ from lab.sequencing.cell.chance import Episode
 from lab.sequencing.cell.routes import Option, choice_of, entry, part_of
 from lab.sequencing.cell.schedule import Move, Schedule
 
+SLACK_S = 1e-6  # so much later is not too late: what sums of times may differ by
+
 
 class Run:
     """Where parts and robot are, and at what time; `move` carries one decision out.
 
     A decision is an entry of a sequence: the part's number, + the number of parts for the second choice it has, and so
     on. The robot travels empty to where the part, or its pallet, is picked, waits there until it is ready, does its
-    service work and carries it on; processing starts at arrival. locations: the position of each part, part 1 first.
+    service work and carries it on; processing starts at arrival. All is done as early as it can be: the robot never waits for
+    anything else. A decision that would pick a part later than it may be picked is not allowed (see `Station.at_most_s`): what
+    was left too long stays where it is, and the run ends as a deadlock does. locations: the position of each part, part 1 first.
     occupied: room taken at each station. ready_s: when each part may be picked. finished_s: when each part reached the
     end of its route (None: not yet; 0: before the work began, or nothing is to be done with it). fetched: how many parts
     were taken from the start of their routes. waited_s: how long the robot has waited. processed_s: how long machines were
@@ -49,7 +53,7 @@ class Run:
             for part in range(1, parts + 1)
             if self._in_turn(part)
             for option in self.cell.positions[self.locations[part - 1]].options
-            if option.possible(full)
+            if option.possible(full) and not self.too_late(part, option)
         ]
         return tuple(sorted(found))
 
@@ -61,8 +65,23 @@ class Run:
         choice, full = choice_of(decision, self.cell.parts), self._full()
         for option in self.cell.positions[self.locations[part - 1]].options:
             if option.choice == choice and option.possible(full):
-                return option
+                return None if self.too_late(part, option) else option
         return None
+
+    def too_late(self, part: int, option: Option) -> bool:
+        """Whether a part would be picked later than it may be, if that were done now."""
+        at_most_s = self.cell.positions[self.locations[part - 1]].at_most_s
+        if at_most_s is None or not option.waits:
+            return False
+        return self._pick_s(part, option) > self.ready_s[part - 1] + at_most_s + SLACK_S
+
+    def spoils(self, decision: int) -> bool:
+        """Whether a decision is not allowed only because it would pick its part too late."""
+        part, choice = part_of(decision, self.cell.parts), choice_of(decision, self.cell.parts)
+        if decision < 1 or not self._in_turn(part):
+            return False
+        options, full = self.cell.positions[self.locations[part - 1]].options, self._full()
+        return any(o.choice == choice and o.possible(full) and self.too_late(part, o) for o in options)
 
     def move(self, decision: int) -> Move:
         """Carry a decision out; BadInput when it may not be taken."""
@@ -72,7 +91,7 @@ class Run:
         cell, part = self.cell, part_of(decision, self.cell.parts)
         here, there = cell.positions[self.locations[part - 1]], cell.positions[option.to]
         start, leave_s = self.robot, self.now_s
-        reach_s = leave_s + (0.0 if start == option.origin else float(cell.empty_s[start, option.origin]))
+        reach_s = self._reach_s(option)
         ready_s = max(reach_s, self.ready_s[part - 1]) if option.waits else reach_s
         pick_s = ready_s + option.service_s
         drop_s = pick_s + float(cell.loaded_s[option.origin, option.target])
@@ -102,6 +121,8 @@ class Run:
             return f"there is no part {decision}, only 1 to {cell.parts}"
         if self.option(decision) is not None:
             return ""
+        if self.spoils(decision):
+            return self._burns(part)
         place = cell.positions[self.locations[part - 1]]
         name, where = cell.part_name(part), cell.names[place.station]
         if not place.options:
@@ -118,6 +139,23 @@ class Run:
         if not taken:
             return f"{name} at '{where}' has no choice {choice_of(decision, cell.parts) + 1}"
         return f"{name} at '{where}' cannot move on: {' and '.join(taken)} full"
+
+    def _burns(self, part: int) -> str:
+        """That a part would be picked too late, in words."""
+        cell, place = self.cell, self.cell.positions[self.locations[part - 1]]
+        option = next(option for option in place.options if self.too_late(part, option))
+        times_s = f"done at {self.ready_s[part - 1]:g} s, fetched at {self._pick_s(part, option):g} s"
+        where = f"{cell.part_name(part)} in '{cell.names[place.station]}'"
+        return f"{where} would burn: {times_s}, allowed {place.at_most_s:g} s"
+
+    def _reach_s(self, option: Option) -> float:
+        """When the robot is where it picks, if it goes there now."""
+        return self.now_s + (
+            0.0 if self.robot == option.origin else float(self.cell.empty_s[self.robot, option.origin])
+        )
+
+    def _pick_s(self, part: int, option: Option) -> float:
+        return max(self._reach_s(option), self.ready_s[part - 1]) + option.service_s
 
     def _first_ready_s(self) -> list[float]:
         arrivals, all_s, came_s = self.cell.arrivals, list(self.cell.begin_s), 0.0

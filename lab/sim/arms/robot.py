@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import atan2, pi
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ _TURNED_RAD = pi / 2  # [rad] from here on the tool begins a path by turning on 
 YAW_ARM = 0.15  # [m/rad] a turn of the tool counts as this much way
 _SAMPLE = 0.004  # [m] between points of a path before it is timed
 _SETTLE_STEPS = 12  # after a path ends
-_GRIP_STEPS = 72  # 0.3 s to close or open
+GRIP_STEPS = 72  # 0.3 s to close or open
 _PEDESTAL_M, _PEDESTAL_RGBA = 0.09, (0.22, 0.23, 0.26, 1.0)  # radius
 _LINKAGE_ITERATIONS = 200  # of the solver: with 60 a slice creeps 2 mm a second in fingers that a linkage moves
 
@@ -119,6 +120,25 @@ def _turned_back(turn: float, first: Array, speed: float, acceleration: float) -
     return rows
 
 
+class MotionListener(Protocol):
+    """Who is told what a robot carries out, as it does; see `lab.export.recorder`."""
+
+    def began(self, poses: Sequence[ToolPose], blend: float, way: Trajectory, before: Array) -> None:
+        """The tool is about to follow `poses`, as planned; `before` (k,) [rad]: the joints it starts from."""
+
+    def drives(self, row: int) -> None:
+        """This row of the plan is set as target now; the number of its rows: it has arrived at the last."""
+
+    def ended(self) -> None:
+        """The tool is at rest where the motion leads."""
+
+    def pressed(self, closed: bool) -> None:
+        """The fingers are about to close, or to open."""
+
+    def rested(self, steps: int) -> None:
+        """The arm is about to stay for so many physics steps."""
+
+
 class Robot:
     """The arm in a world. Its motions are generators: each `next` sets the targets of one physics step."""
 
@@ -138,6 +158,7 @@ class Robot:
             world.iterations(_LINKAGE_ITERATIONS)
         self._free = [joint for joint in fingers.joints if joint not in fingers.driven]
         self.closed = False
+        self.listener: MotionListener | None = None
         self._half_on = False  # whether the tool is half a turn on from the yaw that was asked for
         self.hold(arm.home)
         self.open_at_once()
@@ -202,29 +223,49 @@ class Robot:
         start = ToolPose(here.x, here.y, here.z, first.yaw + turn)
         way = plan(self.arm, [start, *poses], self.speed * slow, self.acceleration * slow, blend, before)
         self._half_on = self.arm.is_half_on(way.positions[-1], poses[-1])
-        for position, velocity in zip(way.positions, way.velocities, strict=True):
+        heard = self.listener
+        if heard is not None:
+            heard.began(poses, blend, way, before)
+        for row, (position, velocity) in enumerate(zip(way.positions, way.velocities, strict=True)):
             self.world.drive(NAME, self.arm.joints, position, velocity)
+            if heard is not None:
+                heard.drives(row)
             yield
         self.world.drive(NAME, self.arm.joints, way.positions[-1])
-        yield from self.rest(_SETTLE_STEPS)
+        if heard is not None:
+            heard.drives(len(way.positions))
+        yield from _stay(_SETTLE_STEPS)
+        if heard is not None:
+            heard.ended()
 
     def rest(self, steps: int) -> Iterator[None]:
         """Stay for so many physics steps."""
-        for _ in range(steps):
-            yield
+        if self.listener is not None:
+            self.listener.rested(steps)
+        yield from _stay(steps)
 
     def grip(self) -> Iterator[None]:
         """Close the fingers and keep pressing with the grip force."""
         self._press(self.arm.fingers.strokes[0], self.grip_force)
         self.closed = True
-        yield from self.rest(_GRIP_STEPS)
+        yield from self._pressed()
 
     def release(self) -> Iterator[None]:
         """Open the fingers."""
         self._press(self.arm.fingers.at(self.arm.fingers.open_m), 60.0)
         self.closed = False
-        yield from self.rest(_GRIP_STEPS)
+        yield from self._pressed()
 
     def lose(self) -> None:
         """The fingers open by themselves, as when their air fails: who moves the arm still holds them to be closed."""
         self._press(self.arm.fingers.at(self.arm.fingers.open_m), 60.0)
+
+    def _pressed(self) -> Iterator[None]:
+        if self.listener is not None:
+            self.listener.pressed(self.closed)
+        yield from _stay(GRIP_STEPS)
+
+
+def _stay(steps: int) -> Iterator[None]:
+    for _ in range(steps):
+        yield

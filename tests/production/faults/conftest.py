@@ -7,8 +7,8 @@ import pytest
 
 from lab.production.faults.injector import Injector
 from lab.production.floor import Floor
-from lab.production.report import Taught
 from lab.production.run import teach_all
+from lab.production.taught import Taught
 from lab.sim.parts.kinds import Spot
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared, prepare

@@ -12,7 +12,7 @@ from lab.production.faults.injector import Injector
 from lab.production.floor import Floor
 from lab.production.perception import perceive, scene_seen
 from lab.production.relearning import adopt, relearned
-from lab.production.report import Taught
+from lab.production.taught import Taught
 from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.skill import Status
 from lab.teaching.teacher import Teacher

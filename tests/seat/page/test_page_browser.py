@@ -157,6 +157,41 @@ def test_a_click_in_the_map_is_the_move_there(tab: "Page", page: SeatPage, until
     assert tab.inner_text("#readout") == "row 2, column 3: goal"
 
 
+def test_a_whole_way_is_drawn_shown_discarded_and_sent(tab: "Page", page: SeatPage, until: Until) -> None:
+    session = Teaching(page, episodes=3).start()
+    until(tab, says(1))
+    until(tab, "!document.getElementById('map').hidden")
+    box = tab.locator("#grid").bounding_box()
+    assert box is not None
+    cell = box["width"] / 3
+
+    def draw(*cells: tuple[int, int]) -> None:
+        for number, (row, column) in enumerate(cells):
+            tab.mouse.move(box["x"] + (column + 0.5) * cell, box["y"] + (row + 0.5) * cell)
+            if number == 0:
+                tab.mouse.down()
+        tab.mouse.up()
+
+    draw((0, 0), (0, 2), (1, 2))
+    assert tab.inner_text("#way-text") == "A way of 3 moves"
+    tab.keyboard.press("Escape")
+    assert tab.is_hidden("#way")
+    draw((0, 0), (1, 0), (0, 1))  # not through the wall
+    draw((0, 1), (0, 2), (1, 2))  # on from where it ends
+    assert tab.inner_text("#way-text") == "A way of 3 moves"
+    tab.click("#way-send")
+    until(tab, says(1, 2))
+    assert "Episode 1 reached the goal in 3 steps" in tab.inner_text("#notices")
+    for key in ("ArrowRight", "ArrowRight", "ArrowLeft", "ArrowRight", "ArrowDown"):  # one of them back, and on again
+        tab.keyboard.press(f"Shift+{key}")
+    assert tab.inner_text("#way-text") == "A way of 3 moves"
+    tab.keyboard.press("Enter")
+    until(tab, says(1, 3))
+    tab.keyboard.press("a")
+    tab.keyboard.press("a")
+    assert session.result(20).steps[:2].tolist() == [3, 3]
+
+
 def test_an_answer_is_taken_back(tab: "Page", page: SeatPage, until: Until) -> None:
     teaching = Teaching(page)
     teaching.start()

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.seat.page.page_messages import MAX_CHARS, Answer, Chair, Layer, Refused, Wish, understood
+from lab.seat.page.page_messages import MAX_CHARS, MOST_MOVES, Answer, Chair, Layer, Pace, Refused, Wish, understood
 
 
 @pytest.mark.parametrize(
@@ -15,6 +15,9 @@ from lab.seat.page.page_messages import MAX_CHARS, Answer, Chair, Layer, Refused
         ({"answer": {"question": 3, "action": 0}}, Answer(3, 0)),
         ({"answer": {"question": 3, "word": "skip"}}, Answer(3, None, "skip")),
         ({"answer": {"question": 3, "word": "undo"}}, Answer(3, None, "undo")),
+        ({"answer": {"question": 3, "path": [3, 1, 3]}}, Answer(3, 3, path=(3, 1, 3))),
+        ({"answer": {"question": 3, "path": [0] * MOST_MOVES}}, Answer(3, 0, path=(0,) * MOST_MOVES)),
+        ({"replay": "step"}, Pace("step")),
         ({"seat": "take"}, Wish("take")),
         ({"seat": "give"}, Wish("give")),
         ({"layer": 4}, Layer(4)),
@@ -45,6 +48,12 @@ def test_what_a_page_says_is_understood(message: object, meant: object) -> None:
         '{"answer": {"question": 1, "word": "rm -rf"}}',
         '{"answer": {"question": 1, "action": 0, "word": "skip"}}',
         '{"answer": {"question": 1, "action": 0}, "more": 1}',
+        '{"answer": {"question": 1, "path": []}}',
+        '{"answer": {"question": 1, "path": [0, true]}}',
+        '{"answer": {"question": 1, "path": [0], "action": 0}}',
+        json.dumps({"answer": {"question": 1, "path": [0] * (MOST_MOVES + 1)}}),
+        '{"replay": "backwards"}',
+        '{"replay": "step", "seat": "take"}',
         "[" * MAX_CHARS,
         '{"layer": ' + "1" * MAX_CHARS + "}",
         b'{"layer": 1}',
@@ -59,7 +68,7 @@ def test_anything_else_is_refused_in_a_line(message: str | bytes) -> None:
 @given(st.text() | st.binary() | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(json.dumps))
 def test_nothing_else_can_come_of_a_message(message: str | bytes) -> None:
     try:
-        assert isinstance(understood(message), Answer | Wish | Layer)
+        assert isinstance(understood(message), Answer | Wish | Layer | Pace)
     except Refused:
         return
 

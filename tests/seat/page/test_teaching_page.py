@@ -22,6 +22,7 @@ from lab.learning.session_events import EpisodeEnded, Event, Improvement
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, grid
 from lab.seat.page.teaching_page import SeatPage
+from lab.seat.replay_pace import ReplayPace
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.request import SequenceRequest
 from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
@@ -300,6 +301,46 @@ def test_answers_that_are_none_are_ignored(page: SeatPage, request_1: AdviceRequ
         assert asked.result(20) == 3
 
 
+def test_a_whole_way_answers_the_questions_along_it(page: SeatPage, request_1: AdviceRequest, opens: "Opens") -> None:
+    with opens(page) as browser:
+        asked = meanwhile(page.ask, request_1)
+        first = browser.hear_until(question)["question"]["number"]
+        answer(browser, first, path=[RIGHT, RIGHT])
+        assert asked.result(20) == RIGHT
+        assert page.ask(replace(request_1, state=1, step=2)) == RIGHT  # nobody has to answer
+        again = meanwhile(page.ask, replace(request_1, episode=2))
+        answer(browser, browser.hear_until(asked_again(first))["question"]["number"], path=[RIGHT, 2, RIGHT])
+        assert again.result(20) == RIGHT
+        elsewhere = meanwhile(page.ask, replace(request_1, episode=2, step=2))  # it stayed in state 0
+        seat = browser.hear_until(lambda seat: seat["question"] and "dropped" in str(seat["notices"]))
+        assert seat["notices"][-1]["text"].startswith("The rest of your way is dropped (2 moves)")
+        assert browser.refused({"answer": {"question": seat["question"]["number"], "path": [RIGHT, 4]}})
+        answer(browser, seat["question"]["number"], path=[0])
+        assert elsewhere.result(20) == 0
+
+
+def test_a_replay_shows_the_answer_and_is_paced_from_the_page(
+    page: SeatPage, request_1: AdviceRequest, opens: "Opens"
+) -> None:
+    pace = ReplayPace(3600.0)
+    with opens(page) as browser:
+        assert browser.refused({"replay": "step"}) == "Nothing is shown again here."
+        page.paced(pace)
+        page.replayed(request_1, RIGHT)
+        seat = browser.hear_until(lambda seat: seat["question"] and seat["replay"])
+        assert (seat["replay"]["action"], seat["replay"]["said"]) == (RIGHT, "The answer was → right.")
+        assert "only shown" in browser.refused({"answer": {"question": seat["question"]["number"], "action": 1}})
+        waits = meanwhile(pace.wait)
+        browser.say({"replay": "step"})
+        assert waits.result(20) is None
+        browser.say({"replay": "faster"})
+        seat = browser.hear_until(lambda seat: seat["replay"]["speed"] == 2.0)
+        assert seat["replay"]["paused"]
+        page.replayed(replace(request_1, state=1, own=0), None)
+        seat = browser.hear_until(lambda seat: seat["replay"]["action"] is None)
+        assert seat["replay"]["said"] == "Left to the learner: it chose ↑ up; that leads nowhere."
+
+
 # ---- page and terminal together
 
 
@@ -313,7 +354,12 @@ def test_an_offered_question_is_answered_in_a_word(page: SeatPage, request_1: Ad
 
     with opens(page) as browser:
         number = 0
-        for what, word in (({"action": RIGHT}, "right"), ({"word": "skip"}, "skip"), ({"word": "auto"}, "auto")):
+        for what, word in (
+            ({"action": RIGHT}, "right"),
+            ({"path": [RIGHT, 0, 2]}, "path →↑←"),
+            ({"word": "skip"}, "skip"),
+            ({"word": "auto"}, "auto"),
+        ):
             page.offer(request_1, told)
             number = browser.hear_until(asked_again(number))["question"]["number"]
             assert browser.seat["question"]["offered"]

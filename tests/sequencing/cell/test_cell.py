@@ -7,7 +7,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell, needed_moves
-from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
+from lab.sequencing.cell.stations import Arrivals, Begins, Product, Stage, Station
 from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
@@ -171,11 +171,42 @@ def table(value: float) -> np.ndarray:
         ({"empty_s": table(np.inf)}, "empty_s 'in' -> 'oven' = inf"),
         ({"empty_s": np.ones((3, 3))}, "'in' -> 'in' = 1.0; staying takes 0 s"),
         ({"empty_s": np.ones((2, 3))}, r"shape \(2, 3\); 3 stations need \(3, 3\)"),
+        ({"closed": ("ovn",)}, "unknown station 'ovn'.*did you mean 'oven'"),
+        ({"closed": ("oven",)}, "begin of toast 1 at 'in': no way that is open leads to an end of its routes"),
+        ({"begins": (Begins(0),)}, "begins has 1 parts; the order has 2"),
+        ({"begins": (Begins(3), Begins(0))}, "begin of toast 1: position 3: its routes have 0 to 2"),
+        ({"begins": (Begins(0, np.inf), Begins(0))}, "begin of toast 1: ready_s = inf"),
+        ({"begins": (Begins(1), Begins(1))}, "begins: station 'oven' holds 2 parts; its capacity is 1"),
+        ({"begins": (Begins(1, stays=True), Begins(0))}, "begin of toast 2 at 'in': no way that is open"),
+        ({"begins": (Begins(None), Begins(2))}, "begins: no part has anything left to do"),
+        (
+            {"begins": (Begins(0, 1.0), Begins(0)), "arrivals": Arrivals((1.0, 1.0))},
+            "begin of toast 1: ready_s = 1, but when it comes, the arrivals say",
+        ),
     ],
 )
 def test_bad_cells(oven_cell: CellMaker, change: dict[str, object], says: str) -> None:
     with pytest.raises(BadInput, match=says):
         oven_cell(**change)
+
+
+def test_where_parts_begin(oven_cell: CellMaker) -> None:
+    """1 is in the oven, 2 is lost, 3 waits, 4 is there already; only 1 and 3 have moves to make, three of them."""
+    cell = oven_cell(4, begins=(Begins(1, 6.0), Begins(None), Begins(0), Begins(2)))
+    assert (cell.begin_at, cell.unfinished, cell.coming) == ((1, 2, 0, 2), (1, 3), (3,))
+    assert cell.possible_moves == 3
+    assert cell.begin_s == (6.0, 0.0, 0.0, 0.0)
+    # 3 cannot go first, the oven is full: the robot, at "in", first goes to the oven, and back for 3
+    assert set(cell.needed.empty) == {("in", "oven"), ("out", "in")}
+
+
+def test_the_window_of_a_stage_goes_before_its_stations(oven_cell: CellMaker) -> None:
+    stations = (IN, Station("oven", "machine", 1, 10.0, 7.0), OUT)
+    assert oven_cell(stations=stations).at_most_s(1, "oven") == 7.0
+    own = route(Stage("in"), Stage("oven", at_most_s=3.0), Stage("out"))
+    limited = oven_cell(stations=stations, **own)
+    assert (limited.at_most_s(2, "oven"), limited.at_most_s(2, "out"), limited.has_windows) == (3.0, None, True)
+    assert not oven_cell().has_windows
 
 
 def test_a_station_that_nothing_leads_to_is_said_to_be_out_of_reach(toast_cell: CellMaker) -> None:

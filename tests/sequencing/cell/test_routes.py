@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.routes import choice_of, entry, from_the_ends, part_of
+from lab.sequencing.cell.routes import choice_of, entry, from_the_ends, open_ways, part_of, reached_from
 from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
@@ -96,3 +96,26 @@ def test_values_are_found_from_the_ends_back(toast_cell: Callable[..., Cell]) ->
     assert by_name == wanted
     whole = from_the_ends(cell.positions, lambda place, ahead: {names[place]}.union(*ahead))
     assert whole[0] == set(names)
+
+
+def test_what_is_shut_is_not_gone_to_nor_what_only_leads_there(toast_cell: Callable[..., Cell]) -> None:
+    """plate 0, toaster 1, its buffer 2, applier 3, its buffer 4, done 5: without an applier nothing leads to the end."""
+    cell = toast_cell("I", 2)
+    assert [len(place.options) for place in cell.positions] == [2, 2, 1, 1, 1, 0]
+    assert [len(place.options) for place in open_ways(cell.positions, {cell.index("butter")})] == [0, 0, 0, 1, 0, 0]
+    assert [len(place.options) for place in open_ways(cell.positions, {cell.index("butter buffer")})] == [
+        2,
+        1,
+        1,
+        1,
+        1,
+        0,
+    ]
+    assert open_ways(cell.positions, ()) == list(cell.positions)
+
+
+def test_what_is_reached_from_where(toast_cell: Callable[..., Cell]) -> None:
+    cell = toast_cell("I", 2)
+    found = {cell.names[cell.positions[place].station] for place in reached_from(cell.positions, {4})}
+    assert found == {"butter buffer", "butter", "done"}
+    assert reached_from(cell.positions, ()) == set()

@@ -1,0 +1,101 @@
+"""`lab export`: a run for the real robot, checked before it is trusted."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from lab.cli.families import offers
+from lab.cli.options import Json
+from lab.cli.output import complain, end, show
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+
+def export(
+    run: Annotated[Path, typer.Argument(help="The folder of a `lab run`.")],
+    to: Annotated[str, typer.Option("--format", help="{export formats}.", autocompletion=offers("export formats"))],
+    positions: Annotated[
+        str, typer.Option("--positions", help="Of job files: rectan, or pulse (assumed pulses of the lab's own arm).")
+    ] = "rectan",
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for the files; default: RUN/FORMAT.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Write what the robot did in a run as job files or trajectories, read them back and play them in physics."""
+    from datetime import datetime
+
+    from lab.errors import unknown
+    from lab.export import FORMATS
+    from lab.export.options import POSITIONS, Options
+    from lab.export.play import deviation
+    from lab.export.program import Program
+    from lab.files import check_out
+
+    if to not in FORMATS:
+        raise unknown("format", to, FORMATS, "--format")
+    if positions not in POSITIONS:
+        raise unknown("sort of positions", positions, POSITIONS, "--positions")
+    folder = out or run / to
+    check_out(folder)
+    program, form = Program.load(run), FORMATS[to]
+    options = Options("pulse" if positions == "pulse" else "rectan", datetime.now().strftime("%Y/%m/%d %H:%M"))
+    written = form.write(program, options)
+    files = _written(written, folder)
+    read = {path.name: path.read_bytes().decode("utf-8") for path in files}
+    off = deviation(program, form.read(read, program.arm))
+    for warning in form.warnings(program):
+        complain(warning)
+    document = {
+        "task": program.carried.task,
+        "arm": program.arm.name,
+        "format": to,
+        "files": [str(path) for path in files],
+        "transfers": len(program.carried.transfers),
+        "motions": off.motions,
+        "poses": off.poses,
+        "max_deviation_m": off.max_m,
+        "max_deviation_rad": off.max_rad,
+        "deviation_at_rest_m": off.at_rest_m,
+        "deviation_at_rest_rad": off.at_rest_rad,
+        "run_off_target_m": off.run_off_m,
+        "within_1_mm_and_1_degree": off.near_enough,
+        "warnings": form.warnings(program),
+    }
+    show(document, as_json, _summary)
+    if not off.near_enough:
+        why = f"in the run it was itself up to {1000 * off.run_off_m:.1f} mm off where it was driven to"
+        end(f"played in physics, the tool is more than 1 mm or 1 degree off the run's; {why}", 1)
+
+
+def _written(texts: dict[str, str], folder: Path) -> list[Path]:
+    """The files, each written whole."""
+    from lab.errors import WorkFailed
+    from lab.files import write_whole
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in texts.items():
+            write_whole(folder / name, text.encode("utf-8"))
+    except OSError as error:
+        raise WorkFailed(f"output folder '{folder}' (--out) cannot be written: {error.strerror or error}") from error
+    return [folder / name for name in texts]
+
+
+def _summary(document: dict[str, Any]) -> "RenderableType":
+    from math import degrees
+
+    from rich.text import Text
+
+    from lab.errors import counted
+
+    files = document["files"]
+    worst = f"{1000 * document['max_deviation_m']:.2f} mm, {degrees(document['max_deviation_rad']):.2f} degrees"
+    rest = f"{1000 * document['deviation_at_rest_m']:.2f} mm, {degrees(document['deviation_at_rest_rad']):.2f} degrees"
+    lines = [
+        f"{document['task']}, {document['arm']}: {counted(document['transfers'], 'transfer')} as "
+        f"{counted(len(files), 'file')} in {Path(files[0]).parent}",
+        f"read back and played in physics: at most {worst} off the run's tool on {counted(document['motions'], 'way')}, "
+        f"{rest} where they end",
+    ]
+    return Text("\n".join(lines))

@@ -1,0 +1,244 @@
+"""INFORM II job files as text: what a controller's job file may say here, written and read.
+
+Source of the dialect: the listings of the thesis (Appendix VI; an XRC controller), which write /JOB, //NAME, //POS, ///NPOS,
+///TOOL, ///POSTYPE PULSE or ROBOT, ///PULSE or ///RECTAN, ///RCONF, C00000=..., //INST, ///DATE, ///ATTR SC,RW, ///GROUP1 RB1,
+NOP, MOVJ, TIMER, CALL JOB and END; beyond these MOVL with V, VR and PL, DOUT OT#, WAIT IN#, ///COMM and comments, as in
+Yaskawa's manuals of job data and INFORM II (XRC, NX100: HW0481924, section 4.1). No controller has read what is written here.
+"""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from lab.errors import BadInput, unknown
+
+MOST_POSITIONS = 998  # steps of one job
+MOST_TEXT = 32  # characters of a comment
+MOST_TIMER_S = 655.35
+NAME = re.compile(r"[A-Z0-9][A-Z0-9_-]{0,7}")  # eight characters, as the XRC and NX100 take
+_NUMBER = r"-?\d+(?:\.\d+)?"
+
+
+@dataclass(frozen=True)
+class MoveJ:
+    """To position `c`, joints interpolated, with so much [%] of their speed."""
+
+    c: int
+    percent: float
+
+    def __str__(self) -> str:
+        return f"MOVJ C{self.c:05d} VJ={self.percent:.2f}"
+
+
+@dataclass(frozen=True)
+class MoveL:
+    """To position `c` in a straight line: "V", at so many mm/s, or "VR", a turn at so many degrees/s.
+
+    level: 0, to a stop at the position, to 8, rounded most.
+    """
+
+    c: int
+    unit: Literal["V", "VR"]
+    speed: float
+    level: int
+
+    def __str__(self) -> str:
+        return f"MOVL C{self.c:05d} {self.unit}={self.speed:.1f} PL={self.level}"
+
+
+@dataclass(frozen=True)
+class Dout:
+    """Sets an output."""
+
+    output: int
+    on: bool
+
+    def __str__(self) -> str:
+        return f"DOUT OT#({self.output}) {'ON' if self.on else 'OFF'}"
+
+
+@dataclass(frozen=True)
+class Wait:
+    """Waits for an input to be on."""
+
+    input: int
+
+    def __str__(self) -> str:
+        return f"WAIT IN#({self.input})=ON"
+
+
+@dataclass(frozen=True)
+class Timer:
+    """Waits for so many seconds."""
+
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"TIMER T={self.seconds:.2f}"
+
+
+@dataclass(frozen=True)
+class Call:
+    """Does another job, and goes on."""
+
+    job: str
+
+    def __str__(self) -> str:
+        return f"CALL JOB:{self.job}"
+
+
+@dataclass(frozen=True)
+class Comment:
+    """A line for people."""
+
+    text: str
+
+    def __str__(self) -> str:
+        return f"'{self.text}"
+
+
+Instruction = MoveJ | MoveL | Dout | Wait | Timer | Call | Comment
+_INSTRUCTIONS: dict[str, tuple[str, Callable[..., Instruction]]] = {  # first word -> the whole line, and what it makes
+    "MOVJ": (rf"MOVJ C(\d{{5}}) VJ=({_NUMBER})", lambda c, v: MoveJ(int(c), float(v))),
+    "MOVL": (
+        rf"MOVL C(\d{{5}}) (VR?)=({_NUMBER}) PL=([0-8])",
+        lambda c, unit, v, level: MoveL(int(c), unit, float(v), int(level)),
+    ),
+    "DOUT": (r"DOUT OT#\((\d{1,4})\) (ON|OFF)", lambda n, on: Dout(int(n), on == "ON")),
+    "WAIT": (r"WAIT IN#\((\d{1,4})\)=ON", lambda n: Wait(int(n))),
+    "TIMER": (rf"TIMER T=({_NUMBER})", lambda seconds: Timer(float(seconds))),
+    "CALL": (rf"CALL JOB:({NAME.pattern})", Call),
+}
+
+
+@dataclass(frozen=True)
+class Position:
+    """Six pulses, or x, y, z [mm] and Rx, Ry, Rz [degrees] with the manipulator's type (8,), see ///RCONF."""
+
+    numbers: tuple[float, ...]
+    configuration: tuple[int, ...] | None = None  # None: pulses
+
+
+@dataclass(frozen=True)
+class InformJob:
+    """One job; its positions are all of one sort."""
+
+    name: str
+    comment: str
+    date: str
+    positions: tuple[Position, ...]
+    instructions: tuple[Instruction, ...]
+
+    def text(self) -> str:
+        """The file, lines ending as controllers want it."""
+        lines = ["/JOB", f"//NAME {self.name}", "//POS", f"///NPOS {len(self.positions)},0,0,0,0,0"]
+        if self.positions:
+            pulses = self.positions[0].configuration is None
+            lines += [
+                "///TOOL 0",
+                f"///POSTYPE {'PULSE' if pulses else 'ROBOT'}",
+                f"///{'PULSE' if pulses else 'RECTAN'}",
+            ]
+        before: tuple[int, ...] | None = None
+        for number, position in enumerate(self.positions):
+            if position.configuration is not None and position.configuration != before:
+                before = position.configuration
+                lines.append(f"///RCONF {','.join(map(str, before))}")
+            lines.append(f"C{number:05d}={','.join(_written(position))}")
+        lines += ["//INST", f"///DATE {self.date}", *([f"///COMM {self.comment}"] if self.comment else [])]
+        lines += ["///ATTR SC,RW", "///GROUP1 RB1", "NOP", *map(str, self.instructions), "END"]
+        return "".join(f"{line}\r\n" for line in lines)
+
+
+def _written(position: Position) -> list[str]:
+    if position.configuration is None:
+        return [str(int(pulses)) for pulses in position.numbers]
+    millimetres, degrees = position.numbers[:3], position.numbers[3:]
+    return [f"{round(mm, 3) + 0.0:.3f}" for mm in millimetres] + [f"{round(turn, 2) + 0.0:.2f}" for turn in degrees]
+
+
+class _Lines:
+    """A file's lines one by one, and where in it something is wrong."""
+
+    def __init__(self, text: str, where: str) -> None:
+        self.lines, self.where, self.number = text.splitlines(), where, 0
+
+    def fault(self, what: str) -> BadInput:
+        return BadInput(f"{self.where}, line {self.number}: {what}")
+
+    def next(self) -> str:
+        self.number += 1
+        if self.number > len(self.lines):
+            raise self.fault("the file ends before END")
+        return self.lines[self.number - 1].rstrip()
+
+    def peek(self) -> str:
+        return self.lines[self.number].rstrip() if self.number < len(self.lines) else ""
+
+    def matched(self, pattern: str, wanted: str) -> "re.Match[str]":
+        line = self.next()
+        match = re.fullmatch(pattern, line)
+        if match is None:
+            raise self.fault(f"'{line}', wanted {wanted}")
+        return match
+
+
+def read_job(text: str, where: str) -> InformJob:
+    """The job that a file's text holds, `where` its name. BadInput names the line that is no part of this dialect."""
+    lines = _Lines(text, where)
+    lines.matched("/JOB", "/JOB")
+    name = lines.matched(rf"//NAME ({NAME.pattern})", "//NAME and up to 8 capital letters and digits")[1]
+    lines.matched("//POS", "//POS")
+    count = int(lines.matched(r"///NPOS (\d{1,5}),0,0,0,0,0", "///NPOS n,0,0,0,0,0")[1])
+    positions = _read_positions(lines, count) if count else []
+    lines.matched("//INST", "//INST")
+    date = lines.matched(r"///DATE (\d{4}/\d\d/\d\d \d\d:\d\d)", "///DATE yyyy/mm/dd hh:mm")[1]
+    comment = lines.next()[len("///COMM ") :] if lines.peek().startswith("///COMM ") else ""
+    lines.matched("///ATTR SC,RW", "///ATTR SC,RW")
+    lines.matched("///GROUP1 RB1", "///GROUP1 RB1")
+    lines.matched("NOP", "NOP")
+    instructions: list[Instruction] = []
+    while (line := lines.next()) != "END":
+        instructions.append(_read_instruction(lines, line, count))
+    if lines.peek():
+        lines.next()
+        raise lines.fault("something follows END")
+    return InformJob(name, comment, date, tuple(positions), tuple(instructions))
+
+
+def _read_positions(lines: _Lines, count: int) -> list[Position]:
+    lines.matched("///TOOL 0", "///TOOL 0")
+    pulses = lines.matched("///POSTYPE (PULSE|ROBOT)", "///POSTYPE PULSE or ROBOT")[1] == "PULSE"
+    sort = "///PULSE" if pulses else "///RECTAN"
+    lines.matched(sort, sort)
+    found: list[Position] = []
+    configuration: tuple[int, ...] | None = None
+    number = r"-?\d{1,9}" if pulses else _NUMBER
+    while len(found) < count:
+        if not pulses and lines.peek().startswith("///RCONF"):
+            bits = lines.matched(r"///RCONF ([01](?:,[01]){7})", "///RCONF and eight times 0 or 1")[1]
+            configuration = tuple(map(int, bits.split(",")))
+            continue
+        at = rf"C{len(found):05d}=({number}(?:,{number}){{5}})"
+        numbers = lines.matched(at, f"C{len(found):05d}= and six {'pulses' if pulses else 'numbers'}")[1]
+        if not pulses and configuration is None:
+            raise lines.fault("a position before any ///RCONF")
+        found.append(Position(tuple(map(float, numbers.split(","))), configuration))
+    return found
+
+
+def _read_instruction(lines: _Lines, line: str, positions: int) -> Instruction:
+    if line.startswith("'"):
+        return Comment(line[1:])
+    word = line.partition(" ")[0]
+    if word not in _INSTRUCTIONS:
+        raise unknown("instruction", word, [*_INSTRUCTIONS, "END"], f"{lines.where}, line {lines.number}")
+    pattern, make = _INSTRUCTIONS[word]
+    match = re.fullmatch(pattern, line)
+    if match is None:
+        raise lines.fault(f"'{line}' is not how {word} is written here")
+    made = make(*match.groups())
+    if isinstance(made, MoveJ | MoveL) and made.c >= positions:
+        raise lines.fault(f"'{line}': the job has {positions} positions")
+    return made

@@ -1,0 +1,265 @@
+"""A run as INFORM II jobs, one a transfer and a master that calls them, and such jobs as commands again.
+
+In the manner of the thesis (Appendix VI): a transfer is a job, the gripper's OPEN and CLOSE are jobs of their own, which a
+site changes to suit. Rectangular positions are the finger tips' in the robot's own axes, from its foot: `///TOOL 0` must have
+the tool's length, its z out of the gripper. PULSES is assumed: a real arm's must be read from its parameters first.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import ceil, degrees, hypot, pi, radians
+from typing import Literal
+
+import numpy as np
+
+from lab.errors import BadInput, counted
+from lab.export.commands import GRIP_S, Await, Command, Grip, Job, Joint, Path, Pause, jobs_of, step_between
+from lab.export.inform import (
+    MOST_POSITIONS,
+    MOST_TEXT,
+    MOST_TIMER_S,
+    Call,
+    Comment,
+    Dout,
+    InformJob,
+    Instruction,
+    MoveJ,
+    MoveL,
+    Position,
+    Timer,
+    Wait,
+    read_job,
+)
+from lab.export.options import Options
+from lab.export.program import Array, Program
+from lab.sim.arms.arm import Arm
+from lab.sim.arms.robot import YAW_ARM
+
+PULSES = {
+    "up6": tuple(n * 4096 / (2 * pi) for n in (120.0, 120.0, 120.0, 50.0, 50.0, 30.0))
+}  # by arm, pulses/rad, assumed
+GRIPPER = 1  # its output
+THROUGH = 1  # PL of a position that is passed without a stop, rounded least
+_ALMOST_M = 1e-6
+_OWN = re.compile(r"M\d{3}|OPEN|CLOSE")
+
+
+def warnings(program: Program) -> list[str]:
+    """What a person must know before such jobs run."""
+    return [
+        f"jbi: no controller has read these files; tool 0 must be the tool of '{program.arm.name}', and the pulses of "
+        "pulse positions are assumed, not a real arm's"
+    ]
+
+
+def write(program: Program, options: Options) -> dict[str, str]:
+    """The jobs' texts by file name, the master first. BadInput for pulses of an arm whose table is not known."""
+    arm = program.arm
+    if options.positions == "pulse" and arm.name not in PULSES:
+        raise BadInput(f"--positions pulse: pulses of arm '{arm.name}' are not known; known: {', '.join(PULSES)}")
+    jobs = [(f"M{number:03d}", job) for number, job in enumerate(jobs_of(program), start=1)]
+    master = re.sub(r"[^A-Z0-9]", "", program.carried.task.upper())[:8]
+    transfers = [_Writer(arm, options).job(name, job) for name, job in jobs]
+    calls = (Call("OPEN"), *(Call(name) for name, _ in jobs))
+    called = {*calls, *(step for job in transfers for step in job.instructions)}
+    grips = [
+        InformJob(name, f"gripper {name.lower()}", options.date, (), (Dout(GRIPPER, on), Timer(GRIP_S)))
+        for name, on in (("OPEN", False), ("CLOSE", True))
+        if Call(name) in called
+    ]
+    name = "RUN" if _OWN.fullmatch(master) else master
+    made = [InformJob(name, program.carried.task[:MOST_TEXT], options.date, (), calls), *grips, *transfers]
+    return {f"{job.name}.JBI": job.text() for job in made}
+
+
+@dataclass
+class _Writer:
+    """Writes one job down: its positions, its instructions, and where the arm is meanwhile."""
+
+    arm: Arm
+    options: Options
+    positions: list[Position] = field(default_factory=list)
+    instructions: list[Instruction] = field(default_factory=list)
+    joints: Array | None = None
+    pose: Array | None = None  # (4,)
+
+    def job(self, name: str, job: Job) -> InformJob:
+        before: Command | None = None
+        for command in job.commands:
+            if not (isinstance(command, Pause) and isinstance(before, Grip)):  # that is in the gripper's jobs
+                self._add(command)
+            before = command
+        if len(self.positions) > MOST_POSITIONS:
+            most = f"a job holds {MOST_POSITIONS}"
+            raise BadInput(f"job {name} ({job.words}): {counted(len(self.positions), 'position')}; {most}")
+        comment = job.words[:MOST_TEXT]
+        return InformJob(name, comment, self.options.date, tuple(self.positions), tuple(self.instructions))
+
+    def _add(self, command: Command) -> None:
+        if isinstance(command, Joint):
+            self.joints = np.array(command.joints)
+            self.pose = _tool(self.arm, self.joints)
+            self.instructions.append(MoveJ(self._at(self.pose, self.joints), command.percent))
+        elif isinstance(command, Path):
+            self._follow(command)
+        elif isinstance(command, Grip):
+            self.instructions.append(Call("CLOSE" if command.closed else "OPEN"))
+        elif isinstance(command, Await):
+            self.instructions += [Comment(f"{command.station} done"[:MOST_TEXT]), Wait(command.machine)]
+        else:
+            times = max(1, ceil(command.seconds / MOST_TIMER_S))
+            self.instructions += [Timer(command.seconds / times)] * times
+
+    def _follow(self, path: Path) -> None:
+        assert self.pose is not None
+        poses = np.vstack([self.pose, path.points])
+        joints = self.arm.inverse_path(poses, self.joints)
+        for number, pose in enumerate(path.points):
+            unit, speed = _spoken_speed(step_between(self.pose, pose), path.speed_m_s)
+            level = 0 if number == len(path.points) - 1 else THROUGH
+            at = self._at(pose, joints[number + 1])
+            self.instructions.append(MoveL(at, unit, speed, level))
+            self.pose = pose
+        self.joints = joints[-1]
+
+    def _at(self, pose: Array, joints: Array) -> int:
+        """The number of a new position."""
+        if self.options.positions == "pulse":
+            pulses = joints * np.array(PULSES[self.arm.name])
+            self.positions.append(Position(tuple(float(round(p)) for p in pulses)))
+        else:
+            x, y, z = (1000.0 * (pose[:3] - [0.0, 0.0, self.arm.base_up_m])).tolist()
+            yaw = round(degrees(_wrapped(pose[3])), 2)
+            self.positions.append(Position((x, y, z, 180.0, 0.0, yaw), _configuration(joints)))
+        return len(self.positions) - 1
+
+
+def _spoken_speed(step: Array, speed_m_s: float) -> tuple[Literal["V", "VR"], float]:
+    """The unit and the speed of one straight piece (4,) at a speed of its way [m/s]: in mm/s, or in degrees/s of a mere turn."""
+    far, turn = hypot(*step[:3]), abs(step[3])
+    way = hypot(far, YAW_ARM * turn)
+    if far < max(_ALMOST_M, 1e-3 * YAW_ARM * turn):
+        return "VR", max(0.1, round(degrees(speed_m_s / YAW_ARM), 1))
+    return "V", max(0.1, round(1000.0 * speed_m_s * far / way, 1))
+
+
+def _way_speed(step: Array, move: MoveL) -> float:
+    """The speed of the way [m/s] that `_spoken_speed` was told."""
+    far, turn = hypot(*step[:3]), abs(step[3])
+    if move.unit == "VR":
+        return radians(move.speed) * YAW_ARM
+    return move.speed / 1000.0 * (hypot(far, YAW_ARM * turn) / far if far > _ALMOST_M else 1.0)
+
+
+def _wrapped(angle: float) -> float:
+    return (angle + pi) % (2 * pi) - pi
+
+
+def _tool(arm: Arm, joints: Array) -> Array:
+    pose = arm.forward(joints)
+    return np.array([pose.x, pose.y, pose.z, pose.yaw])
+
+
+def _configuration(joints: Array) -> tuple[int, ...]:
+    """The manipulator's type: not flipped, upper arm, in front; then whether R, T and S are half a turn off zero or more."""
+    far = [int(not -pi < float(joint) <= pi) for joint in (joints[3], joints[-1], joints[0])]
+    return (0, 0, 0, *far, 0, 0)
+
+
+def read(files: Mapping[str, str], arm: Arm) -> list[Command]:
+    """The commands of jobs, by file name, from the one that no other calls. BadInput says what is wrong, and in which line."""
+    jobs: dict[str, InformJob] = {}
+    for file, text in files.items():
+        job = read_job(text, file)
+        if job.name in jobs:
+            raise BadInput(f"{file}: there are two jobs '{job.name}'")
+        jobs[job.name] = job
+    called = {step.job for job in jobs.values() for step in job.instructions if isinstance(step, Call)}
+    if missing := sorted(called - jobs.keys()):
+        raise BadInput(f"job '{missing[0]}' is called, but is in none of the files")
+    masters = [name for name in jobs if name not in called]
+    if len(masters) != 1:
+        raise BadInput(f"wanted one job that no other calls, found {', '.join(masters) or 'none'}")
+    return _Reader(arm, jobs).read(masters[0])
+
+
+@dataclass
+class _Reader:
+    """Follows the calls, and knows where the arm is meanwhile."""
+
+    arm: Arm
+    jobs: Mapping[str, InformJob]
+    found: list[Command] = field(default_factory=list)
+    pose: Array | None = None
+    points: list[Array] = field(default_factory=list)  # since the last stop
+    speeds: list[float] = field(default_factory=list)
+
+    def read(self, master: str) -> list[Command]:
+        for job, step in self._steps(master, ()):
+            if isinstance(step, MoveL):
+                self._straight(job, step)
+                continue
+            self._stop()
+            if isinstance(step, MoveJ):
+                joints = self._joints(job.positions[step.c], f"job {job.name}, C{step.c:05d}")
+                self.pose = _tool(self.arm, joints)
+                self.found.append(Joint(tuple(joints.tolist()), step.percent))
+            elif isinstance(step, Dout) and step.output == GRIPPER:
+                self.found.append(Grip(step.on))
+            elif isinstance(step, Timer):
+                self.found.append(Pause(step.seconds))
+            elif isinstance(step, Wait):
+                self.found.append(Await(step.input))
+        self._stop()
+        return self.found
+
+    def _steps(self, name: str, within: Sequence[str]) -> Iterator[tuple[InformJob, Instruction]]:
+        if name in within:
+            raise BadInput(f"job '{name}' calls itself, by way of {' and '.join(within)}")
+        for step in self.jobs[name].instructions:
+            if isinstance(step, Call):
+                yield from self._steps(step.job, (*within, name))
+            else:
+                yield self.jobs[name], step
+
+    def _straight(self, job: InformJob, step: MoveL) -> None:
+        where = f"job {job.name}, C{step.c:05d}"
+        if self.pose is None:
+            raise BadInput(f"{where}: a straight line before any MOVJ has said where it begins")
+        position = job.positions[step.c]
+        pose = (
+            _tool(self.arm, self._joints(position, where)) if position.configuration is None else self._tool(position)
+        )
+        way = step_between(self.pose, pose)
+        self.speeds.append(_way_speed(way, step))
+        self.pose = self.pose + way
+        self.points.append(self.pose)
+        if step.level == 0:
+            self._stop()
+
+    def _stop(self) -> None:
+        if self.points:
+            self.found.append(Path(np.array(self.points), min(self.speeds)))
+            self.points, self.speeds = [], []
+
+    def _tool(self, position: Position) -> Array:
+        x, y, z, rx, ry, rz = position.numbers
+        if abs(abs(rx) - 180.0) > 0.01 or abs(ry) > 0.01:
+            raise BadInput(f"Rx = {rx}, Ry = {ry}: the lab's tool points straight down, Rx = 180 and Ry = 0")
+        return np.array([x / 1000.0, y / 1000.0, z / 1000.0 + self.arm.base_up_m, radians(rz)])
+
+    def _joints(self, position: Position, where: str) -> Array:
+        """The joints of a position: by its pulses, or by where the tool is and whether T is half a turn off zero."""
+        if position.configuration is None:
+            if self.arm.name not in PULSES:
+                raise BadInput(f"{where}: pulses of arm '{self.arm.name}' are not known; known: {', '.join(PULSES)}")
+            return np.asarray(np.array(position.numbers) / np.array(PULSES[self.arm.name]))
+        joints = self.arm.inverse_each(self._tool(position)[None])[0]
+        if np.isnan(joints[0]):
+            raise BadInput(f"{where}: out of reach of arm '{self.arm.name}'")
+        if position.configuration[4]:
+            turned = joints[-1] - 2 * pi * np.sign(joints[-1] or 1.0)
+            if self.arm.lower[-1] <= turned <= self.arm.upper[-1]:
+                joints[-1] = turned
+        return np.asarray(joints)

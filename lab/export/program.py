@@ -1,0 +1,185 @@
+"""What a robot carried out in a run: its motions, gripper outputs, rests and transfers, as the run's folder keeps them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError
+
+from lab.errors import BadInput
+from lab.sim.arms.arm import Arm
+from lab.sim.arms.arm_models import arm_of
+from lab.tasks.record import Record
+from lab.tasks.robot_fields import RobotSettings
+
+PROGRAM, TRAJECTORY = "program.json", "trajectory.npz"
+MAX_BYTES = 200_000_000  # of one of the two files
+_ARRAYS = {"at_s": 1, "joints": 2, "closed": 1, "seen_at_s": 1, "seen": 2}  # and how many dimensions they have
+
+Array = NDArray[np.float64]
+At = Annotated[float, Field(ge=0)]
+Row = Annotated[int, Field(ge=0)]
+
+
+class Motion(Record):
+    """The tool's way along `poses` (x, y, z [m], yaw [rad], each), rounded by `blend_m`, from rest to rest.
+
+    Rows `first` to `last` of the joints were driven, `seen_first` to `seen_last` of what was seen. complete: to the end; if
+    not, it was broken off, and its last row is where the arm was when it went on.
+    """
+
+    what: Literal["motion"] = "motion"
+    at_s: At
+    poses: tuple[tuple[float, float, float, float], ...]
+    blend_m: Annotated[float, Field(ge=0)]
+    first: Row
+    last: Row
+    seen_first: Row
+    seen_last: Row
+    complete: bool
+
+
+class Press(Record):
+    """The fingers close, or open."""
+
+    what: Literal["gripper"] = "gripper"
+    at_s: At
+    closed: bool
+
+
+class Rest(Record):
+    """The arm stays, as over a cell that it covers."""
+
+    what: Literal["rest"] = "rest"
+    at_s: At
+    seconds: At
+
+
+Action = Annotated[Motion | Press | Rest, Field(discriminator="what")]
+
+
+class Transfer(Record):
+    """One move of the sequence: the robot leaves `start`, reaches the part at `origin`, sets it down at `target`.
+
+    waits_for: the machine that must have finished before the part is taken out; None: none.
+    """
+
+    part: str
+    carries: Literal["part", "pallet"]
+    start: str
+    origin: str
+    target: str
+    leave_s: At
+    reach_s: At
+    drop_s: At
+    waits_for: str | None
+
+    @property
+    def words(self) -> str:
+        """What it does, for people."""
+        what = self.part if self.carries == "part" else f"pallet of {self.part}"
+        return f"{what}: {self.origin} to {self.target}"
+
+
+class Carried(Record):
+    """What `program.json` says; the rows that it counts stand in `trajectory.npz`. folder: of an arm that is a URDF file."""
+
+    version: Literal[1] = 1
+    task: str
+    seed: int
+    robot: RobotSettings
+    folder: str
+    machines: tuple[str, ...]
+    transfers: tuple[Transfer, ...]
+    actions: tuple[Action, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """One run of one robot; all times [s] since its floor was ready.
+
+    joints (n, k) [rad]: the arm's targets at at_s (n,), with the gripper closed (n,) or not; seen (m, 7): where the finger
+    tips were in physics at seen_at_s (m,): x, y, z [m] and their frame's quaternion xyzw, x out of the gripper, y across it.
+    """
+
+    carried: Carried
+    at_s: Array
+    joints: Array
+    closed: NDArray[np.bool_]
+    seen_at_s: Array
+    seen: Array
+
+    @cached_property
+    def arm(self) -> Arm:
+        """The arm that carried it out."""
+        return arm_of(self.carried.robot, Path(self.carried.folder))
+
+    @property
+    def motions(self) -> list[Motion]:
+        """Its motions, in order."""
+        return [action for action in self.carried.actions if isinstance(action, Motion)]
+
+    def tools(self, first: int, last: int) -> Array:
+        """The tool poses x, y, z [m], yaw [rad] (n, 4) that these rows of joints hold; the yaw goes on without jumps."""
+        poses = self.arm.kinematics.tools(self.joints[first:last])
+        poses[:, 2] += self.arm.base_up_m
+        poses[:, 3] = np.unwrap(poses[:, 3])
+        return poses
+
+    def save(self, folder: Path) -> None:
+        """Write its two files into a folder that is there. Raises OSError."""
+        text = self.carried.model_dump_json(indent=1)
+        (folder / PROGRAM).write_text(f"{text}\n", encoding="utf-8")
+        joints, seen = np.asarray(self.joints, np.float32), np.asarray(self.seen, np.float32)
+        np.savez_compressed(
+            folder / TRAJECTORY, at_s=self.at_s, joints=joints, closed=self.closed, seen_at_s=self.seen_at_s, seen=seen
+        )
+
+    @classmethod
+    def load(cls, folder: Path) -> "Program":
+        """What a run left in its folder. BadInput says what is missing or damaged."""
+        paths = [folder / name for name in (PROGRAM, TRAJECTORY)]
+        for path in paths:
+            if not path.is_file():
+                raise BadInput(f"'{folder}' (RUN): no {path.name} in it; give the folder of a `lab run` (its --out)")
+            if path.stat().st_size > MAX_BYTES:
+                raise BadInput(f"'{path}': over {MAX_BYTES // 1_000_000} MB")
+        try:
+            carried = Carried.model_validate_json(paths[0].read_bytes())
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(map(str, first["loc"])) or "the document"
+            raise BadInput(f"'{paths[0]}': {place}: {first['msg']}") from None
+        program = cls(carried, *_arrays(paths[1]))
+        _check_rows(program, paths[0])
+        return program
+
+
+def _arrays(path: Path) -> list[Any]:
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            found = {name: np.asarray(stored[name], bool if name == "closed" else float) for name in _ARRAYS}
+    except (OSError, KeyError, ValueError, EOFError) as error:
+        raise BadInput(f"'{path}': not a run's trajectory: {error}") from None
+    for name, dimensions in _ARRAYS.items():
+        if found[name].ndim != dimensions or not np.isfinite(found[name]).all():
+            raise BadInput(f"'{path}': '{name}' is not an array of {dimensions} dimensions of finite numbers")
+    return list(found.values())
+
+
+def _check_rows(program: Program, path: Path) -> None:
+    """BadInput unless all rows that the motions count by are there, and the arm has so many joints."""
+    rows, seen, axes = len(program.joints), len(program.seen), len(program.arm.joints)
+    if program.joints.shape[1] != axes or program.seen.shape[1] != 7:
+        raise BadInput(f"'{path}': its trajectory is not of the arm '{program.arm.name}' with {axes} joints")
+    if not rows == len(program.at_s) == len(program.closed) or seen != len(program.seen_at_s):
+        raise BadInput(f"'{path}': the columns of its trajectory are not equally long")
+    for number, motion in enumerate(program.motions, start=1):
+        if not (motion.first < motion.last <= rows and motion.seen_first < motion.seen_last <= seen):
+            raise BadInput(f"'{path}': motion {number} counts rows that its trajectory does not have")
+    for number, transfer in enumerate(program.carried.transfers, start=1):
+        if transfer.waits_for is not None and transfer.waits_for not in program.carried.machines:
+            raise BadInput(f"'{path}': transfer {number} waits for '{transfer.waits_for}', which is no machine of it")

@@ -1,0 +1,149 @@
+"""Writes down what a robot carries out, as it does, to be exported afterwards."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.export.program import Action, Array, Carried, Motion, Press, Program, Rest, Transfer
+from lab.sequencing.cell.schedule import Move
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.arms.robot import NAME, Robot, Trajectory
+from lab.sim.world import TIME_STEP
+from lab.tasks.task import Task
+
+SEEN_EVERY = 2  # physics steps: the tool is looked at 120 times a simulated second
+
+
+class MotionRecorder:
+    """A `MotionListener`: joint targets of each physics step in which the arm moves, and where physics has the tool."""
+
+    def __init__(self, robot: Robot) -> None:
+        """Its times begin now; the robot tells it from now on."""
+        self._robot, self._zero = robot, robot.world.steps
+        self._actions: list[Action] = []
+        self._rows: list[Array] = []  # joints (n, k) and times (n,) [steps] of each motion
+        self._times: list[Array] = []
+        self._seen: list[tuple[int, Array]] = []  # when [steps], and the tool link's pose (7,)
+        self._open: tuple[Sequence[ToolPose], float, Trajectory, Array, int, int] | None = None
+        self._driven = 0
+        robot.listener = self
+
+    @property
+    def _steps(self) -> int:
+        return self._robot.world.steps - self._zero
+
+    def began(self, poses: Sequence[ToolPose], blend: float, way: Trajectory, before: Array) -> None:
+        """A motion; one that was under way has been broken off."""
+        self._close(complete=False)
+        self._open = poses, blend, way, before, self._steps, len(self._seen)
+        self._driven = 0
+
+    def drives(self, row: int) -> None:
+        """Count it, and look at the tool now and then; it is where the row before has led it."""
+        assert self._open is not None
+        rows = len(self._open[2].positions)
+        self._driven = min(row + 1, rows)
+        if row % SEEN_EVERY == 0 or row == rows:
+            self._see()
+
+    def ended(self) -> None:
+        """The motion is complete."""
+        self._see()
+        self._close(complete=True)
+
+    def pressed(self, closed: bool) -> None:
+        """A gripper output."""
+        self._close(complete=False)
+        self._actions.append(Press(at_s=self._steps * TIME_STEP, closed=closed))
+
+    def rested(self, steps: int) -> None:
+        """A rest."""
+        self._close(complete=False)
+        self._actions.append(Rest(at_s=self._steps * TIME_STEP, seconds=steps * TIME_STEP))
+
+    def _see(self) -> None:
+        position, turn = self._robot.world.pose(NAME, self._robot.arm.tool_link)
+        self._seen.append((self._steps, np.concatenate([position, turn])))
+
+    def _close(self, *, complete: bool) -> None:
+        """Write down the motion that is under way, as far as it was driven."""
+        if self._open is None:
+            return
+        poses, blend, way, before, begun, seen = self._open
+        self._open = None
+        self._driven = min(self._driven, self._steps - begun)  # a target that was set in the step of a stop is none
+        if not self._driven:
+            return
+        first = sum(map(len, self._rows))
+        rows, times = [before, *way.positions[: self._driven]], [*range(begun, begun + self._driven + 1)]
+        if not complete:  # it ends where the arm has come to a stop
+            self._see()
+            rows.append(self._robot.world.joints(NAME, self._robot.arm.joints))
+            times.append(self._steps)
+        self._rows.append(np.array(rows))
+        self._times.append(np.array(times, float))
+        self._actions.append(
+            Motion(
+                at_s=begun * TIME_STEP,
+                poses=tuple((p.x, p.y, p.z, p.yaw) for p in poses),
+                blend_m=blend,
+                first=first,
+                last=first + len(rows),
+                seen_first=seen,
+                seen_last=len(self._seen),
+                complete=complete,
+            )
+        )
+
+    def program(self, task: Task, seed: int, moves: Sequence[Move], name: Callable[[int], str]) -> Program:
+        """What was written down so far; `moves`: the transfers that were made, `name`: of a part."""
+        self._close(complete=False)
+        arm = self._robot.arm
+        machines = tuple(station.name for station in task.stations if station.kind == "machine")
+        carried = Carried(
+            task=task.name,
+            seed=seed,
+            robot=task.robot,
+            folder=str(task.folder) if task.robot.is_file else "",
+            machines=machines,
+            transfers=tuple(_transfer(move, name(move.part), machines) for move in moves),
+            actions=tuple(self._actions),
+        )
+        joints = np.concatenate([np.empty((0, len(arm.joints))), *self._rows])
+        at_s = np.concatenate([np.empty(0), *self._times]) * TIME_STEP
+        seen_at_s = np.array([steps for steps, _ in self._seen], float) * TIME_STEP
+        links = np.array([pose for _, pose in self._seen]).reshape(-1, 7)
+        return Program(carried, at_s, joints, closed_at(carried.actions, at_s), seen_at_s, tips(links, arm.tip))
+
+
+def tips(links: Array, tip: Array) -> Array:
+    """Where the finger tips are (n, 7), x, y, z [m] and quaternion xyzw, for poses (n, 7) of the link that `tip` (4, 4) is in."""
+    from scipy.spatial.transform import Rotation
+
+    if not len(links):
+        return links
+    turns = Rotation.from_quat(links[:, 3:])
+    return np.hstack([links[:, :3] + turns.apply(tip[:3, 3]), (turns * Rotation.from_matrix(tip[:3, :3])).as_quat()])
+
+
+def closed_at(actions: Sequence[Action], at_s: Array) -> NDArray[np.bool_]:
+    """Whether the gripper was closed (n,) at times (n,) [s]; it begins open."""
+    presses = [action for action in actions if isinstance(action, Press)]
+    states = np.array([False, *(press.closed for press in presses)])
+    return np.asarray(states[np.searchsorted([press.at_s for press in presses], at_s, side="right")])
+
+
+def _transfer(move: Move, part: str, machines: Sequence[str]) -> Transfer:
+    waits = move.origin in machines and move.carries == "part"
+    return Transfer(
+        part=part,
+        carries=move.carries,
+        start=move.start,
+        origin=move.origin,
+        target=move.target,
+        leave_s=move.leave_s,
+        reach_s=move.reach_s,
+        drop_s=move.drop_s,
+        waits_for=move.origin if waits else None,
+    )

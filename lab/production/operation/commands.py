@@ -1,0 +1,155 @@
+"""The operator's commands: one table, and how a typed line is read. Terminal, page and pipe all send these words."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+from typing import Literal
+
+from lab.errors import BadInput, unknown
+
+Argument = str | float | tuple[float, float, float] | tuple[int, ...] | None
+How = Literal["at once", "by hand", "in turn", "console"]
+MOST_MM, MOST_DEGREES, MOST_SPEED, MOST_ENTRIES, MOST_CHARACTERS = 500.0, 180.0, 100.0, 10_000, 4000
+AXES = {"x": 0, "y": 1, "z": 2}
+_SIGN = re.compile(r"([+-])([xyz])")
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command: its arguments as they are typed ("": none), what it does, and when it is done.
+
+    how: "at once", whatever goes on; "by hand", a motion of the arm, when nothing moves, also in a pause; "in turn", when
+    what was said before is done; "console": it concerns the console, not the run. read: the argument that words mean.
+    """
+
+    arguments: str
+    help: str
+    how: How
+    read: Callable[[str], Argument]
+
+
+@dataclass(frozen=True)
+class Spoken:
+    """A line as it was understood: the command's word and argument; `words`: the line itself, in one form."""
+
+    word: str
+    argument: Argument
+    words: str
+
+    @property
+    def how(self) -> How:
+        """When it is done."""
+        return COMMANDS[self.word].how
+
+
+def spoken(line: str) -> Spoken:
+    """What a typed line means; BadInput, in one line, for what is no command."""
+    words = line.split()
+    if not words:
+        raise BadInput("no command: help lists them")
+    word = words[0].lower()
+    if len(line) > MOST_CHARACTERS:
+        raise BadInput(f"'{word[:40]} ...': a line has {MOST_CHARACTERS} characters at the most")
+    if word not in COMMANDS:
+        raise unknown("command", words[0][:80], COMMANDS, "typed")
+    rest = " ".join(words[1:])
+    try:
+        argument = COMMANDS[word].read(rest)
+    except BadInput as error:
+        raise BadInput(f"{word}: {error}") from None
+    return Spoken(word, argument, f"{word} {rest}".strip())
+
+
+def _nothing(rest: str) -> None:
+    if rest:
+        raise BadInput(f"'{rest[:80]}' after it: wanted nothing")
+
+
+def _name(rest: str) -> str:
+    if not rest:
+        raise BadInput("no name after it")
+    return rest
+
+
+def _parts(rest: str) -> str:
+    if "=" not in rest:
+        raise BadInput(f"'{rest[:80]}': wanted kind=number, such as slice=2,cup=1")
+    return ",".join(rest.replace(",", " ").split())
+
+
+def _number(text: str, most: float, unit: str, least: float = -inf) -> float:
+    """A number of at most `most`, whatever its sign, and at least `least`."""
+    try:
+        number = float(text)
+    except ValueError:
+        raise BadInput(f"'{text[:80]}' is no number of {unit}") from None
+    if not abs(number) <= most or number < least:
+        low = -most if least == -inf else least
+        raise BadInput(f"{text[:40]}: allowed are {low:g} to {most:g} {unit}")
+    return number
+
+
+def _jog(rest: str) -> tuple[float, float, float]:
+    """How far [m] along the world's axes: "+x 10" is ten millimetres."""
+    axis, _, far = rest.partition(" ")
+    sign = _SIGN.fullmatch(axis.lower())
+    if sign is None:
+        raise BadInput(
+            f"'{axis[:80]}' is no direction: wanted +x, -x, +y, -y, +z or -z, then millimetres, such as +x 10"
+        )
+    length_m = _number(far, MOST_MM, "mm", least=0.0) / 1000
+    way = [0.0, 0.0, 0.0]
+    way[AXES[sign[2]]] = length_m if sign[1] == "+" else -length_m
+    return way[0], way[1], way[2]
+
+
+def _speed(rest: str) -> float | None:
+    if rest == "max":
+        return None
+    return _number(rest, MOST_SPEED, "times real time, or max", least=0.1)
+
+
+def _order(rest: str) -> tuple[int, ...]:
+    words = rest.replace(",", " ").split()
+    if not words:
+        raise BadInput("no entries: wanted one number a move, such as 1 2 1 3")
+    for number, word in enumerate(words, start=1):
+        if not (word.isascii() and word.isdecimal() and len(word) <= 6 and int(word) > 0):
+            raise BadInput(f"entry {number}, '{word[:40]}': wanted the number of a part, from 1")
+    if len(words) > MOST_ENTRIES:
+        raise BadInput(f"{len(words)} entries: allowed are 1 to {MOST_ENTRIES}")
+    return tuple(int(word) for word in words)
+
+
+COMMANDS: dict[str, Command] = {
+    "parts": Command("slice=2,cup=1", "choose how many parts of each kind; lays the scene out anew", "in turn", _parts),
+    "policy": Command("", "find or learn the skills, time them, and find the best order", "in turn", _nothing),
+    "run": Command("", "carry the plan out from where it stands", "in turn", _nothing),
+    "pause": Command("", "stop when the move under way has ended", "at once", _nothing),
+    "step": Command("", "carry one move out, then pause", "at once", _nothing),
+    "go": Command("", "go on after a pause or a protective stop", "at once", _nothing),
+    "stop": Command("", "emergency stop: the arm holds at once, until it is reset", "at once", _nothing),
+    "reset": Command("", "release the emergency stop; then go", "at once", _nothing),
+    "speed": Command("1|4|max", "simulated seconds per second", "at once", _speed),
+    "jog": Command("+x 10", "move the tool so many mm along +x -x +y -y +z or -z", "by hand", _jog),
+    "rotate": Command(
+        "15", "turn the gripper so many degrees", "by hand", lambda rest: _number(rest, MOST_DEGREES, "degrees")
+    ),
+    "open": Command("", "open the gripper", "by hand", _nothing),
+    "close": Command("", "close the gripper", "by hand", _nothing),
+    "home": Command("", "bring the arm home, over everything", "by hand", _nothing),
+    "grasp": Command("", "take up the part that is nearest to the gripper", "by hand", _nothing),
+    "order": Command("1 2 1 3", "make this sequence the plan, checked move by move", "in turn", _order),
+    "learn": Command("NAME", "learn a skill, or a family of skills, and keep it", "in turn", _name),
+    "execute": Command("NAME [PART]", "carry one skill out now", "by hand", _name),
+    "status": Command("", "say where everything stands", "console", _nothing),
+    "help": Command("", "list the commands", "console", _nothing),
+    "quit": Command("", "keep everything and leave", "console", _nothing),
+}
+
+
+def help_lines() -> list[str]:
+    """The commands, one a line."""
+    width = max(len(f"{word} {command.arguments}") for word, command in COMMANDS.items())
+    return [f"{f'{word} {command.arguments}':{width}}  {command.help}" for word, command in COMMANDS.items()]

@@ -1,0 +1,112 @@
+"""Where commands are said while another thread simulates: stops act at once, the rest is carried out in its turn."""
+
+from threading import Condition
+
+from lab.errors import BadInput, LabError
+from lab.production.controls import RESET_FIRST, StopKind
+from lab.production.operation.commands import Spoken, spoken
+from lab.production.operation.operated_scene import Left
+from lab.production.operation.operation import OPERATOR, Done, Operation
+from lab.production.run_status import RunStatus
+
+AT_WORK = "the robot is at work: pause first"
+
+
+class Desk:
+    """`say` may be called in any thread, `serve` in the one that simulates.
+
+    attended: somebody is there who goes on after a protective stop; without, what it stops has failed.
+    busy: the command under way, "" for none. What came of commands is told by the operation's `on_done`.
+    """
+
+    def __init__(self, operation: Operation, *, attended: bool = True) -> None:
+        self.operation = operation
+        self.busy, self.closed = "lays the scene out", False
+        self._changed = Condition()
+        operation.controls.attended = attended
+
+    def now(self) -> RunStatus:
+        """Where the run stands."""
+        return self.operation.now()
+
+    def say(self, line: str, by: str = OPERATOR) -> Done | None:
+        """Take a command; what came of it, where that is known at once, else None."""
+        try:
+            said = spoken(line)
+            if said.how == "at once":
+                done = self.operation.at_once(said, by)
+                if said.word == "step" and not done.refused:
+                    self._begin(by)
+                self._wake()
+            elif said.how == "by hand" and self.busy and not self._rests:
+                raise BadInput(RESET_FIRST if self.operation.controls.holds_arm else AT_WORK)
+            elif said.how == "console":
+                raise BadInput(f"{said.word}: it is said to a console, not to the run")
+            else:
+                self.operation.waiting.append((said, by))
+                self._wake()
+                return None
+        except LabError as error:
+            return self.operation.refuse(line, str(error), by)
+        return done
+
+    @property
+    def _rests(self) -> bool:
+        """Whether what is under way waits for the operator, or will after the move."""
+        return StopKind.PAUSE in self.operation.controls.stops and not self.operation.controls.holds_arm
+
+    def _begin(self, by: str) -> None:
+        """A single step begins the run where nothing is under way."""
+        if not self.busy and self.operation.scene.plan is not None:
+            self.operation.waiting.append((spoken("run"), by))
+
+    def leave(self) -> None:
+        """Break off what is under way, and end."""
+        self.closed = self.operation.scene.leaving = True
+        self._wake()
+
+    def settle(self) -> None:
+        """Wait until all that was said is done, or waits in a pause. To be called in another thread than `serve`."""
+        with self._changed:
+            while not (self.closed or self.still):
+                self._changed.wait(0.05)
+
+    @property
+    def still(self) -> bool:
+        """Whether nothing moves before somebody says something."""
+        operation = self.operation
+        rests = operation.scene.resting and operation.controls.waits
+        return not operation.waiting and (not self.busy or rests)
+
+    def _wake(self) -> None:
+        with self._changed:
+            self._changed.notify_all()
+
+    def serve(self) -> None:
+        """Carry out what is said until somebody leaves; the scene is laid out first. Raises LabError."""
+        operation = self.operation
+        try:
+            operation.open()
+            while not self.closed:
+                following = self._following()
+                operation.write()
+                if following is not None:
+                    operation.do(*following)
+        except Left:
+            pass
+        finally:
+            self.busy, self.closed = "", True
+            self._wake()
+
+    def _following(self) -> tuple[Spoken, str] | None:
+        """The next command; None when there is none for a while."""
+        waiting = self.operation.waiting
+        with self._changed:
+            self.busy = ""
+            if not waiting:
+                self._changed.notify_all()
+                self._changed.wait(0.1)
+            if not waiting:
+                return None
+            self.busy = waiting[0][0].words
+            return waiting.popleft()

@@ -1,0 +1,308 @@
+"""The scene that the operator works in: laid out, taught, ordered and carried out, each as a command that was checked first."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from threading import RLock
+
+from lab.errors import BadInput, WorkFailed, unknown
+from lab.export.recorder import MotionRecorder
+from lab.production.composer import Production, noting
+from lab.production.conditions import Conditions
+from lab.production.controls import RESET_FIRST, StopKind
+from lab.production.faults.draw import draw
+from lab.production.faults.injector import Injector
+from lab.production.floor import Floor
+from lab.production.operation.by_hand import ByHand
+from lab.production.operation.commands import Spoken
+from lab.production.operation.typed_order import checked
+from lab.production.order import OrderAdvice, ordered
+from lab.production.relearning import Relearner
+from lab.production.run import teach_all
+from lab.production.run_status import RunStatus
+from lab.production.taught import Taught, skill_row
+from lab.sequencing.cell.routes import part_of
+from lab.sequencing.methods.exact import Optimum
+from lab.sequencing.search import SequenceResult
+from lab.sequencing.simulate.run import simulate
+from lab.sim.world import World
+from lab.skills.prepared_scene import Prepared, prepare
+from lab.skills.trial import trial_of
+from lab.tasks.fault_fields import FaultFields
+from lab.tasks.task import Order, Task, counts_from_word, in_words
+from lab.teaching.events import Event, PhaseBegan, PlanMade, SkillReady, TroubleMet
+from lab.teaching.lesson_plan import LessonPlan
+from lab.teaching.teacher import Teacher
+
+Deed = Callable[[], str]  # carries a checked command out, and says what came of it; raises WorkFailed
+LAY_OUT = "parts lays the scene out anew"
+PROTECTED = "a protective stop holds the robot: go first"
+
+
+class Left(KeyboardInterrupt):
+    """The operator leaves while something goes on."""
+
+
+@dataclass
+class Plan:
+    """What was taught, the order to carry out, and what is proven of it."""
+
+    taught: Taught
+    found: SequenceResult
+    proven: Optimum
+    production: Production
+
+
+class OperatedScene:
+    """One scene and all that is in it; it belongs to the thread that simulates, but for `now` and the controls.
+
+    leaving: what is under way is broken off. resting: a pause lasts. again: it is carried out once more, as a journal says.
+    meanwhile: called in a pause of the run, for what is done by hand.
+    """
+
+    def __init__(self, task: Task, order: Order, seed: int, teacher: Teacher, conditions: Conditions) -> None:
+        """Nothing is laid out before `open`. What happens is told to the teacher's listener."""
+        self.task, self.order, self.seed, self.conditions = task, order, seed, conditions
+        self.controls, self.journal = conditions.controls, conditions.journal
+        self.leaving = self.again = self.resting = False
+        self.plan: Plan | None = None
+        self.failure: str | None = None
+        self.on_laid_out: Callable[[], None] = lambda: None
+        self.on_step: Callable[[], None] = lambda: None
+        self.meanwhile: Callable[[], bool] = lambda: False
+        self._world: World | None = None
+        self.lock, self._status = RLock(), RunStatus.of(task, order)
+        self._told, self.teacher = teacher.tell, replace(teacher, tell=self.tell)
+
+    def open(self) -> None:
+        """Lay the scene out. BadInput for what cannot be."""
+        self.prepared: Prepared = prepare(self.task, self.order, self.seed)
+        self._build(self.task.faults)
+
+    def _build(self, faults: Sequence[FaultFields]) -> None:
+        """The floor, with nothing done on it yet."""
+        self.close()
+        prepared, self.plan, self.failure = self.prepared, None, None
+        world = World()
+        floor = self.floor = Floor(world, prepared.skillset, prepared.layout, prepared.order)
+        self.injector = Injector(faults)
+        self.injector.prepare(floor.scene)
+        floor.record(self.conditions.viewer)
+        self.motions = MotionRecorder(floor.scene.robot)
+        floor.scene.robot.override(self.conditions.override)
+        floor.stand(prepared.surveys.approach(self.task.robot.start))
+        floor.restart_clock()
+        self.heard: list[Event] = []
+        floor.tell = noting(floor, self.journal, self.heard, self.tell)
+        floor.hand, floor.meanwhile = self._hand, lambda: self.meanwhile()
+        floor.controls, floor.stops.note = self.controls, self.journal.note_stops
+        self._world, self.by_hand = world, ByHand(floor)
+        with self.lock:
+            self._status = RunStatus.of(self.task, prepared.order)
+        self.on_laid_out()
+
+    def close(self) -> None:
+        """Take the scene down; safe to call again."""
+        if self._world is not None:
+            self._world.close()
+            self._world = None
+
+    def check_leaving(self) -> None:
+        """Raises Left when the operator leaves."""
+        if self.leaving:
+            raise Left("the operator left")
+
+    def _hand(self) -> bool:
+        self._status.now_s, self.resting = self.floor.now_s, False
+        self.on_step()
+        self.check_leaving()
+        return self.injector.tick(self.floor)
+
+    @property
+    def steps(self) -> int:
+        """Physics steps since the scene was laid out."""
+        return 0 if self._world is None else self.floor.steps
+
+    def tell(self, event: Event) -> None:
+        """Take an event over, and tell it on."""
+        with self.lock:
+            self._status.hear(event)
+        self._told(event)
+        self.check_leaving()
+
+    def now(self) -> RunStatus:
+        """Where the run stands, to be looked at in any thread."""
+        with self.lock:
+            return self._status.copied()
+
+    def trouble(self, why: str) -> None:
+        """Tell what went wrong in something that the operator said."""
+        self.floor.tell(TroubleMet(why, "waits for the operator", "", "", self.floor.now_s))
+
+    # ---- commands --------------------------------------------------------------------------------------------------
+
+    def checked(self, said: Spoken) -> Deed:
+        """What a command does, once it was checked. Raises BadInput for what may not be."""
+        word, argument = said.word, said.argument
+        if said.how == "by hand":
+            return self._moved(word, argument)
+        match word, argument:
+            case "policy", _:
+                return self._policy()
+            case "run", _:
+                return self._run()
+            case "order", tuple():
+                return self._order(tuple(int(one) for one in argument))
+            case "learn", str():
+                return self._learn(argument)
+            case "parts", str():
+                order = self.task.order(None, counts_from_word(argument))
+                return lambda: self._lay_out(order)
+        raise BadInput(f"{word}: it is said to a console, not to the run")
+
+    def _lay_out(self, order: Order) -> str:
+        self.prepared = prepare(self.task, order, self.seed)
+        self.order = order
+        self._build(self.task.faults)
+        return f"{in_words(order)} laid out"
+
+    def _moved(self, word: str, argument: object) -> Deed:
+        """A motion by hand; the run goes on from where it ends."""
+        if self.controls.holds_arm and not self.again:
+            raise BadInput(RESET_FIRST if StopKind.EMERGENCY in self.controls.stops else PROTECTED)
+        deed = getattr(self.by_hand, word)(*(() if argument is None else (argument,)))
+
+        def moved() -> str:
+            try:
+                deed()
+            finally:
+                self.floor.recorder.take()  # type: ignore[union-attr]
+                if self.plan is not None:
+                    self.plan.production.work.place = ""
+            return ""
+
+        return moved
+
+    # ---- skills and order --------------------------------------------------------------------------------------------
+
+    def _policy(self) -> Deed:
+        if self.plan is not None and self.plan.production.work.moves:
+            raise BadInput("policy: the run has begun: parts lays the scene out anew")
+        drawn = self.conditions.fault_seed is not None
+        if drawn and self.floor.steps:
+            raise BadInput("policy: with --faults it comes before the arm is moved: parts lays the scene out anew")
+
+        def deed() -> str:
+            taught = teach_all(self.prepared, self.teacher, self.journal)
+            self.tell(PhaseBegan("sequence", 1))
+            chosen = ordered(taught.cell, self.task.sequencing, OrderAdvice(), self.seed, self.tell)
+            found, proven = chosen.found, chosen.proven
+            if drawn:
+                self._build(
+                    (
+                        *self.task.faults,
+                        *draw(self.task, self.prepared.order, self.conditions.fault_seed or 0, found.cost),
+                    )
+                )
+            relearner = Relearner(self.prepared, taught, self.teacher)
+            production = Production(self.floor, taught.cell, self.floor.tell, relearner)
+            self.plan = Plan(taught, found, proven, production)
+            production.sequence = [*found.sequence]
+            self._tell_plan("")
+            return f"{len(found.sequence)} moves, {found.cost:.1f} s"
+
+        return deed
+
+    def _tell_plan(self, why: str) -> None:
+        """The plan in use, its times counted from now on."""
+        plan, now_s = self._planned(), self.floor.now_s
+        schedule = simulate(plan.taught.cell, plan.found.sequence).later(now_s)
+        gap = plan.proven.gap(plan.found.cost)
+        self.tell(PlanMade(schedule, len(plan.found.sequence), gap, plan.proven.proven, now_s, why))
+
+    def _planned(self) -> Plan:
+        if self.plan is None:
+            raise BadInput("there is no plan yet: policy finds one")
+        return self.plan
+
+    def _order(self, sequence: tuple[int, ...]) -> Deed:
+        plan = self._planned()
+        production = plan.production
+        order = checked(production.work.plan, sequence)
+        if production.recovery.lost or production.recovery.out:
+            raise BadInput("order: parts or machines were given up in this run: its plan has to leave them out")
+
+        def deed() -> str:
+            production.sequence = [*order.sequence]
+            if not production.work.moves:
+                plan.found = replace(plan.found, sequence=order.sequence, cost=order.schedule.makespan_s)
+                self._tell_plan(f"the operator's order: {order.words}")
+            else:
+                schedule = order.schedule.later(self.floor.now_s - production.work.plan.now_s)
+                now_s, why = self.floor.now_s, f"the operator's order: {order.words}"
+                self.tell(PlanMade(schedule, len(order.sequence), order.gap, order.proven, now_s, why))
+            return order.words
+
+        return deed
+
+    def _learn(self, name: str) -> Deed:
+        problems, task = self.prepared.problems, self.task
+        families = {problem.subtask for problem in problems.values()}
+        wanted = [own for own, problem in problems.items() if name in (own, problem.subtask)]
+        if not wanted:
+            raise unknown("skill", name, [*problems, *families], "learn")
+
+        def deed() -> str:
+            teacher = replace(self.teacher, trial=trial_of(self.prepared))
+            self.tell(PhaseBegan("learn", len(wanted)))
+            for own in wanted:
+                problem, settings = problems[own], task.subtask(problems[own].subtask)
+                lesson = teacher.teach(LessonPlan(problem, settings.learner, settings.gate, task.name))
+                self.prepared.skillset.policies[own] = lesson.policy
+                self.journal.keep_skill(skill_row(own, lesson), lesson.policy)
+                self.tell(SkillReady(own, lesson))
+            if self.plan is not None and not self.plan.production.work.moves:
+                self.plan = None  # its times are those of the skills as they were
+            return f"learned {', '.join(wanted)}"
+
+        return deed
+
+    # ---- the run -----------------------------------------------------------------------------------------------------
+
+    def _run(self) -> Deed:
+        plan = self._planned()
+        production = plan.production
+        if not production.sequence:
+            raise BadInput("run: nothing is left to do: parts lays the scene out anew")
+        if not self.again and self.controls.waits and (why := self.controls.go_on()):
+            raise BadInput(f"run: {why}")
+
+        def deed() -> str:
+            self.tell(PhaseBegan("carry out", len(production.sequence)))
+            if not production.work.moves:
+                self._tell_plan("")
+            self.held_first()
+            self.failure = production.carry_out(production.sequence)
+            if self.failure is not None:
+                raise WorkFailed(self.failure)
+            return f"{len(production.work.finished)} of {len(self.prepared.order)} parts made"
+
+        return deed
+
+    def held_first(self) -> None:
+        """What the operator let the arm take up is brought on first. Raises WorkFailed where that may not be."""
+        held, plan = self.floor.bench.held, self.plan
+        if held is None or plan is None or plan.production.work.under_way:
+            return
+        production = plan.production
+        run = production.work.plan
+        own = [d for d in run.allowed() if held in self._bodies(part_of(d, run.cell.parts))]
+        if not own:
+            raise WorkFailed(f"{held} is in the gripper and may not be brought on now: put it down, and open")
+        if production.sequence[0] not in own:
+            production.sequence.insert(0, own[0])
+            production.replan(f"the robot holds {held}")
+
+    def _bodies(self, part: int) -> list[str]:
+        assert self.plan is not None
+        work = self.plan.production.work
+        return self.floor.scene.bodies_of(work.name(part), work.comes_as(part))

@@ -1,0 +1,244 @@
+"""The operator's run: commands in words, carried out one after the other in one scene, each noted before it counts.
+
+A command takes effect at a physics step, and between two commands no simulated time goes by: the scene stands still as
+long as nobody says anything, machines under way with it. So the commands with their steps, the stops with theirs, task,
+options and seed give the same scene again, bit for bit. The steps are counted from when the scene was laid out last.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeGuard
+
+from lab.errors import LabError, WorkFailed
+from lab.production.conditions import Conditions
+from lab.production.operation.commands import Spoken, spoken
+from lab.production.operation.operated_scene import OperatedScene
+from lab.production.report import Report
+from lab.production.run_journal import Commanded, Entry, Stopped, stops_of
+from lab.production.run_status import HeldStatus, RunStatus
+from lab.production.stop_record import StopsChanged
+from lab.tasks.task import Order, Task
+from lab.teaching.events import OperatorActed
+from lab.teaching.teacher import Teacher
+
+OPERATOR = "operator"
+
+
+@dataclass(frozen=True)
+class Done:
+    """What came of a command: refused, why it was not begun; failed, why it did not come to its end; said, what it came to."""
+
+    words: str
+    refused: str = ""
+    failed: str = ""
+    said: str = ""
+
+    @property
+    def well(self) -> bool:
+        """Whether it was carried out."""
+        return not (self.refused or self.failed)
+
+
+class Operation:
+    """What the operator does in one scene; all but `at_once` and `now` belongs to the thread that simulates.
+
+    waiting: commands that were said in other threads, and by whom (see `Desk`). done: what came of all that was said;
+    on_done: called with each, in the thread in which it was done.
+    """
+
+    def __init__(self, task: Task, order: Order, seed: int, teacher: Teacher, conditions: Conditions) -> None:
+        """Nothing is laid out before `open`. What happens is told to the teacher's listener."""
+        self.scene = OperatedScene(task, order, seed, teacher, conditions)
+        self.scene.on_laid_out, self.scene.meanwhile = self._laid_out, self._meanwhile
+        self.scene.on_step = self.write
+        self.controls, self._journal = conditions.controls, conditions.journal
+        self.waiting: deque[tuple[Spoken, str]] = deque()
+        self.done: list[Done] = []
+        self.on_done: Callable[[Done], None] = lambda done: None
+        self._began = time.perf_counter()
+        self._unwritten = deque[Commanded]()
+        self._script = deque[Stopped | Commanded]()  # of a journal, what is still to be done again
+        self._inside = False  # a pause, carrying a command out
+
+    def open(self) -> None:
+        """Lay the scene out. BadInput for what cannot be."""
+        self.scene.open()
+
+    def close(self) -> None:
+        """Take the scene down; safe to call again."""
+        self.write()
+        self.scene.close()
+
+    def now(self) -> RunStatus:
+        """Where the run stands, to be looked at in any thread; a stop shows as soon as it is pressed."""
+        shown, held = self.scene.now(), self.controls.held
+        shown.held = None if held is None else HeldStatus(held.kind, held.why, held.by)
+        shown.speed = self.controls.speed
+        return shown
+
+    def do(self, line: str | Spoken, by: str = OPERATOR) -> Done:
+        """Carry a command out, in the thread that simulates; what is wrong with it is in what comes back."""
+        words = line if isinstance(line, str) else line.words
+        try:
+            said = spoken(line) if isinstance(line, str) else line
+            words = said.words
+            if said.how == "at once":
+                return self.at_once(said, by)
+            deed = self.scene.checked(said)
+        except LabError as error:
+            return self._noted(Done(words, refused=str(error)), by)
+        self._noted(Done(words), by)
+        try:
+            told = deed()
+        except LabError as error:
+            self.scene.trouble(str(error))
+            return self._kept(Done(words, failed=str(error)))
+        return self._kept(Done(words, said=told))
+
+    def at_once(self, said: Spoken, by: str = OPERATOR) -> Done:
+        """A stop, or what releases it, or the pace: in any thread, without waiting for anything."""
+        why = self._pressed(said, by)
+        return self._aside(Done(said.words, refused=why), by)
+
+    def _pressed(self, said: Spoken, by: str) -> str:
+        controls = self.controls
+        match said.word:
+            case "stop":
+                controls.emergency(by=by)
+            case "pause":
+                controls.pause(by)
+            case "reset":
+                return controls.reset()
+            case "go":
+                return controls.go_on()
+            case "step":
+                return controls.step()
+            case "speed":
+                assert not isinstance(said.argument, str | tuple)
+                controls.set_speed(said.argument)
+        return ""
+
+    def _noted(self, done: Done, by: str) -> Done:
+        """Write a command down before it takes effect, and tell it."""
+        floor = self.scene.floor
+        self.write()
+        if not self.scene.again:
+            self._journal.write(Commanded(floor.steps, done.words, by, done.refused))
+        self.scene.tell(OperatorActed(done.words, by, floor.now_s, done.refused))
+        return self._kept(done) if done.refused else done
+
+    def refuse(self, words: str, why: str, by: str = OPERATOR) -> Done:
+        """What is said is not begun: in any thread."""
+        return self._aside(Done(words, refused=why), by)
+
+    def _aside(self, done: Done, by: str) -> Done:
+        """Tell of what another thread did, or was refused; it is written by the one that simulates, as soon as it can."""
+        if not self.scene.again:
+            self._unwritten.append(Commanded(self.scene.steps, done.words, by, done.refused))
+        self.scene.tell(OperatorActed(done.words, by, self.scene.now().now_s, done.refused))
+        return self._kept(done)
+
+    def write(self) -> None:
+        """Write down what was said in other threads, in the one that simulates."""
+        while self._unwritten:
+            self._journal.write(self._unwritten.popleft())
+
+    def _kept(self, done: Done) -> Done:
+        with self.scene.lock:
+            self.done.append(done)
+        self.on_done(done)
+        return done
+
+    def _meanwhile(self) -> bool:
+        """In a pause of the run: one command that is carried out by hand, if there is any."""
+        self.scene.check_leaving()
+        if self._inside:
+            return False
+        following = self._following() if self.scene.again else self._said_by_hand()
+        if following is None:
+            self.scene.resting = self.controls.waits
+            return False
+        self._inside = True
+        try:
+            self.do(*following)
+            self.scene.held_first()
+        except LabError as error:
+            self.scene.trouble(str(error))
+        finally:
+            self._inside = False
+        return True
+
+    def _said_by_hand(self) -> tuple[Spoken, str] | None:
+        return self.waiting.popleft() if self.waiting and self.waiting[0][0].how == "by hand" else None
+
+    # ---- once more ---------------------------------------------------------------------------------------------------
+
+    def repeat(self, entries: Sequence[Entry]) -> None:
+        """Do again what a journal says was done. Raises WorkFailed where a command does not come at its step."""
+        self._script = deque(entry for entry in entries if isinstance(entry, Stopped) or _is_deed(entry))
+        self.scene.again = True
+        self.open()
+        while self._script:
+            entry = self._script.popleft()
+            if isinstance(entry, Stopped):
+                continue
+            if entry.step != self.scene.floor.steps:
+                raise WorkFailed(
+                    f"'{entry.words}' came at step {entry.step}, and this run is at {self.scene.floor.steps}"
+                )
+            self.do(entry.words, entry.by)
+        self.scene.again = False
+
+    def _laid_out(self) -> None:
+        """Of what is done again, the stops until the scene is laid out the next time."""
+        if not self.scene.again:
+            return
+        stops, last = list[StopsChanged](), 0
+        for entry in self._script:
+            if isinstance(entry, Commanded) and entry.words.split()[0] == "parts":
+                break
+            if isinstance(entry, Stopped):
+                stops.append(stops_of(entry))
+            if isinstance(entry, Stopped | Commanded):
+                last = max(last, entry.step)
+        self.scene.floor.stops.again(stops, last)
+
+    def _following(self) -> tuple[Spoken, str] | None:
+        """The next command of the journal, when it was given here, in this pause."""
+        while self._script and isinstance(self._script[0], Stopped) and self._script[0].step <= self.scene.floor.steps:
+            self._script.popleft()
+        entry = self._script[0] if self._script else None
+        if not isinstance(entry, Commanded) or entry.step != self.scene.floor.steps:
+            return None
+        said = spoken(entry.words)
+        if said.how != "by hand":
+            return None
+        self._script.popleft()
+        return said, entry.by
+
+    # ---- what came of it ---------------------------------------------------------------------------------------------
+
+    def report(self) -> Report | None:
+        """The run as `lab run` reports it; None when no plan was made."""
+        scene = self.scene
+        plan = scene.plan
+        if plan is None or (recorder := scene.floor.recorder) is None:
+            return None
+        left = bool(plan.production.sequence)
+        why = scene.failure or ("the operator left before its end" if left else None)
+        production = plan.production
+        outcome = replace(
+            production.outcome(why, left),
+            happened=tuple(scene.injector.happened),
+            heard=tuple(scene.heard),
+            program=scene.motions.program(scene.task, scene.seed, production.work.moves, production.cell.part_name),
+        )
+        recorder.take()
+        return Report(scene.prepared, plan.taught, plan.found, plan.proven, outcome, recorder.recording, self._began)
+
+
+def _is_deed(entry: Entry) -> TypeGuard[Commanded]:
+    """Whether a line is of something that was done in its turn, or by hand: stops and the pace have lines of their own."""
+    return isinstance(entry, Commanded) and not entry.refused and spoken(entry.words).how in ("in turn", "by hand")

@@ -1,0 +1,217 @@
+"""The order of a job's transfers: as an operator gives it, as people advise it, and as a method finds it alone."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lab.advice.advising import through
+from lab.advice.advisors import PEOPLE, AdvisorName, make_advisor
+from lab.advice.entries import Closed
+from lab.advice.journal import Again, Journal
+from lab.advice.receipt import receipt
+from lab.errors import BadInput, counted
+from lab.learning.requests import Ask
+from lab.learning.session_events import EpisodeEnded
+from lab.learning.session_events import Event as SessionEvent
+from lab.learning.settings import GateSettings
+from lab.sequencing import find_sequence
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
+from lab.sequencing.cell.routes import part_of
+from lab.sequencing.methods.exact import Optimum, optimum
+from lab.sequencing.search import SAME, Reference, Search, SequenceResult
+from lab.sequencing.simulate.run import Run, follow
+from lab.tasks.sequencing import Sequencing, search_for
+from lab.teaching.events import ORDER, LessonEvent, OrderChosen, SequenceFound, SequencingBegan, Tell, unheard
+from lab.teaching.lesson_sessions import TellingAdvisor
+
+if TYPE_CHECKING:
+    from lab.sequencing.methods.srl_advised import AdvisedResult
+
+NOBODY = AdvisorName.of("none")
+KeepOrder = Callable[[Cell, str], Journal]  # given the cell and the objective
+SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
+ADVISED, GIVEN, EXACT = "advised", "given", "exact"  # by whom an order is, beside the methods' names
+
+
+def taken_moves(cell: Cell, words: str, done: Sequence[int] = (), where: str = "order") -> tuple[tuple[int, ...], str]:
+    """The first moves of "1 2 1 3" or "1,2,1,3" that may be made after `done`; why the next may not, "" where all may.
+
+    A number is a decision as in a sequence (see `Run`): the part's number, + the number of parts for its second choice.
+    BadInput for words that are no moves at all; `where` says what they were typed to.
+    """
+    run, taken = Run(cell), list[int]()
+    for decision in done:
+        run.move(decision)
+    typed = words.replace(",", " ").split()
+    if not typed:
+        raise BadInput(f"{where} '{words}': no moves; wanted part numbers such as 1 2 1")
+    for position, word in enumerate(typed, 1):
+        if not (word.isascii() and word.isdigit()) or len(word) > 6:
+            raise BadInput(f"{where} '{words}': move {position} '{word}' is no part's number, 1 to {cell.parts}")
+        if reason := run.refusal(int(word)):
+            return tuple(taken), f"move {position} '{word}': {reason}; {_allowed(run)}"
+        run.move(int(word))
+        taken.append(int(word))
+    return tuple(taken), ""
+
+
+def checked_order(cell: Cell, words: str, where: str = "--order") -> tuple[int, ...]:
+    """A whole order, as a sequence. BadInput for the first move that may not be made, with the reason, and for what is left."""
+    taken, reason = taken_moves(cell, words, where=where)
+    if reason:
+        raise BadInput(f"{where} '{words}': {reason}")
+    run = Run(cell)
+    for decision in taken:
+        run.move(decision)
+    if not run.done:
+        part = run.finished_s.index(None) + 1
+        station = cell.names[cell.positions[run.locations[part - 1]].station]
+        made = counted(len(taken), "move")
+        raise BadInput(
+            f"{where} '{words}': it ends after {made}, but {cell.part_name(part)} is still at '{station}'; {_allowed(run)}"
+        )
+    return taken
+
+
+def _allowed(run: Run) -> str:
+    """What may be moved now, in words."""
+    if run.done:
+        return "all parts are done"
+    names = [f"{decision} ({run.cell.part_name(part_of(decision, run.cell.parts))})" for decision in run.allowed()]
+    return f"allowed here: {', '.join(names)}" if names else "nothing can move any more"
+
+
+@dataclass(frozen=True)
+class OrderAdvice:
+    """Whose word counts on the order: one that is given whole, or whom SRL may ask which part to move next, and when.
+
+    given: the words of an order, "" for none. people: those behind such names as "terminal"; keep: gives the journal of what
+    they say, by default one that is not written.
+    """
+
+    given: str = ""
+    advisor: AdvisorName = NOBODY
+    gate: str = "ccrl"
+    people: Mapping[str, Ask] = field(default_factory=dict)
+    keep: KeepOrder = lambda cell, objective: Journal()
+
+
+def person_of(names: Sequence[str]) -> AdvisorName:
+    """Who of a run's advisors is asked about the order, too: the first person; nobody where there is none."""
+    return next((AdvisorName.of(name) for name in names if name in PEOPLE), NOBODY)
+
+
+@dataclass(frozen=True)
+class Ordered:
+    """The order that is used, and by whom it is; what each order that was found costs; what the advice was worth.
+
+    receipt: None where nobody was asked and nothing was given; `guided_best` in it: the cheapest episode with advice.
+    """
+
+    found: SequenceResult
+    proven: Optimum
+    used: str
+    costs: dict[str, float]
+    receipt: dict[str, Any] | None = None
+
+
+def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, tell: Tell = unheard) -> Ordered:
+    """The order of a job, beside what cannot be beaten: the given one, or the best of those that were found.
+
+    With advice, SRL looks for one with it, and the settings' method for one alone; the exact search gives one, too. Of orders
+    that cost the same the advised one is used, then the method's. Raises BadInput as `checked_order` and `advised_srl` do,
+    WorkFailed and KeyboardInterrupt.
+    """
+    search, proven = search_for(settings), optimum(cell)
+    is_timed = search.objective == MAKESPAN
+    known = Reference(proven.bound_s, proven.proven, "A*") if is_timed else reference(cell, search.objective)
+    orders = dict[str, SequenceResult]()
+    if advice.given:
+        taken = checked_order(cell, advice.given)
+        own = cost(follow(cell, taken), search.objective)
+        orders[GIVEN] = SequenceResult(taken, own, (own,))
+    said: dict[str, Any] = {}
+    if advice.advisor.row != "none" and not advice.given:
+        orders[ADVISED], said = _with_advice(cell, search, advice, seed, known, tell)
+    orders[settings.method] = find_sequence(cell, settings.method, search, seed)
+    if is_timed and len(orders) > 1 and proven.sequence:
+        orders[EXACT] = SequenceResult(proven.sequence, proven.cost, (proven.cost,))
+    used = GIVEN if advice.given else _cheapest(orders)
+    costs = {name: order.cost for name, order in orders.items()}
+    tell(SequenceFound(orders[used], known))
+    if len(orders) == 1:
+        return Ordered(orders[used], proven, used, costs)
+    tell(OrderChosen(used, costs, search.objective))
+    worth = {"used": used, "costs": costs, "objective": search.objective, "bound": known.bound}
+    return Ordered(orders[used], proven, used, costs, worth | said)
+
+
+def reference(cell: Cell, objective: str) -> Reference:
+    """The proven optimum, or the best bound: by A* for the makespan, by CP-SAT for the other objectives."""
+    if objective == MAKESPAN:
+        from lab.sequencing.methods.exact import optimum
+
+        best = optimum(cell)
+        return Reference(best.bound_s, best.proven, "A*")
+    from lab.sequencing.methods.cp_sat import cp_sat, fits
+
+    unit = "" if objective == "tardy-parts" else " s"
+    if objective not in BUILT_IN:
+        return Reference(0.0, False, "nothing: CP-SAT has no rule for this objective", unit)
+    if not fits(cell):
+        return Reference(0.0, False, "nothing: too many moves for CP-SAT", unit)
+    opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)
+    return Reference(opinion.bound, opinion.status == "optimal", "CP-SAT", unit)
+
+
+def _cheapest(orders: Mapping[str, SequenceResult]) -> str:
+    """The first of those that nothing is cheaper than."""
+    least = min(order.cost for order in orders.values())
+    return next(name for name, order in orders.items() if order.cost <= least + SAME)
+
+
+def _with_advice(
+    cell: Cell, search: Search, advice: OrderAdvice, seed: int, known: Reference, tell: Tell
+) -> "tuple[AdvisedResult, dict[str, Any]]":
+    """SRL's order with advice, and its receipt; it begins again each time an answer is taken back."""
+    is_person = advice.advisor.row in PEOPLE
+    journal = advice.keep(cell, search.objective) if is_person else Journal()
+    try:
+        while True:
+            tell(SequencingBegan(search.episodes, known, GateSettings(advice.gate, spare_best=True)))
+            try:
+                found = advised_session(cell, search, advice, (seed, 0), journal, tell)
+                break
+            except Again:
+                journal.rewind()
+        bound = known.bound if known.proven else None
+        is_best = bound is not None and found.cost <= bound + SAME
+        journal.closes(Closed(search.episodes, found.cost, bound, is_best, saved_as=""))
+    finally:
+        journal.close()
+    made = receipt(journal.entries, None, None, certain=False)
+    guided = [entry.steps for entry in journal.entries if isinstance(entry, EpisodeEnded) and entry.guided]
+    return found, made.to_json() | {"lines": made.lines(), "guided_best": min(guided, default=None)}
+
+
+def advised_session(
+    cell: Cell, search: Search, advice: OrderAdvice, seeds: tuple[int, int], journal: Journal | None, tell: Tell
+) -> "AdvisedResult":
+    """A session of SRL with advice; seeds: the command's, and the session's number. Raises Again, and as `advised_srl`."""
+    from lab.advice.order_level import OrderLevel, signature_of
+    from lab.sequencing.methods.srl_advised import advised_srl
+
+    seed, session = seeds
+    rng, own = (np.random.default_rng([seed, stream, session]) for stream in (2, 3))
+    people, signature = through(journal, advice.people), signature_of(cell, search.objective)
+    advisor = make_advisor(advice.advisor, OrderLevel(cell, own, people, search.episodes, signature))
+    if advisor is not None:
+        advisor = TellingAdvisor(advisor, tell)
+
+    def hear(event: SessionEvent) -> None:
+        tell(LessonEvent(ORDER, event, True if journal is None else journal.tell(event)))
+
+    return advised_srl(cell, search, rng, GateSettings(advice.gate, spare_best=True), advisor, hear)

@@ -1,0 +1,64 @@
+"""The order of the work that remains, found anew from the state that was reached, with its proven gap."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.schedule import Schedule
+from lab.sequencing.methods.exact import Optimum, optimum
+from lab.sequencing.simulate.rest import NOTHING, Mishaps, Rest, rest_of
+from lab.sequencing.simulate.run import Run, branch, simulate
+
+
+@dataclass(frozen=True)
+class NewPlan:
+    """The run to go on with, the decisions still to come, and what is proven of them; schedule: None where there are none.
+
+    stuck: the parts that cannot be finished, and why not.
+    """
+
+    run: Run
+    sequence: tuple[int, ...]
+    proven: Optimum | None
+    schedule: Schedule | None
+    stuck: Mapping[int, str]
+
+
+def plan_again(run: Run, mishaps: Mishaps, under_way: int | None = None) -> NewPlan:
+    """The best order from where a run is; under_way: the decision that must come first, its part is in the gripper.
+
+    Raises WorkFailed where no order comes to its end.
+    """
+    fallback_s = float(np.nanmax(run.cell.empty_s, initial=0.0))
+    rest = rest_of(run, mishaps, fallback_s)
+    if rest.cell is None:
+        return NewPlan(run, (), None, None, rest.stuck)
+    now = Run(rest.cell)
+    if under_way is None or now.option(under_way) is None:
+        return _ordered(rest, now, ())
+    ahead = branch(now)
+    ahead.move(under_way)
+    later = rest_of(ahead, NOTHING, fallback_s)
+    return _ordered(replace(later, stuck={**rest.stuck, **later.stuck}), now, (under_way,))
+
+
+def _ordered(rest: Rest, now: Run, first: tuple[int, ...]) -> NewPlan:
+    if rest.cell is None:
+        return NewPlan(now, first, None, None, rest.stuck)
+    found = optimum(rest.cell)
+    sequence = (*first, *found.sequence)
+    schedule = None if first else simulate(now.cell, sequence)
+    return NewPlan(now, sequence, None if first else found, schedule, rest.stuck)
+
+
+def in_another(run: Run, cell: Cell) -> Run:
+    """The same state in a cell with other times: its robot is at the same station, its parts in the same positions."""
+    other = Run(cell)
+    own = run.cell.begins
+    for part, place in enumerate(run.locations):
+        stays = place >= len(cell.laid_out)
+        other.locations[part] = (own[part].position if own is not None and stays else place) or 0
+    other.ready_s, other.robot, other.now_s = run.ready_s.copy(), run.robot, run.now_s
+    return other

@@ -1,0 +1,106 @@
+"""What people say in a run, at both levels: a journal for each lesson and one for the order, and what each was worth."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from lab.advice.advisors import PEOPLE
+from lab.advice.journal import Journal
+from lab.learning.requests import Ask
+from lab.production.order import OrderAdvice, Ordered, person_of
+from lab.production.run_journal import RunJournal, SessionKept
+from lab.sequencing.cell.cell import Cell
+from lab.teaching.events import ORDER
+from lab.teaching.kept_order import OrderOptions, OrderSession, kept_order
+from lab.teaching.kept_session import KeptSession, NewSession, SessionInFolder
+from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.lesson_plan import MAX_SESSIONS, LessonPlan
+from lab.toolbox.registry import Toolbox
+
+
+@dataclass
+class RunAdvice:
+    """Who is asked in a run; where people are, what they say is kept in the toolbox's sessions, each named in the run's journal.
+
+    given: the words of an order that is not to be looked for, "" for none; gate: when SRL asks about the order. Of a run that is
+    gone on with, the sessions that it began go on.
+    """
+
+    toolbox: Toolbox
+    options: LessonOptions
+    journal: RunJournal = field(default_factory=RunJournal)
+    given: str = ""
+    gate: str = "ccrl"
+    sessions: dict[str, SessionInFolder] = field(default_factory=dict)
+
+    @property
+    def asks_people(self) -> bool:
+        """Whether anybody is asked who has to be shown things."""
+        return any(name in PEOPLE for name in self.options.advisors)
+
+    # ---- the lessons
+
+    def keep(self, plan: LessonPlan) -> Journal:
+        """The journal of a lesson: that of the run which is gone on with, or a new one."""
+        name = plan.problem.name
+        if not self.asks_people:
+            return Journal()
+        begun = self.journal.session(name)
+        if begun is not None:
+            kept = KeptSession(begun, "--resume")
+            again = kept if kept.read.closed is None else KeptSession(begun, "--resume", read_only=True)
+            self.sessions[name] = again
+            return again.keep(plan)
+        new = NewSession(None, self.toolbox, replace(self.options, subtask=name, sessions=MAX_SESSIONS))
+        self.sessions[name] = new
+        made = new.keep(plan)
+        self.journal.write(SessionKept(name, str(new.folder)))
+        return made
+
+    # ---- the order
+
+    def order(self, people: Mapping[str, Ask], durations: Mapping[str, Any]) -> OrderAdvice:
+        """Whose word counts on the order; durations: those it is planned with, which its session keeps (`to_json`)."""
+
+        def keep(cell: Cell, objective: str) -> Journal:
+            begun = self.journal.session(ORDER)
+            session = self._new_order(durations) if begun is None else self._order_again(begun)
+            self.sessions[ORDER] = session
+            made = session.keep(cell, objective)
+            if begun is None:
+                self.journal.write(SessionKept(ORDER, str(session.folder)))
+            return made
+
+        return OrderAdvice(self.given, person_of(self.options.advisors), self.gate, people, keep)
+
+    def _new_order(self, durations: Mapping[str, Any]) -> OrderSession:
+        options = OrderOptions(
+            task=str(self.options.task),
+            toasts=self.options.toasts,
+            method="srl",
+            advisor=str(person_of(self.options.advisors)),
+            gate=self.gate,
+            seed=self.options.seed,
+            parts=self.options.parts,
+        )
+        return OrderSession(options, self.toolbox, durations=durations)
+
+    def _order_again(self, folder: Path) -> OrderSession:
+        kept = kept_order(folder, "--resume", self.toolbox)
+        is_over = kept.read is not None and kept.read.closed is not None
+        return kept_order(folder, "--resume", self.toolbox, read_only=True) if is_over else kept
+
+    # ---- what it was worth
+
+    def receipts(self, found: Ordered) -> dict[str, Any]:
+        """What the advice of each level was worth: by skill, where people were asked, and of the order, None for nobody's."""
+        lessons = {name: one.worth() for name, one in self.sessions.items() if name != ORDER and _was_asked(one)}
+        order = self.sessions.get(ORDER)
+        where = {} if order is None or order.folder is None else {"session": str(order.folder)}
+        return {"skills": lessons, "order": None if found.receipt is None else found.receipt | where}
+
+
+def _was_asked(session: SessionInFolder) -> bool:
+    """Whether anything was asked in it."""
+    return session.journal is not None and session.receipt().questions > 0

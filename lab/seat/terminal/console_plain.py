@@ -1,0 +1,78 @@
+"""The operator's console without a screen: commands line by line from a pipe, what came of each in one line."""
+
+from collections.abc import Callable, Iterable
+from threading import Thread
+
+from lab.production.operation.commands import help_lines
+from lab.production.operation.desk import Desk
+from lab.production.operation.operation import Done
+from lab.seat.terminal.console_view import plain_lines
+
+Write = Callable[[str], None]
+
+
+def told(done: Done) -> str:
+    """What came of a command, in one line."""
+    if done.refused:
+        return f"{done.words}: refused: {done.refused}"
+    return f"{done.words}: {done.failed or done.said or 'done'}"
+
+
+class PlainConsole:
+    """Reads a line when the one before is done, or waits in a pause; ends at the first that was not carried out.
+
+    write: where the lines go that tell what came of it.
+    """
+
+    def __init__(self, desk: Desk, write: Write) -> None:
+        self._desk, self._write = desk, write
+        self._bad: Done | None = None
+        self._error: Exception | None = None
+        desk.operation.on_done = self._done
+
+    def run(self, lines: Iterable[str]) -> Done | None:
+        """The command that was refused or failed, None when all went well. Raises what the simulation raised."""
+        worker = Thread(target=self._simulate, name="simulation", daemon=True)
+        worker.start()
+        try:
+            self._desk.settle()
+            for line in lines:
+                if self._error is not None or not self._said(line.strip()):
+                    break
+                self._desk.settle()
+                if self._bad is not None:
+                    break
+        finally:
+            self._desk.leave()
+            worker.join()
+        if self._error is not None:
+            raise self._error
+        return self._bad
+
+    def _simulate(self) -> None:
+        try:
+            self._desk.serve()
+        except Exception as error:  # it is raised again in the thread of the console
+            self._error = error
+
+    def _said(self, line: str) -> bool:
+        """Take a line; whether there is more to come."""
+        match line.split()[0].lower() if line else "":
+            case "quit":
+                return False
+            case "":
+                pass
+            case "help":
+                for text in help_lines():
+                    self._write(text)
+            case "status":
+                for text in plain_lines(self._desk.now()):
+                    self._write(text)
+            case _:
+                self._desk.say(line)
+        return True
+
+    def _done(self, done: Done) -> None:
+        self._write(told(done))
+        if not done.well and self._bad is None:
+            self._bad = done

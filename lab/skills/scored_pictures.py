@@ -1,0 +1,111 @@
+"""Pictures read back: how many grids of those that `made_pictures` made are exact; parts in an overhead picture."""
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from math import hypot
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lab.errors import BadInput, LabError
+from lab.sim.hand_camera import seen_corners
+from lab.sim.scene.scene_check import places_of
+from lab.skills.camera_grids import camera_view
+from lab.skills.made_pictures import INDEX, mat_of
+from lab.tasks.task import Task
+from lab.tasks.task_file import load
+from lab.vision import Image, View, read_picture, see
+from lab.vision.calibration import Calibration, calibrate
+from lab.vision.part_outline import Outlined, find_part
+
+PART_REACH_M, PART_REACH_RAD = 0.03, 0.2  # around a station's spots
+
+
+def calibrated_view(task: Task, station: str, calibration: Calibration) -> View:
+    """How a calibrated camera's straightened picture maps to a station's grid."""
+    return replace(camera_view(task, station), pixel_from_world=calibration.pixel_from_world)
+
+
+def score_pictures(
+    folder: Path, calibration: Calibration | None = None, *, tell: Callable[[int], None] = lambda n: None
+) -> dict[str, Any]:
+    """Read every picture of a folder that `make_pictures` made, and compare with what each shows.
+
+    The camera is calibrated with the folder's pictures of the mat unless a calibration is given. A grid is exact when
+    start, goal and obstacles are all right and nothing else is seen. BadInput for a folder without an index.
+    """
+    try:
+        record = json.loads((folder / INDEX).read_bytes())
+        task, station = load(record["task"]), str(record["station"])
+        count, mats = int(record["pictures"]), int(record["mats"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BadInput(f"{folder / INDEX}: wanted the index that `lab see --make` writes: {error}") from None
+    if calibration is None:
+        names = [folder / f"mat-{number + 1}.png" for number in range(mats)]
+        calibration = calibrate([(str(name), read_picture(name)) for name in names], mat_of(task))
+    view, lens = calibrated_view(task, station, calibration), calibration.lens
+    wrong: list[dict[str, str]] = []
+    errors: list[float] = []
+    for number, image, truth in _kept(folder, count):
+        reason, off = _compared(lens.straightened(image), view, truth)
+        errors += off
+        if reason:
+            wrong.append({"picture": f"{number:05}.png", "reason": reason})
+        tell(number)
+    exact = count - len(wrong)
+    return {
+        "pictures": count,
+        "exact": exact,
+        "exact_percent": 100.0 * exact / count,
+        "marker_mean_m": float(np.mean(errors)) if errors else None,
+        "marker_max_m": float(np.max(errors)) if errors else None,
+        "calibration_residual_px": calibration.residual_px,
+        "wrong": wrong,
+    }
+
+
+def _kept(folder: Path, count: int) -> Iterator[tuple[int, Image, dict[str, Any]]]:
+    for number in range(1, count + 1):
+        try:
+            truth = json.loads((folder / f"{number:05}.json").read_bytes())
+        except (OSError, ValueError) as error:
+            raise BadInput(f"{folder / f'{number:05}.json'}: {error}") from None
+        yield number, read_picture(folder / f"{number:05}.png"), truth
+
+
+def _compared(straight: Image, view: View, truth: dict[str, Any]) -> tuple[str, list[float]]:
+    """Why what is read differs from the truth, "" when it does not; and how far off each marker was seen [m]."""
+    try:
+        seen = see(straight, view)
+    except LabError as error:
+        return str(error), []
+    off = []
+    for marker in truth["markers"]:
+        dx, dy = view.offsets_m.get(marker["kind"], (0.0, 0.0))
+        x, y = marker["world_m"][0] + dx, marker["world_m"][1] + dy
+        off.append(min(hypot(m.world_m[0] - x, m.world_m[1] - y) for m in seen.markers if m.kind == marker["kind"]))
+    record = seen.to_json()
+    different = [name for name in ("start", "goal", "obstacles") if record[name] != truth[name]]
+    return "; ".join(f"{name} {record[name]}, is {truth[name]}" for name in different), off
+
+
+def parts_seen(task: Task, image: Image, view: View) -> list[dict[str, Any]]:
+    """The parts that stand on stations' spots in a straightened overhead picture: kind, station, place [m], yaw, outline."""
+    places, found = places_of(task), []
+    height, width = image.shape[:2]
+    for station in task.stations:
+        for kind in {kind.name: kind for kind in places.kinds_at(station.name) if kind.rider is None}.values():
+            colours = np.array([look.rgba[:3] for look in kind.shape.looks])
+            for spot in places.spots(station):
+                foot = places.raised(kind.name, station, spot)
+                part = Outlined(seen_corners(kind.shape), foot.z, not kind.grip.period, view.pixel_from_world, colours)
+                near = np.array([foot.x, foot.y, foot.yaw])
+                outline = part.outlines(near[None])[0, :, :2]
+                if outline.min() < 0 or (outline.max(axis=0) > (width - 1, height - 1)).any():
+                    continue
+                if seen := find_part(image, part, near, PART_REACH_M, PART_REACH_RAD):
+                    at = {"kind": kind.name, "station": station.name, "world_m": [seen.x, seen.y], "yaw_rad": seen.yaw}
+                    found.append(at | {"outline_px": seen.outline.round(2).tolist()})
+    return found

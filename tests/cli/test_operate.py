@@ -1,0 +1,55 @@
+"""`lab operate` from a pipe: the document, the exit codes, what is kept."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Lab = Callable[..., Any]
+
+
+def test_commands_come_from_a_pipe_and_are_kept(lab: Lab, tmp_path: Path) -> None:
+    ran = lab(
+        "operate",
+        "toast",
+        "--toasts",
+        "1",
+        "--json",
+        "--out",
+        str(tmp_path),
+        stdin="jog +z 20\nspeed max\nhome\nquit\n",
+    )
+    assert ran.code == 0
+    assert [row["words"] for row in ran.json["commands"]] == ["jog +z 20", "speed max", "home"]
+    assert (ran.json["task"], ran.json["seed"], ran.json["parts"]) == ("toast", 0, {"slice": 1})
+    assert (ran.json["success"], ran.json["status"]["parts"][0]["state"]) == (False, "waiting")
+    kept = [json.loads(line) for line in (tmp_path / "run.jsonl").read_text().splitlines()]
+    assert [line["words"] for line in kept if line["kind"] == "commanded"] == ["jog +z 20", "speed max", "home"]
+
+
+@pytest.mark.parametrize(
+    ("lines", "options", "why"),
+    [
+        ("gresp\n", ("toast",), "did you mean 'grasp'?"),
+        ("run\n", ("toast",), "there is no plan yet"),
+        ("", ("toast", "--speed", "fast"), "'fast' is no number of times real time, or max"),
+        ("", ("toats",), "did you mean 'toast'?"),
+    ],
+)
+def test_what_is_wrong_ends_it_with_exit_code_2(
+    lab: Lab, tmp_path: Path, lines: str, options: tuple[str, ...], why: str
+) -> None:
+    ran = lab("operate", *options, "--json", "--out", str(tmp_path / "out"), stdin=lines)
+    assert ran.code == 2
+    assert why in ran.err.splitlines()[-1]
+    assert len(ran.out.splitlines()) == 1
+
+
+def test_a_motion_that_is_stopped_ends_it_with_exit_code_1(lab: Lab, tmp_path: Path) -> None:
+    lines = "close\n" + 80 * "jog -z 10\n" + "home\n"
+    ran = lab("operate", "toast", "--toasts", "1", "--json", "--out", str(tmp_path), stdin=lines)
+    assert ran.code == 1
+    assert "protective stop: the arm presses on '" in ran.err.splitlines()[-1]
+    assert ran.json["commands"][-1]["failed"]

@@ -1,0 +1,95 @@
+"""A run as commands: few straight pieces that keep to the way driven, and transfers in their order."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lab.export.commands import (
+    WITHIN_M,
+    Await,
+    Grip,
+    Joint,
+    Path,
+    Pause,
+    jobs_of,
+    moving,
+    straightened,
+    thinned,
+    way_of,
+)
+from lab.export.program import Program
+from lab.sim.arms.robot import YAW_ARM
+
+
+def test_a_straight_line_needs_two_rows_and_a_corner_one_more() -> None:
+    """Ten steps along x, then ten along y."""
+    line = np.array([[float(step), 0.0] for step in range(11)])
+    corner = np.concatenate([line, [[10.0, float(step)] for step in range(1, 11)]])
+    assert thinned(np.arange(11.0), line, 0.01) == [0, 10]
+    assert thinned(np.arange(21.0), corner, 0.01) == [0, 10, 20]
+
+
+def test_a_half_circle_of_10_cm_is_kept_within_a_tenth_of_a_millimetre_by_few_pieces() -> None:
+    """A chord of a circle r misses it by r (1 - cos(a / 2)): at 0.1 mm it spans 5.1 degrees, so 36 pieces at the least."""
+    angles = np.linspace(0.0, pi, 2001)
+    circle = np.column_stack([0.1 * np.cos(angles), 0.1 * np.sin(angles), 0 * angles, 0 * angles])
+    pieces = straightened(circle)
+    assert 36 <= len(pieces) - 1 <= 72
+    middles = (pieces[1:] + pieces[:-1])[:, :2] / 2
+    assert np.abs(np.linalg.norm(middles, axis=1) - 0.1).max() <= WITHIN_M * 1.01
+
+
+ways: st.SearchStrategy[np.ndarray] = st.lists(
+    st.tuples(*[st.floats(-1.0, 1.0)] * 3, st.floats(-3.0, 3.0)), min_size=2, max_size=12
+).map(np.array)
+
+
+@given(ways)
+def test_straight_pieces_keep_to_any_way_and_turn_the_short_way_round(corners: np.ndarray) -> None:
+    poses = np.concatenate([corners[:-1] + (corners[1:] - corners[:-1]) * share for share in (0.0, 0.25, 0.5, 0.75)])
+    poses = np.vstack([poses.reshape(4, -1, 4).transpose(1, 0, 2).reshape(-1, 4), corners[-1:]])
+    pieces = straightened(poses)
+    assert pieces[[0, -1]] == pytest.approx(poses[[0, -1]], abs=1e-12)
+    assert np.abs(np.diff(pieces[:, 3])).max() <= pi / 2 + 1e-9
+    way, along = way_of(poses), way_of(pieces)
+    if way[-1] > 1e-6:
+        flat = np.array([1.0, 1.0, 1.0, YAW_ARM])
+        ends = np.array([np.interp(way, along * way[-1] / along[-1], pieces[:, k]) for k in range(4)]).T
+        assert np.linalg.norm((ends - poses) * flat, axis=1).max() < 20 * WITHIN_M  # their lengths differ a little
+
+
+def test_two_transfers_become_two_jobs(up6: Program) -> None:
+    first, second = jobs_of(up6)
+    assert [type(command) for command in first.commands] == [Joint, Path, Grip, Pause, Path, Grip, Pause]
+    assert [type(command) for command in second.commands] == [Joint, Path, Await, Pause, Path, Pause]
+    assert [command.closed for command in first.commands if isinstance(command, Grip)] == [True, False]
+    assert second.commands[2] == Await(1, "toaster")
+    assert [command.seconds for command in second.commands if isinstance(command, Pause)] == pytest.approx([1.0, 0.25])
+
+
+def test_a_job_begins_where_the_arm_is_and_a_way_ends_where_it_was_to(up6: Program) -> None:
+    first, _ = jobs_of(up6)
+    start, down = first.commands[:2]
+    assert isinstance(start, Joint)
+    assert isinstance(down, Path)
+    assert start.joints == pytest.approx(tuple(up6.joints[0]))
+    assert down.points == pytest.approx(np.array([[0.5, 0.1, 0.15, 0.0]]), abs=1e-3)
+    assert down.speed_m_s == pytest.approx(0.3, rel=0.01)
+
+
+def test_motions_that_lead_nowhere_are_left_out(up6: Program) -> None:
+    """The same program with its first motion ended before it moved."""
+    motions = up6.motions
+    still = motions[0].model_copy(update={"last": motions[0].first + 1})
+    actions = (still, *up6.carried.actions[1:])
+    cut = Program(up6.carried.model_copy(update={"actions": actions}), *_arrays(up6))
+    assert len(moving(up6)) == len(motions)
+    assert len(moving(cut)) == len(motions) - 1
+    assert [type(command) for command in jobs_of(cut)[0].commands] == [Grip, Pause, Joint, Path, Grip, Pause]
+
+
+def _arrays(program: Program) -> tuple[np.ndarray, ...]:
+    return program.at_s, program.joints, program.closed, program.seen_at_s, program.seen

@@ -1,0 +1,86 @@
+"""Whole runs of two toasts in physics in which something goes wrong: what comes of each, and what is said of it."""
+
+from typing import Any
+
+import pytest
+
+from lab.errors import WorkFailed
+from lab.production.composer import carry_out
+from lab.production.conditions import Conditions
+from lab.production.outcome import Outcome
+from lab.production.relearning import Relearner
+from lab.production.taught import Taught
+from lab.sequencing.methods.exact import optimum
+from lab.skills.prepared_scene import Prepared
+from lab.tasks.fault_fields import FaultFields
+from lab.teaching.teacher import Teacher
+
+NAMES = ("slice 1", "slice 2")
+
+
+@pytest.fixture
+def run_with(two_toasts: tuple[Prepared, Taught], teacher: Teacher) -> Any:
+    prepared, taught = two_toasts
+    sequence = optimum(taught.cell).sequence
+
+    def run(*faults: dict[str, Any]) -> Outcome:
+        conditions = Conditions(faults=tuple(FaultFields.model_validate(fields) for fields in faults))
+        relearner = Relearner(prepared, taught, teacher)
+        return carry_out(prepared, taught.cell, sequence, conditions, relearner=relearner)[0]
+
+    return run
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"what": "part moved", "part": "slice 2", "by_m": [0.0, 0.08]},
+        {"what": "part moved", "when": "in machine", "at_m": [0.5, 0.25]},
+        {"what": "part dropped", "by_m": [0.1, 0.0], "at_s": 60},
+        {"what": "obstacle moved", "obstacle": "cubes A", "by_m": [0.0, -0.06], "at_s": 20},
+        {"what": "station moved", "station": "toaster", "by_m": [0.02, 0.0], "at_s": 20},
+        {"what": "machine slow", "station": "toaster"},
+        {"what": "camera blind", "at_s": 5, "seconds": 20},
+    ],
+    ids=lambda fault: fault["what"],
+)
+def test_both_are_made_all_the_same(run_with: Any, fault: dict[str, Any]) -> None:
+    outcome = run_with(fault)
+    verdict = outcome.verdict(NAMES)
+    assert len(outcome.happened) == 1
+    assert (outcome.failure, outcome.delivered, verdict.came) == (None, (1, 2), "delivered")
+    assert verdict.rows[0]["noticed"]
+    assert verdict.unexplained == ()
+
+
+@pytest.mark.parametrize(
+    ("fault", "delivered", "said"),
+    [
+        ({"what": "part gone", "part": "slice 1"}, (2,), "slice 1 is nowhere on the table"),
+        ({"what": "part dropped", "part": "slice 1", "at_m": [1.36, 1.34]}, (2,), "out of reach"),
+        ({"what": "part fallen", "part": "slice 2"}, (1,), "slice 2 lies on its side at ("),
+        ({"what": "machine fails", "station": "toaster"}, (), "after it should be"),
+    ],
+    ids=lambda value: value["what"] if isinstance(value, dict) else "",
+)
+def test_what_cannot_be_made_is_left_and_said(
+    run_with: Any, fault: dict[str, Any], delivered: tuple[int, ...], said: str
+) -> None:
+    outcome = run_with(fault)
+    assert outcome.delivered == delivered
+    assert said in outcome.failure
+    assert outcome.verdict(NAMES).came == "stopped"
+
+
+def test_an_arm_that_cannot_pass_over_everything_stops_and_says_so(
+    run_with: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody holds it then: it is tried a few times, not for ever."""
+
+    def too_high(bench: Any, end: Any) -> Any:
+        yield from ()
+        raise WorkFailed("the tool cannot reach (0.541, -0.330, 0.460) m")
+
+    monkeypatch.setattr("lab.production.transfers.over_everything", too_high)
+    outcome = run_with({"what": "part moved", "part": "slice 2", "by_m": [0.0, 0.08]})
+    assert "the tool cannot reach (0.541, -0.330, 0.460) m (tried 3 times)" in outcome.failure

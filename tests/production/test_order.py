@@ -1,0 +1,192 @@
+"""The order of a job: as it is given, or refused with the reason; as people advise it; and as a method finds it alone."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lab.advice.advisors import AdvisorName
+from lab.advice.journal import Undo
+from lab.errors import BadInput
+from lab.production.order import OrderAdvice, Ordered, checked_order, ordered, person_of, taken_moves
+from lab.production.run_advice import RunAdvice
+from lab.production.run_journal import RunBegan, RunJournal
+from lab.sequencing import find_sequence
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.request import SequenceRequest
+from lab.sequencing.simulate.run import Run, simulate
+from lab.tasks.sequencing import Sequencing, search_for
+from lab.tasks.task_file import load_cell
+from lab.teaching.events import ORDER, Event, OrderChosen
+from lab.teaching.lesson_options import LessonOptions
+from lab.toolbox.registry import Toolbox
+
+TWO = load_cell("toast-case-1").cell(2)  # plate > toaster (buffer) > applier (buffer) > finished plate, one place each
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ("1 1 1 1", "move 4 '1': toast 1 is already at 'finished_plate'; allowed here: 2 (toast 2)"),
+        ("1,2,2", "move 3 '2': toast 2 at 'toaster_buffer' cannot move on: 'toaster' full; allowed here: 1 (toast 1)"),
+        ("3", "move 1 '3': there is no part 3, only 1 to 2; allowed here: 1 (toast 1), 2 (toast 2)"),
+        ("1 two", "move 2 'two' is no part's number, 1 to 2"),
+        ("1 -2", "move 2 '-2' is no part's number, 1 to 2"),
+        ("1 ²", "move 2 '²' is no part's number, 1 to 2"),
+        (" , ", "no moves; wanted part numbers such as 1 2 1"),
+        (
+            "1 2 1",
+            "it ends after 3 moves, but toast 1 is still at 'butter_applier'; allowed here: 1 (toast 1), 2 (toast 2)",
+        ),
+    ],
+)
+def test_an_order_is_refused_with_the_first_move_that_may_not_be_made(words: str, reason: str) -> None:
+    with pytest.raises(BadInput) as refused:
+        checked_order(TWO, words)
+    assert str(refused.value) == f"--order '{words}': {reason}"
+
+
+def test_the_moves_before_the_refused_one_are_taken() -> None:
+    assert taken_moves(TWO, "1 2 2 1") == (
+        (1, 2),
+        "move 3 '2': toast 2 at 'toaster_buffer' cannot move on: 'toaster' full; allowed here: 1 (toast 1)",
+    )
+    assert taken_moves(TWO, "1 2 2", done=(1, 2, 1)) == ((1, 2, 2), "")
+
+
+@given(st.data(), st.sampled_from([" ", ",", ", "]))
+def test_every_way_through_a_cell_is_an_order(data: st.DataObject, comma: str) -> None:
+    cell: Cell = load_cell("toast-case-1").cell(data.draw(st.integers(1, 4)))
+    run, made = Run(cell), list[int]()
+    while not run.done:
+        made.append(data.draw(st.sampled_from(run.allowed())))
+        run.move(made[-1])
+    assert checked_order(cell, comma.join(map(str, made))) == tuple(made)
+
+
+# ---- found, given, advised ------------------------------------------------------------------------------------------
+
+THREE = load_cell("toast-case-1").cell(3)
+SRL = Sequencing(method="srl", episodes=60)
+
+
+def by(name: str) -> OrderAdvice:
+    return OrderAdvice(advisor=AdvisorName.of(name))
+
+
+def test_without_advice_it_is_the_methods_order() -> None:
+    heard = list[Event]()
+    found = ordered(THREE, SRL, OrderAdvice(), 4, heard.append)
+    assert found.found == find_sequence(THREE, "srl", search_for(SRL), 4)
+    assert (found.used, found.receipt) == ("srl", None)
+    assert not any(isinstance(event, OrderChosen) for event in heard)
+
+
+def test_a_given_order_is_used_though_others_are_better() -> None:
+    words = "1 1 1 2 2 2 3 3 3"
+    found = ordered(THREE, SRL, OrderAdvice(words), 0)
+    sequence = tuple(map(int, words.split()))
+    assert found.found.sequence == sequence
+    assert found.found.cost == simulate(THREE, sequence).makespan_s == found.costs["given"]
+    assert found.used == "given"
+    assert found.costs["exact"] == found.proven.cost < found.costs["given"]
+    assert found.receipt is not None
+    assert found.receipt["used"] == "given"
+
+
+@pytest.mark.parametrize("advisor", ["expert", "wrong"])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_cheapest_order_is_used_and_each_is_told(advisor: str, seed: int) -> None:
+    heard = list[Event]()
+    found = ordered(THREE, SRL, by(advisor), seed, heard.append)
+    assert list(found.costs) == ["advised", "srl", "exact"]
+    assert found.found.cost == min(found.costs.values()) == simulate(THREE, found.found.sequence).makespan_s
+    assert found.costs[found.used] == pytest.approx(found.found.cost, abs=1e-6)
+    (told,) = (event for event in heard if isinstance(event, OrderChosen))
+    assert (told.used, told.costs) == (found.used, found.costs)
+    assert found.receipt is not None
+    assert found.receipt["requests"] > 0
+    assert found.receipt["guided_best"] >= found.costs["advised"]
+    expert_is_better = ordered(THREE, SRL, by("expert"), seed).receipt["guided_best"]  # type: ignore[index]
+    assert expert_is_better <= found.receipt["guided_best"]
+
+
+def test_the_first_person_of_a_run_is_asked_about_the_order() -> None:
+    assert str(person_of(("expert", "web", "terminal"))) == "web"
+    assert person_of(("expert", "none")).row == "none"
+
+
+# ---- people, and runs that are gone on with --------------------------------------------------------------------------
+
+
+def last_allowed(request: SequenceRequest) -> int:
+    return request.allowed[-1]
+
+
+def advised(folder: Path, ask: Callable[[Any], int | None], journal: RunJournal) -> tuple[Ordered, dict[str, Any]]:
+    """The order of a run that a person at the terminal advises."""
+    options = LessonOptions(task="toast", advisors=("terminal",), seed=2)
+    advice = RunAdvice(Toolbox(folder / "toolbox"), options, journal)
+    found = ordered(THREE, SRL, advice.order({"terminal": ask}, {"empty_s": {}}), 2)
+    return found, advice.receipts(found)
+
+
+def begun(folder: Path) -> RunJournal:
+    return RunJournal.begin(folder / "run", RunBegan({}, "toast", "0"))
+
+
+def test_an_answer_taken_back_is_as_if_it_had_not_been_given(tmp_path: Path) -> None:
+    asked = list[SequenceRequest]()
+
+    def hesitant(request: SequenceRequest) -> int:
+        asked.append(request)
+        if len(asked) == 2:
+            raise Undo
+        return request.allowed[0] if len(asked) == 1 else request.allowed[-1]
+
+    plain, worth = advised(tmp_path / "plain", last_allowed, begun(tmp_path / "plain"))
+    undone, same = advised(tmp_path / "undone", hesitant, begun(tmp_path / "undone"))
+    assert undone == plain
+    assert asked[0].made == asked[2].made == ()
+    assert {**worth["order"], "session": ""} == {**same["order"], "session": ""}
+
+
+@pytest.mark.parametrize("after", [0, 1, 7])
+def test_a_run_that_is_gone_on_with_asks_on_where_it_was_broken_off(tmp_path: Path, after: int) -> None:
+    whole, worth = advised(tmp_path / "whole", last_allowed, begun(tmp_path / "whole"))
+    asked = list[SequenceRequest]()
+
+    def leaves(request: SequenceRequest) -> int:
+        if len(asked) == after:
+            raise KeyboardInterrupt
+        asked.append(request)
+        return last_allowed(request)
+
+    def goes_on(request: SequenceRequest) -> int:
+        asked.append(request)
+        return last_allowed(request)
+
+    broken = begun(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        advised(tmp_path, leaves, broken)
+    broken.close()
+    again = RunJournal.resume(tmp_path / "run")
+    assert again.session(ORDER) is not None
+    found, same = advised(tmp_path, goes_on, again)
+    assert found == whole
+    assert len(asked) == worth["order"]["questions"]
+    assert {**worth["order"], "session": ""} == {**same["order"], "session": ""}
+    again.close()
+    over = RunJournal.resume(tmp_path / "run")  # broken off again, after the order was found: nobody is asked twice
+    assert advised(tmp_path, lambda request: pytest.fail("asked again"), over)[0] == whole
+    over.close()
+
+
+def test_a_bad_order_is_refused_before_anything_is_made(lab: Callable[..., Any], tmp_path: Path) -> None:
+    ran = lab("run", "toast", "--toasts", "1", "--order", "1,1", "--out", str(tmp_path / "run"), "--json")
+    assert ran.code == 2
+    assert "--order '1,1': it ends after 2 moves, but slice 1 is still at 'butter_applier'" in ran.err
+    assert not (tmp_path / "run").exists()
