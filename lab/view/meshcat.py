@@ -162,9 +162,9 @@ def replay_html(
 ) -> Path:
     """Write the recording as one HTML file that plays from disk without a network, with keys and buttons to move in it.
 
-    `speed` is how many times faster than real time it begins. `story`: what is told beside the picture. Returns `path`, written whole or not at all; its folder is made
-    when it is missing. Raises BadInput for a speed that is not above 0, a recording that contradicts itself, an
-    unreadable mesh and a path that cannot be written.
+    `speed` is how many times faster than real time it begins; `story`: what is told beside the picture. Returns `path`,
+    written whole or not at all; its folder is made when it is missing. Raises BadInput for a speed that is not above 0, a
+    recording that contradicts itself, an unreadable mesh and a path that cannot be written.
     """
     from lab.view.keyframes import motions
     from lab.view.scene_data import describe
