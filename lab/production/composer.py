@@ -25,7 +25,7 @@ from lab.sequencing.simulate.rest import Mishaps
 from lab.sim.frames import Recording
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared
-from lab.teaching.events import Event, MachineBegan, MachineDone, MoveMade, PlanMade, Tell, TroubleMet, unheard
+from lab.teaching.events import Event, MachineDone, MoveMade, PlanMade, Tell, TroubleMet, unheard
 
 
 @dataclass
@@ -211,10 +211,8 @@ def noting(floor: Floor, journal: RunJournal, heard: list[Event], tell: Tell) ->
             case MoveMade(move, part):
                 journal.tell(Moved(floor.steps, part, move.origin, move.target, move.pick_s, move.drop_s))
             case TroubleMet(what, answer, part, station):
-                heard.append(event)
                 journal.tell(Met(floor.steps, what, answer, part, station))
-            case MachineBegan():
-                heard.append(event)
+        heard.append(event)
         tell(event)
 
     return noted

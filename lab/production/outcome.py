@@ -18,7 +18,7 @@ class Outcome:
     timed: how long each move took in which nothing had to be
     tried again. skipped_s: of sim_s, the time that passed without physics, while the robot waited and nothing moved.
     interrupted: by Ctrl-C; all else is what came of it until then. happened: the faults that struck. heard: what the run
-    told of troubles and machines. program: what the robot carried out.
+    told. program: what the robot carried out.
     """
 
     schedule: Schedule

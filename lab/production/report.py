@@ -11,6 +11,7 @@ from lab.errors import WorkFailed
 from lab.export.program import PROGRAM, TRAJECTORY
 from lab.files import draft
 from lab.production.outcome import Outcome
+from lab.production.run_story import story_of
 from lab.production.taught import Taught
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.cell.schedule_rows import csv_of, rows_of
@@ -152,7 +153,8 @@ def _draw_all(report: Report, folder: Path) -> None:
         )
         write_picture(paths["overhead"], photo.picture)
     title = f"{prepared.task.title or prepared.task.name}: {prepared.words}"
-    replay_html(report.recording, paths["replay"], title=title)
+    story = story_of(report.outcome, predicted)
+    replay_html(report.recording, paths["replay"], title=title, story=story)
     _write_json(paths["sequence"], _sequence_document(report, predicted))
     rows = rows_of(predicted, taught.cell, "planned") + rows_of(report.outcome.schedule, taught.cell, "measured")
     paths["schedule_table"].write_text(csv_of(rows), encoding="utf-8")

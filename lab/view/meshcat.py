@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from lab.view.keyframes import Motion, Track
     from lab.view.server import File, Server
     from lab.view.server_page import Panel
+    from lab.view.story import Story
 
 HERE = Path(__file__).parent
 # meshcat's viewer, and dat.gui in it, bring their styles as elements of their own: nothing else may be inline when served
@@ -156,12 +157,14 @@ class LiveView:
         return self._server
 
 
-def replay_html(recording: Recording, path: Path, speed: float = 8.0, title: str = "Teaching lab") -> Path:
-    """Write the recording as one HTML file that plays from disk without a network, over and over.
+def replay_html(
+    recording: Recording, path: Path, speed: float = 4.0, title: str = "Teaching lab", story: "Story | None" = None
+) -> Path:
+    """Write the recording as one HTML file that plays from disk without a network, with keys and buttons to move in it.
 
-    `speed` is how many times faster than real time. Returns `path`, written whole or not at all; its folder is made
-    when it is missing. Raises BadInput for a speed that is not above 0, a recording that contradicts itself, an
-    unreadable mesh and a path that cannot be written.
+    `speed` is how many times faster than real time it begins; `story`: what is told beside the picture. Returns `path`,
+    written whole or not at all; its folder is made when it is missing. Raises BadInput for a speed that is not above 0, a
+    recording that contradicts itself, an unreadable mesh and a path that cannot be written.
     """
     from lab.view.keyframes import motions
     from lab.view.scene_data import describe
@@ -175,9 +178,12 @@ def replay_html(recording: Recording, path: Path, speed: float = 8.0, title: str
         body["motion"] = _motion(tracks[body["name"]])
     start_s = recording.frames[0].time_s if recording.frames else 0.0
     data = {"scene": scene, "speed": speed, "start_s": start_s, "duration_s": recording.duration_s}
+    data["story"] = None if story is None else story.to_json()
     script = viewer_script()
-    own = (HERE / "page.js").read_text(encoding="utf-8")
-    scripts = f"<script>{script.read_text(encoding='utf-8')}</script>\n<script>{own}</script>"
+    scripts = "\n".join(
+        f"<script>{part.read_text(encoding='utf-8')}</script>"
+        for part in (script, *(HERE / name for name in ("gantt.js", "replay.js", "page.js")))
+    )
     styles = f"<style>{(HERE / 'page.css').read_text(encoding='utf-8')}</style>"
     notice = script.with_name(f"{script.name}.LICENSE.txt")
     licences = notice.read_text(encoding="utf-8").replace("--", "- -") if notice.is_file() else ""

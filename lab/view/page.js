@@ -1,4 +1,4 @@
-// The lab's scene in meshcat's viewer, live (frames from a websocket) or as a replay (tracks in the page itself).
+// The lab's scene in meshcat's viewer, live (frames from a websocket) or as a replay (tracks in the page itself, replay.js).
 // Scene tree: /lab/<body> carries the body's pose, /lab/<body>/<shape number> a shape's place in the body. Metres, z up.
 "use strict";
 
@@ -214,80 +214,6 @@ function follow(pause = 300) {
     if (panel) panel.lost();
     setTimeout(follow, pause, Math.min(2 * pause, 3000));
   };
-}
-
-function smoothTrack(name, type, { times, values }) {
-  return { name, type, times: unpack(times, Float32Array), values: unpack(values, Float32Array) };
-}
-
-// Steps [[time, value], ...] hold until the next; before the first, what the body had from the beginning
-function stepTrack(name, type, steps, before, values) {
-  const all = steps[0][0] > 0 ? [[0, before], ...steps] : steps;
-  const times = all.map(([time]) => time);
-  return { name, type, times, values: all.flatMap(([, value]) => values(value)), interpolation: THREE.InterpolateDiscrete };
-}
-
-function colorTracks(mesh, shape, steps) {
-  const rgba = [shape.rgba, ...steps.map(([, value]) => value)];
-  if (rgba.some((color) => color[3] < 1)) Object.assign(mesh.material, { transparent: true, depthWrite: false });
-  return [
-    stepTrack(".material.color", "color", steps, shape.rgba, (value) => linear(value).toArray()),
-    stepTrack(".material.opacity", "number", steps, shape.rgba, (value) => [value[3]]),
-  ];
-}
-
-function animationsOf(bodies, duration) {
-  const animations = [];
-  const animate = (path, tracks) => tracks.length && animations.push({ path, clip: { name: path.join("/"), duration, tracks } });
-  for (const { name, shapes, motion } of bodies) {
-    const tracks = [];
-    if (motion.position) tracks.push(smoothTrack(".position", "vector3", motion.position));
-    if (motion.quaternion) tracks.push(smoothTrack(".quaternion", "quaternion", motion.quaternion));
-    if (motion.visible.length) tracks.push(stepTrack(".visible", "bool", motion.visible, true, (value) => [value]));
-    animate([LAB, name], tracks);
-    if (!motion.colors.length) continue;
-    shapes.forEach((shape, number) => {
-      const path = [LAB, name, String(number), "<object>"];
-      animate(path, colorTracks(viewer.scene_tree.find(path).object, shape, motion.colors));
-    });
-  }
-  return animations;
-}
-
-function replay({ scene, speed, start_s, duration_s }) {
-  const poses = Object.fromEntries(scene.bodies.map(({ name, motion }) => [name, motion.start]));
-  showScene(scene);
-  showFrame({ poses, colors: {}, visible: {} });
-  const rest = 2 * speed; // the last picture stays for two seconds before the replay begins again
-  const animations = animationsOf(scene.bodies, duration_s + rest);
-  if (!animations.length) return;
-  const animator = viewer.animator;
-  animator.load(animations, { play: false, repetitions: Infinity });
-  animator.mixer.timeScale = speed;
-  for (const action of animator.actions) action.play(); // so that the first picture is the first frame
-  animator.mixer.update(0);
-  steer(animator, start_s, duration_s);
-  // the clock starts after the first picture is drawn, or slow machines would miss the beginning
-  requestAnimationFrame(() => requestAnimationFrame(() => animator.play()));
-}
-
-function steer(animator, start_s, duration_s) {
-  const [bar, play, seek] = ["player", "play", "seek"].map((id) => document.getElementById(id));
-  bar.hidden = false;
-  seek.max = duration_s;
-  play.onclick = () => (animator.playing ? animator.pause() : animator.play());
-  seek.oninput = () => {
-    animator.seek(Number(seek.value));
-    animator.display_progress(Number(seek.value));
-  };
-  const show = () => {
-    const time = Math.min(animator.time, duration_s);
-    note(`${(start_s + time).toFixed(1)} s, ${animator.mixer.timeScale} × real time`);
-    seek.value = time;
-    play.textContent = animator.playing ? "Pause" : "Play";
-    requestAnimationFrame(show);
-  };
-  show();
 }
 
 // The picture fills its pane, whatever the pane does; meshcat's own way takes the window's height
