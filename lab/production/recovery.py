@@ -2,11 +2,12 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from lab.errors import LabError
 from lab.production.controls import StopKind
 from lab.production.perception import BELOW_M, Deviation, perceive, seen_at
+from lab.production.standing import too_near
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
 from lab.sim.scene.scene import pallet_of
@@ -192,6 +193,9 @@ class Recovery:
     def _follow(self, part: int, seen: Deviation) -> None:
         """A part that was moved is taken up where it stands; out of its machine before that was done, it is put back there."""
         assert seen.at is not None
+        if other := too_near(self.work.floor.bench, seen.name):
+            self._leave(part, replace(seen, words=f"{seen.words}, too near to {other} to be taken up"))
+            return
         work, machine, answer = self.work, self.work.machine_of(part), "takes it up there"
         unfinished = machine is not None and not machine.done(work.floor.now_s)
         if unfinished or part in work.finished:

@@ -11,7 +11,8 @@ from lab.skills.skillset import Carried, SkillSet
 
 ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
 DELIVERED_M = 0.02  # a part this near to its spot has been delivered
-FREE_M = 0.005  # around a part where it is set down, of what lies about
+FREE_M = 0.03  # around a part where it is set down, of what lies about: the fingers need it, too
+BESIDE_M = 0.004  # between the open fingers and what stands beside a part that they come down to
 
 
 def free_spot(scene: Scene, name: str, way: Carried, taken: Collection[Spot], lying: Collection[str]) -> Spot:
@@ -37,6 +38,22 @@ def blocked_by(scene: Scene, name: str, way: Carried, spot: Spot, lying: Collect
         aside = low[0] > spot.x + x or high[0] < spot.x - x or low[1] > spot.y + y or high[1] < spot.y - y
         if not aside and high[2] > spot.z and body != name:
             return body
+    return ""
+
+
+def too_near(bench: Bench, body: str) -> str:
+    """What stands so near to a part that the open fingers would touch it; "" for nothing."""
+    scene, goal = bench.scene, bench.part_pose(body)
+    gripper = scene.robot.arm.gripper
+    across, along = gripper.opening_m / 2 + gripper.thick_m, gripper.width_m / 2
+    c, s = abs(cos(goal.yaw)), abs(sin(goal.yaw))
+    x, y = c * along + s * across + BESIDE_M, s * along + c * across + BESIDE_M
+    others = [*scene.kind_of, *(obstacle.name for obstacle in scene.task.obstacles)]
+    for other in others:
+        low, high = scene.world.bounds(other)
+        aside = low[0] > goal.x + x or high[0] < goal.x - x or low[1] > goal.y + y or high[1] < goal.y - y
+        if other not in (body, pallet_of(body), body.removesuffix("'s pallet")) and not aside and high[2] > goal.z:
+            return other
     return ""
 
 

@@ -204,7 +204,8 @@ class Transfers:
             return self.spot_of[pallet_of(name)]
         own = scene.bodies_of(name, way.kind)
         taken = [spot for body, spot in self.spot_of.items() if body not in own] + [*self.taken]
-        return free_spot(scene, name, way, taken, self.left_lying)
+        in_the_way = self.left_lying | {self.name(one) for one in self.to_put_back}
+        return free_spot(scene, name, way, taken, in_the_way)
 
     # ---- what a move is made of ------------------------------------------------------------------------------------
 
@@ -318,6 +319,8 @@ class Transfers:
         if self.place:
             move.leg = len(legs) - 1 if self.place == way.target else 0
         for skill in legs[move.leg :]:
+            if skill is legs[-1]:
+                self.look()  # before anything is set down
             self._to_begin(skill, name, way.target)
             self.place = ""
             self._do(skill.aim(name, spot), name, way.target)
