@@ -16,6 +16,7 @@ from lab.production.recovery import Recovery
 from lab.production.relearning import Relearner, adopt
 from lab.production.replanning import in_another, plan_again
 from lab.production.run_journal import Met, Moved, RunJournal
+from lab.production.standing import has_fallen, stands
 from lab.production.transfers import Transfers
 from lab.production.trouble import RunStopped, Trouble
 from lab.sequencing.cell.cell import Cell
@@ -70,7 +71,7 @@ class Production:
             if self.sequence:
                 self.floor.between_moves()
             self.recovery.look()
-            self.work.set_right()
+            self.work.put_back()
             if self.sequence:
                 self.work.bring_on(self.sequence[0], len(self.sequence))
                 self.sequence.pop(0)
@@ -88,12 +89,11 @@ class Production:
         ready_s = {
             part: work.left_s(part) for part in range(1, self.cell.parts + 1) if work.machine_of(part) is not None
         }
-        mishaps = Mishaps(frozenset(recovery.lost), tuple(recovery.out), ready_s, dict(recovery.back))
+        mishaps = Mishaps(frozenset(recovery.lost), tuple(recovery.out), ready_s)
         try:
             found = plan_again(work.plan, mishaps, first)
         except LabError as error:
             raise RunStopped(f"{why}: {error}") from None
-        recovery.back.clear()
         recovery.lose(dict(found.stuck))
         work.plan, self.sequence = found.run, [*found.sequence]
         if first is not None and first not in self.sequence:
@@ -134,15 +134,20 @@ class Production:
             for name in names:
                 self.floor.recorder.show(name)
 
+    def _stands(self, name: str) -> bool:
+        return stands(self.floor.bench, name, self.work.spot_of[name])
+
     def outcome(self, failure: str | None, interrupted: bool = False) -> Outcome:
         """What came of it."""
         work, floor = self.work, self.floor
-        delivered = tuple(part for part in sorted(work.finished) if work.stands(part) and part not in work.spoilt)
+        delivered = tuple(
+            part for part in sorted(work.finished) if part not in work.spoilt and self._stands(work.name(part))
+        )
         left = [part for part in range(1, self.cell.parts + 1) if part not in delivered]
         return Outcome(
             Schedule.from_moves(self.cell, work.moves),
             delivered,
-            tuple(part for part in left if work.has_fallen(part)),
+            tuple(part for part in left if has_fallen(floor.bench, work.name(part))),
             tuple(self.recovery.notes),
             failure,
             floor.now_s,

@@ -1,5 +1,6 @@
 """A scene with the robot and the machines at work in it: who is where, at one clock, and what stops it."""
 
+from collections import deque
 from collections.abc import Callable, Iterator
 from math import ceil
 from time import perf_counter
@@ -13,7 +14,7 @@ from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME
 from lab.sim.scene.places import Layout
 from lab.sim.scene.scene import Scene
-from lab.sim.world import TIME_STEP, World
+from lab.sim.world import TIME_STEP, Array, World
 from lab.skills import Skill
 from lab.skills.sight import SkillFailed
 from lab.skills.skill import SETTLE_STEPS, STAND_STEPS, Bench, Status
@@ -24,6 +25,7 @@ from lab.teaching.events import RunHeld, RunWentOn, Tell, unheard
 AT_REST_STEPS = 60  # physics steps at the end of a wait that are simulated in any case
 SKIPPED_STEPS = 240  # at the most without a look at what else goes on
 FORCE_EVERY = 4  # physics steps between two looks at what presses on the arm
+BACK_STEPS = 120  # physics steps of its way that the arm goes back when it was stopped by a force
 DISTURBED_S = 2.0  # after a hand has reached into the scene, all of it is simulated for so long
 
 
@@ -62,6 +64,7 @@ class Floor:
         self.meanwhile: Callable[[], bool] = _nothing
         self.pressing_n = 0.0  # allowed on top of the task's limit, so that the arm gets away from where it was stopped
         self.was_held = False  # by the operator, in the last motion
+        self._trail: deque[Array] = deque(maxlen=BACK_STEPS // FORCE_EVERY)  # the joints on the last steps of the way
         for _ in range(SETTLE_STEPS):
             world.step()
         self.recorder: Recorder | None = None
@@ -189,9 +192,18 @@ class Floor:
         """What the arm presses on harder than the task allows; "" for nothing."""
         if self.steps % FORCE_EVERY:
             return ""
+        robot = self.scene.robot
+        self._trail.append(self.world.joints(NAME, robot.arm.joints))
         body, force_n = self.world.pressed(NAME)
         limit_n = self.scene.task.robot.stops_at_n + self.pressing_n
         return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {limit_n:g}" if force_n > limit_n else ""
+
+    def _back_off(self) -> None:
+        """Go back a little on the way that led against something."""
+        while self._trail:
+            self.world.drive(NAME, self.scene.robot.arm.joints, self._trail.pop())
+            for _ in range(FORCE_EVERY):
+                self.tick()
 
     # ---- skills --------------------------------------------------------------------------------------------------
 
@@ -232,6 +244,7 @@ class Floor:
             return why
         if too_hard := self._too_hard():
             self.scene.robot.brake()
+            self._back_off()
             if self.controls.attended:
                 self.controls.protective(too_hard)
                 self.held()

@@ -27,8 +27,7 @@ class Recovery:
     """The answers to trouble, for parts that are being brought on.
 
     replan: orders the rest of the work anew, given why. relearn: learns what changed in the scene, given what was seen.
-    lost: why a part was given up, by its number. out: why nothing is brought to a station any more. back: positions to which
-    parts fell back, by number, that the next plan has to know of.
+    lost: why a part was given up, by its number. out: why nothing is brought to a station any more.
     """
 
     work: Transfers
@@ -36,7 +35,6 @@ class Recovery:
     relearn: Callable[[Sequence[Deviation]], None]
     lost: dict[int, str] = field(default_factory=dict)
     out: dict[str, str] = field(default_factory=dict)
-    back: dict[int, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     _strange: dict[str, str] = field(default_factory=dict)  # what belongs to nobody, and the station that it closes
     _missing: set[int] = field(default_factory=set)  # parts that were given up because they cannot be taken up
@@ -192,21 +190,17 @@ class Recovery:
         self._tell_seen(seen, "leaves it")
 
     def _follow(self, part: int, seen: Deviation) -> None:
-        """A part that was moved is taken up where it stands; out of its machine before that was done, it goes back there."""
+        """A part that was moved is taken up where it stands; out of its machine before that was done, it is put back there."""
         assert seen.at is not None
-        work, name = self.work, self.work.name(part)
-        machine = work.machine_of(part)
-        answer = "takes it up there"
-        if machine is not None:
-            before = work.came_from.get(name)
-            if not machine.done(work.floor.now_s) and before is not None:
-                self.back[part], answer = before, "takes it up there, and brings it to the machine again"
-            machine.clear()
-        elif part in work.finished:
-            answer = "sets it right"
-            work.to_set_right.append(part)
-        if part not in work.finished:
+        work, machine, answer = self.work, self.work.machine_of(part), "takes it up there"
+        unfinished = machine is not None and not machine.done(work.floor.now_s)
+        if unfinished or part in work.finished:
+            answer = "puts it back"
+            work.to_put_back.append(part)
+        else:
             work.spot_of[seen.name] = seen.at
+        if machine is not None:
+            machine.clear()
         self._tell_seen(seen, answer)
 
     def _learn_again(self, fixed: Sequence[Deviation]) -> None:
@@ -241,8 +235,9 @@ class Recovery:
     def _lose(self, part: int, why: str) -> None:
         self.lost[part] = why
         self.work.left_lying.add(self.work.name(part))
+        self.work.spot_of.pop(self.work.name(part), None)
         self.work.finished.pop(part, None)
-        self.work.to_set_right = [one for one in self.work.to_set_right if one != part]
+        self.work.to_put_back = [one for one in self.work.to_put_back if one != part]
         self.work.tell(PartLost(self.work.name(part), why, self.work.floor.now_s))
 
     def _wait(self, seconds: float) -> None:
@@ -263,7 +258,7 @@ class Recovery:
         part = self._part_of(one.name)
         if part is None:
             return one.name in self._strange and one.sort != "part gone"
-        return part in self.lost or part in self.work.to_set_right
+        return part in self.lost or part in self.work.to_put_back
 
     def _part_of(self, body: str) -> int | None:
         """The number of the part that a body is, or whose pallet."""

@@ -2,20 +2,22 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import cos, hypot, sin
+from math import hypot
 
 from lab.production.durations import TimedMove
 from lab.production.floor import Floor
 from lab.production.machine import Machine
+from lab.production.standing import free_spot, station_near
 from lab.production.trouble import Trouble
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option, part_of
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.simulate.run import Run
-from lab.sim.parts.kinds import Kind, Spot, comes_as, on_its_pallet
+from lab.sim.parts.kinds import Spot, comes_as, on_its_pallet
 from lab.sim.scene.scene import pallet_of
 from lab.skills import Skill
-from lab.skills.skill import UPRIGHT, Status, over_everything
+from lab.skills.free_way import by_free_cells
+from lab.skills.skill import Status
 from lab.skills.skillset import Carried, ways_of
 from lab.teaching.events import (
     MachineBegan,
@@ -29,10 +31,7 @@ from lab.teaching.events import (
     unheard,
 )
 
-ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
-DELIVERED_M = 0.02  # a part this near to its spot has been delivered
 BEGINS_M = 0.05  # a tool this near to where a skill begins need not be brought there
-FREE_M = 0.005  # around a part where it is set down, of what lies about
 PATIENCE, PATIENCE_S = (
     1.0,
     10.0,
@@ -62,10 +61,10 @@ class Transfers:
     """Parts being brought on upon a floor: where they are, which spots are taken, when machines should be done.
 
     spot_of: by body, a part's or its pallet's. expected_s: by machine, when it should be done [s]. place: the station at
-    whose approach the tool is; "": it is somewhere else. came_from: by part, its position before the one it is in. taken:
-    spots on which something stands that belongs to nobody. finished: when a part reached the end of its route [s].
-    to_set_right: those of them that were moved there. left_lying: parts that were given up. spoilt: why a part was, which
-    is brought on all the same. look: called while the robot waits; raises Trouble.
+    whose approach the tool is; "": it is somewhere else. taken: spots on which something stands that belongs to nobody.
+    finished: when a part reached the end of its route [s]. to_put_back: parts that were moved from where they were brought.
+    left_lying: parts that were given up. spoilt: why a part was, which is brought on all the same. look: called while the
+    robot waits; raises Trouble.
     """
 
     floor: Floor
@@ -76,10 +75,9 @@ class Transfers:
     deviations_m: list[float] = field(default_factory=list)
     expected_s: dict[str, float] = field(default_factory=dict)
     spot_of: dict[str, Spot] = field(default_factory=dict)
-    came_from: dict[str, int] = field(default_factory=dict)
     taken: set[Spot] = field(default_factory=set)
     finished: dict[int, float] = field(default_factory=dict)
-    to_set_right: list[int] = field(default_factory=list)
+    to_put_back: list[int] = field(default_factory=list)
     left_lying: set[str] = field(default_factory=set)
     spoilt: dict[int, str] = field(default_factory=dict)
 
@@ -88,7 +86,7 @@ class Transfers:
         self.place = self.cell.robot_start
         self.look: Callable[[], None] = _unseen
         self._under_way: _UnderWay | None = None
-        self._last_way: dict[str, Carried] = {}
+        self._last: dict[str, tuple[Carried, Spot, float]] = {}
         self._served: set[str] = set()  # parts for which the robot's service is done
         scene = self.floor.scene
         for number, spot in enumerate(scene.places.begins(scene.order), start=1):
@@ -137,17 +135,27 @@ class Transfers:
         """Whether a move was begun and not ended."""
         return self._under_way is not None
 
-    def set_right(self) -> None:
-        """Set parts that were moved at the ends of their routes onto their spots again. Raises Trouble."""
-        while self.to_set_right and self.floor.bench.held in (None, self.name(self.to_set_right[0])):
-            name = self.name(self.to_set_right[0])
-            way, spot = self._last_way[name], self.spot_of[name]
+    def put_back(self) -> None:
+        """Bring parts again to where they were moved from; their machines begin anew. Raises Trouble."""
+        while self.to_put_back and self.floor.bench.held in (None, self.name(self.to_put_back[0])):
+            name = self.name(self.to_put_back[0])
+            way, spot, process_s = self._last[name]
             move = self._under_way = _UnderWay((name, way), self.place, self.floor.now_s, smooth=False)
             if self.floor.bench.held is None:
                 self._take_up(name, way, spot)
             self._bring(way, spot, move)
             self._under_way = None
-            self.to_set_right.pop(0)
+            self._start_machine(name, way.target, process_s)
+            self.to_put_back.pop(0)
+
+    def _start_machine(self, name: str, station: str, process_s: float) -> None:
+        """Let the machine begin that a part has been brought to."""
+        floor = self.floor
+        self._served.discard(name)
+        self.expected_s[station] = floor.now_s + process_s
+        if station in floor.machines:
+            floor.begin(station, name, process_s)
+            self.tell(MachineBegan(station, name, floor.now_s, self.expected_s[station]))
 
     def _begin(self, name: str, way: Carried, ahead: int) -> _UnderWay:
         """The times of the move, which begins now or was interrupted."""
@@ -168,16 +176,12 @@ class Transfers:
         self.place, self._under_way = way.target, None
         for body in floor.scene.bodies_of(name, way.kind):
             self.spot_of[body] = spot
-        self._last_way[name] = way
-        self.came_from[name] = self.plan.locations[part - 1]
         planned = self.plan.move(decision)
         times_s = move.leave_s, move.reach_s, move.pick_s, floor.now_s, planned.process_s, move.pick_s - move.served_s
         self.moves.append(Move(part, move.start, way.origin, way.target, *times_s, planned.carries))
-        if planned.carries == "part" and way.target in floor.machines:
-            self._served.discard(name)
-            self.expected_s[way.target] = floor.now_s + planned.process_s
-            floor.begin(way.target, name, planned.process_s)
-            self.tell(MachineBegan(way.target, name, floor.now_s, self.expected_s[way.target]))
+        if planned.carries == "part":
+            self._last[name] = way, spot, planned.process_s
+            self._start_machine(name, way.target, planned.process_s)
         self.tell(MoveMade(self.moves[-1], name))
         if self.plan.finished_s[part - 1] is not None:
             self.finished[part] = floor.now_s
@@ -200,32 +204,12 @@ class Transfers:
             return self.spot_of[pallet_of(name)]
         own = scene.bodies_of(name, way.kind)
         taken = [spot for body, spot in self.spot_of.items() if body not in own] + [*self.taken]
-        spots = [s for s in scene.places.spots(scene.task.station(way.target)) if s not in taken]
-        blocked = ""
-        for spot in spots:
-            blocked = self._blocked_by(spot, name, way)
-            if not blocked:
-                return spot
-        why = f": {blocked} is there" if blocked else ""
-        raise Trouble(f"no spot of '{way.target}' is free{why}", name, way.target, final=True)
-
-    def _blocked_by(self, spot: Spot, name: str, way: Carried) -> str:
-        """Which of the parts that were given up lies where a part is to be set down; "" for none."""
-        scene, shape = self.floor.scene, self.floor.scene.kinds[way.kind].shape
-        half = max(abs(shape.low[0]), abs(shape.high[0])), max(abs(shape.low[1]), abs(shape.high[1]))
-        c, s = abs(cos(spot.yaw)), abs(sin(spot.yaw))
-        x, y = c * half[0] + s * half[1] + FREE_M, s * half[0] + c * half[1] + FREE_M
-        for body in self.left_lying:
-            low, high = scene.world.bounds(body)
-            aside = low[0] > spot.x + x or high[0] < spot.x - x or low[1] > spot.y + y or high[1] < spot.y - y
-            if not aside and high[2] > spot.z and body != name:
-                return body
-        return ""
+        return free_spot(scene, name, way, taken, self.left_lying)
 
     # ---- what a move is made of ------------------------------------------------------------------------------------
 
     def _go(self, station: str, name: str, move: _UnderWay) -> None:
-        """Bring the empty gripper to a station: by the learned way, or over everything from where none leads."""
+        """Bring the empty gripper to a station: by the learned way, or by free cells from where none leads."""
         if self.place == station:
             move.reach_s = self.floor.now_s
             return
@@ -240,10 +224,10 @@ class Transfers:
         self.place, move.reach_s = station, self.floor.now_s
 
     def over_to(self, station: str) -> None:
-        """Take the tool to a station's approach over everything, from wherever it is. Raises Trouble."""
+        """Take the tool to a station's approach by free cells, from wherever it is. Raises Trouble."""
         surveys = next(iter(self.floor.skillset.skills.values())).surveys
         self.place = ""
-        why = self.floor.follow(over_everything(self.floor.bench, surveys.approach(station)))
+        why = self.floor.follow(by_free_cells(self.floor.bench, surveys, surveys.approach(station)))
         if why:
             raise Trouble(why, station=station, held=self.floor.was_held)
         self.place = station
@@ -317,7 +301,7 @@ class Transfers:
     def _take_up(self, name: str, way: Carried, spot: Spot) -> None:
         """Take a part up: by the way of the station that it stands near to, or of its own where it stands astray."""
         bench, skillset, body = self.floor.bench, self.floor.skillset, self.floor.scene.body_of(name, way.kind)
-        near = self._near(body, way)
+        near = station_near(bench, body, way, skillset)
         if near != way.origin:
             self.over_to(near)
         self.place = ""
@@ -327,16 +311,6 @@ class Transfers:
         if near == way.origin and (machine := self.floor.machines.get(near)) is not None and machine.part == name:
             machine.clear()
         assert bench.held == body
-
-    def _near(self, body: str, way: Carried) -> str:
-        """The station of the two on a way that a part stands at; its origin when it stands at neither."""
-        scene, at = self.floor.scene, self.floor.bench.part_pose(body)
-        for station in (way.origin, way.target):
-            foots = scene.places.spots(scene.task.station(station))
-            near = any(hypot(at.x - foot.x, at.y - foot.y) < ASTRAY_M for foot in foots)
-            if near and (way.kind, station) in self.floor.skillset.picks:
-                return station
-        return way.origin
 
     def _bring(self, way: Carried, spot: Spot, move: _UnderWay) -> None:
         """Carry what is in the gripper to its target and set it down; from a station near the target, that is all."""
@@ -352,12 +326,14 @@ class Transfers:
         self.place = way.target
 
     def _to_begin(self, skill: Skill, name: str, where: str) -> None:
-        """Bring the tool to where a skill begins, over everything, when it is far from there as after an interruption."""
+        """Bring the tool to where a skill begins, by free cells, when it is far from there as after an interruption."""
         begin, tool = skill.begins_at(), self.floor.scene.robot.tool()
         if begin is None or self._under_way is None or self._under_way.smooth:
             return
         if hypot(tool.x - begin.x, tool.y - begin.y, tool.z - begin.z) > BEGINS_M:
-            why = self.floor.follow(over_everything(self.floor.bench, begin))
+            why = self.floor.follow(
+                by_free_cells(self.floor.bench, skill.surveys, begin, skill.kind if skill.carries else "")
+            )
             if why:
                 raise Trouble(why, name, where, held=self.floor.was_held)
 
@@ -366,24 +342,3 @@ class Transfers:
         self.tell(SkillBegan(skill.name, skill.does(name), name, self.floor.now_s))
         if self.floor.run(skill) is not Status.SUCCESS:
             raise Trouble(skill.reason, name, where, held=self.floor.was_held, skill=skill.name)
-
-    # ---- what came of it -------------------------------------------------------------------------------------------
-
-    def stands(self, part: int) -> bool:
-        """Whether a part, and its pallet, stands where it was set down last."""
-        scene, name = self.floor.scene, self.name(part)
-        spot = self.spot_of[name]
-        for body, own in zip(scene.bodies_of(name, comes_as(scene.kind_of[name].part)), self._stack(part), strict=True):
-            if not self.floor.bench.stands(body, spot, DELIVERED_M, truly=True):
-                return False
-            spot = spot.raised(own.shape.height_m)
-        return True
-
-    def has_fallen(self, part: int) -> bool:
-        """Whether a part is neither held nor upright."""
-        bench, name = self.floor.bench, self.name(part)
-        return bench.held not in (name, pallet_of(name)) and bench.upright(name) < UPRIGHT
-
-    def _stack(self, part: int) -> list[Kind]:
-        scene = self.floor.scene
-        return scene.kinds[comes_as(scene.kind_of[self.name(part)].part)].stack()

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 from lab.sim.arms.kinematics import ToolPose
 from lab.skills.around_part import SLOW, AroundPart
+from lab.skills.free_way import by_free_cells
 from lab.skills.looking import FAR_M, look_at
 from lab.skills.sight import SkillFailed
-from lab.skills.skill import Bench, over_everything
+from lab.skills.skill import Bench
 from lab.skills.state_words import plain
 from lab.tasks.task import Task
 
@@ -52,15 +53,15 @@ class Grasp(AroundPart):
             raise SkillFailed(f"{body} is out of reach at ({goal.x:.2f}, {goal.y:.2f}) m")
         tool, approach = robot.tool(), self.surveys.approach(self.station)
         if tool.z < approach.z - 0.01 or hypot(tool.x - approach.x, tool.y - approach.y) > FAR_M:
-            yield from over_everything(bench, approach)
+            yield from by_free_cells(bench, self.surveys, approach)
         astray = self._is_astray(goal)
         if astray:
-            yield from over_everything(bench, replace(goal, z=approach.z))
+            yield from by_free_cells(bench, self.surveys, replace(goal, z=approach.z))
         yield from self.down(bench, policy, goal)
         yield from robot.grip()
         bench.held = body
         if astray:
-            yield from over_everything(bench, approach)
+            yield from by_free_cells(bench, self.surveys, approach, self.kind)
         else:
             for pose in self.surveys.way_out(self.station, goal):
                 yield from robot.follow([pose], slow=SLOW)

@@ -13,10 +13,11 @@ from lab.learning.problem import Problem
 from lab.mdp import NoPath, grid
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.kinds import Spot
+from lab.skills.free_way import by_free_cells
 from lab.skills.looking import look_at
 from lab.skills.place import let_go, release_pose
 from lab.skills.sight import SkillFailed
-from lab.skills.skill import Bench, Photo, Skill, learned_path, no_way, over_everything
+from lab.skills.skill import Bench, Photo, Skill, learned_path, no_way
 from lab.skills.state_words import plain
 from lab.skills.surveys import Surveys
 from lab.tasks.task import Task
@@ -164,7 +165,7 @@ class Insert(Skill):
         """Where the tool is not at the grid's start, as when trying again: over everything and down to it."""
         start, tool = self.pose(self.problem.mdp.start), bench.scene.robot.tool()
         if hypot(tool.x - start.x, tool.y - start.y, tool.z - start.z) >= self.grid.settings.cell_m:
-            yield from over_everything(bench, start)
+            yield from by_free_cells(bench, self.surveys, start, self.kind)
 
     def _same_picture(self, bench: Bench) -> None:
         """A new snapshot must show the obstacles and the machine where they were learned around, and no others."""

@@ -6,8 +6,9 @@ from math import hypot
 
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.kinds import Spot
+from lab.skills.free_way import by_free_cells
 from lab.skills.sight import ABOVE_M, SkillFailed
-from lab.skills.skill import Bench, over_everything
+from lab.skills.skill import Bench
 from lab.skills.surveys import Surveys
 
 FAR_M = 0.2  # [m] a tool farther from the station's approach, as when trying again, comes over everything
@@ -22,7 +23,7 @@ def look_at(bench: Bench, surveys: Surveys, station: str, body: str, spot: Spot)
     at = _over(bench, surveys, station, body, spot)
     tool = robot.tool()
     if tool.z < approach.z - 0.01 or hypot(tool.x - approach.x, tool.y - approach.y) > FAR_M:
-        yield from over_everything(bench, at)
+        yield from by_free_cells(bench, surveys, at)
     elif hypot(tool.x - at.x, tool.y - at.y, tool.z - at.z) > 0.001:
         yield from robot.follow([at], slow=SLOW)
     if bench.sight.look(body, spot) is None:

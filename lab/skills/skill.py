@@ -31,8 +31,6 @@ LOST_M = 0.03  # [m] a part farther than this from where the fingers hold it is 
 UPRIGHT = 0.97  # cosine of the largest tilt of a part that stands
 SETTLE_STEPS = 60  # physics steps until a new scene is at rest
 STAND_STEPS = 15  # physics steps until what was put somewhere at once is at rest
-SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of a way across at which it is seen whether the arm reaches it
-DOWN_M = 0.03  # [m] between two heights that are tried for it
 NOT_OFF = (0.0, 0.0, 0.0)  # of a part that stands on its spot
 
 
@@ -331,29 +329,6 @@ class Skill:
     def stop(self) -> None:
         """Break off; the skill can be started again."""
         self._motion, self.status = None, Status.IDLE
-
-
-def over_everything(bench: Bench, end: ToolPose) -> Iterator[None]:
-    """Bring the tool from wherever it is to `end`, over all that stands in the cell: up, across, down.
-
-    As high as the workspace, or as high as the arm reaches on that way.
-    """
-    robot, tool = bench.scene.robot, bench.scene.robot.tool()
-    high = _reachable_height(bench, tool, end)
-    for pose in (ToolPose(tool.x, tool.y, high, end.yaw), ToolPose(end.x, end.y, high, end.yaw), end):
-        yield from robot.follow([pose])
-
-
-def _reachable_height(bench: Bench, tool: ToolPose, end: ToolPose) -> float:
-    """The greatest height [m] up to the top of the workspace at which the arm reaches all of the way across to `end`."""
-    arm, grid = bench.scene.robot.arm, bench.scene.task.workspace
-    top = max(end.z, grid.lower_m[2] + (grid.shape[2] - 0.5) * grid.cell_m[2])
-    across = [tool.x + t * (end.x - tool.x) for t in SHARES], [tool.y + t * (end.y - tool.y) for t in SHARES]
-    for high in np.arange(top, max(end.z, min(tool.z, top)), -DOWN_M):
-        ways = np.array([[x, y, high, yaw] for x, y in zip(*across, strict=True) for yaw in {tool.yaw, end.yaw}])
-        if not np.isnan(arm.inverse_each(ways)[:, 0]).any():
-            return float(high)
-    return max(end.z, min(tool.z, top))
 
 
 def learned_path(policy: "Policy", mdp: TabularMDP, start: int) -> list[int]:

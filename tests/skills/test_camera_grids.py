@@ -1,12 +1,15 @@
 """The grids that the overhead camera looks at: what it sees in them, and what else stands in the way there."""
 
 from math import hypot
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lab.errors import BadInput
+from lab.files import tasks_folder
 from lab.mdp import greedy_path, optimal_values
+from lab.sim.camera import Camera
 from lab.sim.scene.places import Layout
 from lab.skills import Insert
 from lab.skills.camera_grids import OUT_OF_SIGHT, camera_view, overhead_camera, settings_of
@@ -14,7 +17,8 @@ from lab.skills.surveys import Surveys
 from lab.tasks.task import Task
 from lab.tasks.task_fields import Obstacle
 from lab.tasks.task_file import load
-from lab.vision import see
+from lab.vision import Lens, see
+from lab.vision.calibration import Calibration, write_calibration
 
 ORDER = ("slice", "slice")
 
@@ -174,3 +178,25 @@ def test_where_the_camera_would_not_see_the_gripper_it_may_not_go(task: Task) ->
     assert causes[6, 6] == ""
     wide = Surveys(task.changed(obstacles=()), ORDER, Layout((), ())).camera_grid("toaster", "slice")
     assert OUT_OF_SIGHT not in wide.survey(frozenset()).causes
+
+
+def test_a_calibrated_camera_with_a_bent_lens_shows_the_same_grid(tmp_path: Path) -> None:
+    hung = Camera((0.85, 0.01, 2.41), (0.84, 0.02, 0.0), (0.01, 1.0, 0.0), 0.4, 640, 640)
+    turn, shift = hung.turn_and_shift()
+    lens = Lens((640, 640), hung.lens().focal, (324.0, 317.0), (-0.5, 0.1, 0.003, -0.002, 0.0))
+    rows = tuple(tuple(row) for row in turn.tolist())
+    write_calibration(tmp_path / "camera.json", Calibration(lens, rows, tuple(shift.tolist()), 0.0, 0, "by hand"))
+    text = (tasks_folder() / "toast.toml").read_text()
+    (tmp_path / "mine.toml").write_text(text.replace("pixels = 640\n", 'pixels = 640\ncalibration = "camera.json"\n'))
+    mine, plain = load(str(tmp_path / "mine.toml")), load("toast")
+    layout = Layout(tuple(one.position_m for one in plain.obstacles), ())
+    grids = [Surveys(task, ("slice",), layout).camera_grid("toaster", "slice") for task in (mine, plain)]
+    seen, wanted = (see(grid.picture(), grid.view()) for grid in grids)
+    assert (seen.start, seen.goal, seen.obstacles) == (wanted.start, wanted.goal, wanted.obstacles)
+    assert all(
+        np.hypot(a.world_m[0] - b.world_m[0], a.world_m[1] - b.world_m[1]) < 0.002
+        for a, b in zip(seen.markers, wanted.markers, strict=True)
+    )
+    assert plain.camera is not None
+    with pytest.raises(BadInput, match=r"calibration.*no such file"):
+        camera_view(plain.changed(camera=plain.camera.model_copy(update={"calibration": "none.json"})), "toaster")

@@ -9,8 +9,10 @@ from lab.errors import BadInput, WorkFailed, unknown
 from lab.production.floor import Floor
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME
+from lab.sim.parts.kinds import comes_as
 from lab.skills import Skill
-from lab.skills.skill import Status, over_everything
+from lab.skills.free_way import by_free_cells
+from lab.skills.skill import Status
 
 SLOW = 0.5  # of the arm's speed, for motions by hand
 NEAR_M = 0.2  # from the tool, across the table, a part may be that "grasp" takes up
@@ -42,10 +44,12 @@ class ByHand:
         return lambda: self._follow(robot.follow([pose], slow=SLOW))
 
     def home(self) -> Deed:
-        """Bring the arm home, over everything."""
-        robot = self.floor.scene.robot
+        """Bring the arm home, by free cells of the workspace."""
+        floor, robot, held = self.floor, self.floor.scene.robot, self.floor.bench.held
         pose = robot.arm.forward(robot.arm.home)
-        return lambda: self._follow(over_everything(self.floor.bench, pose))
+        surveys = next(iter(floor.skillset.skills.values())).surveys
+        carried = "" if held is None else comes_as(floor.scene.kind_of[held].part)
+        return lambda: self._follow(by_free_cells(floor.bench, surveys, pose, carried))
 
     def open(self) -> Deed:
         """Open the gripper; what it holds is let go."""
@@ -131,7 +135,7 @@ class ByHand:
         for skill in skills:
             begin = skill.begins_at()
             if skill.carries and begin is not None:
-                self._follow(over_everything(floor.bench, begin))
+                self._follow(by_free_cells(floor.bench, skill.surveys, begin, skill.kind))
             with self._careful():
                 done = floor.run(skill.aim(part)) is Status.SUCCESS
             for machine in floor.machines.values():

@@ -1,0 +1,63 @@
+"""From wherever the tool is to a pose, without a learned way: up, through cells of the workspace that are free, and down."""
+
+from collections import deque
+from collections.abc import Iterator
+from math import hypot
+
+import numpy as np
+
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.scene.blocked_cells import Survey
+from lab.skills.skill import Bench
+from lab.skills.surveys import Cell, Surveys
+
+_BLEND_M = 0.10
+
+
+def by_free_cells(bench: Bench, surveys: Surveys, end: ToolPose, carried: str = "") -> Iterator[None]:
+    """Bring the tool to `end`; carried: the kind of part in the gripper, "" for none.
+
+    As when something is tried again. Where the free cells do not hang together: straight across, as high as they go.
+    """
+    robot, tool = bench.scene.robot, bench.scene.robot.tool()
+    survey = surveys.workspace(carried)
+    first, last = (_nearest(surveys, survey, pose) for pose in (tool, end))
+    cells = shortest(survey, first, last) or [first, last]
+    way = [surveys.cell_pose(cell) for cell in cells]
+    yield from robot.follow([ToolPose(tool.x, tool.y, max(tool.z, way[0].z), tool.yaw)])
+    high = robot.tool()
+    yield from robot.follow([ToolPose(high.x, high.y, high.z, way[0].yaw)])
+    yield from robot.follow([*way, ToolPose(end.x, end.y, way[-1].z, way[-1].yaw)], blend=_BLEND_M)
+    yield from robot.follow([ToolPose(end.x, end.y, way[-1].z, end.yaw), end])
+
+
+def _nearest(surveys: Surveys, survey: Survey, pose: ToolPose) -> Cell:
+    """The free cell nearest to a pose as seen from above, the lowest of those that are not below it."""
+    free = [tuple(map(int, cell)) for cell in np.argwhere(~survey.blocked)]
+
+    def far(cell: Cell) -> tuple[float, bool, float]:
+        at = surveys.cell_pose(cell)
+        return round(hypot(at.x - pose.x, at.y - pose.y), 6), at.z < pose.z - 1e-6, abs(at.z - pose.z)
+
+    return min(free, key=far)
+
+
+def shortest(survey: Survey, first: Cell, last: Cell) -> list[Cell]:
+    """The cells of a shortest way between two free ones, from neighbour to neighbour; none where no way leads there."""
+    blocked, before = survey.blocked, dict[Cell, Cell]({first: first})
+    pending = deque([first])
+    while pending and last not in before:
+        cell = pending.popleft()
+        for axis in (2, 0, 1):
+            for step in (1, -1):
+                to = tuple(n + step * (k == axis) for k, n in enumerate(cell))
+                inside = all(0 <= n < size for n, size in zip(to, blocked.shape, strict=True))
+                if inside and not blocked[to] and to not in before:
+                    before[to] = cell
+                    pending.append(to)
+    if last not in before:
+        return []
+    way = [last]
+    while way[-1] != first:
+        way.append(before[way[-1]])
+    return way[::-1]
