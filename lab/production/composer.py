@@ -68,7 +68,8 @@ class Production:
     def _next(self) -> bool:
         """The next move, or the answer to what keeps it from being made; False when nothing is left. Raises RunStopped."""
         try:
-            self.floor.between_moves()
+            if self.sequence:
+                self.floor.between_moves()
             self.recovery.look()
             self.work.put_back()
             if self.sequence:

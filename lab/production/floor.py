@@ -38,8 +38,8 @@ class Floor:
     """A scene in which skills are carried out: one clock, the robot's skill and the machines' processes side by side.
 
     controls: what stops it and sets its pace; stops: when they did, for the journal. on_tick: called after each physics
-    step; hand: called before each, to reach into the scene as a fault does, and says whether it did. meanwhile: called while
-    a pause lasts, for what the operator does by hand, and says whether that was anything.
+    step; hand: called before each, to reach into the scene as a fault does, and says whether it did. meanwhile: called between
+    moves and while a pause lasts, for what the operator does by hand, and says whether that was anything.
     """
 
     def __init__(
@@ -171,7 +171,7 @@ class Floor:
 
     def between_moves(self) -> None:
         """Wait as long as there is a pause, without any time going by."""
-        while self.stops.look(self.steps, self.controls) and (self.meanwhile() or self.stops.pauses(self.controls)):
+        while self.meanwhile() or (self.stops.look(self.steps, self.controls) and self.stops.pauses(self.controls)):
             self._tell_held()
             self.controls.wait(0.0 if self.stops.folding else 0.1)
         self._tell_held()

@@ -75,8 +75,9 @@ class Desk:
     def still(self) -> bool:
         """Whether nothing moves before somebody says something."""
         operation = self.operation
-        rests = operation.scene.resting and operation.controls.waits
-        return not operation.waiting and (not self.busy or rests)
+        if operation.waiting:  # looked at first: what is taken from there moves
+            return False
+        return not self.busy or (operation.scene.resting and operation.controls.waits)
 
     def _wake(self) -> None:
         with self._changed:

@@ -156,6 +156,8 @@ class Operation:
         self.scene.check_leaving()
         if self._inside:
             return False
+        if self.waiting:
+            self.scene.resting = False  # before it is taken: see `Desk.still`
         following = self._following() if self.scene.again else self._said_by_hand()
         if following is None:
             self.scene.resting = self.controls.waits
