@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 
 def operate(
-    task: Annotated[str, typer.Argument(help="A task that ships, or a .toml file.")] = "toast",
+    task: Annotated[
+        str | None, typer.Argument(help="A task that ships, or a .toml file.", show_default="toast")
+    ] = None,
     toasts: Toasts = None,
     parts: Parts = None,
     page: ShowPage = False,
@@ -29,6 +31,9 @@ def operate(
     ] = None,
     seed: Seed = 0,
     toolbox: ToolboxPlace = None,
+    resume: Annotated[
+        Path | None, typer.Option("--resume", help="Go on with what was done by hand in this folder, from there.")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for journal, pictures and replay; default: TASK-run.")
     ] = None,
@@ -36,6 +41,7 @@ def operate(
 ) -> None:
     """Run a task by hand: order, pause, stop, jog, grasp, learn, in a live console or line by line from a pipe."""
     import sys
+    from dataclasses import replace
 
     from lab.files import check_out
     from lab.production.conditions import Conditions
@@ -43,7 +49,8 @@ def operate(
     from lab.production.operation.commands import spoken
     from lab.production.operation.desk import Desk
     from lab.production.operation.operation import Operation
-    from lab.production.run_options import RunOptions, begun
+    from lab.production.run_journal import RunJournal
+    from lab.production.run_options import RunOptions, begun, gone_on
     from lab.tasks.task_file import load
     from lab.teaching.events import unheard
     from lab.teaching.lesson_options import DEFAULT_ADVISORS
@@ -51,20 +58,24 @@ def operate(
     live = sys.stdin.isatty() and sys.stderr.isatty()
     pace = spoken(f"speed {speed or ('4' if live else 'max')}").argument
     assert not isinstance(pace, str | tuple)
-    options = RunOptions(task, toasts, parts, DEFAULT_ADVISORS, seed=seed, faults=faults)
-    loaded = load(task)
-    order, folder = loaded.ordered(toasts, parts), out or Path(f"{loaded.name}-run")
+    options = RunOptions(task or "", toasts, parts, seed=seed, faults=faults)
+    if resume is None:
+        options = replace(options, task=task or "toast", advisors=DEFAULT_ADVISORS)
+        loaded = load(options.task)
+    else:
+        options, loaded = gone_on(options, resume, out, "operate")
+    order, folder = loaded.ordered(options.toasts, options.parts), resume or out or Path(f"{loaded.name}-run")
     check_out(folder)
-    journal = begun(options, loaded, folder)
+    journal = begun(options, loaded, folder, "operate") if resume is None else RunJournal.resume(folder)
     try:
         with lesson_seat(options.advisors, page=page, port=port) as seat:
             if live:
                 seat.progress.hear = unheard  # type: ignore[method-assign]  # the panel tells
             teacher = teacher_of(toolbox, options.lessons(), seat)
-            conditions = Conditions(1.0, seat.page, Controls(pace), journal, fault_seed=faults)
-            operation = Operation(loaded, order, seed, teacher, conditions)
+            conditions = Conditions(1.0, seat.page, Controls(pace), journal, fault_seed=options.faults)
+            operation = Operation(loaded, order, options.seed, teacher, conditions)
             try:
-                bad = _at_console(Desk(operation, attended=live), live, as_json)
+                bad = _at_console(Desk(operation, attended=live, known=journal.known), live, as_json)
             finally:
                 document = _kept(operation, folder)
                 operation.close()

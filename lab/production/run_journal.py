@@ -36,11 +36,15 @@ MAX_STEP = 10**12  # physics steps, more than a century
 
 @dataclass(frozen=True)
 class RunBegan:
-    """The first line: the words that began the run, the task's file as a hash, and the version that wrote it."""
+    """The first line: the words that began the run, the task's file as a hash, and the version that wrote it.
+
+    command: "run", or "operate" where it is done by hand.
+    """
 
     words: dict[str, Any]
     task: str
     task_hash: str
+    command: str = "run"
     lab: str = __version__
     schema: int = SCHEMA
 

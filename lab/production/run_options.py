@@ -52,16 +52,21 @@ class RunOptions(SessionOptions):
         )
 
 
-def begun(options: RunOptions, task: Task, folder: Path) -> RunJournal:
+def begun(options: RunOptions, task: Task, folder: Path, command: str = "run") -> RunJournal:
     """The journal of a new run in its folder. BadInput when it cannot be written."""
-    return RunJournal.begin(folder, RunBegan(options.to_json(), task.name, hash_of(task)))
+    return RunJournal.begin(folder, RunBegan(options.to_json(), task.name, hash_of(task), command))
 
 
-def gone_on(given: RunOptions, folder: Path, out: Path | None) -> tuple[RunOptions, Task]:
-    """What the run in a folder was begun with, and its task; BadInput for options beside it, and when the task has changed."""
+def gone_on(given: RunOptions, folder: Path, out: Path | None, command: str = "run") -> tuple[RunOptions, Task]:
+    """What the run in a folder was begun with, and its task; BadInput for options beside it, for another command's run, and
+    when the task has changed."""
     if out is not None:
         raise BadInput(f"--out {out} beside --resume {folder}: a run goes on in its own folder: leave it away")
     head, _, _ = read_run(folder, "--resume")
+    if head.command != command:
+        raise BadInput(
+            f"the run in '{folder}' (--resume) was begun otherwise: go on with lab {head.command} --resume {folder}"
+        )
     options = RunOptions.from_json(head.words, f"journal in '{folder}' (--resume)")
     check_alone(given, RunOptions(task=""), folder)
     task = load(options.task)

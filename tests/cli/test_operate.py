@@ -53,3 +53,19 @@ def test_a_motion_that_is_stopped_ends_it_with_exit_code_1(lab: Lab, tmp_path: P
     assert ran.code == 1
     assert "protective stop: the arm presses on '" in ran.err.splitlines()[-1]
     assert ran.json["commands"][-1]["failed"]
+
+
+def test_what_was_done_by_hand_is_done_again_and_gone_on_with(lab: Lab, tmp_path: Path) -> None:
+    """Nobody ran it to its end; the jog is done again at its step, and a run is not gone on with as another command's."""
+    out = tmp_path / "mine"
+    first = lab("operate", "toast", "--toasts", "1", "--out", str(out), "--json", stdin="jog +z 20\nquit\n")
+    assert first.code == 0
+    again = lab("operate", "--resume", str(out), "--json", stdin="jog -z 20\nquit\n")
+    assert again.code == 0
+    said = [one["words"] for one in again.json["commands"]]
+    assert said == ["jog +z 20", "jog -z 20"]
+    lines = [json.loads(line) for line in (out / "run.jsonl").read_text().splitlines()]
+    steps = [line["step"] for line in lines if line["kind"] == "commanded"]
+    assert steps[0] == 0 < steps[1]
+    other = lab("run", "--resume", str(out))
+    assert other.err.endswith(f"was begun otherwise: go on with lab operate --resume {out}\n")

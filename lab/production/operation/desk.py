@@ -1,5 +1,6 @@
 """Where commands are said while another thread simulates: stops act at once, the rest is carried out in its turn."""
 
+from collections.abc import Sequence
 from threading import Condition
 
 from lab.errors import BadInput, LabError
@@ -7,6 +8,7 @@ from lab.production.controls import RESET_FIRST, StopKind
 from lab.production.operation.commands import Spoken, spoken
 from lab.production.operation.operated_scene import Left
 from lab.production.operation.operation import OPERATOR, Done, Operation
+from lab.production.run_journal import Entry
 from lab.production.run_status import RunStatus
 
 AT_WORK = "the robot is at work: pause first"
@@ -19,8 +21,9 @@ class Desk:
     busy: the command under way, "" for none. What came of commands is told by the operation's `on_done`.
     """
 
-    def __init__(self, operation: Operation, *, attended: bool = True) -> None:
-        self.operation = operation
+    def __init__(self, operation: Operation, *, attended: bool = True, known: Sequence[Entry] = ()) -> None:
+        """known: what a journal says was done, which is done again first."""
+        self.operation, self._known = operation, known
         self.busy, self.closed = "lays the scene out", False
         self._changed = Condition()
         operation.controls.attended = attended
@@ -87,7 +90,7 @@ class Desk:
         """Carry out what is said until somebody leaves; the scene is laid out first. Raises LabError."""
         operation = self.operation
         try:
-            operation.open()
+            operation.repeat(self._known)
             while not self.closed:
                 following = self._following()
                 operation.write()

@@ -258,7 +258,8 @@ class OperatedScene:
                 problem, settings = problems[own], task.subtask(problems[own].subtask)
                 lesson = teacher.teach(LessonPlan(problem, settings.learner, settings.gate, task.name))
                 self.prepared.skillset.policies[own] = lesson.policy
-                self.journal.keep_skill(skill_row(own, lesson), lesson.policy)
+                if not self.again:
+                    self.journal.keep_skill(skill_row(own, lesson), lesson.policy)
                 self.tell(SkillReady(own, lesson))
             if self.plan is not None and not self.plan.production.work.moves:
                 self.plan = None  # its times are those of the skills as they were
