@@ -20,9 +20,10 @@ from lab.sequencing import find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
 from lab.sequencing.cell.routes import part_of
+from lab.sequencing.cell.schedule import Move
 from lab.sequencing.methods.exact import Optimum, optimum
 from lab.sequencing.search import SAME, Reference, Search, SequenceResult
-from lab.sequencing.simulate.run import Run, follow
+from lab.sequencing.simulate.run import Run, branch, follow
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.teaching.events import ORDER, LessonEvent, OrderChosen, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.lesson_sessions import TellingAdvisor
@@ -36,44 +37,38 @@ SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
 ADVISED, GIVEN, EXACT = "advised", "given", "exact"  # by whom an order is, beside the methods' names
 
 
-def taken_moves(cell: Cell, words: str, done: Sequence[int] = (), where: str = "order") -> tuple[tuple[int, ...], str]:
-    """The first moves of "1 2 1 3" or "1,2,1,3" that may be made after `done`; why the next may not, "" where all may.
+def checked_order(cell: Cell, words: str, where: str = "--order") -> tuple[int, ...]:
+    """A whole order as it is typed, "1 2 1 3" or "1,2,1,3", as a sequence.
 
     A number is a decision as in a sequence (see `Run`): the part's number, + the number of parts for its second choice.
-    BadInput for words that are no moves at all; `where` says what they were typed to.
+    BadInput for words that are no moves, for the first move that may not be made, with the reason, and for what is left.
     """
-    run, taken = Run(cell), list[int]()
-    for decision in done:
-        run.move(decision)
     typed = words.replace(",", " ").split()
     if not typed:
         raise BadInput(f"{where} '{words}': no moves; wanted part numbers such as 1 2 1")
     for position, word in enumerate(typed, 1):
         if not (word.isascii() and word.isdigit()) or len(word) > 6:
             raise BadInput(f"{where} '{words}': move {position} '{word}' is no part's number, 1 to {cell.parts}")
-        if reason := run.refusal(int(word)):
-            return tuple(taken), f"move {position} '{word}': {reason}; {_allowed(run)}"
-        run.move(int(word))
-        taken.append(int(word))
-    return tuple(taken), ""
+    sequence = tuple(map(int, typed))
+    moves_from(Run(cell), sequence, f"{where} '{words}'")
+    return sequence
 
 
-def checked_order(cell: Cell, words: str, where: str = "--order") -> tuple[int, ...]:
-    """A whole order, as a sequence. BadInput for the first move that may not be made, with the reason, and for what is left."""
-    taken, reason = taken_moves(cell, words, where=where)
-    if reason:
-        raise BadInput(f"{where} '{words}': {reason}")
-    run = Run(cell)
-    for decision in taken:
-        run.move(decision)
+def moves_from(start: Run, sequence: Sequence[int], what: str) -> list[Move]:
+    """The moves of a sequence from where a run is to the end of the work; the run stays where it is. BadInput, of `what`."""
+    run, moves = branch(start), list[Move]()
+    for position, decision in enumerate(sequence, 1):
+        if reason := run.refusal(decision):
+            raise BadInput(f"{what}: move {position} '{decision}': {reason}; {_allowed(run)}")
+        moves.append(run.move(decision))
     if not run.done:
         part = run.finished_s.index(None) + 1
-        station = cell.names[cell.positions[run.locations[part - 1]].station]
-        made = counted(len(taken), "move")
+        station = run.cell.names[run.cell.positions[run.locations[part - 1]].station]
+        made = counted(len(moves), "move")
         raise BadInput(
-            f"{where} '{words}': it ends after {made}, but {cell.part_name(part)} is still at '{station}'; {_allowed(run)}"
+            f"{what}: it ends after {made}, but {run.cell.part_name(part)} is still at '{station}'; {_allowed(run)}"
         )
-    return taken
+    return moves
 
 
 def _allowed(run: Run) -> str:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lab.advice.advisors import AdvisorName
 from lab.advice.journal import Undo
 from lab.errors import BadInput
-from lab.production.order import OrderAdvice, Ordered, checked_order, ordered, person_of, taken_moves
+from lab.production.order import OrderAdvice, Ordered, checked_order, moves_from, ordered, person_of
 from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import RunBegan, RunJournal
 from lab.sequencing import find_sequence
@@ -49,12 +49,14 @@ def test_an_order_is_refused_with_the_first_move_that_may_not_be_made(words: str
     assert str(refused.value) == f"--order '{words}': {reason}"
 
 
-def test_the_moves_before_the_refused_one_are_taken() -> None:
-    assert taken_moves(TWO, "1 2 2 1") == (
-        (1, 2),
-        "move 3 '2': toast 2 at 'toaster_buffer' cannot move on: 'toaster' full; allowed here: 1 (toast 1)",
-    )
-    assert taken_moves(TWO, "1 2 2", done=(1, 2, 1)) == ((1, 2, 2), "")
+def test_an_order_may_go_on_from_the_middle() -> None:
+    run = Run(TWO)
+    for decision in (1, 2, 1):
+        run.move(decision)
+    assert [move.part for move in moves_from(run, (1, 2, 2, 2), "order")] == [1, 2, 2, 2]
+    assert run.locations != Run(TWO).locations  # it stays where it is
+    with pytest.raises(BadInput, match=r"^order: it ends after 1 move, but toast 2 is still at"):
+        moves_from(run, (1,), "order")
 
 
 @given(st.data(), st.sampled_from([" ", ",", ", "]))

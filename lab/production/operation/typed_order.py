@@ -3,10 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lab.errors import BadInput, counted
+import numpy as np
+
+from lab.errors import counted
+from lab.production.order import moves_from
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import optimum
-from lab.sequencing.simulate.run import Run, branch
+from lab.sequencing.simulate.rest import rest_of
+from lab.sequencing.simulate.run import Run
 
 
 @dataclass(frozen=True)
@@ -32,25 +36,9 @@ class TypedOrder:
 
 
 def checked(state: Run, sequence: Sequence[int]) -> TypedOrder:
-    """A typed sequence from a state on, to the end of the work; BadInput names the first entry that may not be taken, and why."""
-    run, moves = branch(state), []
-    begun_s = run.now_s
-    for number, decision in enumerate(sequence, start=1):
-        if why := run.refusal(decision):
-            allowed = ", ".join(map(str, run.allowed())) or "none, all is done"
-            before = f"; the {counted(number - 1, 'entry').replace('entrys', 'entries')} before it may be taken" * (
-                number > 1
-            )
-            raise BadInput(f"entry {number}, '{decision}': {why}; allowed there: {allowed}{before}")
-        moves.append(run.move(decision))
-    if not run.done:
-        left = run.finished_s.index(None) + 1
-        where = run.cell.names[run.cell.positions[run.locations[left - 1]].station]
-        allowed = ", ".join(map(str, run.allowed())) or "none"
-        raise BadInput(
-            f"after the last entry, {run.cell.part_name(left)} is still at '{where}': go on to the end; allowed there: {allowed}"
-        )
-    schedule = Schedule.from_moves(run.cell, moves, sequence)
-    proven = optimum(state.cell)
-    cost_s = schedule.makespan_s - begun_s
-    return TypedOrder(tuple(sequence), schedule, proven.gap(cost_s), proven.proven)
+    """A typed sequence from a state on, to the end of the work. BadInput names the first move that may not be made, and why."""
+    moves = moves_from(state, sequence, "order")
+    schedule = Schedule.from_moves(state.cell, moves, sequence)
+    rest = rest_of(state, fallback_s=float(np.nanmax(state.cell.empty_s, initial=0.0))).cell
+    proven = optimum(state.cell if rest is None else rest)
+    return TypedOrder(tuple(sequence), schedule, proven.gap(schedule.makespan_s - state.now_s), proven.proven)

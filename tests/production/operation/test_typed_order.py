@@ -29,16 +29,16 @@ def test_an_order_that_may_be_taken_is_held_against_the_optimum(state: Run) -> N
 @pytest.mark.parametrize(
     ("sequence", "why"),
     [
-        ((3,), "entry 1, '3': there is no part 3, only 1 to 2; allowed there: 1, 2"),
+        ((3,), "order: move 1 '3': there is no part 3, only 1 to 2; allowed here: 1 (toast 1), 2 (toast 2)"),
         (
             (1, 2),
-            "entry 2, '2': toast 2 at 'in' cannot move on: 'hot' full; allowed there: 1; the 1 entry before it may be taken",
+            "order: move 2 '2': toast 2 at 'in' cannot move on: 'hot' full; allowed here: 1 (toast 1)",
         ),
         (
             (1, 1, 1),
-            "entry 3, '1': toast 1 is already at 'out'; allowed there: 2; the 2 entries before it may be taken",
+            "order: move 3 '1': toast 1 is already at 'out'; allowed here: 2 (toast 2)",
         ),
-        ((1, 1, 2), "after the last entry, toast 2 is still at 'hot': go on to the end; allowed there: 2"),
+        ((1, 1, 2), "order: it ends after 3 moves, but toast 2 is still at 'hot'; allowed here: 2 (toast 2)"),
     ],
 )
 def test_the_first_entry_that_may_not_be_taken_is_named(state: Run, sequence: tuple[int, ...], why: str) -> None:
@@ -50,5 +50,5 @@ def test_the_first_entry_that_may_not_be_taken_is_named(state: Run, sequence: tu
 def test_it_goes_on_from_where_the_run_is(state: Run) -> None:
     state.move(1)
     assert checked(state, (1, 2, 2)).schedule.makespan_s == 29.0
-    with pytest.raises(BadInput, match="entry 1, '2'"):
+    with pytest.raises(BadInput, match="order: move 1 '2'"):
         checked(state, (2, 1, 2))
