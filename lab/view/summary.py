@@ -33,7 +33,7 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
         answer = (
             f"noticed: {fault['noticed']}; {fault['answer']}" if fault["noticed"] else "not noticed, and no harm done"
         )
-        table.add_row("fault", Text(f"{fault['at_s']:.1f} s: {fault['words']}; {answer}"))
+        table.add_row("fault", Text(f"{fault['at_s']:.1f} s: {fault['true_reason']}; {answer}"))
     if report["retries"]:
         table.add_row("retries", Text("\n".join(report["retries"])))
     table.add_row("skills", _found(skills, report["task"]))

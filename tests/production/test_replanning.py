@@ -1,0 +1,59 @@
+"""The rest of the work ordered anew, by hand: two toasts through one oven, in the middle, with one lost or in the gripper."""
+
+import numpy as np
+import pytest
+
+from lab.production.replanning import in_another, plan_again
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.stations import Product, Stage, Station
+from lab.sequencing.simulate.rest import Mishaps
+from lab.sequencing.simulate.run import Run
+
+
+def oven(seconds: float = 10.0) -> Cell:
+    """2 s in, the oven's time, 2 s out; the robot comes back in 1 s: two toasts take 29 s."""
+    stations = (Station("in", "storage", 9), Station("hot", "machine", 1, seconds), Station("out", "storage", 9))
+    step = np.ones((3, 3)) - np.eye(3)
+    route = (Stage("in"), Stage("hot"), Stage("out"))
+    return Cell(stations, (Product("toast", (route,)),), ("toast", "toast"), step, 2 * step, "in")
+
+
+@pytest.fixture
+def run() -> Run:
+    """Toast 1 has just been brought into the oven."""
+    run = Run(oven())
+    run.move(1)
+    return run
+
+
+def test_the_rest_takes_what_is_left_of_the_whole(run: Run) -> None:
+    found = plan_again(run, Mishaps())
+    assert found.sequence == (1, 2, 2)
+    assert found.proven is not None
+    assert (found.proven.cost, found.proven.proven, found.stuck) == (pytest.approx(29.0 - 2.0), True, {})
+    assert found.schedule is not None
+    assert found.schedule.makespan_s == found.proven.cost
+
+
+def test_a_lost_part_is_left_out(run: Run) -> None:
+    assert plan_again(run, Mishaps(lost=frozenset({2}))).sequence == (1,)
+    assert plan_again(run, Mishaps(lost=frozenset({1}))).sequence == (2, 2)
+    assert plan_again(run, Mishaps(lost=frozenset({1, 2}))).sequence == ()
+
+
+def test_what_is_in_the_gripper_comes_first() -> None:
+    found = plan_again(Run(oven()), Mishaps(), under_way=2)
+    assert (found.sequence, found.proven) == ((2, 2, 1, 1), None)
+
+
+def test_what_is_in_an_oven_that_is_out_of_order_is_stuck(run: Run) -> None:
+    found = plan_again(run, Mishaps(closed=("hot",)))
+    assert found.sequence == ()
+    assert list(found.stuck) == [1, 2]
+    assert found.stuck[1] == "toast 1 is not done in 'hot', which is out of use"
+
+
+def test_the_same_state_in_a_cell_with_other_times(run: Run) -> None:
+    other = in_another(run, oven(30.0))
+    assert (other.locations, other.now_s, other.robot) == (run.locations, run.now_s, run.robot)
+    assert plan_again(other, Mishaps()).sequence == (1, 2, 2)
