@@ -19,6 +19,8 @@ from lab.teaching.events import (
 )
 from lab.view.story import Mark, Story
 
+LEAST_WAIT_S = 0.5  # that is worth a word
+
 
 @dataclass
 class _Story:
@@ -66,8 +68,13 @@ def story_of(outcome: Outcome, planned: Schedule | None) -> Story:
     found = _Story()
     for event in outcome.heard:
         found.hear(event)
+    schedule = outcome.schedule
+    names = {activity.part: activity.resource for activity in schedule.parts}
+    for did in schedule.robot:
+        if did.kind == "wait" and did.end_s - did.start_s > LEAST_WAIT_S:
+            found._say(did.start_s, f"The robot waits at '{did.origin}' for {names.get(did.part, 'its part')}")
     struck = tuple(Mark(fault.at_s, "fault", fault.words) for fault in outcome.happened)
-    return Story(outcome.schedule, planned, tuple(found.captions), (*found.marks, *struck), tuple(found.begins_s))
+    return Story(schedule, planned, tuple(found.captions), (*found.marks, *struck), tuple(found.begins_s))
 
 
 def held_words(kind: str) -> str:

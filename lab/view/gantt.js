@@ -19,7 +19,7 @@ const labGantt = (() => {
     return [...names.filter((name) => name === robot), ...names.filter((name) => name !== robot)];
   }
 
-  const leftOf = (svg) => (svg.clientWidth < 520 ? 62 : 104);
+  const leftOf = (svg) => (svg.clientWidth < 520 ? 76 : 104);
 
   function tickOf(last, wide) {
     const most = Math.max(2, Math.floor(wide / 64));
@@ -49,7 +49,7 @@ const labGantt = (() => {
     const wide = svg.clientWidth || 600, left = leftOf(svg), last = Math.max(end_s, 1), foot = TOP + rows.length * ROW;
     const room = wide - left - RIGHT, x = (seconds) => left + (room * Math.min(Math.max(seconds, 0), last)) / last;
     svg.style.height = `${foot + FOOT}px`;
-    const most = Math.floor(left / 6.6), parts = rows.map((row, k) => node("text", { x: left - 8, y: TOP + k * ROW + 14, "text-anchor": "end", class: "row" }, row.length > most ? `${row.slice(0, most - 1)}…` : row));
+    const most = Math.floor((left - 8) / 6.2), parts = rows.map((row, k) => node("text", { x: left - 8, y: TOP + k * ROW + 14, "text-anchor": "end", class: "row" }, row.length > most ? `${row.slice(0, most - 1)}…` : row));
     for (let at = 0, step = tickOf(last, room); at <= last; at += step) {
       parts.push(node("line", { x1: x(at), x2: x(at), y1: TOP, y2: foot, class: "tick" }));
       parts.push(node("text", { x: x(at), y: foot + 13, "text-anchor": "middle", class: "row" }, at + step > last ? `${at} s` : at));

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import trimesh
 
+from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.sim.frames import IDENTITY, Body, Frame, Recording, Shape
 from lab.view.meshcat import LiveView, replay_html
+from lab.view.story import Mark, Story
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -148,12 +150,12 @@ def test_the_replay_plays_from_disk_without_a_network(
     browser_page.on("request", lambda request: asked.append(request.url))
     browser_page.context.set_offline(True)
     browser_page.goto(path.as_uri())
-    until(browser_page, "viewer.animator.playing && viewer.animator.time > 0")
+    until(browser_page, "player.state().playing && player.state().time > 0")
     assert "2 × real time" in browser_page.inner_text("#caption")
     assert browser_page.inner_text("#caption").startswith("Toast <b>bold</b>")
 
     browser_page.click("#play")
-    assert browser_page.evaluate("viewer.animator.playing") is False
+    assert browser_page.evaluate("player.state().playing") is False
     middle = [0.3, 0.2, 0.5, 0.0, 0.0, 0.0, 1.0]  # half way between the first two poses
     for time_s, pose in ((0.0, POSES[0]), (0.5, middle), (1.0, POSES[1]), (2.0, POSES[2])):
         browser_page.evaluate("time => viewer.animator.seek(time)", time_s)
@@ -168,8 +170,8 @@ def test_colours_and_visibility_step_in_the_replay(
 ) -> None:
     recording.frames[2] = Frame(5.0, {"slice 1": POSES[2]}, {"slice 1": WHITE}, {"arm": True})
     browser_page.goto(replay_html(recording, tmp_path / "replay.html").as_uri())
-    until(browser_page, "viewer.animator.playing")
-    browser_page.evaluate("viewer.animator.pause()")
+    until(browser_page, "player.state().playing")
+    browser_page.click("#play")
     start = (*recording.bodies[2].shapes[0].rgba, True)
     for time_s, expected in ((0.5, start), (1.5, (*BROWN, False)), (2.5, (*WHITE, True)), (0.2, start)):
         browser_page.evaluate("time => viewer.animator.seek(time)", time_s)
@@ -191,3 +193,27 @@ def test_a_still_recording_has_no_player(browser_page: "Page", recording: Record
     browser_page.goto(replay_html(recording, tmp_path / "replay.html").as_uri())
     assert pose_of(browser_page, "slice 1") == pytest.approx(POSES[0], abs=1e-5)
     assert browser_page.is_hidden("#player")
+
+
+def test_keys_go_from_move_to_move_and_the_words_the_chart_and_the_slider_follow(
+    browser_page: "Page", recording: Recording, tmp_path: Path, until: Until
+) -> None:
+    done = Activity("robot", "carry", 1, "plate", "toaster", 3.0, 5.0)
+    schedule = Schedule((done,), (), (), 5.0, (1,))
+    told = ((3.0, "The robot grasps slice 1"), (4.0, "The robot waits"))
+    story = Story(schedule, schedule, told, (Mark(4.0, "stop", "pause"),), (3.0, 4.0))
+    browser_page.goto(replay_html(recording, tmp_path / "replay.html", speed=1, story=story).as_uri())
+    until(browser_page, "player.state().playing")
+    browser_page.keyboard.press(" ")
+    browser_page.keyboard.press("Home")
+    assert browser_page.inner_text("#doing") == "The robot grasps slice 1"
+    browser_page.keyboard.press("n")
+    assert browser_page.inner_text("#doing") == "The robot waits"
+    assert browser_page.evaluate("player.state()") == {"time": 1, "playing": False, "speed": 1}
+    assert pose_of(browser_page, "slice 1") == pytest.approx(POSES[1], abs=3e-4)
+    browser_page.keyboard.press("+")
+    browser_page.keyboard.press("ArrowRight")
+    assert browser_page.evaluate("player.state()") == {"time": 2, "playing": False, "speed": 2}
+    browser_page.click("#marks button")
+    assert browser_page.input_value("#seek") == "1"
+    assert browser_page.locator("#gantt rect.planned").count() == 1

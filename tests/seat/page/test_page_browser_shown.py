@@ -156,11 +156,11 @@ def test_a_pallets_move_is_no_carry(tab: "Page", page: SeatPage, until: Until) -
         until(tab, "!document.querySelector('#moves button:enabled')")
         if carries == "pallet":
             break
-        assert tab.is_hidden("[data-kind=pallet]")
+        assert tab.is_hidden("#work [data-kind=pallet]")
     assert carries == "pallet"
     ThreadPoolExecutor(1).submit(page.ask, replace(request, run=run, allowed=run.allowed() or (1,), made=tuple(made)))
     until(tab, "document.querySelectorAll('#bars .k-pallet').length === 1")
-    assert tab.is_visible("[data-kind=pallet]")
+    assert tab.is_visible("#work [data-kind=pallet]")
     assert "carry an empty pallet" in (tab.text_content("#bars .k-pallet title") or "")
 
 
