@@ -72,11 +72,11 @@ def test_the_replay_shows_the_arm_and_the_slices_offline(
     asked: list[str] = []
     browser_page.on("request", lambda request: asked.append(request.url))
     browser_page.context.set_offline(True)
-    page = replay_html(recorder.recording, tmp_path / "replay.html").as_uri()
+    page = replay_html(recorder.recording, tmp_path / "replay.html", speed=0.5).as_uri()
     browser_page.goto(page)
-    until(browser_page, "viewer.animator.playing")
+    until(browser_page, "player.state().playing")
     browser_page.click("#play")  # pauses
-    for time_s, expected in ((0.0, first), (1.0, last)):
-        browser_page.evaluate("time => viewer.animator.seek(time)", time_s)
+    for key, expected in (("Home", first), ("End", last)):
+        browser_page.keyboard.press(key)
         assert on_page(browser_page, expected)
     assert asked == [page]
