@@ -227,7 +227,7 @@ def test_a_step_that_goes_on_failing_stops_the_run_with_part_place_and_reason(
     assert outcome.schedule.robot == ()
 
 
-def test_where_no_learned_way_leads_the_empty_gripper_goes_over_everything(
+def test_where_no_learned_way_leads_the_empty_gripper_goes_by_free_cells(
     prepared: Prepared, cell: Cell, clueless: Callable[[str], None]
 ) -> None:
     clueless("transfer toaster_buffer to plate")

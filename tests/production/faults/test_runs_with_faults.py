@@ -36,7 +36,7 @@ def run_with(two_toasts: tuple[Prepared, Taught], teacher: Teacher) -> Any:
     [
         {"what": "part moved", "part": "slice 2", "by_m": [0.0, 0.08]},
         {"what": "part moved", "when": "in machine", "at_m": [0.5, 0.25]},
-        {"what": "part dropped", "by_m": [0.1, 0.0], "at_s": 60},
+        {"what": "part dropped", "by_m": [0.1, 0.0], "at_s": 8},
         {"what": "obstacle moved", "obstacle": "cubes A", "by_m": [0.0, -0.06], "at_s": 20},
         {"what": "station moved", "station": "toaster", "by_m": [0.02, 0.0], "at_s": 20},
         {"what": "machine slow", "station": "toaster"},
@@ -72,15 +72,13 @@ def test_what_cannot_be_made_is_left_and_said(
     assert outcome.verdict(NAMES).came == "stopped"
 
 
-def test_an_arm_that_cannot_pass_over_everything_stops_and_says_so(
-    run_with: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_arm_that_cannot_get_through_stops_and_says_so(run_with: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody holds it then: it is tried a few times, not for ever."""
 
-    def too_high(bench: Any, end: Any) -> Any:
+    def too_high(*_: Any) -> Any:
         yield from ()
         raise WorkFailed("the tool cannot reach (0.541, -0.330, 0.460) m")
 
-    monkeypatch.setattr("lab.production.transfers.over_everything", too_high)
-    outcome = run_with({"what": "part moved", "part": "slice 2", "by_m": [0.0, 0.08]})
+    monkeypatch.setattr("lab.production.transfers.by_free_cells", too_high)
+    outcome = run_with({"what": "part moved", "part": "slice 1", "by_m": [0.3, -0.45]})
     assert "the tool cannot reach (0.541, -0.330, 0.460) m (tried 3 times)" in outcome.failure

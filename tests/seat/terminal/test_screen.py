@@ -134,6 +134,8 @@ def test_text_is_folded_between_words() -> None:
 
 def test_a_dumb_terminal_has_its_own_size(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "dumb")
+    monkeypatch.delenv("LINES", raising=False)
+    monkeypatch.delenv("COLUMNS", raising=False)
     in_memory = Console(file=StringIO(), force_terminal=True)
     assert room(in_memory) == (80, 25)  # rich's guess
     assert room(Console(file=StringIO(), width=34, height=20)) == (34, 20)
