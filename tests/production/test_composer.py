@@ -285,6 +285,19 @@ def test_a_slice_that_was_moved_is_taken_up_where_it_stands(ground: Ground) -> N
     assert ground.work.moves[0].target == "toaster"
 
 
+def test_a_way_that_cannot_be_gone_is_tried_a_few_times_not_for_ever(
+    ground: Ground, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def too_high(*_: object) -> Iterator[None]:
+        yield from ()
+        raise WorkFailed("the tool cannot reach (0.541, -0.330, 0.460) m")
+
+    monkeypatch.setattr("lab.production.transfers.by_free_cells", too_high)
+    ground.work.place = ""
+    stopped = ground.production.carry_out((1,))
+    assert stopped == "'plate': the tool cannot reach (0.541, -0.330, 0.460) m (tried 3 times)"
+
+
 def test_a_slice_set_down_beside_the_slot_is_picked_up_again_and_inserted(ground: Ground, task: Task) -> None:
     floor = ground.floor
     x, y, _ = task.station("toaster").pose

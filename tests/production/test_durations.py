@@ -204,8 +204,8 @@ def test_all_that_moves_the_arm_is_in_the_key() -> None:
     package = Path(lab.__file__).parent
     rooms = [*package.glob("sim/**/*.py"), *package.glob("skills/*.py")]
     found = sources(MEASURED_BY, DECIDED_BY_RESULT)
-    look_on = ("__init__", "trial", "reach", "ground_plan", "cell_outline", "new_cell")  # they draw and write files
-    look_on += ("made_pictures", "scored_pictures")
+    look_on = {"__init__", "trial", "reach", "ground_plan", "cell_outline", "new_cell"}  # they draw and write files
+    look_on |= {"made_pictures", "scored_pictures"}
     here = {
         ".".join(path.relative_to(package.parent).with_suffix("").parts) for path in rooms if path.stem not in look_on
     }

@@ -4,7 +4,6 @@ from typing import Any
 
 import pytest
 
-from lab.errors import WorkFailed
 from lab.production.composer import carry_out
 from lab.production.conditions import Conditions
 from lab.production.outcome import Outcome
@@ -70,15 +69,3 @@ def test_what_cannot_be_made_is_left_and_said(
     assert outcome.delivered == delivered
     assert said in outcome.failure
     assert outcome.verdict(NAMES).came == "stopped"
-
-
-def test_an_arm_that_cannot_get_through_stops_and_says_so(run_with: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody holds it then: it is tried a few times, not for ever."""
-
-    def too_high(*_: Any) -> Any:
-        yield from ()
-        raise WorkFailed("the tool cannot reach (0.541, -0.330, 0.460) m")
-
-    monkeypatch.setattr("lab.production.transfers.by_free_cells", too_high)
-    outcome = run_with({"what": "part moved", "part": "slice 1", "by_m": [0.3, -0.45]})
-    assert "the tool cannot reach (0.541, -0.330, 0.460) m (tried 3 times)" in outcome.failure
