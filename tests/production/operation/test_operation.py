@@ -116,9 +116,9 @@ def test_a_typed_order_is_checked_and_carried_out(made: Made, heard: list[Event]
     operation = made(2)
     operation.open()
     assert operation.do("policy").well
-    assert "entry 3, '3': there is no part 3" in operation.do("order 1 1 3").refused
-    assert "entry 2, '2': slice 2 at 'plate' cannot move on: 'toaster' full" in operation.do("order 1 2").refused
-    assert "slice 2 is still at 'plate': go on to the end" in operation.do("order 1 1 1").refused
+    assert "move 3 '3': there is no part 3" in operation.do("order 1 1 3").refused
+    assert "move 2 '2': slice 2 at 'plate' cannot move on: 'toaster' full" in operation.do("order 1 2").refused
+    assert "it ends after 3 moves, but slice 2 is still at 'plate'" in operation.do("order 1 1 1").refused
     done = operation.do("order 1 1 1 2 2 2")
     assert "% longer than the proven optimum" in done.said
     assert operation.do("run").well
