@@ -10,8 +10,9 @@ from lab.cli.options import Json, Parts, Port, Seed, ShowPage, Toasts, ToolboxPl
 from lab.cli.output import complain, end, show, write
 
 if TYPE_CHECKING:
+    from lab.production.operation.at_once import Done
     from lab.production.operation.desk import Desk
-    from lab.production.operation.operation import Done, Operation
+    from lab.production.operation.operation import Operation
 
 
 def operate(

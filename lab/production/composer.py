@@ -58,10 +58,8 @@ class Production:
                 if not self._next():
                     return self.recovery.failure()
             except RunStopped as stopped:
-                if not self.floor.controls.attended:
+                if not self.floor.protected(f"{stopped}; put it right, then go on"):
                     return str(stopped)
-                self.floor.controls.protective(f"{stopped}; put it right, then go on")
-                self.floor.held()
                 self.recovery.forget()
                 self.replan("a person has put things right")
 
@@ -188,6 +186,7 @@ def carry_out(
         floor.controls = conditions.controls
         floor.stops.note = journal.note_stops
         floor.stops.again(journal.stops(), journal.last_step())
+        conditions.on_floor(floor)
         production = Production(floor, cell, noted, relearner)
         interrupted = False
         try:

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
+from lab.production.controls import Controls
 from lab.sequencing.cell.schedule import Activity, robot_activities
 from lab.tasks.task import Order, Task
 from lab.teaching.events import (
@@ -232,6 +233,13 @@ class RunStatus:
         """What was measured, with what machines are doing now."""
         under_way = (self._work(machine, self.now_s) for machine in self.machines if machine.part)
         return [*self.measured, *(activity for work in under_way for activity in work)]
+
+    def under(self, controls: Controls) -> "RunStatus":
+        """With a stop as soon as it is pressed, and the pace."""
+        held = controls.held
+        self.held = None if held is None else HeldStatus(held.kind, held.why, held.by)
+        self.speed = controls.speed
+        return self
 
     def copied(self) -> "RunStatus":
         """As it is now, for another thread to show while this one goes on."""

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable
 from threading import Thread
 
 from lab.production.operation.commands import help_lines
+from lab.production.operation.at_once import Done
 from lab.production.operation.desk import Desk
-from lab.production.operation.operation import Done
 from lab.seat.terminal.console_view import plain_lines
 
 Write = Callable[[str], None]
@@ -28,7 +28,7 @@ class PlainConsole:
         self._desk, self._write = desk, write
         self._bad: Done | None = None
         self._error: Exception | None = None
-        desk.operation.on_done = self._done
+        desk.operation.on_done.append(self._done)
 
     def run(self, lines: Iterable[str]) -> Done | None:
         """The command that was refused or failed, None when all went well. Raises what the simulation raised."""
