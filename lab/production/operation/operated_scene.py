@@ -140,7 +140,11 @@ class OperatedScene:
             return {}
         problems = self.prepared.problems
         families = dict.fromkeys(problem.subtask for problem in problems.values())
-        return {"parts": [part.name for part in self.task.made], "learn": [*families, *problems], "execute": [*problems]}
+        return {
+            "parts": [part.name for part in self.task.made],
+            "learn": [*families, *problems],
+            "execute": [*problems],
+        }
 
     def trouble(self, why: str) -> None:
         """Tell what went wrong in something that the operator said."""

@@ -24,6 +24,7 @@ from lab.tasks.task import Order, Task
 from lab.teaching.events import OperatorActed
 from lab.teaching.teacher import Teacher
 
+
 class Operation:
     """What the operator does in one scene; all but `at_once` and `now` belongs to the thread that simulates.
 

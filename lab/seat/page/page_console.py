@@ -1,0 +1,113 @@
+"""The operator's console on the page: what it steers, and the documents that say where the run stands."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any, Protocol
+
+from lab.production.controls import Controls, StopKind
+from lab.production.operation.at_once import Done
+from lab.production.run_status import RunStatus
+from lab.sequencing.cell.schedule import Activity
+from lab.teaching.events import Event, MoveMade, PartLost, PlanMade
+
+Json = dict[str, Any]
+MOST_DONE = 20  # commands that are shown with what came of them
+ONLOOKER = "onlooker"  # who stops in an emergency without having the seat
+PARTS = ("run", "plan", "measured")
+STOP = "stop"
+
+
+class Console(Protocol):
+    """What a page steers: all but `hear` is called in the server's thread.
+
+    words: the commands that are taken; names: what may follow some of them. busy: the command under way, "" for none.
+    done: what came of all that was said.
+    """
+
+    @property
+    def controls(self) -> Controls: ...
+    @property
+    def words(self) -> Sequence[str]: ...
+    @property
+    def names(self) -> Mapping[str, Sequence[str]]: ...
+    @property
+    def done(self) -> Sequence[Done]: ...
+    @property
+    def busy(self) -> str: ...
+
+    def now(self) -> RunStatus:
+        """Where the run stands."""
+
+    def say(self, line: str, by: str) -> Done | None:
+        """Take a command; returns at once."""
+
+    def watched(self, pages: int) -> None:
+        """So many pages are open."""
+
+    def hear(self, event: Event) -> None:
+        """What happens, in the session's thread."""
+
+
+def changed_by(event: Event) -> tuple[str, ...]:
+    """The parts of the page's document that an event has changed."""
+    match event:
+        case PlanMade():
+            return ("run", "plan")
+        case MoveMade() | PartLost():
+            return ("run", "measured")
+    return ("run",)
+
+
+def run_of(console: Console | None) -> Json | None:
+    """Where the run stands, and what may be said; without what has an own part."""
+    if console is None:
+        return None
+    status = console.now()
+    row = status.to_json()
+    kept = {
+        name: row[name] for name in ("now_s", "phase", "words", "next_station", "move", "moves", "finished", "parts")
+    }
+    machines = [asdict(machine) for machine in status.machines]
+    done = console.done
+    return kept | {
+        "machines": machines,
+        "trouble": row["trouble"],
+        "commands": list(console.words),
+        "names": {word: list(names) for word, names in console.names.items()},
+        "busy": console.busy,
+        "said": len(done),
+        "done": [asdict(one) for one in done[-MOST_DONE:]],
+    }
+
+
+def plan_of(console: Console | None) -> Json | None:
+    """The plan in use: of the robot and the machines, without the parts' own rows."""
+    plan = None if console is None else console.now().plan
+    if plan is None:
+        return None
+    return {
+        "makespan_s": plan.makespan_s,
+        "gap": plan.gap,
+        "proven": plan.proven,
+        "why": plan.why,
+        "rows": [_bar(one) for one in plan.rows if one.kind != "store"],
+    }
+
+
+def measured_of(console: Console | None) -> list[Json]:
+    """What was done so far, without what machines are doing now."""
+    return [] if console is None else [_bar(one) for one in console.now().measured]
+
+
+def _bar(one: Activity) -> Json:
+    return asdict(one) | {"start_s": round(one.start_s, 2), "end_s": round(one.end_s, 2)}
+
+
+def held_of(console: Console) -> Json:
+    """What stops the run now, what may be said next ("": nothing has to be), and the pace."""
+    controls = console.controls
+    held = controls.held
+    if held is None:
+        return {"kind": "", "speed": controls.speed}
+    after = "reset" if held.kind is StopKind.EMERGENCY else "go"
+    return {"kind": held.kind, "why": held.why, "by": held.by, "next": after, "speed": controls.speed}
