@@ -7,7 +7,9 @@ from typing import Any, Protocol
 from lab.production.controls import Controls, StopKind
 from lab.production.operation.at_once import Done
 from lab.production.run_status import RunStatus
-from lab.sequencing.cell.schedule import Activity
+from lab.seat.event_text import PHASES
+from lab.seat.page.page_order import chart_row
+from lab.sequencing.cell.stations import ROBOT
 from lab.teaching.events import Event, MoveMade, PartLost, PlanMade
 
 Json = dict[str, Any]
@@ -70,6 +72,7 @@ def run_of(console: Console | None) -> Json | None:
     machines = [asdict(machine) for machine in status.machines]
     done = console.done
     return kept | {
+        "phase_words": PHASES.get(status.phase, status.phase),
         "machines": machines,
         "trouble": row["trouble"],
         "commands": list(console.words),
@@ -82,25 +85,22 @@ def run_of(console: Console | None) -> Json | None:
 
 def plan_of(console: Console | None) -> Json | None:
     """The plan in use: of the robot and the machines, without the parts' own rows."""
-    plan = None if console is None else console.now().plan
-    if plan is None:
+    status = None if console is None else console.now()
+    if status is None or status.plan is None:
         return None
+    plan, rows = status.plan, {ROBOT, *(machine.station for machine in status.machines)}
     return {
         "makespan_s": plan.makespan_s,
         "gap": plan.gap,
         "proven": plan.proven,
         "why": plan.why,
-        "rows": [_bar(one) for one in plan.rows if one.kind != "store"],
+        "rows": [chart_row(one) for one in plan.rows if one.resource in rows],
     }
 
 
 def measured_of(console: Console | None) -> list[Json]:
     """What was done so far, without what machines are doing now."""
-    return [] if console is None else [_bar(one) for one in console.now().measured]
-
-
-def _bar(one: Activity) -> Json:
-    return asdict(one) | {"start_s": round(one.start_s, 2), "end_s": round(one.end_s, 2)}
+    return [] if console is None else [chart_row(one) for one in console.now().measured]
 
 
 def held_of(console: Console) -> Json:

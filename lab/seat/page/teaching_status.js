@@ -69,10 +69,12 @@ const seatStatus = (() => {
   }
 
   function showWork({ work }) {
-    el("work").hidden = !work || !work.bars.length;
+    el("work").hidden = !work || !work.measured.length;
     if (el("work").hidden) return;
-    el("work").querySelector("[data-kind=pallet]").hidden = !work.bars.some((bar) => bar[1] === "pallet");
-    seatDraw.bars(el("bars"), work);
+    el("work").querySelector("[data-kind=pallet]").hidden = !work.measured.some((one) => one.kind === "pallet");
+    labGantt.draw(el("bars"), { ...work, planned: work.measured, marks: [], end_s: Math.max(work.end_s, work.now_s) }).grow(work.now_s);
+    const moves = work.measured.filter((one) => ["carry", "pallet"].includes(one.kind)).length;
+    el("bars").setAttribute("aria-label", `${count(moves, "move")} so far, ${Math.round(work.now_s)} s`);
   }
 
   function receiptRows(of) {
