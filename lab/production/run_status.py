@@ -117,6 +117,7 @@ class RunStatus:
     speed: float | None = None
     _target: str = ""  # of the move under way
     _grasped: str = ""  # the part that the robot is taking up
+    _grasped_s: float = 0.0  # when that began
     _made: int = 0  # moves
 
     @classmethod
@@ -162,7 +163,9 @@ class RunStatus:
             case SkillBegan():
                 if part.state in ("waiting", "in machine") and self._grasped == event.part:
                     part.state, self.next_station = "carried", self._target
+                    self._fetched(part.station, event.part, self._grasped_s)
                 self._grasped = event.part if event.name.startswith(TAKES_UP) else ""
+                self._grasped_s = event.at_s
                 self.words = event.words
             case MoveMade(move):
                 self._made, self.words, self._grasped, self.next_station = self._made + 1, "", "", ""

@@ -10,7 +10,7 @@ from lab.production.run_status import RunStatus
 from lab.seat.event_text import PHASES
 from lab.seat.page.page_order import chart_row
 from lab.sequencing.cell.stations import ROBOT
-from lab.teaching.events import Event, MoveMade, PartLost, PlanMade
+from lab.teaching.events import Event, MoveMade, PartLost, PlanMade, SkillBegan
 
 Json = dict[str, Any]
 MOST_DONE = 20  # commands that are shown with what came of them
@@ -55,7 +55,7 @@ def changed_by(event: Event) -> tuple[str, ...]:
     match event:
         case PlanMade():
             return ("run", "plan")
-        case MoveMade() | PartLost():
+        case MoveMade() | PartLost() | SkillBegan():
             return ("run", "measured")
     return ("run",)
 
