@@ -77,9 +77,9 @@ class RunDesk:
         except BadInput as error:
             done = Done(words, refused=str(error))
         steps, now_s = (0, 0.0) if self._floor is None else (self._floor.steps, self._floor.now_s)
+        self.done.append(done)
         self._unwritten.append(Commanded(steps, done.words, by, done.refused))
         self._tell(OperatorActed(done.words, by, now_s, done.refused))
-        self.done.append(done)
         return done
 
     def watched(self, pages: int) -> None:
