@@ -30,12 +30,12 @@ const seatConsole = (() => {
   ];
   // Key, its name on the button, what is said before the number that is chosen, where it is chosen, label, what it does, place
   const JOGS = [
-    ["ArrowUp", "↑", "jog +y", "run-mm", "+y", "away", "1 / 2"],
-    ["ArrowLeft", "←", "jog -x", "run-mm", "-x", "to the left", "2 / 1"],
-    ["ArrowRight", "→", "jog +x", "run-mm", "+x", "to the right", "2 / 3"],
-    ["ArrowDown", "↓", "jog -y", "run-mm", "-y", "nearer", "2 / 2"],
-    ["PageUp", "PgUp", "jog +z", "run-mm", "+z", "up", "1 / 4"],
-    ["PageDown", "PgDn", "jog -z", "run-mm", "-z", "down", "2 / 4"],
+    ["ArrowUp", "↑", "jog +y", "run-mm", "+y", "move the tool along +y", "1 / 2"],
+    ["ArrowLeft", "←", "jog -x", "run-mm", "-x", "move the tool along -x", "2 / 1"],
+    ["ArrowRight", "→", "jog +x", "run-mm", "+x", "move the tool along +x", "2 / 3"],
+    ["ArrowDown", "↓", "jog -y", "run-mm", "-y", "move the tool along -y", "2 / 2"],
+    ["PageUp", "PgUp", "jog +z", "run-mm", "+z", "move the tool up", "1 / 4"],
+    ["PageDown", "PgDn", "jog -z", "run-mm", "-z", "move the tool down", "2 / 4"],
     ["[", "[", "rotate -", "run-degrees", "↷ turn", "turn the gripper clockwise", "1 / 1"],
     ["]", "]", "rotate +", "run-degrees", "↶ turn", "turn the gripper the other way", "1 / 3"],
   ];
@@ -104,7 +104,7 @@ const seatConsole = (() => {
     event.preventDefault();
     const able = found.find((one) => !one.made.disabled) || (mine() && found.length === 1 ? found[0] : null); // else the run says why not
     if (!able && !mine()) refused(state.you.free ? "Nobody operates yet: press 'Operate here' first." : "Another page operates: here only the emergency stop works.");
-    if (able && (!event.repeat || able.where === "jog")) press(able);
+    if (able && !event.repeat) press(able);
     return true;
   }
 

@@ -59,7 +59,7 @@ const seat = (() => {
     document.body.classList.toggle("mine", Boolean(you.seat));
     document.title = `${shown && you.seat ? "● " : ""}${title}`;
     el("lesson").textContent = state.run && !shown && state.run.words ? state.run.phase_words : lesson.title || lesson.page;
-    el("chair-text").textContent = chairInWords(you);
+    el("chair-text").textContent = finished ? "" : seatStatus.chair(state, Boolean(send));
     el("chair").classList.toggle("yours", Boolean(you.seat && send));
     const button = el("chair-button");
     button.hidden = Boolean(state.replay) || !(lesson.asks || state.run) || !(send && (you.seat ? you.pages > 1 : you.free));
@@ -73,17 +73,6 @@ const seat = (() => {
     el(state.ended ? "ask" : "learning").append(el("receipt")); // at the end it is what matters
     if (shown) showReasons();
     countDown();
-  }
-
-  // Who answers, or, where nobody is asked, who operates
-  function chairInWords(you) {
-    const { asks } = state.lesson, others = you.pages > 1 ? `; ${seatStatus.count(you.pages - 1, "other page")} watching` : "";
-    if (finished || (send && state.replay)) return "";
-    if (!send) return "connection lost: trying again";
-    if (!asks && !state.run) return "Nobody is asked here";
-    if (you.seat) return `${asks ? "You answer here" : "You operate this run"}${others}`;
-    if (you.free) return asks ? "No page answers yet" : "Nobody operates yet";
-    return `You are watching: another page ${asks ? "answers" : "operates"}`;
   }
 
   function idle() {
@@ -272,7 +261,7 @@ const seat = (() => {
   const paced = (word) => send && send({ replay: word });
 
   function pressed(event) {
-    if (seatConsole.pressed(event, { busy: Boolean(shown), drawn: seatMap.drawn().length > 0 })) return;
+    if (seatConsole.pressed(event, { busy: Boolean(shown), drawn: Boolean(shown) && seatMap.drawn().length > 0 })) return;
     if (event.key === "Escape" && !seatMap.drop()) event.target.blur();
     const pace = state.replay && !state.ended && !event.ctrlKey && !event.target.matches("input, button") ? PACES[event.key] : undefined;
     if (pace) {

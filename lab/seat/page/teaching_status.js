@@ -106,5 +106,15 @@ const seatStatus = (() => {
     box.querySelector("ol").replaceChildren(...[...progress.lines].reverse().map((line) => make("li", line)));
   }
 
-  return { show, make, percent, count };
+  // Who answers, or, where nobody is asked, who operates; live: the page hears the run
+  function chair({ you = {}, lesson: { asks }, run, replay }, live) {
+    if (live && replay) return "";
+    if (!live) return "connection lost: trying again";
+    if (!asks && !run) return "Nobody is asked here";
+    if (you.seat) return `${asks ? "You answer here" : "You operate this run"}${you.pages > 1 ? `; ${count(you.pages - 1, "other page")} watching` : ""}`;
+    if (you.free) return asks ? "No page answers yet" : "Nobody operates yet";
+    return `You are watching: another page ${asks ? "answers" : "operates"}`;
+  }
+
+  return { show, chair, make, percent, count };
 })();
