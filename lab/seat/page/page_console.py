@@ -64,17 +64,19 @@ def run_of(console: Console | None) -> Json | None:
     """Where the run stands, and what may be said; without what has an own part."""
     if console is None:
         return None
-    status = console.now()
-    row = status.to_json()
-    kept = {
-        name: row[name] for name in ("now_s", "phase", "words", "next_station", "move", "moves", "finished", "parts")
-    }
-    machines = [asdict(machine) for machine in status.machines]
-    done = console.done
-    return kept | {
+    status, done = console.now(), console.done
+    return {
+        "now_s": status.now_s,
+        "phase": status.phase,
         "phase_words": PHASES.get(status.phase, status.phase),
-        "machines": machines,
-        "trouble": row["trouble"],
+        "words": status.words,
+        "next_station": status.next_station,
+        "move": status.move,
+        "moves": status.moves,
+        "finished": status.finished,
+        "parts": [asdict(part) for part in status.parts],
+        "machines": [asdict(machine) for machine in status.machines],
+        "trouble": [asdict(one) for one in status.trouble],
         "commands": list(console.words),
         "names": {word: list(names) for word, names in console.names.items()},
         "busy": console.busy,
