@@ -253,9 +253,9 @@ const seatConsole = (() => {
     if (el("run-chart").hidden) return;
     const last = [...planned, ...measured].reduce((most, one) => Math.max(most, one.end_s), 1);
     chartEnd = now > last ? now * 1.1 : last;
-    const rows = labGantt.rowsOf([...planned, ...measured]);
+    const done = [...measured, ...underWay(chartEnd)], rows = labGantt.rowsOf([...planned, ...done]);
     const marks = run.trouble.map((one) => ({ at_s: one.at_s, kind: "trouble", words: `${one.what}; ${one.answer}` }));
-    chart = labGantt.draw(el("run-gantt"), { rows, measured: [...measured, ...underWay(chartEnd)], planned, marks, end_s: chartEnd });
+    chart = labGantt.draw(el("run-gantt"), { rows, measured: done, planned, marks, end_s: chartEnd });
     el("run-chart").querySelector("[data-kind=pallet]").hidden = ![...planned, ...measured].some((one) => one.kind === "pallet");
     el("run-plan").textContent = plan ? planInWords(plan) : "There is no plan yet.";
     el("run-gantt").setAttribute("aria-label", `${el("run-plan").textContent} Measured until ${Math.round(now)} s.`);
