@@ -22,6 +22,10 @@ def run(
     asked: Asked = "together",
     decide: Decide = "trust-weighted",
     page: ShowPage = False,
+    speed: Annotated[
+        str | None,
+        typer.Option("--speed", help="Simulated seconds per second, or max; default: 4 with a page, else max."),
+    ] = None,
     view: Annotated[bool, typer.Option("--view/--no-view", hidden=True)] = False,  # the old word for --page
     port: Port = 0,
     wait: Wait = None,
@@ -50,6 +54,9 @@ def run(
 
     from lab.files import check_out
     from lab.production.conditions import Conditions
+    from lab.production.controls import Controls
+    from lab.production.operation.commands import pace
+    from lab.production.operation.run_desk import RunDesk
     from lab.production.run import run as run_task
     from lab.production.run_advice import RunAdvice
     from lab.production.run_journal import RunJournal
@@ -67,6 +74,8 @@ def run(
         options, loaded = gone_on(given, resume, out)
     folder = resume or out or Path(f"{loaded.name}-run")
     check_out(folder)
+    watched = page or view or "web" in options.advisors
+    controls = Controls(pace(speed or ("4" if watched else "max")))
     lessons = options.lessons()
     lessons.advising()
     prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed)
@@ -77,7 +86,11 @@ def run(
             advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "")
             teacher = replace(teacher, keep=advice.keep)
             share = options.override / 100
-            conditions = Conditions(share, seat.page, journal=journal, fault_seed=options.faults, advice=advice)
+            conditions = Conditions(share, seat.page, controls, journal, fault_seed=options.faults, advice=advice)
+            if seat.page is not None:
+                desk = RunDesk(loaded, prepared.order, controls, journal, seat.hear)
+                conditions = replace(conditions, on_floor=desk.on_floor)
+                seat.page.steer(desk)
             with seat.progress:
                 report = run_task(prepared, teacher, folder, conditions)
     except BadInput:
