@@ -1,0 +1,206 @@
+"""The shortest period beside all orders tried one by one, and beside what the field has published."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from lab.errors import BadInput, WorkFailed
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import Option
+from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
+from lab.sequencing.cyclic.cycle import best_cycle
+
+CellMaker = Callable[..., Cell]
+Move = tuple[int, int, Option]  # the part of the cycle, the position that it leaves, and how
+
+# Phillips and Unger 1976: least and most soak [s] of tanks 1 to 12, loaded moves into each and out of the last, empty moves
+# from tank (row) to tank (column; the first is the load), the last row from the unload.
+SOAK_S = [
+    *((150, 200), (90, 120), (120, 180), (90, 125), (30, 40), (60, 120), (60, 120), (45, 75)),
+    *((130, math.inf), (120, math.inf), (90, 120), (30, 60)),
+]
+LOADED_S = [31, 22, 22, 22, 25, 23, 22, 22, 22, 47, 27, 22, 30]
+EMPTY_S = """
+    11  0  2  5  2  8 10 13 15 17 10  3  1
+    14  2  0  2  0  5  8 10 13 15 12  6  3
+    16  5  2  0  2  3  5  8 10 13 15  8  6
+    14  2  0  2  0  5  8 10 13 15 12  6  3
+    19  8  5  3  5  0  3  5  7 10 18 11  9
+    22 10  8  5  8  3  0  2  5  7 20 14 11
+    24 13 10  8 10  5  2  0  2  5 23 16 14
+    26 15 13 10 13  7  5  2  0  2 25 19 16
+    29 17 15 13 15 10  7  5  2  0 27 21 19
+     6 10 12 15 12 18 20 23 25 27  0  7  9
+     8  3  6  8  6 11 14 16 19 21  7  0  2
+    10  1  3  6  3  9 11 14 16 19  9  2  0
+     0 11 14 16 14 19 22 24 26 29  6  8 10
+"""
+
+
+def build_hoist_cell(parts: int = 6) -> Cell:
+    """The line of Phillips and Unger: load, 12 tanks, unload."""
+    tanks = [
+        Station(f"tank {n}", "machine", 1, float(least), None if most == math.inf else float(most - least))
+        for n, (least, most) in enumerate(SOAK_S, 1)
+    ]
+    stations = (Station("load", "storage", 200), *tanks, Station("unload", "storage", 200))
+    empty, loaded = np.full((14, 14), np.nan), np.full((14, 14), np.nan)
+    empty[1:, :-1] = np.array(EMPTY_S.split(), float).reshape(13, 13)
+    for n, seconds in enumerate(LOADED_S):
+        loaded[n, n + 1] = seconds
+    route = tuple(Stage(station.name) for station in stations)
+    return Cell(stations, (Product("carrier", (route,)),), ("carrier",) * parts, empty, loaded, "unload")
+
+
+def test_the_hoist_of_phillips_and_unger_takes_521() -> None:
+    found = best_cycle(build_hoist_cell(), ("carrier",))
+    assert (found.period_s, found.bound_s, found.proven) == (521.0, 521.0, True)
+    assert found.most_in_work == 4
+
+
+@pytest.mark.parametrize(("case", "period_s"), [("I", 150.0), ("II", 200.0), ("III", 295.0)])
+def test_the_thesis_s_toast_cell(toast_cell: CellMaker, case: str, period_s: float) -> None:
+    """Case I by hand: the robot carries 36 + 28 + 12 s, and drives 19 + 20 + 26 s, but the toaster is the one that is waited
+    for: 60 s in it, 28 s out, 26 s for the plate after 12 s and 20 s: 28 + ... = 150 s a toast."""
+    assert best_cycle(toast_cell(case, 3), ("toast",)).period_s == pytest.approx(period_s)
+
+
+def test_one_oven_by_hand(oven_cell: CellMaker) -> None:
+    """10 s in the oven, 2 s out of it, 1 s back, 2 s into it: a toast in 15 s, whatever a cycle takes."""
+    for parts in (1, 2, 3):
+        found = best_cycle(oven_cell(), ("toast",) * parts)
+        assert (found.period_s, found.proven) == (15.0 * parts, True)
+
+
+def test_two_places_alike(oven_cell: CellMaker) -> None:
+    """Each place needs 15 s a toast as before, but the robot only 2 + 0 + 2 + 1 s: 7.5 s, which is no whole number."""
+    stations = (Station("in", "storage", 9), Station("oven", "machine", 2, 10.0), Station("out", "storage", 9))
+    found = best_cycle(oven_cell(stations=stations), ("toast",))
+    assert (found.period_s, found.proven, found.most_in_work) == (7.5, True, 2)
+
+
+def tours(moves: Sequence[Move]) -> Iterator[tuple[int, ...]]:
+    for rest in permutations(range(1, len(moves))):
+        yield (0, *rest)
+
+
+def ways(cell: Cell, mix: Sequence[str]) -> Iterator[list[Move]]:
+    """The moves of a cycle, for each choice of ways of its parts."""
+
+    def onward(place: int) -> Iterator[tuple[tuple[int, Option], ...]]:
+        options = cell.positions[place].options
+        if not options:
+            yield ()
+        for option in options:
+            for rest in onward(option.to):
+                yield ((place, option), *rest)
+
+    starts = [cell.starts[cell.order.index(name)] for name in mix]
+    for chosen in product(*(list(onward(start)) for start in starts)):
+        yield [(slot, place, option) for slot, path in enumerate(chosen) for place, option in path]
+
+
+def is_legal(cell: Cell, moves: Sequence[Move], tour: Sequence[int], over: Sequence[int]) -> bool:
+    """Whether all moves have the room they need, once the line is full: parts are put down and taken up one by one."""
+    cycles = 2 * (max(over) + 2)
+    happens = sorted((cycle + over[n], tour.index(n), cycle, n) for cycle in range(cycles) for n in range(len(moves)))
+    taken = [0] * len(cell.stations)
+    for when, _, _, n in happens:
+        _, place, option = moves[n]
+        if max(over) + 1 <= when < cycles:  # before, the line is filled; after, it is emptied
+            if any(taken[station] >= cell.capacities[station] for station in option.needs):
+                return False
+            if option.if_full is not None and taken[option.if_full] < cell.capacities[option.if_full]:
+                return False
+        for station in cell.positions[place].holds:
+            taken[station] -= 1
+        for station in cell.positions[option.to].holds:
+            taken[station] += 1
+    return True
+
+
+def least_period(cell: Cell, moves: Sequence[Move], tour: Sequence[int], over: Sequence[int]) -> float:
+    """The shortest period of one order as a linear program in the begins and the period; inf: there is none."""
+    work = [option.service_s + cell.loaded_s[option.origin, option.target] for _, _, option in moves]
+    rows, most = list[list[float]](), list[float]()
+
+    def at_least(one: int, then: int, seconds: float, periods: int) -> None:
+        """begin[then] + periods * period >= begin[one] + seconds"""
+        row = [0.0] * (len(moves) + 1)
+        row[one] += 1
+        row[then] -= 1
+        row[-1] -= periods
+        rows.append(row)
+        most.append(-seconds)
+
+    for number, one in enumerate(tour):
+        then = tour[(number + 1) % len(tour)]
+        left, origin = moves[one][2].target, moves[then][2].origin
+        empty = 0.0 if left == origin else cell.empty_s[left, origin]
+        if math.isnan(empty):
+            return math.inf
+        at_least(one, then, work[one] + empty, int(number == len(tour) - 1))
+    for n, (slot, place, option) in enumerate(moves):
+        if n == 0 or moves[n - 1][0] != slot:
+            brought = None
+            continue
+        if cell.positions[place].processing_s is not None:
+            brought = n - 1
+        at_least(n - 1, n, work[n - 1], over[n] - over[n - 1])
+        if option.waits:
+            done = work[brought] + cell.positions[moves[brought][2].to].processing_s
+            at_least(brought, n, done, over[n] - over[brought])
+            if cell.positions[place].at_most_s is not None:
+                latest = done + cell.positions[place].at_most_s - option.service_s
+                at_least(n, brought, -latest, over[brought] - over[n])
+    found = linprog([0.0] * len(moves) + [1.0], A_ub=rows, b_ub=most, bounds=[(0, None)] * (len(moves) + 1))
+    return float(found.fun) if found.status == 0 else math.inf
+
+
+def by_trying_all(cell: Cell, mix: Sequence[str]) -> float:
+    """The shortest period of all orders, ways, and numbers of cycles that parts stay."""
+    best = math.inf
+    for moves in ways(cell, mix):
+        stays = [n for n in range(1, len(moves)) if moves[n - 1][0] == moves[n][0]]
+        rooms = [min(cell.capacities[s] for s in cell.positions[moves[n][1]].holds) for n in stays]
+        for chosen in product(*(range(room + 1) for room in rooms)):
+            over = [0] * len(moves)
+            for n, periods in zip(stays, chosen, strict=True):
+                over[n] = over[n - 1] + periods
+            for tour in tours(moves):
+                if is_legal(cell, moves, tour, over):
+                    best = min(best, least_period(cell, moves, tour, over))
+    return best
+
+
+def check(cell: Cell, mix: Sequence[str]) -> float:
+    """The period found is the shortest of all; inf: there is none."""
+    least_s = by_trying_all(cell, mix)
+    try:
+        found = best_cycle(cell, mix)
+    except WorkFailed as error:
+        assert "proven" in str(error)
+        assert least_s == math.inf
+        return math.inf
+    assert found.proven
+    assert found.period_s == pytest.approx(least_s, abs=max(1e-6, found.rounded_s))
+    return found.period_s
+
+
+@pytest.mark.parametrize("kind", ["buffers", "windows", "many"])
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@given(data=st.data())
+def test_no_order_has_a_shorter_period(kind: str, cells: CellMaker, data: st.DataObject) -> None:
+    cell = data.draw(cells(max_machines=2, max_parts=2, many=kind == "many", windows=kind == "windows"))
+    assume(cell.parts > 1)
+    cell = replace(cell, arrivals=None, due_s=None)
+    mix = cell.order[: data.draw(st.integers(1, 2))]
+    assume(max(len(moves) for moves in ways(cell, mix)) <= 6)
+    check(cell, mix)
