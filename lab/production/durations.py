@@ -16,6 +16,7 @@ from lab.files import assets_folder
 from lab.learning.sources import sources
 from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.stations import one_robot
 from lab.sim import urdf_reader
 from lab.sim.scene.places import Layout
 from lab.sim.world import TIME_STEP, World
@@ -190,7 +191,7 @@ def cell_of(task: Task, durations: Durations, order: Order) -> Cell:
         for (origin, target), seconds in times.items():
             table[names.index(origin), names.index(target)] = seconds
         tables.append(table)
-    return Cell(places, products(wanted, durations.service_s), order, tables[0], tables[1], task.robot.start)
+    return Cell(places, products(wanted, durations.service_s), order, tables[0], tables[1], one_robot(task.robot.start))
 
 
 def cell_without_times(task: Task, order: Order) -> Cell:
@@ -198,7 +199,12 @@ def cell_without_times(task: Task, order: Order) -> Cell:
     places = stations(task, {})
     no_time = np.zeros((len(places), len(places)))
     return Cell(
-        places, products(part for part in task.made if part.name in order), order, no_time, no_time, task.robot.start
+        places,
+        products(part for part in task.made if part.name in order),
+        order,
+        no_time,
+        no_time,
+        one_robot(task.robot.start),
     )
 
 

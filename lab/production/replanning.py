@@ -60,5 +60,6 @@ def in_another(run: Run, cell: Cell) -> Run:
     for part, place in enumerate(run.locations):
         stays = place >= len(cell.laid_out)
         other.locations[part] = (own[part].position if own is not None and stays else place) or 0
-    other.ready_s, other.robot, other.now_s = run.ready_s.copy(), run.robot, run.now_s
+    other.ready_s = run.ready_s.copy()
+    other.robots_at, other.robots_s = run.robots_at.copy(), run.robots_s.copy()
     return other

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from lab.errors import unknown
 from lab.sequencing.cell.cell import needed_moves
 from lab.sequencing.cell.routes import NeededMoves
-from lab.sequencing.cell.stations import Product, Route, Stage, Station
+from lab.sequencing.cell.stations import Product, Route, Stage, Station, one_robot
 from lab.sim.parts.kinds import comes_as
 from lab.skills import SKILLS, Skill
 from lab.tasks.task import Order, Task
@@ -58,7 +58,7 @@ class SkillSet:
         """
         check_names(task)
         wanted = [part for part in task.made if part.name in order]
-        moves = needed_moves(stations(task, {}), products(wanted), task.robot.start, len(order))
+        moves = needed_moves(stations(task, {}), products(wanted), one_robot(task.robot.start), len(order))
         made = cls(task, moves)
         kinds = SKILLS.values()
         for part in wanted:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import MAX_PARTS, needed_moves
 from lab.sequencing.cell.stations import check_layout
-from lab.tasks.cell_fields import CellFields
+from lab.tasks.cell_fields import CellFields, CellRobot
 from lab.tasks.toml_text import Loc
 
 MAX_STAGES = 400  # of all routes together: the time to find the moves they need grows with the square
@@ -25,12 +25,24 @@ class Fault(NamedTuple):
 def file_faults(cell: CellFields) -> Iterator[Fault]:
     """Faults of all but stations, routes and times: the order, the robot's start, due times, names of methods."""
     yield from _order_faults(cell)
-    if cell.robot.start not in cell.station_names:
-        yield Fault(("robot", "start"), str(unknown("station", cell.robot.start, cell.station_names, "robot.start")))
+    yield from _robot_faults(cell)
     if cell.due_s is not None and cell.due_factor is not None:
         yield Fault(("due_factor",), "due_s and due_factor: wanted is one of them, a time for each part or a rule")
     for field, error in cell.sequencing.faults(due=cell.due_s is not None or cell.due_factor is not None):
         yield Fault(("sequencing", field), str(error))
+
+
+def _robot_faults(cell: CellFields) -> Iterator[Fault]:
+    if (cell.robot is None) == (cell.robots is None):
+        yield Fault(("robot",), "robot and robots: wanted is one of them, the only one or a list, [] for none")
+    single: list[tuple[Loc, CellRobot]] = [] if cell.robot is None else [(("robot",), cell.robot)]
+    for loc, robot in [*single, *((("robots", n), robot) for n, robot in enumerate(cell.robots or ()))]:
+        for field, name in (("start", robot.start), *(("serves", name) for name in robot.serves or ())):
+            if name not in cell.station_names:
+                where = ".".join(str(word) for word in (*loc, field))
+                yield Fault((*loc, field), str(unknown("station", name, cell.station_names, where)))
+        if [other.name for other in cell.robots or ()].count(robot.name) > 1:
+            yield Fault((*loc, "name"), f"robot '{robot.name}': the name is used twice; every robot needs its own")
 
 
 def _order_faults(cell: CellFields) -> Iterator[Fault]:
@@ -56,7 +68,9 @@ def layout_faults(cell: CellFields) -> Iterator[Fault]:
         check_layout(cell.built_stations, cell.built_products)
     except BadInput as error:
         yield Fault(loc_of(cell, str(error)) or _bad_stage(cell), str(error))
-    reached = {cell.robot.start} | {name for _, stage in stages for name in (stage.station, stage.buffer)}
+    reached = {robot.start for robot in cell.built_robots} | {
+        name for _, stage in stages for name in (stage.station, stage.buffer)
+    }
     timeless = {one.name for one in cell.stations if one.kind == "machine" and one.processing_s is None}
     for loc, stage in stages:
         if stage.station in timeless and stage.processing_s is None:
@@ -86,7 +100,7 @@ def missing_times(cell: CellFields, parts: int) -> Iterator[Fault]:
 
     For a cell without the faults above.
     """
-    needed = needed_moves(cell.built_stations, cell.built_products, cell.robot.start, parts, cell.buffers)
+    needed = needed_moves(cell.built_stations, cell.built_products, cell.built_robots, parts, cell.buffers)
     given = {(origin, target) for origin, row in cell.travel.items() for target in row}
     carried = given | {(origin, target) for origin, row in cell.loaded.items() for target in row}
     lacking = {pair: "go there empty" for pair in needed.empty if pair not in given}
@@ -116,7 +130,7 @@ def loc_of(cell: CellFields, message: str) -> Loc:
                 return (field, number, "name")
     if found := re.match(r"due_s of part (\d+) ", message):
         return ("due_s", int(found[1]) - 1)
-    return ("due_s",) if message.startswith("due_s") else ()
+    return next(((field,) for field in ("due_s", "release_s") if message.startswith(field)), ())
 
 
 def _bad_stage(cell: CellFields) -> Loc:

@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field
 
 from lab.errors import unknown
 from lab.sequencing.cell.chance import LAWS, Chance
-from lab.sequencing.cell.stations import STATION_KINDS, Product, Stage, Station
+from lab.sequencing.cell.stations import ROBOT, STATION_KINDS, UNLIMITED, Product, Robot, Stage, Station
 from lab.tasks.record import Name, Record, as_tuple
 from lab.tasks.sequencing import Sequencing
 from lab.tasks.toml_text import Loc
@@ -34,26 +34,43 @@ def _as_stage(value: object) -> object:
 
 
 class CellRobot(Record):
-    """The transfer robot: the station where it stands at time 0."""
+    """A transfer robot, or a vehicle: the station where it stands at time 0.
+
+    name: needed where there are several. speed: how many times faster it is than `travel` says. serves: the stations where it may
+    pick and drop; left out: all.
+    """
 
     start: Name
+    name: Name = ROBOT
+    speed: Annotated[float, Field(ge=1e-3, le=1e3)] = 1.0
+    serves: Annotated[tuple[Name, ...], BeforeValidator(as_tuple)] | None = None
+
+    def built(self) -> Robot:
+        """As the sequencer has it."""
+        return Robot(self.name, self.start, self.speed, self.serves)
 
 
 class CellStation(Record):
-    """A place for parts: `capacity` in parts; a machine may have one processing time for all products [s].
+    """A place for parts: `capacity` in parts, or "unlimited"; a machine may have one processing time for all products [s].
 
-    at_most_s: how long after it a part may stay in the machine, else it is spoilt [s].
+    at_most_s: how long after it a part may stay in the machine, else it is spoilt [s]. servers: how many parts it works on at
+    once; the others wait in its room, and those that are done, too; left out: all that stand in it, and no waiting. setup_s: from
+    product -> to product -> seconds that a server takes to change over.
     """
 
     name: Name
     kind: Annotated[Literal["storage", "buffer", "machine"], _known("kind", STATION_KINDS, "station")]
-    capacity: Room
+    capacity: Room | Literal["unlimited"]
     processing_s: Seconds | None = None
     at_most_s: Seconds | None = None
+    servers: Room | None = None
+    setup_s: Times = Field(default={})
 
     def built(self) -> Station:
         """As the sequencer has it."""
-        return Station(self.name, self.kind, self.capacity, self.processing_s or 0.0, self.at_most_s)
+        room = UNLIMITED if self.capacity == "unlimited" else self.capacity
+        setups = tuple((a, b, seconds) for a, row in self.setup_s.items() for b, seconds in row.items())
+        return Station(self.name, self.kind, room, self.processing_s or 0.0, self.at_most_s, self.servers, setups)
 
 
 class CellStage(Record):
@@ -110,8 +127,9 @@ class CellFields(Record):
 
     Either `order`, a product for each part, or, for one product, `parts`. travel: seconds from a station (the row) to
     another; a pair that is left out is no allowed move. loaded: those that differ when the robot carries something.
-    in_physics: the name of the task, or its file in the same folder, in which lab run carries such a cell out.
-    due_s: one a part; due_factor: a part is due so many times its own work after it arrives (see `CellFile.work_s`).
+    Either `robot`, the only one, or `robots`: several, or [] where parts go on by themselves. in_physics: the name of the task,
+    or its file in the same folder, in which lab run carries such a cell out. due_s, release_s: one a part, when it is wanted, and
+    when it is there at first; due_factor: a part is due so many times its own work after it arrives (see `CellFile.work_s`).
     """
 
     kind: Literal["cell"] = "cell"
@@ -122,11 +140,13 @@ class CellFields(Record):
     parts: int | None = None
     buffers: Literal["busy", "free"] = "busy"
     due_s: Annotated[tuple[Seconds, ...], BeforeValidator(as_tuple)] | None = None
+    release_s: Annotated[tuple[Seconds, ...], BeforeValidator(as_tuple)] | None = None
     due_factor: Annotated[float, Field(gt=0, le=1000)] | None = None
-    robot: CellRobot
+    robot: CellRobot | None = None
+    robots: Annotated[tuple[CellRobot, ...], BeforeValidator(as_tuple), Field(max_length=50)] | None = None
     stations: Annotated[tuple[CellStation, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=100)]
     products: Annotated[tuple[CellProduct, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=50)]
-    travel: Times
+    travel: Times = Field(default={})
     loaded: Times = Field(default={})
     arrivals: CellArrivals | None = None
     stochastic: Stochastic = Stochastic()
@@ -146,6 +166,12 @@ class CellFields(Record):
     def built_stations(self) -> tuple[Station, ...]:
         """The stations as the sequencer has them."""
         return tuple(station.built() for station in self.stations)
+
+    @property
+    def built_robots(self) -> tuple[Robot, ...]:
+        """The robots as the sequencer has them."""
+        given = self.robots if self.robots is not None else (self.robot,) if self.robot is not None else ()
+        return tuple(robot.built() for robot in given)
 
     @property
     def built_products(self) -> tuple[Product, ...]:

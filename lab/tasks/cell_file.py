@@ -12,7 +12,8 @@ from pydantic import PrivateAttr, ValidationError
 from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import MAX_PARTS, Cell
 from lab.sequencing.cell.chance import Chance
-from lab.sequencing.cell.stations import Arrivals
+from lab.sequencing.cell.routes import positions_of
+from lab.sequencing.cell.stations import Arrivals, Begins
 from lab.tasks.cell_faults import Fault, file_faults, layout_faults, loc_of, missing_times, travel_faults
 from lab.tasks.cell_fields import CellFields, CellStage, Times
 from lab.tasks.task_faults import fields_at
@@ -100,10 +101,21 @@ class CellFile(CellFields):
             parts,
             self._table(self.travel),
             self._table(self.travel, self.loaded),
-            self.robot.start,
+            self.built_robots,
             None if arrivals is None else Arrivals((arrivals.interval_s,) * len(parts), arrivals.after),
             self.buffers,
             due_s,
+            None if self.release_s is None else self._begins(parts, self.release_s),
+        )
+
+    def _begins(self, parts: tuple[str, ...], release_s: tuple[float, ...]) -> tuple[Begins, ...]:
+        """All parts at their first stations, each there from its time on."""
+        if len(release_s) != len(parts):
+            raise BadInput(f"release_s has {len(release_s)} times; {len(parts)} parts need {len(parts)}")
+        places = positions_of(self.built_stations, self.built_products, self.buffers, self.built_robots)
+        first = {place.product: number for number, place in reversed([*enumerate(places)])}
+        return tuple(
+            Begins(first[self.names.index(name)], seconds) for name, seconds in zip(parts, release_s, strict=True)
         )
 
     def _table(self, *tables: Times) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from lab.sequencing.cell.cell import Cell, needed_moves
-from lab.sequencing.cell.stations import Arrivals, Product, Route, Stage, Station
+from lab.sequencing.cell.stations import Arrivals, Product, Route, Stage, Station, one_robot
 from lab.sequencing.simulate.run import Run, branch
 
 X = math.nan
@@ -81,7 +81,7 @@ def build_oven_cell(parts: int = 2, **change: object) -> Cell:
         "order": ("toast",) * parts,
         "empty_s": np.ones((3, 3)) - np.eye(3),
         "loaded_s": 2 * (np.ones((3, 3)) - np.eye(3)),
-        "robot_start": "in",
+        "robots": one_robot("in"),
     }
     return Cell(**(described | change))  # type: ignore[arg-type]
 
@@ -104,7 +104,7 @@ def build_fms_cell(order: str, interval_s: float = 200.0) -> Cell:
     names = tuple({"R": "rook", "S": "sign"}[letter] for letter in order)
     table = np.array(FMS_S)
     arrivals = Arrivals((interval_s,) * len(names), "pick")
-    return Cell(tuple(stations), products, names, table, table, "incoming", arrivals)
+    return Cell(tuple(stations), products, names, table, table, one_robot("incoming"), arrivals)
 
 
 def _fms_route(machine: str, service_s: float) -> Route:
@@ -120,7 +120,7 @@ def build_crossing_cell() -> Cell:
     routes = [tuple(Stage(name) for name in ("in", *middle, "out")) for middle in ways]
     products = (Product("there", (routes[0],)), Product("back", (routes[1],)))
     table = 1.0 - np.eye(4)
-    return Cell(stations, products, ("there", "back"), table, table, "in")
+    return Cell(stations, products, ("there", "back"), table, table, one_robot("in"))
 
 
 def all_ends(run: Run) -> Iterator[Run]:
@@ -157,7 +157,7 @@ def random_cells(
     buffers = draw(st.sampled_from(["busy", "free"])) if many else "busy"
     start = draw(st.sampled_from(stations)).name
     order = tuple(draw(st.sampled_from(products)).name for _ in range(parts))
-    moves = needed_moves(stations, products, start, parts, buffers)  # type: ignore[arg-type]
+    moves = needed_moves(stations, products, one_robot(start), parts, buffers)  # type: ignore[arg-type]
     names = [station.name for station in stations]
     tables = []
     for pairs in (moves.empty, moves.loaded):
@@ -171,7 +171,7 @@ def random_cells(
         arrivals = Arrivals(tuple(draw(seconds) for _ in order), draw(st.sampled_from(["clock", "pick"])))
     due_s = tuple(1000.0 * draw(seconds) + 4000.0 for _ in order) if many else None
     tables_s = tables[0], tables[1]
-    return Cell(tuple(stations), tuple(products), order, *tables_s, start, arrivals, buffers, due_s)  # type: ignore[arg-type]
+    return Cell(tuple(stations), tuple(products), order, *tables_s, one_robot(start), arrivals, buffers, due_s)  # type: ignore[arg-type]
 
 
 def _with_window(draw: st.DrawFn, station: Station, products: list[Product]) -> Station:

@@ -1,4 +1,4 @@
-"""A cell: stations, products with their routes, an order of parts, and one transfer robot. What is to be sequenced."""
+"""A cell: stations, products with their routes, an order of parts, and transfer robots. What is to be sequenced."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,17 +9,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lab.errors import BadInput, unknown
-from lab.sequencing.cell.routes import NeededMoves, Position, moves_between, open_ways, positions_of, reached_from
+from lab.sequencing.cell.routes import (
+    NeededMoves,
+    Position,
+    is_serial,
+    moves_between,
+    open_ways,
+    positions_of,
+    reached_from,
+)
 from lab.sequencing.cell.stations import (
     MAX_S,
     Arrivals,
     Begins,
     Product,
+    Robot,
     Route,
     Station,
     check_layout,
+    check_robots,
     check_seconds,
     is_count,
+    one_robot,
 )
 
 MAX_PARTS = 200
@@ -29,10 +40,11 @@ ARRIVALS_AFTER = ("clock", "pick")
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """What is to be sequenced: the parts of an order along the routes of their products, moved by one robot.
+    """What is to be sequenced: the parts of an order along the routes of their products, moved by one robot, several, or none.
 
     order: a product's name for each part. Parts are numbered from 1. empty_s and loaded_s: (n, n) seconds from station
-    row to station column, in the order of `stations`; NaN: no such move; staying takes 0 s. arrivals None: all parts
+    row to station column, in the order of `stations`, for a robot of speed 1; NaN: no such move; staying takes 0 s. robots: they
+    do not hinder each other; none: parts go on by themselves, at once, and wait wherever they are. arrivals None: all parts
     wait at their first station, and may be taken in any order; else they come, and are taken, in their order. buffers:
     "busy", a buffer is used only when the station ahead is full; "free", the robot chooses. due_s: when each part is
     wanted [s]. begins: where each part is at time 0, None: all at their first stations; the makespan is then the last
@@ -47,7 +59,7 @@ class Cell:
     order: tuple[str, ...]
     empty_s: NDArray[np.float64]
     loaded_s: NDArray[np.float64]
-    robot_start: str
+    robots: tuple[Robot, ...]
     arrivals: Arrivals | None = None
     buffers: Literal["busy", "free"] = "busy"
     due_s: tuple[float, ...] | None = None
@@ -56,8 +68,7 @@ class Cell:
 
     def __post_init__(self) -> None:
         check_layout(self.stations, self.products)
-        if self.robot_start not in self.names:
-            raise unknown("station", self.robot_start, self.names, "start of the robot")
+        check_robots(self.robots, self.stations)
         if self.buffers not in BUFFER_USES:
             raise unknown("use of buffers", self.buffers, BUFFER_USES, "cell")
         self._check_order()
@@ -80,7 +91,9 @@ class Cell:
     ) -> "Cell":
         """A cell of so many toasts along one route, all there at the start. BadInput as for any cell."""
         check_parts(parts)
-        return cls(stations, (Product("toast", (route,)),), ("toast",) * parts, empty_s, loaded_s, robot_start)
+        return cls(
+            stations, (Product("toast", (route,)),), ("toast",) * parts, empty_s, loaded_s, one_robot(robot_start)
+        )
 
     @property
     def parts(self) -> int:
@@ -97,6 +110,21 @@ class Cell:
         """Room for parts, by station index."""
         return tuple(station.capacity for station in self.stations)
 
+    @property
+    def robot_start(self) -> str:
+        """Where the first robot stands at time 0."""
+        return self.robots[0].start
+
+    @cached_property
+    def serial(self) -> bool:
+        """Whether one robot does all the work, so that what is decided later also happens later."""
+        return is_serial(self.positions, self.robots)
+
+    @cached_property
+    def setups(self) -> tuple[dict[tuple[str, str], float], ...]:
+        """How long a server of each station takes to change over, by product before and product [s]."""
+        return tuple({(a, b): seconds for a, b, seconds in station.setups} for station in self.stations)
+
     @cached_property
     def positions(self) -> tuple[Position, ...]:
         """Every place on a route where a part of the order may stand between two moves."""
@@ -108,7 +136,7 @@ class Cell:
     @cached_property
     def laid_out(self) -> tuple[Position, ...]:
         """The positions with all their ways, whatever is closed, and none for parts that stay where they are."""
-        return positions_of(self.stations, self.products, self.buffers)
+        return positions_of(self.stations, self.products, self.buffers, self.robots)
 
     @cached_property
     def starts(self) -> tuple[int, ...]:
@@ -152,7 +180,7 @@ class Cell:
             taken = [station for at in self.begin_at for station in self.positions[at].holds]
             full = [taken.count(station) >= room for station, room in enumerate(self.capacities)]
             first = [way for way in first if way.possible(full)]
-        return moves_between(self.stations, self.positions, begins, first, self.robot_start, len(self.unfinished))
+        return moves_between(self.stations, self.positions, begins, first, self.robots, len(self.unfinished))
 
     @cached_property
     def possible_moves(self) -> int:
@@ -183,7 +211,10 @@ class Cell:
         """A time that no sequence exceeds: everything slowest, one after the other [s]."""
         slowest_s = sum(float(np.nanmax(table, initial=0.0)) for table in (self.empty_s, self.loaded_s))
         service_s = max((option.service_s for place in self.positions for option in place.options), default=0.0)
+        slowest_s /= min([robot.speed for robot in self.robots], default=1.0)
         process_s = sum(place.processing_s or 0.0 for place in self.positions)
+        change_s = [max([seconds for *_, seconds in one.setups], default=0.0) for one in self.stations]
+        process_s += sum(change_s[place.station] for place in self.positions)
         come_s = (sum(self.arrivals.interval_s) if self.arrivals else 0.0) + max(0.0, *self.begin_s)
         return self.parts * (len(self.positions) * (slowest_s + service_s) + process_s) + come_s
 
@@ -243,6 +274,8 @@ class Cell:
             if any(name == self.part_name(part) for part in range(1, self.parts + 1)):
                 raise BadInput(f"station '{name}': a part has that name; call the station something else")
         for end in self._ends() if self.arrivals is None else ():
+            if self.stations[self.index(end)].servers is not None:
+                continue
             room = self.stations[self.index(end)].capacity
             most = sum(self.order.count(product.name) for product in self.products if end in _ends_of(product))
             if room < most:
@@ -273,7 +306,7 @@ def _ends_of(product: Product) -> set[str]:
 def needed_moves(
     stations: Sequence[Station],
     products: Sequence[Product],
-    robot_start: str,
+    robots: Sequence[Robot],
     parts: int,
     buffers: Literal["busy", "free"] = "busy",
 ) -> NeededMoves:
@@ -284,10 +317,10 @@ def needed_moves(
     may be longer than strictly needed. Raises BadInput as Cell does for stations and routes.
     """
     check_layout(stations, products)
-    positions = positions_of(stations, products, buffers)
+    positions = positions_of(stations, products, buffers, robots)
     starts = {place.product: index for index, place in reversed([*enumerate(positions)])}.values()
     first = [way for at in starts for way in positions[at].options]
-    return moves_between(stations, positions, starts, first, robot_start, parts)
+    return moves_between(stations, positions, starts, first, robots, parts)
 
 
 def check_parts(parts: object) -> None:

@@ -5,6 +5,7 @@ from typing import Protocol
 
 from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import SERVER
 
 MAKESPAN = "makespan"
 WITH_DUE_TIMES = ("mean-tardiness", "tardy-parts")
@@ -14,7 +15,7 @@ class Run(Protocol):
     """What an objective looks at: `lab.sequencing.simulate.run.Run`, and whatever else knows as much."""
 
     cell: Cell
-    now_s: float
+    end_s: float
     waited_s: float
     processed_s: float
     finished_s: list[float | None]
@@ -25,8 +26,8 @@ class Run(Protocol):
 
 
 def _makespan(run: Run) -> float:
-    """When the last part reaches the end of its route [s]."""
-    return run.now_s
+    """When the last part is finished [s]."""
+    return run.end_s
 
 
 def _mean_tardiness(run: Run) -> float:
@@ -46,13 +47,15 @@ def _robot_idle(run: Run) -> float:
 
 def _machine_idle(run: Run) -> float:
     """How long the places of the routes' machines stand without work, added up, from time 0 to the makespan [s]."""
-    return machine_places(run.cell) * run.now_s - run.processed_s
+    return machine_places(run.cell) * run.end_s - run.processed_s
 
 
 def machine_places(cell: Cell) -> int:
     """How many parts the machines that a route leads to can process at once."""
     used = {station for place in cell.positions for station in place.holds}
-    return sum(cell.capacities[station] for station in used if cell.stations[station].kind == "machine")
+    used |= {way.target for place in cell.positions for way in place.options if way.robot == SERVER}
+    machines = [station for number, station in enumerate(cell.stations) if station.kind == "machine" and number in used]
+    return sum(station.servers or station.capacity for station in machines)
 
 
 # name -> function(run) of a finished run

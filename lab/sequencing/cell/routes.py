@@ -9,14 +9,18 @@ from dataclasses import dataclass, replace
 from graphlib import TopologicalSorter
 from typing import Literal, TypeVar
 
-from lab.sequencing.cell.stations import Product, Route, Stage, Station
+from lab.errors import BadInput
+from lab.sequencing.cell.stations import Product, Robot, Route, Stage, Station
 
 Value = TypeVar("Value")
+SERVER = -1  # who works a way that no robot does
 
 
 @dataclass(frozen=True)
 class Option:
-    """One way on from a position: the robot picks at station `origin`, drops at `target`, the part is in `to` then.
+    """One way on from a position: a robot picks at station `origin`, drops at `target`, the part is in `to` then.
+
+    robot: which one, by index; SERVER: none, a server of the station `target` takes the part, works on it and is done with it.
 
     choice: what the decision is called when a position has several (see `entry`). needs: stations, by index, where there
     must be room. if_full: only allowed when this station is full. service_s: the robot's work before the pick [s].
@@ -32,6 +36,7 @@ class Option:
     service_s: float = 0.0
     waits: bool = True
     carries: Literal["part", "pallet"] = "part"
+    robot: int = 0
 
     def possible(self, full: Sequence[bool]) -> bool:
         """Whether there is room for it, and no more than it may find; `full`: whether each station is."""
@@ -82,10 +87,13 @@ def choice_of(entry: int, parts: int) -> int:
 
 
 def positions_of(
-    stations: Sequence[Station], products: Sequence[Product], buffers: Literal["busy", "free"]
+    stations: Sequence[Station], products: Sequence[Product], buffers: Literal["busy", "free"], robots: Sequence[Robot]
 ) -> tuple[Position, ...]:
-    """The positions of all products, each product's start first; routes that are sound are taken for granted."""
-    layout = _Positions(stations, buffers)
+    """The positions of all products, each product's start first; routes that are sound are taken for granted.
+
+    BadInput where no robot serves both ends of a move.
+    """
+    layout = _Positions(stations, buffers, robots)
     for number, product in enumerate(products):
         layout.add(number, product)
     return tuple(layout.positions)
@@ -122,17 +130,20 @@ def moves_between(
     positions: Sequence[Position],
     begins: Collection[int],
     first: Collection[Option],
-    robot_start: str,
+    robots: Sequence[Robot],
     parts: int,
 ) -> NeededMoves:
     """The moves that may follow one another, and those that carry something; staying is left out.
 
     begins: the positions in which parts begin; first: the ways that may be taken first; parts: how many have something to do.
+    Where more than one robot works, any of its moves may follow any other one.
     """
     names = [station.name for station in stations]
+    if not is_serial(positions, robots):
+        return _moves_of_robots(names, positions, begins, robots)
     options = [(positions[at], way) for at in sorted(reached_from(positions, begins)) for way in positions[at].options]
     loaded = dict.fromkeys((option.origin, option.target) for _, option in options)
-    begin = names.index(robot_start)
+    begin = names.index(robots[0].start)
     empty = dict.fromkeys((begin, option.origin) for option in first)
     for left, done in options:
         there = positions[done.to]
@@ -142,6 +153,29 @@ def moves_between(
         for _, other in options if parts > 1 else ():
             if other.origin not in gone and not full.intersection(other.needs):
                 empty[done.target, other.origin] = None
+    return _named(names, empty, loaded)
+
+
+def is_serial(positions: Sequence[Position], robots: Sequence[Robot]) -> bool:
+    """Whether one robot does all the work, so that what is decided later also happens later."""
+    return len(robots) == 1 and all(way.robot != SERVER for place in positions for way in place.options)
+
+
+def _moves_of_robots(
+    names: Sequence[str], positions: Sequence[Position], begins: Collection[int], robots: Sequence[Robot]
+) -> NeededMoves:
+    ways = [way for at in sorted(reached_from(positions, begins)) for way in positions[at].options]
+    empty = dict[tuple[int, int], None]()
+    for number, robot in enumerate(robots):
+        own = [way for way in ways if way.robot == number]
+        left = [names.index(robot.start), *dict.fromkeys(way.target for way in own)]
+        empty |= dict.fromkeys((a, way.origin) for a in left for way in own)
+    return _named(names, empty, dict.fromkeys((way.origin, way.target) for way in ways if way.robot != SERVER))
+
+
+def _named(
+    names: Sequence[str], empty: Collection[tuple[int, int]], loaded: Collection[tuple[int, int]]
+) -> NeededMoves:
     named = [tuple((names[a], names[b]) for a, b in pairs if a != b) for pairs in (empty, loaded)]
     return NeededMoves(named[0], named[1])
 
@@ -149,9 +183,9 @@ def moves_between(
 class _Positions:
     """Positions as they are added, route by route."""
 
-    def __init__(self, stations: Sequence[Station], buffers: str) -> None:
+    def __init__(self, stations: Sequence[Station], buffers: str, robots: Sequence[Robot]) -> None:
         self.positions: list[Position] = []
-        self._stations, self._buffers = stations, buffers
+        self._stations, self._buffers, self._robots = stations, buffers, robots
         self._index = {station.name: index for index, station in enumerate(stations)}
 
     def add(self, product: int, described: Product) -> None:
@@ -164,6 +198,10 @@ class _Positions:
     def _add_route(self, product: int, route: Route, start: int, ends: dict[str, int]) -> None:
         leave, service_s = start, 0.0
         for before, stage, after in zip(route[:-1], route[1:], [*route[2:], None], strict=True):
+            if self._stations[self._index[stage.station]].servers is not None:
+                leave = self._add_served(leave, stage, service_s, after is None)
+                service_s = stage.service_s
+                continue
             if after is None:
                 reach = ends.get(stage.station)
                 if reach is None:
@@ -181,22 +219,49 @@ class _Positions:
             if stage.pallet and after is not None:
                 holds = (stage.station, after.station)
                 leave = self._position(product, stage.station, holds, None, self._at_most_s(stage))
-                self._join(reach, leave, replace(self._way(after.station), waits=False, carries="pallet"))
+                self._carry(reach, leave, replace(self._way(after.station), waits=False, carries="pallet"))
+
+    def _add_served(self, leave: int, stage: Stage, service_s: float, last: bool) -> int:
+        """A machine with servers: a position in its room, and one when it has been worked on; without robots only that."""
+        product, room = self.positions[leave].product, (stage.station,) if self._robots else ()
+        if self._robots:
+            queue = self._position(product, stage.station, room)
+            self._link(leave, queue, stage, service_s)
+            leave = queue
+        at_most_s = None if last else self._at_most_s(stage)
+        done = self._position(product, stage.station, () if last else room, self._processing_s(stage), at_most_s)
+        self._join(leave, done, replace(self._way(stage.station), robot=SERVER))
+        return done
 
     def _link(self, leave: int, reach: int, stage: Stage, service_s: float) -> None:
         """The ways from a position to a stage: directly, and through its buffer."""
-        self._join(leave, reach, self._way(stage.station, service_s))
+        choices = self._carry(leave, reach, self._way(stage.station, service_s))
         if stage.buffer is None:
             return
         wait = self._position(self.positions[leave].product, stage.buffer, (stage.buffer,))
+        way = self._way(stage.buffer, service_s)
         if self._buffers == "busy":
             # Never both at once: the decision is the same, and the cell says where it leads.
-            choice = self.positions[leave].options[-1].choice
-            way = replace(self._way(stage.buffer, service_s), choice=choice, if_full=self._index[stage.station])
-            self._join(leave, wait, way)
+            for robot, choice in choices.items():
+                full = replace(way, choice=choice, if_full=self._index[stage.station], robot=robot)
+                if self._serves(robot, self.positions[leave].station, full.target):
+                    self._join(leave, wait, full)
         else:
-            self._join(leave, wait, self._way(stage.buffer, service_s))
-        self._join(wait, reach, self._way(stage.station))
+            self._carry(leave, wait, way)
+        self._carry(wait, reach, self._way(stage.station))
+
+    def _carry(self, leave: int, to: int, way: Option) -> dict[int, int]:
+        """A way for each robot that serves both ends of it; the choices, by robot. BadInput when there is none."""
+        origin = self.positions[leave].station
+        able = [robot for robot in range(len(self._robots)) if self._serves(robot, origin, way.target)]
+        if not able:
+            ends = f"'{self._stations[origin].name}' to '{self._stations[way.target].name}'"
+            raise BadInput(f"no robot can carry from {ends}: none serves both")
+        return {robot: self._join(leave, to, replace(way, robot=robot)) for robot in able}
+
+    def _serves(self, robot: int, *stations: int) -> bool:
+        serves = self._robots[robot].serves
+        return serves is None or all(self._stations[station].name in serves for station in stations)
 
     def _way(self, target: str, service_s: float = 0.0) -> Option:
         """An option of which only that is known yet."""
@@ -214,13 +279,14 @@ class _Positions:
         self.positions.append(Position(product, self._index[station], held, processing_s, (), at_most_s))
         return len(self.positions) - 1
 
-    def _join(self, leave: int, to: int, way: Option) -> None:
-        """A way from a position to another: what is said of it beside these, completed; no choice yet: a new one."""
+    def _join(self, leave: int, to: int, way: Option) -> int:
+        """A way from a position to another: what is said of it beside these, completed; no choice yet: a new one. The choice."""
         place, there = self.positions[leave], self.positions[to]
         choice = way.choice if way.choice >= 0 else 1 + max((option.choice for option in place.options), default=-1)
         needs = tuple(station for station in there.holds if station not in place.holds)
         option = replace(way, choice=choice, to=to, origin=place.station, needs=needs)
         self.positions[leave] = replace(place, options=(*place.options, option))
+        return choice
 
     def _processing_s(self, stage: Stage) -> float:
         station = self._stations[self._index[stage.station]]

@@ -36,7 +36,8 @@ class Activity:
 class Move:
     """One decision carried out: the robot leaves `start`, reaches what it picks at `origin`, and drops it at `target`.
 
-    process_s: the processing that begins with the drop [s]. service_s: the robot's work that ends with the pick [s].
+    process_s: the processing that begins with the drop [s]. service_s: the robot's work that ends with the pick [s]. by: the
+    robot's name; the name of `target` where a server of that machine takes the part, at `pick_s` and `drop_s` alike.
     """
 
     part: int
@@ -50,6 +51,17 @@ class Move:
     process_s: float = 0.0
     service_s: float = 0.0
     carries: Literal["part", "pallet"] = "part"
+    by: str = ROBOT
+
+    @property
+    def served(self) -> bool:
+        """Whether a server of a machine takes the part, and no robot."""
+        return self.by == self.target
+
+    @property
+    def end_s(self) -> float:
+        """When what was decided is done: dropped, or, by a server, worked on [s]."""
+        return self.drop_s + (self.process_s if self.served else 0.0)
 
 
 @dataclass(frozen=True)
@@ -64,9 +76,9 @@ class FetchBy:
 
 @dataclass(frozen=True)
 class Schedule:
-    """A timed run, predicted or measured: activities by start for the robot, the machines and the parts; seconds.
+    """A timed run, predicted or measured: activities by start for the robots, the machines and the parts; seconds.
 
-    `makespan_s` is when the last part reaches the end of its route. `sequence`: the decisions (see `Run`). fetch_by: until when
+    `makespan_s` is when the last part is finished. `sequence`: the decisions (see `Run`). fetch_by: until when
     parts are to be picked, where there is such a limit, by time; `to_json` has it only then. Raises
     BadInput for an activity that ends before it starts, times that are not finite, or an unknown kind.
     Source: fig. IV.1.
@@ -96,7 +108,7 @@ class Schedule:
         came_s: when each part came to its first station [s]; None: all at 0. A part that has nothing to do has no row.
         """
         robot = [activity for move in moves for activity in robot_activities(move)]
-        end_s = max((move.drop_s for move in moves), default=0.0)
+        end_s = max((move.end_s for move in moves), default=0.0)
         parts: list[Activity] = []
         machines: list[Activity] = []
         limits: list[FetchBy] = []
@@ -108,6 +120,7 @@ class Schedule:
             limits += _limits(cell, part, own) if cell.has_windows else ()
         order = [move.part for move in moves] if sequence is None else sequence
         limits.sort(key=lambda limit: limit.until_s)
+        robot.sort(key=lambda a: (a.start_s, a.end_s)) if not cell.serial else None
         return cls(tuple(robot), _by_start(machines), tuple(parts), end_s, tuple(order), tuple(limits))
 
     def later(self, by_s: float) -> "Schedule":
@@ -128,6 +141,8 @@ class Schedule:
 
 def robot_activities(move: Move) -> list[Activity]:
     """What the robot does in one move, without what takes no time."""
+    if move.served:
+        return []
     served_s = move.pick_s - move.service_s
     carries: Kind = "carry" if move.carries == "part" else "pallet"
     spans: tuple[tuple[Kind, int | None, str, str, float, float], ...] = (
@@ -136,7 +151,7 @@ def robot_activities(move: Move) -> list[Activity]:
         ("service", move.part, move.origin, move.origin, served_s, move.pick_s),
         (carries, move.part, move.origin, move.target, move.pick_s, move.drop_s),
     )
-    return [Activity(ROBOT, *span) for span in spans if span[5] > span[4]]
+    return [Activity(move.by, *span) for span in spans if span[5] > span[4]]
 
 
 def _part_activities(
@@ -148,17 +163,22 @@ def _part_activities(
     rows: list[Activity] = []
     machines: list[Activity] = []
     for move in [*moves, None]:
+        station = cell.stations[cell.index(place)]
+        # A measured run may fetch a little before the nominal end: processing then ends with the pick.
         until_s = end_s if move is None else move.pick_s
-        if cell.stations[cell.index(place)].kind == "machine":
-            # A measured run may fetch a little before the nominal end: processing then ends with the pick.
-            done_s = min(since_s + process_s, until_s)
+        done_s = min(since_s + process_s, until_s)
+        if station.kind == "machine":
             for resource, log in ((row, rows), (place, machines)):
                 log.append(Activity(resource, "process", part, place, place, since_s, done_s))
+        if station.kind == "machine" and station.servers is None:
+            for resource, log in ((row, rows), (place, machines)):
                 log.append(Activity(resource, "blocked", part, place, place, done_s, until_s))
-        else:
-            rows.append(Activity(row, "store", part, place, place, since_s, until_s))
+        elif move is not None or station.kind != "machine":
+            idle_s = done_s if station.kind == "machine" else since_s
+            rows.append(Activity(row, "store", part, place, place, idle_s, until_s))
         if move is not None:
-            rows.append(Activity(row, "carry", part, move.origin, move.target, move.pick_s, move.drop_s))
+            if not move.served:
+                rows.append(Activity(row, "carry", part, move.origin, move.target, move.pick_s, move.drop_s))
             since_s, place, process_s = move.drop_s, move.target, move.process_s
     return _lasting(rows), _lasting(machines)
 
@@ -166,9 +186,11 @@ def _part_activities(
 def _limits(cell: Cell, part: int, moves: Sequence[Move]) -> Iterator[FetchBy]:
     """Until when a part is to be picked at the machines that it begins in or is brought to."""
     begins = cell.names[cell.positions[cell.begin_at[part - 1]].station], cell.begin_s[part - 1]
+    served = [station.servers is not None for station in cell.stations]
+    queued = {(move.target, move.drop_s) for move in moves if served[cell.index(move.target)] and not move.served}
     for station, done_s in (begins, *((move.target, move.drop_s + move.process_s) for move in moves)):
         at_most_s = cell.at_most_s(part, station)
-        if at_most_s is not None:
+        if at_most_s is not None and (station, done_s) not in queued:
             yield FetchBy(part, station, done_s, done_s + at_most_s)
 
 

@@ -11,6 +11,7 @@ from lab.errors import BadInput, unknown
 
 MAX_S = 1e9  # one time; far above any cell, far below where sums lose their nanoseconds
 ROBOT = "robot"
+UNLIMITED = 10**6  # room that is never full
 STATION_KINDS = ("storage", "buffer", "machine")
 
 
@@ -19,7 +20,10 @@ class Station:
     """A place for parts. `capacity` in parts; `processing_s` in seconds, above 0 only for machines.
 
     at_most_s: how long after its processing a part may stay in a machine before it is picked, else it is spoilt [s]; None: as
-    long as you like.
+    long as you like. servers: how many parts a machine works on at once; None: all that stand in it, each from when it comes.
+    Else a part waits in the machine's room until a server takes it, in any order, leaves the server by itself and waits in the
+    room until it is fetched. setups: (product before, product, seconds) that a server takes to change over; the first product
+    takes none.
     """
 
     name: str
@@ -27,6 +31,26 @@ class Station:
     capacity: int
     processing_s: float = 0.0
     at_most_s: float | None = None
+    servers: int | None = None
+    setups: tuple[tuple[str, str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A transfer robot, or a vehicle: where it stands at time 0, and how many times faster it is than the cell's tables say.
+
+    serves: the stations where it may pick and drop; None: all.
+    """
+
+    name: str
+    start: str
+    speed: float = 1.0
+    serves: tuple[str, ...] | None = None
+
+
+def one_robot(start: str) -> tuple[Robot, ...]:
+    """The robots of a cell that has one."""
+    return (Robot(ROBOT, start),)
 
 
 @dataclass(frozen=True)
@@ -54,7 +78,8 @@ Route = tuple[Stage, ...]
 class Product:
     """A type of part: its name and the routes that a part of it may take.
 
-    All begin at the same station, and may end there, too: the part then comes back to where it was.
+    All begin at the same station, and may end there, too: the part then comes back to where it was. A route may end at a machine
+    with servers: the part is finished with its processing there, and takes no room from then on.
     """
 
     name: str
@@ -92,6 +117,13 @@ def check_layout(stations: Sequence[Station], products: Sequence[Product]) -> No
     """BadInput for stations and routes that cannot be."""
     _check_stations(stations)
     names: set[str] = set()
+    for station in stations:
+        for before, after, _ in station.setups:
+            for name in (before, after):
+                if name not in {product.name for product in products}:
+                    raise unknown(
+                        "product", name, [product.name for product in products], f"setups of '{station.name}'"
+                    )
     for product in products:
         if product.name in names:
             raise BadInput(f"product '{product.name}': the name is used twice; every product needs its own")
@@ -106,7 +138,8 @@ def check_layout(stations: Sequence[Station], products: Sequence[Product]) -> No
                 raise BadInput(f"product '{product.name}': its routes begin at {starts}; they must begin alike")
     if not products:
         raise BadInput("a cell needs at least one product")
-    ends = {stage.station for p in products for route in p.routes for stage in (route[0], route[-1])}
+    served = {station.name for station in stations if station.servers is not None}
+    ends = {stage.station for p in products for route in p.routes for stage in (route[0], route[-1])} - served
     inner = {stage.station for p in products for route in p.routes for stage in route[1:-1]}
     inner |= {stage.buffer for p in products for route in p.routes for stage in route if stage.buffer}
     if ends & inner:
@@ -135,6 +168,42 @@ def _check_stations(stations: Sequence[Station]) -> None:
                 raise BadInput(
                     f"{where}: at_most_s = {station.at_most_s:g}, but it is a {station.kind}; only a machine has it"
                 )
+        _check_servers(station, where)
+
+
+def _check_servers(station: Station, where: str) -> None:
+    if station.servers is None:
+        if station.setups:
+            raise BadInput(
+                f"{where}: setups need servers, such as servers = 1: each begins when the one before is done"
+            )
+        return
+    if station.kind != "machine":
+        raise BadInput(f"{where}: servers = {station.servers}, but it is a {station.kind}; only a machine has them")
+    if not is_count(station.servers) or station.servers > station.capacity:
+        room = "any number" if station.capacity >= UNLIMITED else f"1 to its capacity, {station.capacity}"
+        raise BadInput(f"{where}: servers = {station.servers!r}; allowed are {room}")
+    for before, after, seconds in station.setups:
+        check_seconds(f"{where}: setup from '{before}' to '{after}'", seconds)
+
+
+def check_robots(robots: Sequence[Robot], stations: Sequence[Station]) -> None:
+    """BadInput for robots that cannot be."""
+    names = [station.name for station in stations]
+    for number, robot in enumerate(robots):
+        if robot.start not in names:
+            raise unknown("station", robot.start, names, "start of the robot")
+        if robot.name in names or robot.name in [other.name for other in robots[:number]]:
+            raise BadInput(f"robot '{robot.name}': a station or another robot has that name; call it something else")
+        if not (isfinite(robot.speed) and 1e-3 <= robot.speed <= 1e3):
+            raise BadInput(f"robot '{robot.name}': speed = {robot.speed}; allowed are 0.001 to 1000 times the cell's")
+        for name in robot.serves or ():
+            if name not in names:
+                raise unknown("station", name, names, f"stations that robot '{robot.name}' serves")
+    if not robots and any(station.kind == "machine" and station.servers is None for station in stations):
+        raise BadInput(
+            "no robots: then every machine needs servers, such as servers = 1, and parts go on by themselves"
+        )
 
 
 def _check_route(stations: Sequence[Station], route: Route, one_of: str) -> None:
@@ -153,15 +222,19 @@ def _check_route(stations: Sequence[Station], route: Route, one_of: str) -> None
             if name not in kinds:
                 raise unknown("station", name, kinds, where)
             back = number == len(route) > 2 and name == route[0].station
-            if name in visited and not back:
+            again = known[name].servers is not None and name != route[number - 2].station
+            if name in visited and not (back or again):
                 raise BadInput(f"{where}: station '{name}' is on the route twice, a cycle; once is allowed")
             visited.add(name)
             if is_buffer and kinds[name] != "buffer":
                 raise BadInput(f"{where}: '{name}' is a {kinds[name]}; a buffer fits")
-        if number in (1, len(route)) and kinds[stage.station] != "storage":
+        ends_here = number == len(route) and known[stage.station].servers is not None
+        if number in (1, len(route)) and kinds[stage.station] != "storage" and not ends_here:
             raise BadInput(
                 f"{where}: '{stage.station}' is a {kinds[stage.station]}; a route starts and ends in storage"
             )
+        if stage.pallet and known[stage.station].servers is not None:
+            raise BadInput(f"{where}: pallet = true, but '{stage.station}' has servers; only one of them is possible")
         _check_stage(stage, known[stage.station], where)
     for number, stage in enumerate(route, 1):
         if stage.pallet and not _takes_pallet(route, number - 1, kinds):

@@ -64,7 +64,7 @@ class _Queue:
     def _in_turn(self, seen: Observed, decision: int) -> bool:
         """Whether the route that a part is about to take is the next one of its product; True once it is on one."""
         cell, part = seen.cell, part_of(decision, seen.cell.parts)
-        if seen.locations[part - 1] != cell.starts[part - 1]:
+        if seen.locations[part - 1] != cell.starts[part - 1] or not cell.serial:
             return True
         alike = [other for other in range(1, cell.parts + 1) if cell.order[other - 1] == cell.order[part - 1]]
         gone = sum(seen.locations[other - 1] != cell.starts[other - 1] for other in alike)

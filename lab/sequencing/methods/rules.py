@@ -11,7 +11,7 @@ from types import MappingProxyType
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import cost
-from lab.sequencing.cell.routes import Option, from_the_ends, part_of
+from lab.sequencing.cell.routes import SERVER, Option, from_the_ends, part_of
 from lab.sequencing.search import Search, SequenceResult, only_one
 from lab.sequencing.simulate.run import Run
 
@@ -25,9 +25,11 @@ def shortest_move(run: Run, allowed: tuple[int, ...]) -> int:
     """
 
     def seconds(option: Option) -> float:
-        return _reach_s(run, option) + option.service_s + float(run.cell.loaded_s[option.origin, option.target])
+        if option.robot == SERVER:
+            return 0.0
+        return run.reach_s(option) - run.robots_s[option.robot] + option.service_s + run.carry_s(option)
 
-    return min(allowed, key=lambda decision: (seconds(_option(run, decision)), decision))
+    return min(allowed, key=lambda decision: (seconds(_option(run, decision)), *_soonest(run, decision)))
 
 
 def longest_remaining_work(run: Run, allowed: tuple[int, ...]) -> int:
@@ -41,7 +43,7 @@ def longest_remaining_work(run: Run, allowed: tuple[int, ...]) -> int:
         index = part_of(decision, run.cell.parts) - 1
         return max(0.0, run.ready_s[index] - run.now_s) + left_s[run.locations[index]]
 
-    return min(allowed, key=lambda decision: (-seconds(decision), decision))
+    return min(allowed, key=lambda decision: (-seconds(decision), *_soonest(run, decision)))
 
 
 def most_urgent_machine(run: Run, allowed: tuple[int, ...]) -> int:
@@ -58,8 +60,12 @@ def most_urgent_machine(run: Run, allowed: tuple[int, ...]) -> int:
     def key(decision: int) -> tuple[float, float, int]:
         option = _option(run, decision)
         here = run.cell.positions[run.locations[part_of(decision, run.cell.parts) - 1]]
-        served = {*feeds[option.to], *here.holds}
-        return -max((ends_s.get(station, 0.0) for station in served), default=0.0), _drop_s(run, decision), decision
+        served = {option.target} if option.robot == SERVER else {*feeds[option.to], *here.holds}
+        return (
+            -max((ends_s.get(station, 0.0) for station in served), default=0.0),
+            run.drop_s(part_of(decision, run.cell.parts), option),
+            decision,
+        )
 
     return min(allowed, key=key)
 
@@ -69,7 +75,7 @@ def earliest_due(run: Run, allowed: tuple[int, ...]) -> int:
     due_s = run.cell.due_s
     if due_s is None:
         raise BadInput("rule 'earliest-due': the cell has no due times (due_s)")
-    return min(allowed, key=lambda decision: (due_s[part_of(decision, run.cell.parts) - 1], decision))
+    return min(allowed, key=lambda decision: (due_s[part_of(decision, run.cell.parts) - 1], *_soonest(run, decision)))
 
 
 def nearest_ready(run: Run, allowed: tuple[int, ...]) -> int:
@@ -77,7 +83,12 @@ def nearest_ready(run: Run, allowed: tuple[int, ...]) -> int:
 
     Source: earliest start first, as non-delay schedules are generated (Baker 1974), with the robot as the resource.
     """
-    return min(allowed, key=lambda decision: (_begin_s(run, decision), decision))
+
+    def begin_s(decision: int) -> float:
+        option = _option(run, decision)
+        return run.pick_s(part_of(decision, run.cell.parts), option) - option.service_s
+
+    return min(allowed, key=lambda decision: (begin_s(decision), decision))
 
 
 # name -> function(run, allowed decisions) -> one of them
@@ -147,10 +158,12 @@ def work_left_s(cell: Cell) -> tuple[float, ...]:
     (positions,) in the order of `cell.positions`.
     """
 
+    least_s = cell.loaded_s / max([robot.speed for robot in cell.robots], default=1.0)
+
     def left_s(place: int, ahead: list[float]) -> float:
         ways = [
             option.service_s
-            + float(cell.loaded_s[option.origin, option.target])
+            + (0.0 if option.robot == SERVER else least_s[option.origin, option.target])
             + (cell.positions[option.to].processing_s or 0.0)
             + then
             for option, then in zip(cell.positions[place].options, ahead, strict=True)
@@ -168,7 +181,8 @@ def _loads_s(cell: Cell) -> tuple[dict[int, float], ...]:
         total: dict[int, float] = {}
         for option, then in zip(cell.positions[place].options, ahead, strict=True):
             there, own = cell.positions[option.to], dict(then)
-            if there.processing_s and (machine := _machine(cell, option.to)) is not None:
+            machine = option.target if option.robot == SERVER else _machine(cell, option.to)
+            if there.processing_s and machine is not None:
                 own[machine] = own.get(machine, 0.0) + there.processing_s
             for station, seconds in own.items():
                 total[station] = total.get(station, 0.0) + seconds / len(ahead)
@@ -182,7 +196,8 @@ def _feeds(cell: Cell) -> tuple[frozenset[int], ...]:
     """For each position, the machines that a part there is at, or else comes to first."""
 
     def feeds(place: int, ahead: list[frozenset[int]]) -> frozenset[int]:
-        machine = _machine(cell, place)
+        ways = cell.positions[place].options
+        machine = ways[0].target if ways and ways[0].robot == SERVER else _machine(cell, place)
         return frozenset().union(*ahead) if machine is None else frozenset({machine})
 
     return tuple(from_the_ends(cell.positions, feeds))
@@ -201,16 +216,25 @@ def _machine_ends_s(run: Run) -> dict[int, float]:
     through_s: dict[int, list[float]] = {}
     for index, position in enumerate(run.locations):
         for station, seconds in loads_s[position].items():
-            to_come_s[station] = to_come_s.get(station, 0.0) + seconds / cell.capacities[station]
-        if (machine := _machine(cell, position)) is not None:
+            places = cell.stations[station].servers or cell.capacities[station]
+            to_come_s[station] = to_come_s.get(station, 0.0) + seconds / places
+        machine = _machine(cell, position)
+        if machine is not None and cell.stations[machine].servers is None:
             through_s.setdefault(machine, []).append(run.ready_s[index])
     ends_s = {}
     for station, seconds in to_come_s.items():
         busy_s = through_s.get(station, [])
         # The first of its places to be through with its part counts, once all are taken.
-        free_s = min(busy_s) if len(busy_s) == cell.capacities[station] else 0.0
+        free_s = min(busy_s) if len(busy_s) == cell.capacities[station] else run.free_s(station)
         ends_s[station] = max(run.now_s, free_s) + seconds
     return ends_s
+
+
+def _soonest(run: Run, decision: int) -> tuple[float, int]:
+    """What tells equally urgent decisions apart: the lowest; where several robots or servers may begin, the soonest."""
+    if run.cell.serial:
+        return 0.0, decision
+    return run.pick_s(part_of(decision, run.cell.parts), _option(run, decision)), decision
 
 
 def _option(run: Run, decision: int) -> Option:
@@ -218,18 +242,3 @@ def _option(run: Run, decision: int) -> Option:
     if option is None:
         raise BadInput(run.refusal(decision))
     return option
-
-
-def _reach_s(run: Run, option: Option) -> float:
-    return 0.0 if run.robot == option.origin else float(run.cell.empty_s[run.robot, option.origin])
-
-
-def _begin_s(run: Run, decision: int) -> float:
-    option = _option(run, decision)
-    ready_s = run.ready_s[part_of(decision, run.cell.parts) - 1] if option.waits else 0.0
-    return max(run.now_s + _reach_s(run, option), ready_s)
-
-
-def _drop_s(run: Run, decision: int) -> float:
-    option = _option(run, decision)
-    return _begin_s(run, decision) + option.service_s + float(run.cell.loaded_s[option.origin, option.target])

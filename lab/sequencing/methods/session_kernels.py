@@ -140,7 +140,7 @@ def _episode(cell: Any, method: Any, work: Any, epsilon: float, seed: Any, learn
         move(cell, run, i, seed)
         count = list_allowed(cell, run)
     if learns and moves > 0 and rules.learner == SRL:
-        if run.whole[2] == 0:
+        if run.whole[1] == 0:
             memory.values[row] = _log_sum(memory.values[row] + rules.end_keep, rules.end_add)
         else:
             memory.values[row] += rules.log_keep
@@ -186,7 +186,7 @@ def advance(learning: Any, work: Any, seeds: Any, epsilons: Any, first: int, fou
         for e in range(len(epsilons)):
             times = _episode_seed(seeds[n], first + e)
             moves = _episode(cell, method, work, epsilons[e], times, rules.learner != RANDOM)
-            value, complete = cost(cell, work.run), work.run.whole[2] == 0
+            value, complete = cost(cell, work.run), work.run.whole[1] == 0
             found.costs[n, e], found.complete[n, e] = value, complete
             _learn(rules, work, moves, value, work.best_cost[0])
             if complete and value < work.best_cost[0]:

@@ -10,6 +10,7 @@ from lab.sequencing.cell.cell import ARRIVALS_AFTER, Cell
 from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, check_built_in, machine_places, stuck_cost
 from lab.sequencing.cell.routes import from_the_ends
+from lab.sequencing.cell.stations import UNLIMITED, Robot
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -51,13 +52,19 @@ class CellArrays(NamedTuple):
     rooms: Ints
     empty_s: Floats
     loaded_s: Floats
+    robot: Ints
+    setup_s: Floats
+    product: Ints
+    serial: bool
+    first_room: Ints
+    first_server: Ints
     starts: Ints
     begin_at: Ints
     begin_s: Floats
     coming: Ints
     interval_s: Floats
     due_s: Floats
-    robot_start: int
+    robot_starts: Ints
     many: bool
     windows: bool
     arrivals: int
@@ -72,8 +79,11 @@ class CellArrays(NamedTuple):
 class RunArrays(NamedTuple):
     """A run, as `lab.sequencing.simulate.run.Run`, and the decisions allowed now.
 
-    locations, ready_s, finished_s (K,). room (S + 2,): what is left. clock (3,): now, waited, processed [s]. whole (3,):
-    the robot's station, parts fetched, parts not yet finished. allowed: decisions, ascending; options: what each means.
+    locations, ready_s, finished_s (K,). room (S + 2,): what is left. clock (4,): when a robot is free first, waited,
+    processed, the end of all that was decided [s]. whole (2,): parts fetched, parts not yet finished. robots_at,
+    robots_s (R,): the robots. rooms_s, servers_s: since when each room and server is free, those of a station ascending as
+    far as they are free; worked: the last product of each server, -1: none. allowed: decisions, ascending; options: what
+    each means.
     """
 
     locations: Ints
@@ -82,6 +92,11 @@ class RunArrays(NamedTuple):
     room: Ints
     clock: Floats
     whole: Ints
+    robots_at: Ints
+    robots_s: Floats
+    rooms_s: Floats
+    servers_s: Floats
+    worked: Ints
     allowed: Ints
     options: Ints
 
@@ -109,15 +124,21 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
         service_s=np.array([float(option.service_s) for option in options]),
         waits=np.array([option.waits for option in options]),
         rooms=np.array([*cell.capacities, ENDLESS, 0]),
-        empty_s=_with_stays(cell.empty_s),
-        loaded_s=_with_stays(cell.loaded_s),
+        empty_s=_with_stays(cell.empty_s, cell.robots),
+        loaded_s=_with_stays(cell.loaded_s, cell.robots),
+        robot=np.array([option.robot for option in options]),
+        setup_s=_setups(cell),
+        product=np.array([_product_names(cell).index(name) for name in cell.order]),
+        serial=cell.serial,
+        first_room=np.cumsum([0, *_rooms(cell), 0, 0]),
+        first_server=np.cumsum([0, *_servers(cell)]),
         starts=np.array(cell.starts),
         begin_at=np.array(cell.begin_at),
         begin_s=np.array(cell.begin_s, np.float64),
         coming=np.array(cell.coming, np.int64) - 1,
         interval_s=np.array(cell.arrivals.interval_s if cell.arrivals else (0.0,) * cell.parts, np.float64),
         due_s=np.array(cell.due_s or (0.0,) * cell.parts, np.float64),
-        robot_start=cell.index(cell.robot_start),
+        robot_starts=np.array([cell.index(robot.start) for robot in cell.robots], np.int64),
         many=cell.most_choices > 1,
         windows=cell.has_windows,
         arrivals=ARRIVAL_CODES[cell.arrivals.after] if cell.arrivals else NO_ARRIVALS,
@@ -138,8 +159,13 @@ def run_arrays(cell: Cell) -> RunArrays:
         ready_s=np.zeros(cell.parts),
         finished_s=np.zeros(cell.parts),
         room=np.zeros(len(cell.stations) + 2, np.int64),
-        clock=np.zeros(3),
-        whole=np.zeros(3, np.int64),
+        clock=np.zeros(4),
+        whole=np.zeros(2, np.int64),
+        robots_at=np.zeros(len(cell.robots), np.int64),
+        robots_s=np.zeros(len(cell.robots)),
+        rooms_s=np.zeros(sum(_rooms(cell))),
+        servers_s=np.zeros(sum(_servers(cell))),
+        worked=np.zeros(sum(_servers(cell)), np.int64),
         allowed=np.zeros(decisions, np.int64),
         options=np.zeros(decisions, np.int64),
     )
@@ -156,8 +182,30 @@ def _padded(stations: Sequence[Sequence[int]], spare: int) -> Ints:
     return np.array([[*given, *(spare,) * (WIDTH - len(given))] for given in stations], np.int64)
 
 
-def _with_stays(table: Floats) -> Floats:
-    """A copy in which staying takes 0 s."""
+def _with_stays(table: Floats, robots: Sequence[Robot]) -> Floats:
+    """A copy for each robot, at its speed, in which staying takes 0 s."""
     table = table.copy()
     np.fill_diagonal(table, 0.0)
-    return table
+    return np.array([table / robot.speed for robot in robots]).reshape(len(robots), *table.shape)
+
+
+def _rooms(cell: Cell) -> list[int]:
+    """How many rooms of each station are looked at one by one: none where decisions follow one another in time."""
+    return [0 if cell.serial or room >= UNLIMITED else room for room in cell.capacities]
+
+
+def _servers(cell: Cell) -> list[int]:
+    return [station.servers or 0 for station in cell.stations]
+
+
+def _product_names(cell: Cell) -> list[str]:
+    return [product.name for product in cell.products]
+
+
+def _setups(cell: Cell) -> Floats:
+    names = _product_names(cell)
+    seconds = np.zeros((len(cell.stations), len(names), len(names)))
+    for station, setups in enumerate(cell.setups):
+        for (before, after), setup_s in setups.items():
+            seconds[station, names.index(before), names.index(after)] = setup_s
+    return seconds

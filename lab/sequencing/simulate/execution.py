@@ -84,8 +84,7 @@ class Execution:
         coming_s = [ready_s for ready_s in run.ready_s if ready_s > run.now_s]
         if not coming_s:
             raise WorkFailed(f"the robot waits at {run.now_s:g} s, but nothing is going to happen: every part is ready")
-        run.waited_s += min(coming_s) - run.now_s
-        run.now_s = min(coming_s)
+        run.wait(min(coming_s))
 
     def _coming(self, index: int) -> bool:
         """Whether the part has not even set out: where each is brought after a pick, those behind the next one."""

@@ -7,7 +7,8 @@ import numpy as np
 from lab.learning import splitmix
 from lab.learning.compiled import inner, lean
 from lab.sequencing.cell import chance
-from lab.sequencing.simulate.cell_arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES
+from lab.sequencing.cell.routes import SERVER
+from lab.sequencing.simulate.cell_arrays import ARRIVAL_CODES, LAW_CODES, NO_ARRIVALS, OBJECTIVE_CODES, WIDTH
 from lab.sequencing.simulate.run import SLACK_S
 
 CLOCK, PICK = ARRIVAL_CODES["clock"], ARRIVAL_CODES["pick"]
@@ -63,8 +64,19 @@ def reset(cell: Any, run: Any, seed: Any) -> None:
         if cell.arrivals == CLOCK or (cell.arrivals == PICK and i == 0):
             came_s += _interval(cell, seed, cell.coming[i])
             run.ready_s[cell.coming[i]] = came_s
-    run.clock[0], run.clock[1], run.clock[2] = 0.0, 0.0, 0.0
-    run.whole[0], run.whole[1], run.whole[2] = cell.robot_start, 0, unfinished
+    run.clock[:] = 0.0
+    run.whole[0], run.whole[1] = 0, unfinished
+    for robot in range(len(cell.robot_starts)):
+        run.robots_at[robot], run.robots_s[robot] = cell.robot_starts[robot], 0.0
+    if not cell.serial:
+        run.rooms_s[:], run.servers_s[:], run.worked[:] = 0.0, 0.0, -1
+
+
+@inner
+def _reach(cell: Any, run: Any, o: int) -> float:
+    """`Run.reach_s`."""
+    robot = cell.robot[o]
+    return float(run.robots_s[robot] + cell.empty_s[robot, run.robots_at[robot], cell.origin[o]])
 
 
 @inner
@@ -73,8 +85,46 @@ def _too_late(cell: Any, run: Any, part: int, o: int) -> bool:
     at_most_s = cell.at_most_s[run.locations[part]]
     if at_most_s == np.inf or not cell.waits[o]:
         return False
-    reach_s = run.clock[0] + cell.empty_s[run.whole[0], cell.origin[o]]
-    return bool(max(reach_s, run.ready_s[part]) + cell.service_s[o] > run.ready_s[part] + at_most_s + SLACK_S)
+    begin_s = _server(cell, run, part, o)[0] if cell.robot[o] == SERVER else _reach(cell, run, o)
+    return bool(max(begin_s, run.ready_s[part]) + cell.service_s[o] > run.ready_s[part] + at_most_s + SLACK_S)
+
+
+@inner
+def _server(cell: Any, run: Any, part: int, o: int) -> Any:
+    """`Run._server`."""
+    station, best_s, best = cell.target[o], np.inf, -1
+    for server in range(cell.first_server[station], cell.first_server[station + 1]):
+        free_s = run.servers_s[server]
+        if run.worked[server] >= 0:
+            free_s += cell.setup_s[station, run.worked[server], cell.product[part]]
+        begin_s = max(run.ready_s[part], free_s)
+        if begin_s < best_s:
+            best_s, best = begin_s, server
+    return best_s, best
+
+
+@inner
+def _room(cell: Any, run: Any, station: int) -> float:
+    """Since when the room of a station that is free first is free; it is taken: the row's last place is then left."""
+    first, left = cell.first_room[station], run.room[station]
+    if cell.first_room[station + 1] == first:
+        return 0.0
+    at_s = run.rooms_s[first]
+    for i in range(first, first + left - 1):
+        run.rooms_s[i] = run.rooms_s[i + 1]
+    return float(at_s)
+
+
+@inner
+def _free(cell: Any, run: Any, station: int, at_s: float) -> None:
+    """A room of a station is free from then on; those that are free stand ascending."""
+    first, i = cell.first_room[station], cell.first_room[station] + run.room[station]
+    if cell.first_room[station + 1] == first:
+        return
+    while i > first and run.rooms_s[i - 1] > at_s:
+        run.rooms_s[i] = run.rooms_s[i - 1]
+        i -= 1
+    run.rooms_s[i] = at_s
 
 
 @lean
@@ -83,7 +133,7 @@ def list_allowed(cell: Any, run: Any) -> int:
     parts, count = len(run.locations), 0
     for part in range(parts):
         place = run.locations[part]
-        if cell.arrivals != NO_ARRIVALS and place == cell.starts[part] and part != cell.coming[run.whole[1]]:
+        if cell.arrivals != NO_ARRIVALS and place == cell.starts[part] and part != cell.coming[run.whole[0]]:
             continue
         for o in range(cell.first_option[place], cell.first_option[place + 1]):
             room = run.room[cell.needs[o, 0]] > 0 and run.room[cell.needs[o, 1]] > 0
@@ -110,45 +160,69 @@ def _sort(run: Any, count: int) -> None:
 def move(cell: Any, run: Any, i: int, seed: Any) -> None:
     """`Run.move`: carries out the i-th of the allowed decisions, with the times of an episode's seed."""
     parts, o = len(run.locations), run.options[i]
-    part = (run.allowed[i] - 1) % parts
-    here, there = run.locations[part], cell.to[o]
-    reach_s = run.clock[0] + cell.empty_s[run.whole[0], cell.origin[o]]
-    ready_s = max(reach_s, run.ready_s[part]) if cell.waits[o] else reach_s
-    pick_s = ready_s + cell.service_s[o]
-    drop_s = pick_s + cell.loaded_s[cell.origin[o], cell.target[o]]
+    part, robot = (run.allowed[i] - 1) % parts, cell.robot[o]
+    here, there, server, reach_s = run.locations[part], cell.to[o], 0, 0.0
+    if robot == SERVER:
+        pick_s, server = _server(cell, run, part, o)
+        drop_s = pick_s
+    else:
+        reach_s = _reach(cell, run, o)
+        ready_s = max(reach_s, run.ready_s[part]) if cell.waits[o] else reach_s
+        pick_s = ready_s + cell.service_s[o]
+        drop_s = pick_s + cell.loaded_s[robot, cell.origin[o], cell.target[o]]
+        run.clock[1] += ready_s - reach_s
     if here == cell.starts[part]:
-        run.whole[1] += 1
-        if cell.arrivals == PICK and run.whole[1] < len(cell.coming):
-            following = cell.coming[run.whole[1]]
+        run.whole[0] += 1
+        if cell.arrivals == PICK and run.whole[0] < len(cell.coming):
+            following = cell.coming[run.whole[0]]
             run.ready_s[following] = pick_s + _interval(cell, seed, following)
-    run.room[cell.holds[here, 0]] += 1  # WIDTH stations, written out: a loop takes twice the time of the whole move
-    run.room[cell.holds[here, 1]] += 1
-    run.room[cell.holds[there, 0]] -= 1
-    run.room[cell.holds[there, 1]] -= 1
-    run.locations[part], run.whole[0] = there, cell.target[o]
-    run.clock[0] = drop_s
-    run.clock[1] += ready_s - reach_s
+    if robot != SERVER and not cell.serial:
+        carried_s = drop_s
+        drop_s = max(drop_s, _room(cell, run, cell.needs[o, 0]), _room(cell, run, cell.needs[o, 1]))
+        run.clock[1] += drop_s - carried_s
+    process_s = 0.0
     if cell.begins[there]:
         number = (part + 1) * len(cell.begins) + there
         process_s = _drawn(cell.processing_law, cell.spread, cell.processing_s[there], seed, number)
         run.ready_s[part] = drop_s + process_s
         run.clock[2] += process_s
+    end_s = drop_s + process_s if robot == SERVER else drop_s
+    if not cell.serial:
+        left_s = end_s if robot == SERVER else pick_s
+        for h in range(WIDTH):
+            station = cell.holds[here, h]
+            if station != cell.holds[there, 0] and station != cell.holds[there, 1]:
+                _free(cell, run, station, left_s)
+    run.room[cell.holds[here, 0]] += 1  # WIDTH stations, written out: a loop takes twice the time of the whole move
+    run.room[cell.holds[here, 1]] += 1
+    run.room[cell.holds[there, 0]] -= 1
+    run.room[cell.holds[there, 1]] -= 1
+    run.locations[part] = there
+    if robot == SERVER:
+        run.servers_s[server], run.worked[server] = end_s, cell.product[part]
+    else:
+        run.robots_at[robot], run.robots_s[robot] = cell.target[o], drop_s
+    run.clock[3] = max(run.clock[3], end_s)
+    now_s = np.inf
+    for free_s in run.robots_s:
+        now_s = min(now_s, free_s)
+    run.clock[0] = now_s if len(run.robots_s) > 0 else run.clock[3]
     if cell.first_option[there] == cell.first_option[there + 1]:
-        run.finished_s[part] = drop_s
-        run.whole[2] -= 1
+        run.finished_s[part] = end_s
+        run.whole[1] -= 1
 
 
 @lean
 def cost(cell: Any, run: Any) -> float:
     """`objectives.cost`."""
-    if run.whole[2] > 0:
+    if run.whole[1] > 0:
         return float(cell.stuck_cost)
     if cell.objective == MAKESPAN:
-        return float(run.clock[0])
+        return float(run.clock[3])
     if cell.objective == ROBOT_IDLE:
         return float(run.clock[1])
     if cell.objective == MACHINE_IDLE:
-        return float(cell.machines * run.clock[0] - run.clock[2])
+        return float(cell.machines * run.clock[3] - run.clock[2])
     total = 0.0
     for part in range(len(run.locations)):
         late_s = max(0.0, run.finished_s[part] - cell.due_s[part])

@@ -70,7 +70,7 @@ def rest_of(run: Run, mishaps: Mishaps = NOTHING, fallback_s: float | None = Non
         due_s = tuple(max(0.0, one - run.now_s) for one in due_s)
     rest = replace(
         cell,
-        robot_start=robot,
+        robots=(replace(cell.robots[0], start=robot),),
         begins=tuple(begins),
         closed=closed,
         arrivals=arrivals,

@@ -1,29 +1,35 @@
 """One pass through a cell, decision by decision: the readable simulation. `kernels` holds the compiled one."""
 
+from bisect import insort
 from collections.abc import Sequence
 
 from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Episode
-from lab.sequencing.cell.routes import Option, choice_of, entry, part_of
+from lab.sequencing.cell.routes import SERVER, Option, Position, choice_of, entry, part_of
 from lab.sequencing.cell.schedule import Move, Schedule
+from lab.sequencing.cell.stations import UNLIMITED
 
 SLACK_S = 1e-6  # so much later is not too late: what sums of times may differ by
 
 
 class Run:
-    """Where parts and robot are, and at what time; `move` carries one decision out.
+    """Where parts and robots are, and at what time; `move` carries one decision out.
 
     A decision is an entry of a sequence: the part's number, + the number of parts for the second choice it has, and so
-    on. The robot travels empty to where the part, or its pallet, is picked, waits there until it is ready, does its
-    service work and carries it on; processing starts at arrival. All is done as early as it can be: the robot never waits for
-    anything else. A decision that would pick a part later than it may be picked is not allowed (see `Station.at_most_s`): what
-    was left too long stays where it is, and the run ends as a deadlock does. locations: the position of each part, part 1 first.
-    occupied: room taken at each station. ready_s: when each part may be picked. finished_s: when each part reached the
-    end of its route (None: not yet; 0: before the work began, or nothing is to be done with it). fetched: how many parts
-    were taken from the start of their routes. waited_s: how long the robot has waited. processed_s: how long machines were
-    given work for.
-    Source: thesis ch. 7.4, 7.5; App. III.
+    on. A robot travels empty to where the part, or its pallet, is picked, waits there until it is ready, does its
+    service work and carries it on; processing starts at arrival, or, where a machine has servers, with the decision that
+    lets one of them take the part. All is done as early as it can be, after what was decided before with the same robot,
+    server, part or room: a robot that comes to a station before there is room waits there, and nobody ever waits for
+    anything else. With one robot and no servers what is decided later also happens later (`Cell.serial`). A decision that
+    would pick a part later than it may be picked is not allowed (see `Station.at_most_s`): what was left too long stays where
+    it is, and the run ends as a deadlock does.
+    locations: the position of each part, part 1 first. occupied: room taken at each station. ready_s: when each part may be
+    picked. finished_s: when each part was finished (None: not yet; 0: before the work began, or nothing is to be done with
+    it). robots_at, robots_s: where each robot is after what it was given to do, and when. end_s: when all that was decided
+    is done. fetched: how many parts were taken from the start of their routes. waited_s: how long the robots have waited.
+    processed_s: how long machines were given work for.
+    Source: thesis ch. 7.4, 7.5; App. III; serial schedule generation, Kolisch 1996.
     """
 
     def __init__(self, cell: Cell, times: Episode | None = None) -> None:
@@ -31,14 +37,32 @@ class Run:
         self.times = times or Episode(cell)
         self.locations = list(cell.begin_at)
         self.occupied = [0] * len(cell.stations)
-        for place in self.locations:
-            for station in cell.positions[place].holds:
-                self.occupied[station] += 1
-        self.robot = cell.index(cell.robot_start)
-        self.now_s = self.waited_s = self.processed_s = 0.0
+        for held in [station for place in self.locations for station in cell.positions[place].holds]:
+            self.occupied[held] += 1
+        self.robots_at = [cell.index(robot.start) for robot in cell.robots]
+        self.robots_s = [0.0] * len(cell.robots)
+        self.end_s = self.waited_s = self.processed_s = 0.0
         self.finished_s: list[float | None] = [None if n in cell.unfinished else 0.0 for n in range(1, cell.parts + 1)]
         self.fetched = 0
         self.ready_s = self._first_ready_s()
+        # What is decided later may happen earlier: since when each room is free, and each server, and what it worked on last.
+        self._rooms_s: dict[int, list[float]] = {}
+        self._servers: dict[int, list[tuple[float, str]]] = {}
+        if not cell.serial:
+            for index, station in enumerate(cell.stations):
+                if station.capacity < UNLIMITED:
+                    self._rooms_s[index] = [0.0] * (station.capacity - self.occupied[index])
+                self._servers[index] = [(0.0, "")] * (station.servers or 0)
+
+    @property
+    def robot(self) -> int:
+        """Where the first robot is."""
+        return self.robots_at[0]
+
+    @property
+    def now_s(self) -> float:
+        """When the robot is free, of several the first one [s]; where there is none, when all is done that was decided."""
+        return min(self.robots_s, default=self.end_s)
 
     @property
     def done(self) -> bool:
@@ -73,7 +97,7 @@ class Run:
         at_most_s = self.cell.positions[self.locations[part - 1]].at_most_s
         if at_most_s is None or not option.waits:
             return False
-        return self._pick_s(part, option) > self.ready_s[part - 1] + at_most_s + SLACK_S
+        return self.pick_s(part, option) > self.ready_s[part - 1] + at_most_s + SLACK_S
 
     def spoils(self, decision: int) -> bool:
         """Whether a decision is not allowed only because it would pick its part too late."""
@@ -89,30 +113,79 @@ class Run:
         if option is None:
             raise BadInput(self.refusal(decision))
         cell, part = self.cell, part_of(decision, self.cell.parts)
-        here, there = cell.positions[self.locations[part - 1]], cell.positions[option.to]
-        start, leave_s = self.robot, self.now_s
-        reach_s = self._reach_s(option)
-        ready_s = max(reach_s, self.ready_s[part - 1]) if option.waits else reach_s
-        pick_s = ready_s + option.service_s
-        drop_s = pick_s + float(cell.loaded_s[option.origin, option.target])
-        if not here.holds:
+        if option.robot == SERVER:
+            return self._serve(part, option)
+        there, robot = cell.positions[option.to], option.robot
+        start, leave_s = self.robots_at[robot], self.robots_s[robot]
+        reach_s, ready_s, pick_s = self._times_s(part, option)
+        drop_s = carried_s = pick_s + self.carry_s(option)
+        if self.locations[part - 1] == cell.starts[part - 1]:
             self._fetch(pick_s)
-        for station in here.holds:
-            self.occupied[station] -= 1
-        for station in there.holds:
-            self.occupied[station] += 1
-        self.locations[part - 1], self.robot, self.now_s = option.to, option.target, drop_s
-        self.waited_s += ready_s - reach_s
+        if not cell.serial:
+            drop_s = max(drop_s, self._room_s(option.needs))
+        self._leave(part, option, pick_s)
+        self.robots_at[robot], self.robots_s[robot] = option.target, drop_s
+        self.waited_s += ready_s - reach_s + drop_s - carried_s
         process_s = 0.0
         if there.processing_s is not None:
             process_s = self.times.processing_s(part, option.to)
             self.ready_s[part - 1] = drop_s + process_s
             self.processed_s += process_s
-        if not there.options:
-            self.finished_s[part - 1] = drop_s
+        self._ends(part, there, drop_s)
         way = cell.names[start], cell.names[option.origin], cell.names[option.target]
         times_s = leave_s, reach_s, pick_s, drop_s, process_s
-        return Move(part, *way, *times_s, option.service_s, option.carries)
+        return Move(part, *way, *times_s, option.service_s, option.carries, cell.robots[robot].name)
+
+    def _serve(self, part: int, option: Option) -> Move:
+        """A server of a machine takes a part and works on it."""
+        cell = self.cell
+        begin_s, server = self._server(part, option)
+        process_s = self.times.processing_s(part, option.to)
+        end_s = begin_s + process_s
+        if self.locations[part - 1] == cell.starts[part - 1]:
+            self._fetch(begin_s)
+        self._servers[option.target][server] = end_s, cell.order[part - 1]
+        self._leave(part, option, end_s)
+        self.ready_s[part - 1] = end_s
+        self.processed_s += process_s
+        self._ends(part, cell.positions[option.to], end_s)
+        way, times_s = (cell.names[option.origin], cell.names[option.target]), (begin_s, begin_s, begin_s, begin_s)
+        return Move(part, way[0], *way, *times_s, process_s, by=way[1])
+
+    def _server(self, part: int, option: Option) -> tuple[float, int]:
+        """When a part may begin at a machine with servers, and with which of them: the one that lets it begin first."""
+        product, setups = self.cell.order[part - 1], self.cell.setups[option.target]
+        free_s = [
+            max(self.ready_s[part - 1], free + setups.get((last, product), 0.0))
+            for free, last in self._servers[option.target]
+        ]
+        return min(free_s), free_s.index(min(free_s))
+
+    def _room_s(self, stations: Sequence[int]) -> float:
+        """When there is room in all of these; it is taken."""
+        return max((self._rooms_s[s].pop(0) for s in stations if s in self._rooms_s), default=0.0)
+
+    def _leave(self, part: int, option: Option, left_s: float) -> None:
+        """A part goes from where it is to where a way leads: what it leaves is free from then on."""
+        here, there = self.cell.positions[self.locations[part - 1]], self.cell.positions[option.to]
+        for station in here.holds:
+            self.occupied[station] -= 1
+            if station not in there.holds and station in self._rooms_s:
+                insort(self._rooms_s[station], left_s)
+        for station in there.holds:
+            self.occupied[station] += 1
+        self.locations[part - 1] = option.to
+
+    def _ends(self, part: int, there: Position, at_s: float) -> None:
+        """A part has come to a position at a time."""
+        self.end_s = max(self.end_s, at_s)
+        if not there.options:
+            self.finished_s[part - 1] = at_s
+
+    def wait(self, until_s: float) -> None:
+        """The robots stay where they are until then, as far as they are free before."""
+        self.waited_s += sum(max(0.0, until_s - free_s) for free_s in self.robots_s)
+        self.robots_s = [max(until_s, free_s) for free_s in self.robots_s]
 
     def refusal(self, decision: int) -> str:
         """Why the decision may not be taken now, in words; empty when it may."""
@@ -144,18 +217,41 @@ class Run:
         """That a part would be picked too late, in words."""
         cell, place = self.cell, self.cell.positions[self.locations[part - 1]]
         option = next(option for option in place.options if self.too_late(part, option))
-        times_s = f"done at {self.ready_s[part - 1]:g} s, fetched at {self._pick_s(part, option):g} s"
+        times_s = f"done at {self.ready_s[part - 1]:g} s, fetched at {self.pick_s(part, option):g} s"
         where = f"{cell.part_name(part)} in '{cell.names[place.station]}'"
         return f"{where} would burn: {times_s}, allowed {place.at_most_s:g} s"
 
-    def _reach_s(self, option: Option) -> float:
-        """When the robot is where it picks, if it goes there now."""
-        return self.now_s + (
-            0.0 if self.robot == option.origin else float(self.cell.empty_s[self.robot, option.origin])
-        )
+    def free_s(self, station: int) -> float:
+        """When the first of a station's servers is through with what it was given; 0 where there is none."""
+        return min((free_s for free_s, _ in self._servers.get(station, ())), default=0.0)
 
-    def _pick_s(self, part: int, option: Option) -> float:
-        return max(self._reach_s(option), self.ready_s[part - 1]) + option.service_s
+    def reach_s(self, option: Option) -> float:
+        """When the robot of a way is where it picks, if it goes there now."""
+        at, cell = self.robots_at[option.robot], self.cell
+        empty_s = (
+            0.0 if at == option.origin else float(cell.empty_s[at, option.origin]) / cell.robots[option.robot].speed
+        )
+        return self.robots_s[option.robot] + empty_s
+
+    def pick_s(self, part: int, option: Option) -> float:
+        """When a way takes a part up, if that were done now; where a server works on it: when it begins."""
+        return self._server(part, option)[0] if option.robot == SERVER else self._times_s(part, option)[2]
+
+    def drop_s(self, part: int, option: Option) -> float:
+        """When a way brings a part to its end, by the cell's own times, as soon as there is room."""
+        if option.robot == SERVER:
+            return self.pick_s(part, option) + (self.cell.positions[option.to].processing_s or 0.0)
+        return self.pick_s(part, option) + self.carry_s(option)
+
+    def carry_s(self, option: Option) -> float:
+        """How long a robot's way with a part is [s]."""
+        return float(self.cell.loaded_s[option.origin, option.target]) / self.cell.robots[option.robot].speed
+
+    def _times_s(self, part: int, option: Option) -> tuple[float, float, float]:
+        """When the robot is there, when the part may be picked, and when it is, the service done."""
+        reach_s = self.reach_s(option)
+        ready_s = max(reach_s, self.ready_s[part - 1]) if option.waits else reach_s
+        return reach_s, ready_s, ready_s + option.service_s
 
     def _first_ready_s(self) -> list[float]:
         arrivals, all_s, came_s = self.cell.arrivals, list(self.cell.begin_s), 0.0
@@ -177,6 +273,11 @@ class Run:
         """Whether it is there: parts that arrive are taken in their order."""
         waits = self.locations[part - 1] == self.cell.starts[part - 1]
         return self.cell.arrivals is None or not waits or part == self.cell.coming[self.fetched]
+
+    def take_times(self, state: "Run") -> None:
+        """Since when rooms and servers are free is as in another run of the cell."""
+        self._rooms_s = {station: times_s.copy() for station, times_s in state._rooms_s.items()}
+        self._servers = {station: servers.copy() for station, servers in state._servers.items()}
 
     def _full(self) -> list[bool]:
         """Whether each station is."""
@@ -230,5 +331,6 @@ def take_over(run: Run, state: Run) -> None:
     """Put a run where another one is; both share the cell, not the times."""
     run.locations, run.occupied = state.locations.copy(), state.occupied.copy()
     run.ready_s, run.finished_s = state.ready_s.copy(), state.finished_s.copy()
-    run.robot, run.fetched = state.robot, state.fetched
-    run.now_s, run.waited_s, run.processed_s = state.now_s, state.waited_s, state.processed_s
+    run.robots_at, run.robots_s, run.fetched = state.robots_at.copy(), state.robots_s.copy(), state.fetched
+    run.end_s, run.waited_s, run.processed_s = state.end_s, state.waited_s, state.processed_s
+    run.take_times(state)

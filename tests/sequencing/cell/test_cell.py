@@ -7,7 +7,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell, needed_moves
-from lab.sequencing.cell.stations import Arrivals, Begins, Product, Stage, Station
+from lab.sequencing.cell.stations import Arrivals, Begins, Product, Stage, Station, one_robot
 from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
@@ -71,7 +71,7 @@ def test_without_a_buffer_a_full_machine_stops_the_move(oven_cell: CellMaker) ->
 def test_needed_moves_of_the_toast_cell(toast_cell: CellMaker) -> None:
     """They are moves that table 7.2 has, all but 4 -> 3 (just emptied) and those that are only made loaded."""
     cell = toast_cell("I", 3)
-    moves = needed_moves(cell.stations, cell.products, cell.robot_start, cell.parts)
+    moves = needed_moves(cell.stations, cell.products, cell.robots, cell.parts)
     number = {name: index + 1 for index, name in enumerate(cell.names)}
     loaded = {(number[a], number[b]) for a, b in moves.loaded}
     empty = {(number[a], number[b]) for a, b in moves.empty}
@@ -133,7 +133,7 @@ def table(value: float) -> np.ndarray:
         (order(0), "parts = 0: allowed are 1 to 200"),
         (order(201), "parts = 201"),
         (order(10), "'in': capacity 9 cannot hold all 10"),
-        ({"robot_start": "ovn"}, "unknown station 'ovn'.*did you mean 'oven'"),
+        ({"robots": one_robot("ovn")}, "unknown station 'ovn'.*did you mean 'oven'"),
         ({"stations": (IN, OVEN, OVEN, OUT)}, "'oven': the name is used twice"),
         ({"stations": (IN, Station("robot", "machine", 1), OUT)}, "names another row"),
         ({"stations": (IN, Station("oven", "grill", 1), OUT)}, "unknown kind 'grill'"),  # type: ignore[arg-type]
@@ -216,7 +216,7 @@ def test_a_station_that_nothing_leads_to_is_said_to_be_out_of_reach(toast_cell: 
     with pytest.raises(
         BadInput, match=r"'toaster buffer' -> 'plate' is missing.*no time leads there: it cannot be reached"
     ):
-        Cell(cell.stations, cell.products, cell.order, times, cell.loaded_s, cell.robot_start)
+        Cell(cell.stations, cell.products, cell.order, times, cell.loaded_s, cell.robots)
 
 
 def test_a_station_is_an_end_or_inside_but_not_both(oven_cell: CellMaker) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule_rows import COLUMNS, csv_of, rows_of
-from lab.sequencing.cell.stations import Product, Stage, Station
+from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.sequencing.simulate.run import simulate
 
 STATIONS = (Station("in", "storage", 9), Station("oven", "machine", 1, 10.0), Station("out", "storage", 9))
@@ -43,7 +43,7 @@ def test_a_spreadsheet_reads_the_table(cell: Cell) -> None:
 
 
 def test_a_row_without_a_part_has_empty_fields(cell: Cell) -> None:
-    two = Cell(cell.stations, cell.products, ("toast", "toast"), cell.empty_s, cell.loaded_s, "in")
+    two = Cell(cell.stations, cell.products, ("toast", "toast"), cell.empty_s, cell.loaded_s, one_robot("in"))
     rows = rows_of(simulate(two, [1, 1, 2, 2]), two, "planned")
     (empty,) = {(row["part"], row["product"]) for row in rows if row["operation"] == "empty"}
     assert empty == (None, None)
@@ -52,7 +52,7 @@ def test_a_row_without_a_part_has_empty_fields(cell: Cell) -> None:
 
 def test_a_job_shop_of_the_rows_keeps_to_its_machines(cell: Cell) -> None:
     """As a library takes it: jobs are parts, machines resources; no machine does two tasks at once, no part is in two."""
-    two = Cell(cell.stations, cell.products, ("toast", "toast"), cell.empty_s, cell.loaded_s, "in")
+    two = Cell(cell.stations, cell.products, ("toast", "toast"), cell.empty_s, cell.loaded_s, one_robot("in"))
     rows = rows_of(simulate(two, [1, 1, 2, 2]), two, "planned")
     tasks = [row for row in rows if row["operation"] != "wait"]
     for key in ("resource", "part"):

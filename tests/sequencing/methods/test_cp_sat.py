@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, WITH_DUE_TIMES, cost
-from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
+from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
 from lab.sequencing.cell.ways import ways_of
 from lab.sequencing.methods.cp_sat import cp_sat, cp_sat_sequencer, fits
 from lab.sequencing.methods.cp_sat_times import Times, longest, timed
@@ -78,7 +78,7 @@ def test_no_room_for_deadlocks(order: str, ends: Ends) -> None:
     stations = (Station("in", "storage", 9), Station("lathe", "machine", 1, 7.0), Station("mill", "machine", 1, 3.0))
     products = tuple(Product(name, (tuple(Stage(place) for place in way),)) for name, way in ways.items())
     table = 2.0 * (np.ones((4, 4)) - np.eye(4))
-    cell = Cell((*stations, Station("out", "storage", 9)), products, tuple(order), table, table, "in")
+    cell = Cell((*stations, Station("out", "storage", 9)), products, tuple(order), table, table, one_robot("in"))
     found = cp_sat(cell)
     assert (found.status, found.cost) == ("optimal", min(run.now_s for run in ends(Run(cell))))
     assert simulate(cell, found.sequence).makespan_s == found.cost
@@ -141,7 +141,7 @@ def test_a_busy_buffer_is_for_when_the_oven_is_full(
 def test_arrivals_by_hand(oven_cell: CellMaker, after: str, ends_s: float) -> None:
     """Every empty way takes 5 s, so the first is picked at 5; 1000 s after it came, or after that pick, comes the other."""
     arrivals = Arrivals((0.0, 1000.0), after)  # type: ignore[arg-type]
-    cell = oven_cell(2, robot_start="out", arrivals=arrivals, empty_s=5.0 * np.ones((3, 3)) - 5.0 * np.eye(3))
+    cell = oven_cell(2, robots=one_robot("out"), arrivals=arrivals, empty_s=5.0 * np.ones((3, 3)) - 5.0 * np.eye(3))
     found = cp_sat(cell)
     assert found.cost == found.bound == ends_s
 

@@ -13,7 +13,7 @@ from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.routes import part_of
-from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
+from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.branch_and_bound import branch_and_bound
 from lab.sequencing.methods.exact import Optimum, exact, optimum
@@ -37,7 +37,7 @@ def crossing_cell(order: str, buffers: str = "busy") -> Cell:
     products = tuple(Product(name, (tuple(Stage(place) for place in way),)) for name, way in ways.items())
     table = 1.0 + np.arange(16.0).reshape(4, 4) % 3 - np.eye(4) * (1.0 + np.arange(16.0).reshape(4, 4) % 3)
     names = tuple({"P": "pin", "N": "nut"}[letter] for letter in order)
-    return Cell(stations, products, names, table, table, "in")
+    return Cell(stations, products, names, table, table, one_robot("in"))
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_a_full_buffer_costs_time(toast_cell: CellMaker) -> None:
 @pytest.mark.parametrize(("after", "ends_s"), [("clock", 1014.0), ("pick", 1019.0)])
 def test_arrivals_by_hand(oven_cell: CellMaker, after: str, ends_s: float) -> None:
     """Every empty way takes 5 s, so the first is picked at 5; 1000 s after it came, or after that pick, comes the other."""
-    cell = oven_cell(2, robot_start="out", arrivals=Arrivals((0.0, 1000.0), after))  # type: ignore[arg-type]
+    cell = oven_cell(2, robots=one_robot("out"), arrivals=Arrivals((0.0, 1000.0), after))  # type: ignore[arg-type]
     cell = replace(cell, empty_s=5.0 * np.ones((3, 3)) - 5.0 * np.eye(3))
     assert optimum(cell).cost == ends_s
 

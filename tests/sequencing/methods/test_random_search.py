@@ -8,7 +8,7 @@ import pytest
 from lab.errors import BadInput, WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Chance
-from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
+from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
 from lab.sequencing.methods.random_search import random_search
 from lab.sequencing.search import EpisodeSequenced, Search
 from lab.sequencing.simulate.run import simulate
@@ -59,7 +59,7 @@ def test_it_says_when_all_it_met_were_deadlocks() -> None:
     ways = [tuple(Stage(name) for name in way) for way in (names, ("in", "n", "m", "out"))]
     products = tuple(Product(name, (way,)) for name, way in zip("ab", ways, strict=True))
     table = 1.0 - np.eye(4)
-    cell = Cell((*stations, Station("out", "storage", 9)), products, ("a", "b"), table, table, "in")
+    cell = Cell((*stations, Station("out", "storage", 9)), products, ("a", "b"), table, table, one_robot("in"))
     ends: set[object] = set()
     for seed in range(20):
         try:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput, WorkFailed
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.stations import Product, Route, Stage, Station
+from lab.sequencing.cell.stations import Product, Route, Stage, Station, one_robot
 from lab.sequencing.methods.rules import RULES, dispatch, dispatched, first_come, usable, work_left_s
 from lab.sequencing.search import Search
 from lab.sequencing.simulate.run import Run, simulate
@@ -34,7 +34,7 @@ def two_lines(
     loaded_s[:, 2] = 3.0
     np.fill_diagonal(loaded_s, 0.0)
     products = (Product("a", (by_oven,)), Product("b", (by_mill,)))
-    return Cell(stations, products, tuple(order), 1.0 - np.eye(4), loaded_s, "in", due_s=due_s)
+    return Cell(stations, products, tuple(order), 1.0 - np.eye(4), loaded_s, one_robot("in"), due_s=due_s)
 
 
 def opposite() -> Cell:
@@ -48,7 +48,9 @@ def opposite() -> Cell:
     there: Route = (Stage("in"), Stage("m"), Stage("n"), Stage("out"))
     back: Route = (Stage("in"), Stage("n"), Stage("m"), Stage("out"))
     table = 1.0 - np.eye(4)
-    return Cell(stations, (Product("a", (there,)), Product("b", (back,))), ("a", "b"), table, 2.0 * table, "in")
+    return Cell(
+        stations, (Product("a", (there,)), Product("b", (back,))), ("a", "b"), table, 2.0 * table, one_robot("in")
+    )
 
 
 def choose(name: str, cell: Cell, *moves: int) -> int:

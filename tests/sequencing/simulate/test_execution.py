@@ -73,7 +73,7 @@ def test_what_is_late_is_expected_now_and_what_is_ready_is_known() -> None:
     assert (seen.now_s, seen.ready_s, seen.ready) == (7.0, [12.0, 7.0], (False, True))
     assert seen.processed_s == 12.0
     execution.step(2)
-    execution.run.now_s = 20.0
+    execution.run.wait(20.0)
     late = execution.observe()
     assert (late.ready_s[0], late.ready[0]) == (20.0, False)
 
@@ -134,7 +134,7 @@ def test_an_arrival_that_is_late_is_expected_now() -> None:
     """Part 2 should have come at 40 s; at 50 s it is expected now, and part 3 20 s later."""
     cell = two_ovens(Arrivals((20.0, 20.0, 20.0)), parts=3)
     execution = after(cell, Told(cell, interval={2: 90.0}), 1, 1)
-    execution.run.now_s = 50.0
+    execution.run.wait(50.0)
     assert execution.observe().ready_s[1:] == [50.0, 70.0]
 
 

@@ -32,14 +32,15 @@ def assert_alike(run: Run, there: RunArrays, count: int) -> None:
     """Every quantity of a run, to rounding where chance has a say."""
     assert run.allowed() == tuple(there.allowed[:count].tolist())
     assert run.locations == there.locations.tolist()
-    assert run.robot == there.whole[0]
-    assert run.fetched == there.whole[1]
+    assert run.robots_at == there.robots_at.tolist()
+    assert there.robots_s.tolist() == pytest.approx(run.robots_s)
+    assert run.fetched == there.whole[0]
     assert [room - taken for room, taken in zip(run.cell.capacities, run.occupied, strict=True)] == (
         there.room[: len(run.occupied)].tolist()
     )
-    assert there.clock.tolist() == pytest.approx([run.now_s, run.waited_s, run.processed_s])
+    assert there.clock.tolist() == pytest.approx([run.now_s, run.waited_s, run.processed_s, run.end_s])
     assert there.ready_s.tolist() == pytest.approx(run.ready_s)
-    assert there.whole[2] == run.finished_s.count(None)
+    assert there.whole[1] == run.finished_s.count(None)
     finished = [(part, end) for part, end in enumerate(run.finished_s) if end is not None]
     assert [float(there.finished_s[part]) for part, _ in finished] == pytest.approx([end for _, end in finished])
 

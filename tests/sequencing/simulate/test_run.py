@@ -12,7 +12,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Chance, Episode
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.cell.stations import Arrivals, Product, Route, Stage, Station
+from lab.sequencing.cell.stations import Arrivals, Product, Route, Stage, Station, one_robot
 from lab.sequencing.simulate.run import Run, simulate
 
 CellMaker = Callable[..., Cell]
@@ -31,7 +31,7 @@ def build(stations: str, *routes: Route, parts: int = 2, **change: object) -> Ce
         "products": tuple(Product(f"type {number}", (route,)) for number, route in enumerate(routes, 1)),
         "order": tuple(f"type {1 + number % len(routes)}" for number in range(parts)),
     }
-    described |= {"empty_s": table, "loaded_s": 2.0 * table, "robot_start": "in"}
+    described |= {"empty_s": table, "loaded_s": 2.0 * table, "robots": one_robot("in")}
     return Cell(all_, **(described | change))  # type: ignore[arg-type]
 
 
@@ -121,7 +121,7 @@ def test_parts_arrive_after_the_pick_of_the_one_before() -> None:
 
 def test_the_next_part_sets_out_when_the_robot_picks_not_when_the_part_came() -> None:
     """The robot starts at "out": it picks at 1 s what has waited since 0.5 s; the next one comes at 1 + 8 s."""
-    run = Run(build("m", way("m"), arrivals=Arrivals((0.5, 8.0), "pick"), robot_start="out"))
+    run = Run(build("m", way("m"), arrivals=Arrivals((0.5, 8.0), "pick"), robots=one_robot("out")))
     run.move(1)
     assert run.ready_s[1] == 9.0
 

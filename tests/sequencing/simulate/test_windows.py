@@ -15,7 +15,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Chance, Episode
 from lab.sequencing.cell.objectives import cost, stuck_cost
 from lab.sequencing.cell.routes import choice_of, part_of
-from lab.sequencing.cell.stations import Product, Stage, Station
+from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.branch_and_bound import branch_and_bound
 from lab.sequencing.methods.cp_sat import cp_sat
@@ -48,7 +48,7 @@ def test_too_late_is_not_allowed(oven_cell: CellMaker) -> None:
     stations = (*oven_cell().stations[:2], Station("stove", "machine", 1, 10.0), Station("out", "storage", 9))
     routes = tuple((Stage("in"), Stage(name), Stage("out")) for name in ("oven", "stove"))
     table = 1.0 - np.eye(4)
-    cell = Cell(stations, (Product("toast", routes),), ("toast",) * 2, table, 2.0 * table, "in")
+    cell = Cell(stations, (Product("toast", routes),), ("toast",) * 2, table, 2.0 * table, one_robot("in"))
     first = follow(with_window(cell, oven=5.0), [1, 4, 2])
     assert first.refusal(1) == "toast 1 in 'oven' would burn: done at 12 s, fetched at 18 s, allowed 5 s"
     assert (first.allowed(), first.done, first.spoils(1), first.spoils(2)) == ((), False, True, False)

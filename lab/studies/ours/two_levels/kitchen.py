@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lab.mdp import BoolArray, IntArray, TabularMDP, grid
 from lab.sequencing.cell.cell import Cell, needed_moves
 from lab.sequencing.cell.stations import Product as Toast
-from lab.sequencing.cell.stations import Route, Stage, Station
+from lab.sequencing.cell.stations import Route, Stage, Station, one_robot
 
 ACTIONS = ("up", "down", "left", "right", "pick", "drop", "wait")  # the first four as `lab.mdp.grid` orders them
 PICK, DROP, WAIT = 4, 5, 6
@@ -60,7 +60,7 @@ class Kitchen:
 
     def needed(self, parts: int) -> tuple[tuple[Way, ...], tuple[Way, ...]]:
         """The transfers that some allowed order of so many toasts may contain: empty ones and loaded ones."""
-        moves = needed_moves(self._stations(parts), (Toast("toast", (ROUTE,)),), LETTERS[START], parts)
+        moves = needed_moves(self._stations(parts), (Toast("toast", (ROUTE,)),), one_robot(LETTERS[START]), parts)
         return moves.empty, moves.loaded
 
     def way(self, way: Way) -> TabularMDP:
