@@ -24,7 +24,9 @@ def cyclic_found(given: "OrderOptions", toolbox: str | None, files: dict[str, Pa
     for name, value in asdict(given).items():
         if name not in OF_A_CYCLE and value != none[name]:
             said = "" if value is True else f" {value}"
-            raise BadInput(f"--cyclic beside --{name}{said}: the shortest cycle is found and proven, by its period alone")
+            raise BadInput(
+                f"--cyclic beside --{name}{said}: the shortest cycle is found and proven, by its period alone"
+            )
     if "plot" in files:
         raise BadInput(f"--cyclic beside --plot {files['plot']}: a cycle has no episodes; --gantt draws it")
     options = LessonOptions(advisors=DEFAULT_ADVISORS, seed=given.seed)

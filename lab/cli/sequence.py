@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.families import offers
 from lab.cli.cyclic import cyclic_found
+from lab.cli.families import offers
 from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Parts, Plain, Port, Seed, ShowPage, ToolboxPlace, Wait
 from lab.cli.output import end, show
@@ -54,7 +54,9 @@ def sequence(
     ] = "ccrl",
     cyclic: Annotated[
         bool,
-        typer.Option("--cyclic", help="The shortest cycle that the robot can repeat; -n, --parts, --case: of one cycle."),
+        typer.Option(
+            "--cyclic", help="The shortest cycle that the robot can repeat; -n, --parts, --case: of one cycle."
+        ),
     ] = False,
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the advice in this folder, as it was begun.")

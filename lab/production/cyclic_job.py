@@ -78,7 +78,9 @@ def _mix(loaded: CellFile | Task, case: str | None, wanted: CyclicWanted) -> tup
         asked = order_from_word(loaded, case) if case is not None else wanted.toasts
         return (loaded.ordered(asked) if asked is not None else mix_of(own)), len(own)
     if case is not None:
-        raise BadInput(f"case '{case}' (--case): task '{loaded.name}' has none; toast has I, II and III, a cell its orders")
+        raise BadInput(
+            f"case '{case}' (--case): task '{loaded.name}' has none; toast has I, II and III, a cell its orders"
+        )
     own = loaded.ordered()
     if wanted.toasts is None and wanted.parts is None:
         return mix_of(own), len(own)

@@ -85,8 +85,8 @@ def _allowed(run: Run) -> str:
 class OrderAdvice:
     """Whose word counts on the order: one that is given whole, or whom SRL may ask which part to move next, and when.
 
-    given: the words of an order, "" for none. cyclic: the order is to repeat the shortest cycle, and nobody is asked. people: those behind such names as "terminal"; keep: gives the journal of what
-    they say, by default one that is not written.
+    given: the words of an order, "" for none. cyclic: the order is to repeat the shortest cycle, and nobody is asked. people:
+    those behind such names as "terminal"; keep: gives the journal of what they say, by default one that is not written.
     """
 
     given: str = ""
@@ -121,9 +121,9 @@ class Ordered:
 def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, tell: Tell = unheard) -> Ordered:
     """The order of a job, beside what cannot be beaten: the given one, or the best of those that were found.
 
-    A cyclic order is used as a given one is. With advice, SRL looks for one with it, and the settings' method for one alone; the exact search gives one, too. Of orders
-    that cost the same the advised one is used, then the method's. Raises BadInput as `checked_order` and `advised_srl` do,
-    WorkFailed and KeyboardInterrupt.
+    A cyclic order is used as a given one is. With advice, SRL looks for one with it, and the settings' method for one alone; the
+    exact search gives one, too. Of orders that cost the same the advised one is used, then the method's. Raises BadInput as
+    `checked_order`, `advised_srl` and `cyclic_order` do, WorkFailed and KeyboardInterrupt.
     """
     search, proven = search_for(settings), optimum(cell)
     is_timed = search.objective == MAKESPAN

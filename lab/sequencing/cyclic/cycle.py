@@ -9,7 +9,7 @@ from typing import Any
 
 from lab.errors import BadInput, WorkFailed, counted
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cyclic.line import CycleMove, Line, away_s, lines
+from lab.sequencing.cyclic.line import CycleMove, Line, at_speed, away_s, lines
 from lab.sequencing.cyclic.model import Answer, CycleModel
 from lab.sequencing.cyclic.times import Timed, shortest_period
 
@@ -106,6 +106,7 @@ def best_cycle(cell: Cell, mix: Sequence[str], time_limit_s: float = TIME_LIMIT_
     """
     began = time.perf_counter()
     check_cyclic(cell, mix)
+    cell = at_speed(cell)
     away = away_s(cell)
     ahead = sorted(((line.bound_s(away), n, line) for n, line in enumerate(lines(cell, mix))), key=lambda one: one[:2])
     best: Cycle | None = None
@@ -129,7 +130,9 @@ def best_cycle(cell: Cell, mix: Sequence[str], time_limit_s: float = TIME_LIMIT_
         raise WorkFailed(f"no order of {counted(len(mix), 'part')} a cycle can be repeated for ever: {why}")
     proven = best.period_s - above_s <= resolution_s
     wall_s = time.perf_counter() - began
-    return replace(best, bound_s=best.period_s if proven else above_s, proven=proven, rounded_s=rounded_s, wall_s=wall_s)
+    return replace(
+        best, bound_s=best.period_s if proven else above_s, proven=proven, rounded_s=rounded_s, wall_s=wall_s
+    )
 
 
 def _timed(model: CycleModel, answer: Answer, left_s: float, seed: int) -> tuple[Timed, Answer] | None:
@@ -147,7 +150,17 @@ def _timed(model: CycleModel, answer: Answer, left_s: float, seed: int) -> tuple
 def check_cyclic(cell: Cell, mix: Sequence[str]) -> None:
     """BadInput, in words, for a cell that no cyclic order is looked for in, and for a mix of products it does not make."""
     if cell.arrivals is not None:
-        raise BadInput("--cyclic: parts arrive one by one in this cell; a cycle takes each when it wants: leave [arrivals] away")
+        raise BadInput(
+            "--cyclic: parts arrive one by one in this cell; a cycle takes each when it wants: leave [arrivals] away"
+        )
+    if len(cell.robots) != 1:
+        raise BadInput(f"--cyclic: the cell has {counted(len(cell.robots), 'robot')}; a cycle is looked for with 1")
+    for station in cell.stations:
+        if station.servers is not None:
+            raise BadInput(
+                f"--cyclic: station '{station.name}' has servers and a queue; in a cycle each part is worked on where and "
+                "when it is put down: leave servers away"
+            )
     if cell.begins is not None or cell.closed:
         raise BadInput("--cyclic: the work is in its middle, or a station is closed; a cycle needs the whole cell")
     for name in mix:

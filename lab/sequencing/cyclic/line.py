@@ -1,7 +1,7 @@
 """The moves of one cycle of a cell: the ways of the parts that enter in it, and what their times have to keep to."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations_with_replacement, islice, product
 from math import comb, inf, prod
@@ -175,6 +175,15 @@ def _paths(cell: Cell, name: str, count: int, parts: int) -> list[Path]:
         told = f"product '{name}' has {numbers[start]} ways through its routes and buffers"
         raise BadInput(f"--cyclic: {told}: too many for a cycle of {counted(parts, 'part')}")
     return list(islice(longer((), cell.positions[start], start), numbers[start]))
+
+
+def at_speed(cell: Cell) -> Cell:
+    """The cell with the times of its one robot, whatever its speed."""
+    robot, *_ = cell.robots
+    if robot.speed == 1.0:
+        return cell
+    empty_s, loaded_s = cell.empty_s / robot.speed, cell.loaded_s / robot.speed
+    return replace(cell, empty_s=empty_s, loaded_s=loaded_s, robots=(replace(robot, speed=1.0),))
 
 
 def away_s(cell: Cell) -> list[list[float]]:

@@ -102,7 +102,7 @@ class CycleModel:
         status = solver.solve(self.model)
         if status == cp_model.INFEASIBLE:
             return Answer(inf if self._longest >= self.line.longest_s * self.unit else self._longest / self.unit)
-        # Begins that are rounded down keep to all demands of a period that is rounded up: it is found when it is longer by a unit.
+        # Begins that are rounded down keep to all demands of a period that is rounded up, which is longer by less than a unit.
         above_s = (solver.best_objective_bound - 1) / self.unit
         if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
             return Answer(above_s)

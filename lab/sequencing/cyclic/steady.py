@@ -44,7 +44,7 @@ def _robot(cycle: Cycle, cycles: range) -> Iterator[Activity]:
     """The robot's row, move by move in the periods that these cycles begin in."""
     line, period_s = cycle.line, cycle.period_s
     names = line.cell.names
-    at, left_s = "", -inf
+    at, left_s, before = "", -inf, 0
     for number in cycles:
         for n in cycle.order:
             move = line.moves[n]

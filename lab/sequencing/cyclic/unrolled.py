@@ -12,6 +12,7 @@ from lab.sequencing.cell.routes import Option, entry, reached_from
 from lab.sequencing.cell.schedule import Move, Schedule
 from lab.sequencing.cell.stations import Product
 from lab.sequencing.cyclic.cycle import Cycle
+from lab.sequencing.cyclic.line import at_speed
 from lab.sequencing.cyclic.times import Arc, earliest
 from lab.sequencing.simulate.run import Run, simulate
 
@@ -128,6 +129,7 @@ def _without_windows(cell: Cell) -> Cell:
 
 def _waiting(cell: Cell, made: Sequence[_Turn]) -> list[Move]:
     """The moves, each as early as all windows allow; WorkFailed when they cannot all be kept."""
+    cell = at_speed(cell)
     arcs, at = list[Arc](), cell.index(cell.robot_start)
     work_s, empty_s = [0.0], list[float]()
     ready = dict[int, tuple[int, float]]()  # by part: the move after which it was last processed, and how long
@@ -150,7 +152,11 @@ def _waiting(cell: Cell, made: Sequence[_Turn]) -> list[Move]:
         raise WorkFailed("the line cannot be filled and emptied by this cycle: a part would be picked too late")
     moves, start, leave_s = list[Move](), cell.robot_start, 0.0
     for number, (part, _, option) in enumerate(made, 1):
-        origin, target, pick_s = cell.names[option.origin], cell.names[option.target], begin_s[number] + option.service_s
+        origin, target, pick_s = (
+            cell.names[option.origin],
+            cell.names[option.target],
+            begin_s[number] + option.service_s,
+        )
         reach_s, drop_s = leave_s + empty_s[number - 1], begin_s[number] + work_s[number]
         process_s = cell.positions[option.to].processing_s or 0.0
         times_s = leave_s, reach_s, pick_s, drop_s, process_s
