@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import ceil, floor, gcd, inf, isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ortools.sat.python import cp_model
 
@@ -49,7 +49,7 @@ class CycleModel:
         self._period = self.model.new_int_var(min(self._down(self.least_s), self._longest), self._longest, "period")
         self._work = [self._down(move.work_s) for move in moves]
         self._begin = [self.model.new_int_var(0, 0 if n == 0 else self._longest, "") for n in range(len(moves))]
-        self._before: dict[tuple[int, int], cp_model.IntVar | int] = {}
+        self._before: dict[tuple[int, int], Any] = {}  # a literal, or 0 or 1
         for one in range(len(moves)):
             for then in range(one):
                 self._apart(then, one)
@@ -188,9 +188,9 @@ class CycleModel:
         """Where the way straight from one move to the next takes longer than one by somewhere else, or is none at all."""
         numbers = range(len(self.line.moves))
         straight = {(a, b): self.line.after_s(a, b) for a in numbers for b in numbers if a != b}
-        if all(self._down(time) <= self._away(*pair) for pair, time in straight.items() if isfinite(time)) and all(
-            isfinite(time) for time in straight.values()
-        ):
+        if len(numbers) == 1:
+            self.model.add(self._period >= self._work[0] + self._down(self.line.after_s(0, 0)))
+        if all(isfinite(time) and self._down(time) <= self._away(*pair) for pair, time in straight.items()):
             return
         arcs = list[tuple[int, int, cp_model.IntVar]]()
         for (one, then), time in straight.items():
@@ -202,7 +202,7 @@ class CycleModel:
             begin = self._period if then == 0 else self._begin[then]
             self.model.add(begin - self._begin[one] >= gap).only_enforce_if(arc)
             if 0 not in (one, then):
-                self.model.add_implication(arc, self._before[one, then])  # type: ignore[arg-type]
+                self.model.add_implication(arc, self._before[one, then])
         self.model.add_circuit(arcs)
 
     def _add_turns(self) -> None:

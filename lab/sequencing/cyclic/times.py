@@ -65,23 +65,20 @@ def shortest_period(line: Line, order: Sequence[int], wraps: Sequence[int]) -> T
 
 
 def earliest(arcs: Sequence[Arc], moves: int, first: int, period_s: float) -> tuple[list[float], list[Arc]]:
-    """The earliest begins after the first move's, or a cycle of arcs that cannot be kept (Bellman and Ford)."""
-    begin_s, by = [-inf] * moves, list[Arc | None]([None] * moves)
-    begin_s[first] = 0.0
+    """The earliest begins after the first move's, or a circle of arcs that cannot be kept (Bellman and Ford)."""
+    begin_s, by = [-inf] * moves, dict[int, Arc]()
+    begin_s[first], late = 0.0, -1
     for _ in range(moves + 1):
-        late = None
+        late = -1
         for arc in arcs:
             at_s = begin_s[arc.one] + arc.least_s - arc.periods * period_s
             if at_s > begin_s[arc.then] + TINY_S:
                 begin_s[arc.then], by[arc.then], late = at_s, arc, arc.then
-        if late is None:
+        if late < 0:
             return begin_s, []
-    seen: set[int] = set()
-    while late not in seen:
-        seen.add(late)
-        late = by[late].one  # type: ignore[union-attr, index]
-    end, broken = late, list[Arc]()
-    while not broken or late != end:
-        broken.append(by[late])  # type: ignore[arg-type, index]
-        late = broken[-1].one
+    for _ in range(moves):  # then it is on the circle, whatever led there
+        late = by[late].one
+    broken = [by[late]]
+    while broken[-1].one != late:
+        broken.append(by[broken[-1].one])
     return begin_s, broken

@@ -12,57 +12,19 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 from scipy.optimize import linprog
 
-from lab.errors import WorkFailed
+from lab.errors import BadInput, WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option
-from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
+from lab.sequencing.cell.stations import Arrivals, Begins, Product, Robot, Stage, Station
 from lab.sequencing.cyclic.cycle import best_cycle
 
 CellMaker = Callable[..., Cell]
 RandomCells = Callable[..., SearchStrategy[Cell]]
 Move = tuple[int, int, Option]  # the part of the cycle, the position that it leaves, and how
 
-# Phillips and Unger 1976: least and most soak [s] of tanks 1 to 12, loaded moves into each and out of the last, empty moves
-# from tank (row) to tank (column; the first is the load), the last row from the unload.
-SOAK_S = [
-    *((150, 200), (90, 120), (120, 180), (90, 125), (30, 40), (60, 120), (60, 120), (45, 75)),
-    *((130, math.inf), (120, math.inf), (90, 120), (30, 60)),
-]
-LOADED_S = [31, 22, 22, 22, 25, 23, 22, 22, 22, 47, 27, 22, 30]
-EMPTY_S = """
-    11  0  2  5  2  8 10 13 15 17 10  3  1
-    14  2  0  2  0  5  8 10 13 15 12  6  3
-    16  5  2  0  2  3  5  8 10 13 15  8  6
-    14  2  0  2  0  5  8 10 13 15 12  6  3
-    19  8  5  3  5  0  3  5  7 10 18 11  9
-    22 10  8  5  8  3  0  2  5  7 20 14 11
-    24 13 10  8 10  5  2  0  2  5 23 16 14
-    26 15 13 10 13  7  5  2  0  2 25 19 16
-    29 17 15 13 15 10  7  5  2  0 27 21 19
-     6 10 12 15 12 18 20 23 25 27  0  7  9
-     8  3  6  8  6 11 14 16 19 21  7  0  2
-    10  1  3  6  3  9 11 14 16 19  9  2  0
-     0 11 14 16 14 19 22 24 26 29  6  8 10
-"""
 
-
-def build_hoist_cell(parts: int = 6) -> Cell:
-    """The line of Phillips and Unger: load, 12 tanks, unload."""
-    tanks = [
-        Station(f"tank {n}", "machine", 1, float(least), None if most == math.inf else float(most - least))
-        for n, (least, most) in enumerate(SOAK_S, 1)
-    ]
-    stations = (Station("load", "storage", 200), *tanks, Station("unload", "storage", 200))
-    empty, loaded = np.full((14, 14), np.nan), np.full((14, 14), np.nan)
-    empty[1:, :-1] = np.array(EMPTY_S.split(), float).reshape(13, 13)
-    for n, seconds in enumerate(LOADED_S):
-        loaded[n, n + 1] = seconds
-    route = tuple(Stage(station.name) for station in stations)
-    return Cell(stations, (Product("carrier", (route,)),), ("carrier",) * parts, empty, loaded, one_robot("unload"))
-
-
-def test_the_hoist_of_phillips_and_unger_takes_521() -> None:
-    found = best_cycle(build_hoist_cell(), ("carrier",))
+def test_the_hoist_of_phillips_and_unger_takes_521(hoist_cell: CellMaker) -> None:
+    found = best_cycle(hoist_cell(), ("carrier",))
     assert (found.period_s, found.bound_s, found.proven) == (521.0, 521.0, True)
     assert found.most_in_work == 4
 
@@ -200,3 +162,72 @@ def test_no_order_has_a_shorter_period(kind: str, cells: RandomCells, data: st.D
     found = best_cycle(cell, mix)
     assert found.proven
     assert found.period_s == pytest.approx(least_s, abs=max(1e-6, found.rounded_s))
+
+
+def test_a_single_move(oven_cell: CellMaker) -> None:
+    """2 s there with a toast, 1 s back."""
+    straight = Product("toast", ((Stage("in"), Stage("out")),))
+    found = best_cycle(oven_cell(products=(straight,)), ("toast",))
+    assert (found.period_s, found.proven) == (3.0, True)
+
+
+def test_a_window_makes_the_robot_wait(oven_cell: CellMaker) -> None:
+    """Two ovens: the second takes 20 s, so a toast would wait in the first one for 9 s or longer; when it must be fetched at
+    once, the robot brings the next one later, and the period is the same."""
+    stations = [Station("in", "storage", 9), Station("oven", "machine", 1, 10.0), Station("out", "storage", 9)]
+    stations += [Station("second", "machine", 1, 20.0)]
+    route = Product("toast", (tuple(Stage(name) for name in ("in", "oven", "second", "out")),))
+    table = np.ones((4, 4)) - np.eye(4)
+    own = {"products": (route,), "empty_s": table, "loaded_s": 2 * table}
+    free = best_cycle(oven_cell(stations=tuple(stations), **own), ("toast",))
+    stations[1] = replace(stations[1], at_most_s=0.0)
+    bound = best_cycle(oven_cell(stations=tuple(stations), **own), ("toast",))
+    # the second oven: 20 s, 2 s out, 1 s to the first, 2 s into it
+    assert free.period_s == bound.period_s == 25.0
+    row = {(move["origin"], move["target"]): move for move in bound.to_json()}
+    in_oven_s = row["oven", "second"]["pick_s"] - row["in", "oven"]["drop_s"]
+    assert in_oven_s % 25.0 == pytest.approx(10.0)
+
+
+def test_half_the_speed_takes_twice_as_long(oven_cell: CellMaker) -> None:
+    found = best_cycle(oven_cell(robots=(Robot("slow", "in", 0.5),)), ("toast",))
+    assert found.period_s == 20.0  # 10 s, and twice 5 s
+
+
+def test_a_mix_of_two_products(crossing_cell: Callable[[], Cell]) -> None:
+    """Two machines passed the one way and the other way: the parts never meet. By hand: a round of the one part is six moves
+    of 1 s and 10 s of work at the least, but each part waits while the other one is worked on."""
+    found = best_cycle(crossing_cell(), ("there", "back"))
+    assert found.proven
+    assert [move["product"] for move in found.to_json()].count("there") == 3
+    assert found.period_s == pytest.approx(by_trying_all(crossing_cell(), ("there", "back")))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"arrivals": Arrivals((1.0, 1.0))}, "parts arrive one by one"),
+        ({"robots": (Robot("a", "in"), Robot("b", "in"))}, "2 robots"),
+        ({"closed": ("oven",), "begins": (Begins(None), Begins(0))}, "work is in its middle"),
+        (
+            {
+                "stations": (
+                    Station("in", "storage", 9),
+                    Station("oven", "machine", 2, 1.0, None, 1),
+                    Station("out", "storage", 9),
+                )
+            },
+            "'oven' has servers",
+        ),
+    ],
+)
+def test_what_has_no_cycle_is_refused(oven_cell: CellMaker, change: dict[str, object], words: str) -> None:
+    with pytest.raises(BadInput, match=words):
+        best_cycle(oven_cell(**change), ("toast",))
+
+
+def test_an_unknown_product_is_refused(oven_cell: CellMaker) -> None:
+    with pytest.raises(BadInput, match="has no 'bun'; it has toast"):
+        best_cycle(oven_cell(), ("bun",))
+    with pytest.raises(BadInput, match="no part enters"):
+        best_cycle(oven_cell(), ())
