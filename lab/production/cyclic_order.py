@@ -28,7 +28,6 @@ def cycle_document(cycle: Cycle) -> dict[str, Any]:
         "parts_per_hour": SECONDS_PER_HOUR / per_part_s,
         "bound_s": cycle.bound_s,
         "proven": cycle.proven,
-        "rounded_s": cycle.rounded_s,
         "most_in_work": cycle.most_in_work,
         "moves": cycle.to_json(),
         "wall_s": cycle.wall_s,
@@ -44,9 +43,9 @@ def mix_of(order: Sequence[str]) -> tuple[str, ...]:
 
 def measured_period(cycle: Cycle, planned: Schedule, measured: Schedule) -> dict[str, Any]:
     """The period of a run that carried a cycle out, beside the planned one; None where too few parts were delivered."""
-    found_s = period_of(measured, cycle.parts)
+    found_s = period_of(measured, cycle)
     return cycle_document(cycle) | {
-        "planned_period_s": period_of(planned, cycle.parts),
+        "planned_period_s": period_of(planned, cycle),
         "measured_period_s": found_s,
         "period_deviation": None if found_s is None else found_s / cycle.period_s - 1.0,
     }

@@ -10,8 +10,8 @@ from typing import Any
 from lab.errors import BadInput, WorkFailed, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cyclic.line import CycleMove, Line, at_speed, away_s, lines
-from lab.sequencing.cyclic.model import Answer, CycleModel
-from lab.sequencing.cyclic.times import Timed, shortest_period
+from lab.sequencing.cyclic.model import CycleModel
+from lab.sequencing.cyclic.times import shortest_period
 
 TIME_LIMIT_S = 60.0
 
@@ -21,8 +21,8 @@ class Cycle:
     """What the robot repeats: the line's moves in their order, the first at 0, and the period [s].
 
     begin_s: of each of the line's moves in the period, when the robot begins it (the service first). wraps: by stay of the line,
-    how many cycles begin while a part stays. bound_s: no period of an order that repeats with as many parts a cycle is shorter;
-    proven: none is shorter than this one. rounded_s: to how much the proof is exact [s]; 0: wholly.
+    how many cycles begin while a part stays. recurs: see `Timed`. bound_s: no period of an order that repeats with as many parts
+    a cycle is shorter; proven: none is shorter than this one, to some nanoseconds.
     """
 
     line: Line
@@ -30,9 +30,9 @@ class Cycle:
     begin_s: tuple[float, ...]
     order: tuple[int, ...]
     wraps: tuple[int, ...]
+    recurs: int = 1
     bound_s: float = 0.0
     proven: bool = False
-    rounded_s: float = 0.0
     wall_s: float = 0.0
 
     @property
@@ -100,51 +100,37 @@ def best_cycle(cell: Cell, mix: Sequence[str], time_limit_s: float = TIME_LIMIT_
     """The shortest period in which one robot can repeat its moves for ever, `mix` (products) entering in each cycle.
 
     The cell's order gives its products only; its parts all wait at the beginning of their routes, and the robot may wait on
-    purpose. Every way that the parts can take is a line with a model of its own; the most promising is solved first, and
-    what cannot beat the best is left out. Raises BadInput for a cell that has no such cycle (`check_cyclic`) or too large a one,
-    WorkFailed when none was found. Source: Phillips and Unger 1976, AIIE Transactions 8(2) (one hoist, time windows).
+    purpose. Every way that the parts can take is a line with a model of its own; what cannot beat the best so far is left out.
+    Raises BadInput for a cell that has no such cycle (`check_cyclic`) or too large a one, WorkFailed when none was found.
+    Source: Phillips and Unger 1976, AIIE Transactions 8(2) (one hoist, time windows).
     """
     began = time.perf_counter()
     check_cyclic(cell, mix)
     cell = at_speed(cell)
     away = away_s(cell)
-    ahead = sorted(((line.bound_s(away), n, line) for n, line in enumerate(lines(cell, mix))), key=lambda one: one[:2])
+    # Of equal periods that with the fewest moves is found first, and stays.
+    ahead = [(len(line.moves), line.bound_s(away), n, line) for n, line in enumerate(lines(cell, mix))]
+    ahead.sort(key=lambda one: one[:3])
     best: Cycle | None = None
-    above_s, resolution_s, rounded_s = inf, 0.0, 0.0
-    for least_s, _, line in ahead:
+    above_s, resolution_s = inf, 0.0
+    for _, least_s, _, line in ahead:
         best_s = inf if best is None else best.period_s
         left_s = time_limit_s - (time.perf_counter() - began)
         if least_s >= best_s or left_s <= 0:
             above_s = min(above_s, least_s)
-            break
+            continue
         model = CycleModel(line, away, least_s, best_s)
         answer = model.solve(left_s, seed)
         above_s, resolution_s = min(above_s, max(least_s, answer.above_s)), max(resolution_s, model.resolution_s)
-        rounded_s = max(rounded_s, model.resolution_s if model.rounded else 0.0)
-        timed = _timed(model, answer, left_s, seed)
-        if timed is not None and timed[0].period_s < best_s:
-            found, answer = timed
-            best = Cycle(line, found.period_s, found.begin_s, answer.order, answer.wraps)
+        timed = shortest_period(line, answer.order, answer.wraps) if answer.order else None
+        if timed is not None and timed.period_s < best_s:
+            best = Cycle(line, timed.period_s, timed.begin_s, answer.order, answer.wraps, timed.recurs)
     if best is None:
         why = "it is proven that there is none" if above_s == inf else f"none was found in {time_limit_s:g} s"
         raise WorkFailed(f"no order of {counted(len(mix), 'part')} a cycle can be repeated for ever: {why}")
     proven = best.period_s - above_s <= resolution_s
     wall_s = time.perf_counter() - began
-    return replace(
-        best, bound_s=best.period_s if proven else above_s, proven=proven, rounded_s=rounded_s, wall_s=wall_s
-    )
-
-
-def _timed(model: CycleModel, answer: Answer, left_s: float, seed: int) -> tuple[Timed, Answer] | None:
-    """The exact times of what a model found; where rounding made it miss a window, of what one finds that misses none."""
-    if not answer.order:
-        return None
-    timed = shortest_period(model.line, answer.order, answer.wraps)
-    if timed is not None:
-        return timed, answer
-    answer = CycleModel(model.line, model.away_s, model.least_s, model.below_s, loose=False).solve(left_s, seed)
-    timed = shortest_period(model.line, answer.order, answer.wraps) if answer.order else None
-    return None if timed is None else (timed, answer)
+    return replace(best, bound_s=best.period_s if proven else above_s, proven=proven, wall_s=wall_s)
 
 
 def check_cyclic(cell: Cell, mix: Sequence[str]) -> None:

@@ -2,18 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from math import ceil, floor, gcd, inf, isfinite
+from math import ceil, floor, inf, isfinite
 from typing import Any, NamedTuple
 
 from ortools.sat.python import cp_model
 
+from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.cyclic.line import Line, Span
 
-TICKS = 10**9  # a second; times are whole numbers of them
-FINEST = 10**6  # units of the model a second, where times are rounded to them
-COARSEST = 1000  # as many parts a second make times whole that need not be rounded
-PARTS = 840  # of such a part in a unit: a period that is a fraction of it with a denominator up to 8 is whole, too
+UNIT = round(TICKS_PER_S)  # of the model, in a second
 
 
 class Answer(NamedTuple):
@@ -31,25 +28,23 @@ class Answer(NamedTuple):
 class CycleModel:
     """The variables and constraints of a line: each move's begin in [0, period), the first move's at 0.
 
-    least_s: no period is shorter. below_s: only shorter ones are looked for, by a unit at least. loose: times are rounded so
-    that what is proven of the model holds of the line: what has to pass down, what may pass up; a cycle that is found may then
-    miss a window by less than a unit a period; not loose: it misses none that is whole in units.
+    least_s: no period is shorter. below_s: only shorter ones are looked for. Times are rounded so that what is proven of the
+    model holds of the line: what has to pass down, what may pass up; a cycle that is found may miss a window by some nanoseconds.
     """
 
     line: Line
     away_s: Sequence[Sequence[float]]
     least_s: float
     below_s: float
-    loose: bool = True
     model: cp_model.CpModel = field(default_factory=cp_model.CpModel)
 
     def __post_init__(self) -> None:
         moves, longest_s = self.line.moves, self.line.longest_s
-        self._longest = ceil(longest_s * self.unit) if self.below_s > longest_s else ceil(self.below_s * self.unit) - 1
+        self._longest = ceil(longest_s * UNIT) if self.below_s > longest_s else ceil(self.below_s * UNIT) - 1
         self._period = self.model.new_int_var(min(self._down(self.least_s), self._longest), self._longest, "period")
         self._work = [self._down(move.work_s) for move in moves]
         self._begin = [self.model.new_int_var(0, 0 if n == 0 else self._longest, "") for n in range(len(moves))]
-        self._before: dict[tuple[int, int], Any] = {}  # a literal, or 0 or 1
+        self._before: dict[tuple[int, int], Any] = {(n, n): 0 for n in range(len(moves))}  # a literal, or 0 or 1
         for one in range(len(moves)):
             for then in range(one):
                 self._apart(then, one)
@@ -65,33 +60,10 @@ class CycleModel:
         self._add_turns()
         self.model.minimize(self._period)
 
-    @cached_property
-    def _whole(self) -> int:
-        """In how many equal parts a second has to be divided for all times to be whole numbers of them."""
-        numbers, needs = range(len(self.line.moves)), self.line.needs
-        times = {move.work_s for move in self.line.moves} | {s for span in needs for s in (span.least_s, span.most_s)}
-        times |= {self.line.after_s(one, then) for one in numbers for then in numbers}
-        return TICKS // gcd(TICKS, *(round(time * TICKS) for time in times if isfinite(time)))
-
-    @property
-    def rounded(self) -> bool:
-        """Whether times are rounded in the model."""
-        return self._whole > COARSEST
-
-    @property
-    def unit(self) -> int:
-        """How many units of the model a second has."""
-        return FINEST if self.rounded else self._whole * PARTS
-
     @property
     def resolution_s(self) -> float:
-        """A period that is longer than what is proven by no more than this is the shortest one.
-
-        Where all times are whole, a period is a whole number divided by how many cycles a circle of demands goes through; two
-        such numbers lie this far apart. Where they are rounded, it is what rounding may change.
-        """
-        moves = len(self.line.moves)
-        return (2 * moves + 1) / self.unit if self.rounded else 0.5 / (self._whole * (1 + sum(self._most_wraps)))
+        """What rounding may change of a period: one that is longer than what is proven by no more than this is the shortest."""
+        return (2 * len(self.line.moves) + 1) / TICKS_PER_S
 
     def solve(self, time_limit_s: float, seed: int) -> Answer:
         """The best cycle that is found within the time limit [s], and what is proven of all."""
@@ -101,9 +73,9 @@ class CycleModel:
         solver.parameters.random_seed = seed
         status = solver.solve(self.model)
         if status == cp_model.INFEASIBLE:
-            return Answer(inf if self._longest >= self.line.longest_s * self.unit else self._longest / self.unit)
+            return Answer(inf if self._longest >= self.line.longest_s * UNIT else self._longest / UNIT)
         # Begins that are rounded down keep to all demands of a period that is rounded up, which is longer by less than a unit.
-        above_s = (solver.best_objective_bound - 1) / self.unit
+        above_s = (solver.best_objective_bound - 1) / UNIT
         if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
             return Answer(above_s)
         numbers = range(len(self.line.moves))
@@ -112,7 +84,7 @@ class CycleModel:
         return Answer(above_s, tuple(order), tuple(solver.value(wraps) for wraps in self._wraps))
 
     def _down(self, time_s: float) -> int:
-        return floor(time_s * self.unit + 1e-3)
+        return floor(time_s * UNIT)
 
     def _away(self, one: int, then: int) -> int:
         moves = self.line.moves
@@ -120,7 +92,6 @@ class CycleModel:
 
     def _apart(self, one: int, then: int) -> None:
         """One robot: of two moves one is done, and the way between them, before the other begins, this cycle and the next."""
-        self._before[one, one] = self._before[then, then] = 0
         there, back = (self._work[a] + self._away(a, b) for a, b in ((one, then), (then, one)))
         if one == 0:
             self._before[0, then], self._before[then, 0] = 1, 0
@@ -154,15 +125,15 @@ class CycleModel:
         self.model.add(total == sum(self._wraps[n] for n in inside))
         self._lasts(span, total, most)
 
-    def _lasts(self, span: Span, wraps: cp_model.IntVar, most: int) -> None:
+    def _lasts(self, span: Span, wraps: cp_model.IntVar, most_wraps: int) -> None:
         apart = self._begin[span.pick] - self._begin[span.drop] - self._work[span.drop]
-        for times in range(most + 1):
+        for times in range(most_wraps + 1):
             these = self._is(wraps, times)
             lasts = apart + times * self._period
             self.model.add(lasts >= self._down(span.least_s)).only_enforce_if(these)
             if span.most_s < inf:
-                slack = (times + self.rounded) if self.loose else 0  # the work is rounded down, too
-                self.model.add(lasts <= ceil(span.most_s * self.unit - 1e-3) + slack).only_enforce_if(these)
+                most = ceil(span.most_s * UNIT) + times + 1  # the period is rounded up, the work down
+                self.model.add(lasts <= most).only_enforce_if(these)
 
     def _is(self, wraps: cp_model.IntVar, times: int) -> cp_model.IntVar:
         these = self.model.new_bool_var("")

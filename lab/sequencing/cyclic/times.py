@@ -5,6 +5,7 @@ from math import inf
 from typing import NamedTuple
 
 from lab.sequencing.cyclic.line import Line
+from lab.sequencing.simulate.run import SLACK_S
 
 TINY_S = 1e-9  # sums of times that differ by less are equal
 
@@ -19,10 +20,15 @@ class Arc(NamedTuple):
 
 
 class Timed(NamedTuple):
-    """The shortest period [s], and when each move of the line begins, in that period, as early as can be after the first."""
+    """The shortest period [s], and when each move of the line begins, in that period, as early as can be after the first.
+
+    recurs: through how many cycles the demands go round that keep it from being shorter. Carried out as early as can be, the
+    moves come in the same intervals after so many cycles, not always after one: with two places alike, every other one.
+    """
 
     period_s: float
     begin_s: tuple[float, ...]
+    recurs: int = 1
 
 
 def arcs_of(line: Line, order: Sequence[int], wraps: Sequence[int]) -> Iterator[Arc]:
@@ -41,7 +47,7 @@ def arcs_of(line: Line, order: Sequence[int], wraps: Sequence[int]) -> Iterator[
         work_s, periods = line.moves[span.drop].work_s, passed[span.pick] - passed[span.drop]
         yield Arc(span.drop, span.pick, work_s + span.least_s, periods)
         if span.most_s < inf:
-            yield Arc(span.pick, span.drop, -work_s - span.most_s, -periods)
+            yield Arc(span.pick, span.drop, -work_s - span.most_s - SLACK_S, -periods)
 
 
 def shortest_period(line: Line, order: Sequence[int], wraps: Sequence[int]) -> Timed | None:
@@ -53,15 +59,15 @@ def shortest_period(line: Line, order: Sequence[int], wraps: Sequence[int]) -> T
     arcs = list(arcs_of(line, order, wraps))
     if any(arc.least_s != arc.least_s for arc in arcs):
         return None  # an empty way that is never made
-    period_s = 0.0
+    period_s, recurs = 0.0, 1
     while True:
         begin_s, broken = earliest(arcs, len(line.moves), order[0], period_s)
         if not broken:
-            return Timed(period_s, tuple(begin_s))
+            return Timed(period_s, tuple(begin_s), recurs)
         least_s, periods = sum(arc.least_s for arc in broken), sum(arc.periods for arc in broken)
         if periods <= 0 or least_s / periods <= period_s:
             return None
-        period_s = least_s / periods
+        period_s, recurs = least_s / periods, periods
 
 
 def earliest(arcs: Sequence[Arc], moves: int, first: int, period_s: float) -> tuple[list[float], list[Arc]]:

@@ -30,10 +30,6 @@ class Unrolled:
     schedule: Schedule
     waits: bool
 
-    def period_s(self, parts: int) -> float | None:
-        """How long a cycle of so many parts takes in the schedule (see `period_of`)."""
-        return period_of(self.schedule, parts)
-
 
 class _Turn(NamedTuple):
     """One move of the finite order: the part, the position that it leaves, and how."""
@@ -49,16 +45,18 @@ def of_parts(cell: Cell, mix: Sequence[str], parts: int) -> Cell:
     return replace(cell, order=order, due_s=None)
 
 
-def period_of(schedule: Schedule, parts: int) -> float | None:
-    """The period of a schedule with so many parts a cycle: the median time between the end of a part and that of the part so
-    many later, without the first and the last cycle of ends where there are enough; None: there are too few parts.
+def period_of(schedule: Schedule, cycle: Cycle) -> float | None:
+    """The period of a schedule that repeats a cycle: the median time between the end of a part and that of the part so many
+    cycles later as come in the same intervals again, without those at the beginning and the end where there are enough.
 
-    Parts come to their ends in cycles; the first come while the line is filled, the last while it is emptied.
+    While the line is filled and emptied parts end in other intervals. None: there are too few parts.
     """
     ends_s = sorted({a.part: a.end_s for a in schedule.parts if a.kind == "carry"}.values())
-    apart_s = [later - end for end, later in zip(ends_s, ends_s[parts:], strict=False)]
-    if len(apart_s) > 2 * parts:
-        apart_s = apart_s[parts:-parts]
+    apart_s = [
+        (later - end) / cycle.recurs for end, later in zip(ends_s, ends_s[cycle.parts * cycle.recurs :], strict=False)
+    ]
+    if len(apart_s) > 2 * cycle.parts:
+        apart_s = apart_s[cycle.parts : -cycle.parts]
     return median(apart_s) if apart_s else None
 
 

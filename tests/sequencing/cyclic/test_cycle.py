@@ -7,7 +7,7 @@ from itertools import permutations, product
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 from scipy.optimize import linprog
@@ -17,9 +17,11 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import Option
 from lab.sequencing.cell.stations import Arrivals, Begins, Product, Robot, Stage, Station
 from lab.sequencing.cyclic.cycle import best_cycle
+from lab.sequencing.simulate.run import SLACK_S
 
 CellMaker = Callable[..., Cell]
 RandomCells = Callable[..., SearchStrategy[Cell]]
+SEARCH = (Phase.explicit, Phase.reuse, Phase.generate)  # what fails is small enough: to shrink it takes minutes
 Move = tuple[int, int, Option]  # the part of the cycle, the position that it leaves, and how
 
 
@@ -123,7 +125,7 @@ def least_period(cell: Cell, moves: Sequence[Move], tour: Sequence[int], over: S
             at_least(brought, n, done, over[n] - over[brought])
             at_most_s = cell.positions[place].at_most_s
             if at_most_s is not None:
-                latest = done + at_most_s - option.service_s
+                latest = done + at_most_s - option.service_s + SLACK_S
                 at_least(n, brought, -latest, over[brought] - over[n])
     found = linprog([0.0] * len(moves) + [1.0], A_ub=rows, b_ub=most, bounds=[(0, None)] * (len(moves) + 1))
     return float(found.fun) if found.status == 0 else math.inf
@@ -146,7 +148,7 @@ def by_trying_all(cell: Cell, mix: Sequence[str]) -> float:
 
 
 @pytest.mark.parametrize("kind", ["buffers", "windows", "many"])
-@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck), phases=SEARCH)
 @given(data=st.data())
 def test_no_order_has_a_shorter_period(kind: str, cells: RandomCells, data: st.DataObject) -> None:
     cell = data.draw(cells(max_machines=2, max_parts=2, many=kind == "many", windows=kind == "windows"))
@@ -161,7 +163,7 @@ def test_no_order_has_a_shorter_period(kind: str, cells: RandomCells, data: st.D
         return
     found = best_cycle(cell, mix)
     assert found.proven
-    assert found.period_s == pytest.approx(least_s, abs=max(1e-6, found.rounded_s))
+    assert found.period_s == pytest.approx(least_s, abs=1e-5)
 
 
 def test_a_single_move(oven_cell: CellMaker) -> None:
@@ -208,7 +210,7 @@ def test_a_mix_of_two_products(crossing_cell: Callable[[], Cell]) -> None:
     [
         ({"arrivals": Arrivals((1.0, 1.0))}, "parts arrive one by one"),
         ({"robots": (Robot("a", "in"), Robot("b", "in"))}, "2 robots"),
-        ({"closed": ("oven",), "begins": (Begins(None), Begins(0))}, "work is in its middle"),
+        ({"begins": (Begins(None), Begins(0))}, "work is in its middle"),
         (
             {
                 "stations": (
