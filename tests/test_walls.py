@@ -259,7 +259,7 @@ def faults(module: str, source: str) -> list[str]:
         (
             "lab.sequencing.methods.exact",
             "from ortools.sat.python import cp_model",
-            "allowed in ['lab.sequencing.methods.cp_",
+            "allowed in ['lab.sequencing.cyclic.model', ",
         ),
         ("lab.sequencing.methods.fifo", "def f():\n    import pymoo", "allowed in ['lab.sequencing.methods.genetic']"),
         ("lab.mdp", "import random", "allowed in no module"),
