@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import inf
 
 from lab.errors import BadInput
@@ -60,19 +61,17 @@ def _robot(cycle: Cycle, cycles: range) -> Iterator[Activity]:
 
 
 def _stays(cycle: Cycle, number: int, first: int) -> Iterator[Activity]:
-    """Where the parts that enter in a cycle stay between their moves."""
+    """Where the parts that enter in a cycle stay between two moves of their own; their pallets take room, and no row."""
     line, cell = cycle.line, cycle.line.cell
-    done_s = {}
-    for span in line.needs:
-        done_s[span.drop] = cycle.at_s(span.drop, number) + line.moves[span.drop].work_s + span.least_s
-    for stay in line.stays:
-        brought, taken = line.moves[stay.drop], line.moves[stay.pick]
-        name = cell.names[cell.positions[taken.place].station]
-        part = (number - first) * cycle.parts + brought.slot + 1
-        come_s = cycle.at_s(stay.drop, number) + brought.work_s
-        gone_s = cycle.at_s(stay.pick, number) + taken.option.service_s
-        if cell.stations[cell.index(name)].kind == "machine":
-            ready_s = min(done_s.get(stay.drop, come_s), gone_s)
+    carried = [n for n, move in enumerate(line.moves) if move.option.carries == "part"]
+    for drop, pick in pairwise(carried):
+        brought, taken = line.moves[drop], line.moves[pick]
+        if brought.slot != taken.slot:
+            continue
+        name, part = cell.names[brought.option.target], (number - first) * cycle.parts + brought.slot + 1
+        come_s, gone_s = cycle.at_s(drop, number) + brought.work_s, cycle.at_s(pick, number) + taken.option.service_s
+        if cell.stations[brought.option.target].kind == "machine":
+            ready_s = min(come_s + (cell.positions[brought.option.to].processing_s or 0.0), gone_s)
             yield Activity(name, "process", part, name, name, come_s, ready_s)
             yield Activity(name, "blocked", part, name, name, ready_s, gone_s)
         else:
