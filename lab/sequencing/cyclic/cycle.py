@@ -22,7 +22,7 @@ class Cycle:
 
     begin_s: of each of the line's moves in the period, when the robot begins it (the service first). wraps: by stay of the line,
     how many cycles begin while a part stays. recurs: see `Timed`. bound_s: no period of an order that repeats with as many parts
-    a cycle is shorter; proven: none is shorter than this one, to some nanoseconds.
+    a cycle is shorter; proven: none is shorter than this one, to some microseconds.
     """
 
     line: Line

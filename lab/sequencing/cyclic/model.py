@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import ceil, floor, inf, isfinite
+from functools import cached_property
+from math import ceil, floor, gcd, inf, isfinite
 from typing import Any, NamedTuple
 
 from ortools.sat.python import cp_model
@@ -10,7 +11,15 @@ from ortools.sat.python import cp_model
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.cyclic.line import Line, Span
 
-UNIT = round(TICKS_PER_S)  # of the model, in a second
+TICKS = round(TICKS_PER_S)
+FINEST = (
+    10**7
+)  # units of the model a second, where times are rounded to them: as the simulation's slack, in some windows
+COARSEST = 1000  # as many parts of a second make times whole that need not be rounded
+PARTS = 840  # units in such a part: a period that is a fraction of it with a denominator up to 8 is whole, too
+
+
+NEAR = 1e-3  # of a unit: what sums of times may differ by
 
 
 class Answer(NamedTuple):
@@ -29,7 +38,7 @@ class CycleModel:
     """The variables and constraints of a line: each move's begin in [0, period), the first move's at 0.
 
     least_s: no period is shorter. below_s: only shorter ones are looked for. Times are rounded so that what is proven of the
-    model holds of the line: what has to pass down, what may pass up; a cycle that is found may miss a window by some nanoseconds.
+    model holds of the line: what has to pass down, what may pass up; a cycle that is found may miss a window by less than the simulation's slack.
     """
 
     line: Line
@@ -40,7 +49,7 @@ class CycleModel:
 
     def __post_init__(self) -> None:
         moves, longest_s = self.line.moves, self.line.longest_s
-        self._longest = ceil(longest_s * UNIT) if self.below_s > longest_s else ceil(self.below_s * UNIT) - 1
+        self._longest = ceil(longest_s * self.unit) if self.below_s > longest_s else ceil(self.below_s * self.unit) - 1
         self._period = self.model.new_int_var(min(self._down(self.least_s), self._longest), self._longest, "period")
         self._work = [self._down(move.work_s) for move in moves]
         self._begin = [self.model.new_int_var(0, 0 if n == 0 else self._longest, "") for n in range(len(moves))]
@@ -60,10 +69,37 @@ class CycleModel:
         self._add_turns()
         self.model.minimize(self._period)
 
+    @cached_property
+    def _whole(self) -> int:
+        """In how many equal parts a second has to be divided for all times to be whole numbers of them."""
+        numbers, needs = range(len(self.line.moves)), self.line.needs
+        times = {move.work_s for move in self.line.moves} | {s for span in needs for s in (span.least_s, span.most_s)}
+        times |= {self.line.after_s(one, then) for one in numbers for then in numbers}
+        return TICKS // gcd(TICKS, *(round(time * TICKS) for time in times if isfinite(time)))
+
+    @property
+    def rounded(self) -> bool:
+        """Whether times are rounded in the model."""
+        return self._whole > COARSEST
+
+    @property
+    def unit(self) -> int:
+        """How many units of the model a second has: as few as will do, for the solver goes through them one by one at worst."""
+        return FINEST if self.rounded else self._whole * PARTS
+
     @property
     def resolution_s(self) -> float:
-        """What rounding may change of a period: one that is longer than what is proven by no more than this is the shortest."""
-        return (2 * len(self.line.moves) + 1) / TICKS_PER_S
+        """A period that is longer than what is proven by no more than this is the shortest one.
+
+        Where all times are whole, a period is a whole number divided by how many cycles a circle of demands goes through; two
+        such numbers lie further apart. Where they are rounded, it is what rounding may change.
+        """
+        moves = len(self.line.moves)
+        return (
+            (2 * moves + 1) / self.unit
+            if self.rounded
+            else max(0.5 / (1 + sum(self._most_wraps)), 1.5 / PARTS) / self._whole
+        )
 
     def solve(self, time_limit_s: float, seed: int) -> Answer:
         """The best cycle that is found within the time limit [s], and what is proven of all."""
@@ -73,9 +109,9 @@ class CycleModel:
         solver.parameters.random_seed = seed
         status = solver.solve(self.model)
         if status == cp_model.INFEASIBLE:
-            return Answer(inf if self._longest >= self.line.longest_s * UNIT else self._longest / UNIT)
+            return Answer(inf if self._longest >= self.line.longest_s * self.unit else self._longest / self.unit)
         # Begins that are rounded down keep to all demands of a period that is rounded up, which is longer by less than a unit.
-        above_s = (solver.best_objective_bound - 1) / UNIT
+        above_s = (solver.best_objective_bound - 1) / self.unit
         if status not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
             return Answer(above_s)
         numbers = range(len(self.line.moves))
@@ -84,7 +120,7 @@ class CycleModel:
         return Answer(above_s, tuple(order), tuple(solver.value(wraps) for wraps in self._wraps))
 
     def _down(self, time_s: float) -> int:
-        return floor(time_s * UNIT)
+        return floor(time_s * self.unit + NEAR)
 
     def _away(self, one: int, then: int) -> int:
         moves = self.line.moves
@@ -132,8 +168,8 @@ class CycleModel:
             lasts = apart + times * self._period
             self.model.add(lasts >= self._down(span.least_s)).only_enforce_if(these)
             if span.most_s < inf:
-                most = ceil(span.most_s * UNIT) + times + 1  # the period is rounded up, the work down
-                self.model.add(lasts <= most).only_enforce_if(these)
+                slack = times + 1 if self.rounded else 0  # the period is rounded up, the work down
+                self.model.add(lasts <= ceil(span.most_s * self.unit - NEAR) + slack).only_enforce_if(these)
 
     def _is(self, wraps: cp_model.IntVar, times: int) -> cp_model.IntVar:
         these = self.model.new_bool_var("")

@@ -8,6 +8,7 @@ from lab.sequencing.cyclic.line import Line
 from lab.sequencing.simulate.run import SLACK_S
 
 TINY_S = 1e-9  # sums of times that differ by less are equal
+NEAR_S = 1e-3  # as much as slack may shorten a period that can be kept without
 
 
 class Arc(NamedTuple):
@@ -31,9 +32,10 @@ class Timed(NamedTuple):
     recurs: int = 1
 
 
-def arcs_of(line: Line, order: Sequence[int], wraps: Sequence[int]) -> Iterator[Arc]:
+def arcs_of(line: Line, order: Sequence[int], wraps: Sequence[int], slack_s: float = 0.0) -> Iterator[Arc]:
     """What a cyclic order demands. order: the line's moves, the first of the cycle first; wraps: by stay, how many
-    cycles begin between the move that brings a part and the one that takes it on, as seen from the first move's begin."""
+    cycles begin between the move that brings a part and the one that takes it on, as seen from the first move's begin.
+    slack_s: so much too late is not too late."""
     for one, then in zip(order, [*order[1:], order[0]], strict=True):
         last = one == order[-1]
         yield Arc(one, then, line.moves[one].work_s + line.after_s(one, then), int(last))
@@ -47,21 +49,32 @@ def arcs_of(line: Line, order: Sequence[int], wraps: Sequence[int]) -> Iterator[
         work_s, periods = line.moves[span.drop].work_s, passed[span.pick] - passed[span.drop]
         yield Arc(span.drop, span.pick, work_s + span.least_s, periods)
         if span.most_s < inf:
-            yield Arc(span.pick, span.drop, -work_s - span.most_s - SLACK_S, -periods)
+            yield Arc(span.pick, span.drop, -work_s - span.most_s - slack_s, -periods)
 
 
 def shortest_period(line: Line, order: Sequence[int], wraps: Sequence[int]) -> Timed | None:
     """The shortest period in which the order can be repeated; None: in none.
 
+    What can only just not be done in time is in time, as in the simulation (`SLACK_S`).
+    """
+    exact, slack = (_shortest(list(arcs_of(line, order, wraps, slack_s)), order[0]) for slack_s in (0.0, SLACK_S))
+    if exact is not None and slack is not None and exact.period_s - slack.period_s > NEAR_S:
+        return slack
+    return exact or slack
+
+
+def _shortest(arcs: Sequence[Arc], first: int) -> Timed | None:
+    """The shortest period in which these can be kept.
+
     From too short a period upwards, each time to the ratio of a cycle of demands that it breaks (Newton's method on
     the parametric longest path; Cochet-Terrasson et al. 1998 prove that it ends).
     """
-    arcs = list(arcs_of(line, order, wraps))
+    moves = 1 + max(arc.then for arc in arcs)
     if any(arc.least_s != arc.least_s for arc in arcs):
         return None  # an empty way that is never made
     period_s, recurs = 0.0, 1
     while True:
-        begin_s, broken = earliest(arcs, len(line.moves), order[0], period_s)
+        begin_s, broken = earliest(arcs, moves, first, period_s)
         if not broken:
             return Timed(period_s, tuple(begin_s), recurs)
         least_s, periods = sum(arc.least_s for arc in broken), sum(arc.periods for arc in broken)
