@@ -184,9 +184,8 @@ class CycleChart(Chart):
     def title(self) -> str:
         """What repeats, and in which period."""
         cycle = self.shown.cycle
-        products = [name.rpartition(" ")[0] for name in self.shown.names.values()]
         mix = [cycle.product(move) for move in {move.slot: move for move in cycle.line.moves}.values()]
-        counts = [f"{mix.count(name)} × {name}" for name in dict.fromkeys(products)]
+        counts = [f"{mix.count(name)} × {name}" for name in dict.fromkeys(mix)]
         what = f"{', '.join(counts)} in a period of {seconds(cycle.period_s)}"
         return f"{what}, {counted(self.shown.periods, 'period')} of what repeats for ever"
 

@@ -10,7 +10,7 @@ from typing import Any
 from lab.errors import BadInput, WorkFailed, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cyclic.line import CycleMove, Line, at_speed, away_s, lines
-from lab.sequencing.cyclic.model import CycleModel
+from lab.sequencing.cyclic.model import CycleModel, Units
 from lab.sequencing.cyclic.times import shortest_period
 
 TIME_LIMIT_S = 60.0
@@ -114,17 +114,21 @@ def best_cycle(cell: Cell, mix: Sequence[str], time_limit_s: float = TIME_LIMIT_
     best: Cycle | None = None
     above_s, resolution_s = inf, 0.0
     for _, least_s, _, line in ahead:
-        best_s = inf if best is None else best.period_s
-        left_s = time_limit_s - (time.perf_counter() - began)
-        if least_s >= best_s or left_s <= 0:
-            above_s = min(above_s, least_s)
-            continue
-        model = CycleModel(line, away, least_s, best_s)
-        answer = model.solve(left_s, seed)
-        above_s, resolution_s = min(above_s, max(least_s, answer.above_s)), max(resolution_s, model.resolution_s)
-        timed = shortest_period(line, answer.order, answer.wraps) if answer.order else None
-        if timed is not None and timed.period_s < best_s:
-            best = Cycle(line, timed.period_s, timed.begin_s, answer.order, answer.wraps, timed.recurs)
+        units = Units.of(line)
+        resolution_s = max(resolution_s, units.resolution_s)
+        # A quick look for a good cycle, a bound, and the rest of the way between the two.
+        steps = (units.coarse, False), (units.coarse, True), (units.fine, units.rounded)
+        for step, (unit, loose) in enumerate(steps):
+            best_s = inf if best is None else best.period_s
+            left_s = time_limit_s - (time.perf_counter() - began)
+            if least_s >= best_s - units.resolution_s or left_s <= 0:
+                break
+            answer = CycleModel(line, away, least_s, best_s, unit, loose).solve(left_s, seed)
+            least_s = max(least_s, answer.above_s) if step else least_s
+            timed = shortest_period(line, answer.order, answer.wraps) if answer.order else None
+            if timed is not None and timed.period_s < best_s:
+                best = Cycle(line, timed.period_s, timed.begin_s, answer.order, answer.wraps, timed.recurs)
+        above_s = min(above_s, least_s)
     if best is None:
         why = "it is proven that there is none" if above_s == inf else f"none was found in {time_limit_s:g} s"
         raise WorkFailed(f"no order of {counted(len(mix), 'part')} a cycle can be repeated for ever: {why}")

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from math import ceil, floor, gcd, inf, isfinite
 from typing import Any, NamedTuple
 
@@ -12,13 +11,11 @@ from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.cyclic.line import Line, Span
 
 TICKS = round(TICKS_PER_S)
-FINEST = (
-    10**7
-)  # units of the model a second, where times are rounded to them: as the simulation's slack, in some windows
-COARSEST = 1000  # as many parts of a second make times whole that need not be rounded
-PARTS = 840  # units in such a part: a period that is a fraction of it with a denominator up to 8 is whole, too
-
-
+COARSE = 1000  # units of the model a second, where times are no whole numbers of so many parts of one
+FINE = (
+    10**4,
+    840,
+)  # times as many: where they are not, and where they are: fractions with a denominator up to 8 are whole, too
 NEAR = 1e-3  # of a unit: what sums of times may differ by
 
 
@@ -33,18 +30,47 @@ class Answer(NamedTuple):
     wraps: tuple[int, ...] = ()
 
 
+class Units(NamedTuple):
+    """How many units a model of a line has a second: first few, in which a solver is quick, then many, for the last step.
+
+    rounded: whether times are rounded in them. resolution_s: a period that is longer than what is proven by less is the shortest:
+    where all times are whole it is a whole number divided by how many cycles a circle of demands goes through, and two such
+    numbers lie further apart; where they are not, it is what rounding changes.
+    """
+
+    coarse: int
+    fine: int
+    rounded: bool
+    resolution_s: float
+
+    @classmethod
+    def of(cls, line: Line) -> "Units":
+        """Those of a line."""
+        numbers = range(len(line.moves))
+        times = {move.work_s for move in line.moves} | {s for span in line.needs for s in (span.least_s, span.most_s)}
+        times |= {line.after_s(one, then) for one in numbers for then in numbers}
+        whole = TICKS // gcd(TICKS, *(round(time * TICKS) for time in times if isfinite(time)))
+        if whole > COARSE:
+            fine = COARSE * FINE[0]
+            return cls(COARSE, fine, True, (2 * len(numbers) + 1) / fine)
+        return cls(whole, whole * FINE[1], False, 1.5 / (whole * FINE[1]))
+
+
 @dataclass
 class CycleModel:
     """The variables and constraints of a line: each move's begin in [0, period), the first move's at 0.
 
-    least_s: no period is shorter. below_s: only shorter ones are looked for. Times are rounded so that what is proven of the
-    model holds of the line: what has to pass down, what may pass up; a cycle that is found may miss a window by less than the simulation's slack.
+    least_s: no period is shorter. below_s: only shorter ones are looked for. unit: how many of the model's a second has. loose:
+    times are rounded so that what is proven of the model holds of the line: what has to pass down, what may pass up, and a cycle
+    that is found may be too late for a window by some units.
     """
 
     line: Line
     away_s: Sequence[Sequence[float]]
     least_s: float
     below_s: float
+    unit: int
+    loose: bool
     model: cp_model.CpModel = field(default_factory=cp_model.CpModel)
 
     def __post_init__(self) -> None:
@@ -68,38 +94,6 @@ class CycleModel:
         self._add_tour()
         self._add_turns()
         self.model.minimize(self._period)
-
-    @cached_property
-    def _whole(self) -> int:
-        """In how many equal parts a second has to be divided for all times to be whole numbers of them."""
-        numbers, needs = range(len(self.line.moves)), self.line.needs
-        times = {move.work_s for move in self.line.moves} | {s for span in needs for s in (span.least_s, span.most_s)}
-        times |= {self.line.after_s(one, then) for one in numbers for then in numbers}
-        return TICKS // gcd(TICKS, *(round(time * TICKS) for time in times if isfinite(time)))
-
-    @property
-    def rounded(self) -> bool:
-        """Whether times are rounded in the model."""
-        return self._whole > COARSEST
-
-    @property
-    def unit(self) -> int:
-        """How many units of the model a second has: as few as will do, for the solver goes through them one by one at worst."""
-        return FINEST if self.rounded else self._whole * PARTS
-
-    @property
-    def resolution_s(self) -> float:
-        """A period that is longer than what is proven by no more than this is the shortest one.
-
-        Where all times are whole, a period is a whole number divided by how many cycles a circle of demands goes through; two
-        such numbers lie further apart. Where they are rounded, it is what rounding may change.
-        """
-        moves = len(self.line.moves)
-        return (
-            (2 * moves + 1) / self.unit
-            if self.rounded
-            else max(0.5 / (1 + sum(self._most_wraps)), 1.5 / PARTS) / self._whole
-        )
 
     def solve(self, time_limit_s: float, seed: int) -> Answer:
         """The best cycle that is found within the time limit [s], and what is proven of all."""
@@ -168,7 +162,7 @@ class CycleModel:
             lasts = apart + times * self._period
             self.model.add(lasts >= self._down(span.least_s)).only_enforce_if(these)
             if span.most_s < inf:
-                slack = times + 1 if self.rounded else 0  # the period is rounded up, the work down
+                slack = times + 1 if self.loose else 0  # the period is rounded up, the work down
                 self.model.add(lasts <= ceil(span.most_s * self.unit - NEAR) + slack).only_enforce_if(these)
 
     def _is(self, wraps: cp_model.IntVar, times: int) -> cp_model.IntVar:
