@@ -39,6 +39,9 @@ def run(
     order: Annotated[
         str | None, typer.Option("--order", help="The order of the moves by part numbers, such as 1,2,1,1,2,2.")
     ] = None,
+    cyclic: Annotated[
+        bool, typer.Option("--cyclic", help="Repeat the robot's shortest cycle, and measure its period.")
+    ] = False,
     seed: Seed = 0,
     toolbox: ToolboxPlace = None,
     resume: Annotated[
@@ -66,7 +69,11 @@ def run(
     from lab.teaching.lesson_options import DEFAULT_ADVISORS
     from lab.view.summary import delivered_in_words, run_summary
 
-    given = RunOptions(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order)
+    if cyclic and order is not None:
+        raise BadInput(f"--cyclic and --order {order}: an order is one or the other")
+    given = RunOptions(
+        task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order, cyclic
+    )
     if resume is None:
         options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
         loaded = load(options.task)
@@ -83,7 +90,7 @@ def run(
     try:
         with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
             teacher = teacher_of(toolbox, lessons, seat)
-            advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "")
+            advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "", cyclic=options.cyclic)
             teacher = replace(teacher, keep=advice.keep)
             share = options.override / 100
             conditions = Conditions(share, seat.page, controls, journal, fault_seed=options.faults, advice=advice)
