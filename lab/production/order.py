@@ -24,6 +24,7 @@ from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.cyclic.cycle import Cycle
 from lab.sequencing.methods.exact import Optimum, optimum
+from lab.sequencing.methods.fewer_moves import fewer_moves
 from lab.sequencing.search import SAME, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import Run, branch, follow
 from lab.tasks.sequencing import Sequencing, search_for
@@ -146,7 +147,7 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
         orders[EXACT] = SequenceResult(proven.sequence, proven.cost, (proven.cost,))
     used = next((name for name in (GIVEN, CYCLIC) if name in orders), None) or _cheapest(orders)
     costs = {name: order.cost for name, order in orders.items()}
-    tell(SequenceFound(orders[used], known))
+    tell(SequenceFound(orders[used], known, cell.parts))
     if len(orders) == 1:
         return Ordered(orders[used], proven, used, costs)
     tell(OrderChosen(used, costs, search.objective))
@@ -160,7 +161,7 @@ def reference(cell: Cell, objective: str) -> Reference:
         from lab.sequencing.methods.exact import optimum
 
         best = optimum(cell)
-        return Reference(best.bound_s, best.proven, "A*")
+        return Reference(best.bound_s, best.proven, "A*", sequence=fewer_moves(cell, best.sequence))
     from lab.sequencing.methods.cp_sat import cp_sat, fits
 
     unit = "" if objective == "tardy-parts" else " s"
@@ -169,7 +170,8 @@ def reference(cell: Cell, objective: str) -> Reference:
     if not fits(cell):
         return Reference(0.0, False, "nothing: too many moves for CP-SAT", unit)
     opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)
-    return Reference(opinion.bound, opinion.status == "optimal", "CP-SAT", unit)
+    sequence = fewer_moves(cell, opinion.sequence, objective) if opinion.sequence else ()
+    return Reference(opinion.bound, opinion.status == "optimal", "CP-SAT", unit, sequence)
 
 
 def _cheapest(orders: Mapping[str, SequenceResult]) -> str:

@@ -186,7 +186,7 @@ def _sessions(
             found += [] if heard.best is None else [heard.result()]
             break
         if journal is None or not journal.folding:
-            tell(SequenceFound(found[-1], shown))
+            tell(SequenceFound(found[-1], shown, cell.parts))
     document = _document(cell, method, search, found, known, wanted) | {"interrupted": interrupted}
     if wanted.stochastic and not interrupted:
         document["stochastic"] = stochastic(
@@ -225,6 +225,7 @@ def _document(
     costs = [result.cost if same_times else cost(follow(cell, result.sequence), search.objective) for result in found]
     best, least = found[costs.index(min(costs))], min(costs)
     optimal, mean = known.bound if known.proven else None, float(np.mean([result.cost for result in found]))
+    answer = _best_known(cell, method, search.objective, (least, best.sequence), known)
     return {
         "toasts": cell.parts,
         "order": list(cell.order),
@@ -251,10 +252,32 @@ def _document(
         **_success(found, known.bound if known.proven and same_times else None),
         "mean_best_s": mean if timed else None,
         "mean_best_cost": mean,
+        **answer,
+        "srl_s": least if timed and method.startswith("srl") else None,
+        "proven": known.proven and known.gap(answer["best_cost"]) == 0.0,
+        "robots": len(cell.robots),
         "advisor": str(wanted.advisor),
         "advice": _advice(found) if wanted.advisor.row != "none" else None,
         "stochastic": None,
         "files": {},
+    }
+
+
+def _best_known(
+    cell: Cell, method: str, objective: str, own: tuple[float, tuple[int, ...]], known: Reference
+) -> dict[str, Any]:
+    """The best order that anything found: the method's own, unless the one of what cannot be beaten costs less."""
+    value, sequence, by = *own, method
+    if known.sequence:
+        theirs = cost(follow(cell, known.sequence), objective)
+        if theirs < value - SAME or (theirs <= value + SAME and len(known.sequence) < len(sequence)):
+            value, sequence, by = theirs, known.sequence, known.method
+    return {
+        "best_s": simulate(cell, sequence).makespan_s,
+        "best_cost": value,
+        "best_by": by,
+        "best_sequence": list(sequence),
+        "best_moves": _in_words(cell, sequence),
     }
 
 
@@ -287,7 +310,7 @@ def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
 
 
 def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], files: dict[str, Path]) -> None:
-    """The pictures that are asked for by name: "plot", the costs of the episodes, "gantt", the best sequence."""
+    """The pictures that are asked for by name: "plot", the costs of the episodes, "gantt", the best order known."""
     from lab.view.gantt import gantt
     from lab.view.sequencing_plots import sequence_plot
 
@@ -297,5 +320,5 @@ def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], 
         stuck = stuck_cost(cell, document["objective"])
         sequence_plot(costs, document["optimal_cost"], files["plot"], ylabel=label, deadlock=stuck)
     if "gantt" in files:
-        gantt(simulate(cell, document["sequence"]), files["gantt"])
+        gantt(simulate(cell, document["best_sequence"]), files["gantt"], due_s=cell.due_s)
     document["files"] = {name: str(path) for name, path in files.items()}

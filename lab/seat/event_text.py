@@ -18,6 +18,7 @@ from lab.learning.session_events import Event as SessionEvent
 from lab.mdp import TabularMDP
 from lab.seat.request_text import percent, verdict
 from lab.sequencing.cell.objectives import MAKESPAN
+from lab.sequencing.cell.routes import part_of
 from lab.teaching.events import (
     Event,
     KeptBeside,
@@ -161,7 +162,7 @@ def saved_text(episodes: int, helped_steps: int) -> str:
 def sequence_parts(event: SequenceFound) -> tuple[str, str]:
     """An order of the parts, and what it costs beside what no order can beat."""
     best, known = event.result, event.reference
-    order = " ".join(map(str, best.sequence[:_SHOWN_MOVES]))
+    order = " ".join(str(part_of(decision, event.parts)) for decision in best.sequence[:_SHOWN_MOVES])
     more = f" and {len(best.sequence) - _SHOWN_MOVES} more" if len(best.sequence) > _SHOWN_MOVES else ""
     shown, reference = f"{best.cost:.1f} s", "its luckiest drawn episode"  # there is nothing to compare it with
     if known is not None:

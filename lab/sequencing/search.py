@@ -110,12 +110,16 @@ def gap(cost: float, bound: float) -> float:
 
 @dataclass(frozen=True)
 class Reference:
-    """What no sequence can beat: `bound`, in the objective's unit; `proven`: some sequence reaches it."""
+    """What no sequence can beat: `bound`, in the objective's unit; `proven`: some sequence reaches it.
+
+    sequence: the best one that the method found, without pointless hops; empty: none.
+    """
 
     bound: float
     proven: bool
     method: str
     unit: str = " s"
+    sequence: tuple[int, ...] = ()
 
     def gap(self, cost: float) -> float | None:
         """`gap` to the bound; None where the bound is 0 and the cost is not."""

@@ -10,6 +10,7 @@ from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Request
 from lab.learning.session import Session
 from lab.learning.settings import GateSettings
+from lab.sequencing.cell.cell import MAX_PARTS
 from lab.sequencing.cell.schedule import Move, Schedule
 from lab.sequencing.search import EpisodeSequenced, Reference, SequenceResult
 from lab.teaching.lesson_plan import Lesson, LessonPlan
@@ -126,10 +127,11 @@ class SequencingBegan:
 
 @dataclass(frozen=True)
 class SequenceFound:
-    """The best order of a sequencer's session, beside what no order can beat; None: costs were drawn."""
+    """The best order of a sequencer's session, beside what no order can beat; None: costs were drawn. parts: how many."""
 
     result: SequenceResult
     reference: Reference | None = None
+    parts: int = MAX_PARTS
 
 
 @dataclass(frozen=True)

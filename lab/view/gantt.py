@@ -26,15 +26,17 @@ BAND = "#F5F5F5"  # every other row's background
 FONT_SIZES = 7.5, 6.0  # of what stands on bars, in points: the larger where it fits
 
 
-def gantt(schedule: Schedule, path: Path, predicted: Schedule | None = None) -> None:
+def gantt(
+    schedule: Schedule, path: Path, predicted: Schedule | None = None, due_s: Sequence[float] | None = None
+) -> None:
     """Parts, machines and robot over time [s], the makespan marked; `predicted` as a thin strip under each row.
 
-    Until when parts are to be fetched from a machine is marked there. PNG or SVG by the path's suffix; in an SVG each bar
-    says what it is when pointed at. The page grows with the number of moves and rows; the colour tells products apart.
-    Raises BadInput for a schedule without activities and as all plots here do: for a path that is no picture or cannot be
-    written. Source: thesis fig. IV.1.
+    Until when parts are to be fetched from a machine is marked there, and on their own rows when they are due [s]. PNG or
+    SVG by the path's suffix; in an SVG each bar says what it is when pointed at. The page grows with the number of moves and
+    rows; the colour tells products apart. Raises BadInput for a schedule without activities and as all plots here do: for a
+    path that is no picture or cannot be written. Source: thesis fig. IV.1.
     """
-    draw, size_inch = _drawing(Chart(schedule), predicted)
+    draw, size_inch = _drawing(Chart(schedule), predicted, due_s=due_s)
     with picture_file(path, *size_inch) as figure:
         draw(figure)
 
@@ -55,7 +57,10 @@ def gantt_picture(schedule: Schedule) -> bytes:
 
 
 def _drawing(
-    chart: Chart, predicted: Schedule | None, ends: list[tuple[float, str, str]] | None = None
+    chart: Chart,
+    predicted: Schedule | None,
+    ends: list[tuple[float, str, str]] | None = None,
+    due_s: Sequence[float] | None = None,
 ) -> tuple[Callable[["Figure"], None], tuple[float, float]]:
     """What draws the chart on a figure, and the figure's width and height [inch].
 
@@ -78,9 +83,11 @@ def _drawing(
         for bar in (*bars, *strips):
             _draw_bar(axes, bar, chart)
         lines = [line for end in ends if (line := _draw_end(axes, *end)) and end[2]]
-        last_s = max(*(bar.activity.end_s for bar in (*bars, *strips)), *(end_s for end_s, _, _ in ends))
+        last_s = max(
+            *(bar.activity.end_s for bar in (*bars, *strips)), *(end_s for end_s, _, _ in ends), *(due_s or ())
+        )
         _dress(axes, chart, 1.01 * last_s, width_inch)
-        marks = [*_draw_arrivals(axes, chart), *_draw_limits(axes, chart)]
+        marks = [*_draw_arrivals(axes, chart), *_draw_limits(axes, chart), *_draw_due(axes, chart, due_s or ())]
         _legend(figure, chart, [*lines, *marks], {bar.look for bar in bars}, width_inch)
         figure.draw_without_rendering()  # settles the layout, so that widths in pixels are known
         _write(axes, bars, chart)
@@ -137,6 +144,20 @@ def _draw_limits(axes: "Axes", chart: Chart) -> list["Line2D"]:
     until = [(limit.until_s, rows.index(limit.station)) for limit in limits if limit.station in rows]
     look: dict[str, Any] = {"marker": "|", "color": RED, "linestyle": "none", "markersize": 14, "markeredgewidth": 2}
     return axes.plot(*zip(*until, strict=True), label="to be fetched until then", **look) if until else []
+
+
+def _draw_due(axes: "Axes", chart: Chart, due_s: Sequence[float]) -> list["Line2D"]:
+    """A mark on each part's row when it is due; another colour where it is finished later."""
+    drawn = []
+    for late, colour, label in ((False, INK, "due"), (True, RED, "due, and late")):
+        marks = [
+            (due_s[part - 1], chart.rows.index(name))
+            for part, name in chart.names.items()
+            if part <= len(due_s) and (chart.finished_s[name] > due_s[part - 1] + 1e-6) is late
+        ]
+        look: dict[str, Any] = {"marker": "v", "color": colour, "linestyle": "none", "markersize": 7, "clip_on": False}
+        drawn += axes.plot(*zip(*marks, strict=True), label=label, **look) if marks else []
+    return drawn
 
 
 def _write(axes: "Axes", bars: Sequence[Bar], chart: Chart) -> None:

@@ -81,6 +81,15 @@ class Chart:
         return {a.resource: a.start_s for a in reversed(self.schedule.parts) if a.kind == "carry"}
 
     @cached_property
+    def finished_s(self) -> dict[str, float]:
+        """When each part is finished [s], by the row's name."""
+        ends, found = _ends(self.schedule.parts), dict[str, float]()
+        for activity in self.schedule.parts:
+            if activity not in ends:
+                found[activity.resource] = max(activity.end_s, found.get(activity.resource, 0.0))
+        return found
+
+    @cached_property
     def products(self) -> dict[str, str]:
         """The colour of each product, by its name."""
         products = dict.fromkeys(self.product(part) for part in sorted(self.names)) or {"": None}

@@ -196,12 +196,23 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     """The end of `lab sequence`, from its JSON document."""
     what, unit = _measured(found["objective"])
     proven = "proven optimum" if found["optimum_proven"] else "proven bound"
-    gap = "" if found["gap"] is None else f", gap {gap_of(found['gap'], 2)}"
-    cost, bound = beside(found["cost"], found["bound_cost"], unit, 2)
+    best, bound = beside(found["best_cost"], found["bound_cost"], unit, 2)
+    alone = beside(found["cost"], found["bound_cost"], unit, 2)[0]
+    by = (
+        found["bound_by"]
+        if found["best_by"] == found["bound_by"]
+        else f"{found['best_by']}, bound by {found['bound_by']}"
+    )
+    gap = (
+        ""
+        if found["proven"] or found["bound_cost"] <= 0
+        else f", gap {gap_of(found['best_cost'] / found['bound_cost'] - 1, 2)}"
+    )
     lines = [
-        f"{found['method']}: {what}{cost} for {_ordered(found['order'])} (seed {found['seed']})",
-        f"order of the transfers: {_begun(found['sequence'], len(found['order']))}",
-        f"{proven} {bound}{gap} ({found['bound_by']})",
+        f"best order known: {what}{best} for {_ordered(found['order'])} (by {by}; seed {found['seed']})",
+        f"{proven} {bound}{gap}",
+        f"{found['method']} alone: {what}{alone}, in episode {found['found_at_episode']} of {found['episodes']}",
+        *_order_of_transfers(found),
     ]
     if found["luckiest_cost"] is not None:
         lines.append(f"by the mean times; in its luckiest drawn episode {found['luckiest_cost']:.2f}{unit}")
@@ -220,13 +231,18 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     return Group(*map(Text, [*lines, *found["files"].values()]))
 
 
-def _begun(sequence: Sequence[int], parts: int) -> str:
-    """A sequence, or its beginning when it is long; a second choice of a part is written as "3b"."""
+def _order_of_transfers(found: Mapping[str, Any]) -> list[str]:
+    """The best order, or its beginning when it is long: parts by number, in words where a part has several ways on."""
+    sequence, words = found["best_sequence"], found["best_moves"]
     more = len(sequence) - SHOWN_MOVES
-    begun = " ".join(f"{(n - 1) % parts + 1}{' bcdefgh'[(n - 1) // parts].strip()}" for n in sequence[:SHOWN_MOVES])
-    if any(n > parts for n in sequence[:SHOWN_MOVES]):
-        begun += "  (b: by its second way)"
-    return begun if more <= 0 else f"{begun} and {more} more (--json has all)"
+    rest = f" and {more} more (--json has all)" if more > 0 else ""
+    if all(decision <= len(found["order"]) for decision in sequence):
+        return [f"order of the transfers: {' '.join(map(str, sequence[:SHOWN_MOVES]))}{rest}"]
+    return [
+        "order of the transfers:",
+        *(f"  {word}" for word in words[:SHOWN_MOVES]),
+        *([rest.strip()] if rest else []),
+    ]
 
 
 def _measured(objective: str) -> tuple[str, str]:
