@@ -1,4 +1,4 @@
-"""Room at the stations of a constraint model: each place has one part after the other, and a buffer may wait for a full station."""
+"""Room at the stations of a constraint model: each place has one part after the other; buffers are for full stations."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -19,7 +19,7 @@ class Visit(NamedTuple):
 
 
 def add_chains(model: cp_model.CpModel, nodes: Nodes, most: int, chains: int) -> None:
-    """Nodes 1 to `most` stand in chains from node 0 to node 0, so many at the most; a node with an arc to itself may be left out."""
+    """Nodes 1 to `most` stand in chains from 0 to 0, so many at the most; a node with an arc to itself may be left out."""
     if not most:
         return
     sure = model.new_constant(1)

@@ -235,7 +235,9 @@ class Tasks:
         picked = self.moment("picked")
         for task in self.of(before[-1]):
             if task.place == cell.starts[before[-1]]:
-                self.model.add(picked == (task.begin if task.option.robot == SERVER else task.left)).only_enforce_if(task.done)
+                self.model.add(picked == (task.begin if task.option.robot == SERVER else task.left)).only_enforce_if(
+                    task.done
+                )
         return picked + intervals[-1]
 
 

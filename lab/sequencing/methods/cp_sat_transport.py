@@ -7,6 +7,7 @@ the cells that it knows.
 from collections.abc import Sequence
 from graphlib import TopologicalSorter
 from heapq import heappop, heappush
+from itertools import pairwise
 
 from ortools.sat.python import cp_model
 
@@ -61,7 +62,7 @@ class TransportModel:
         for team, tasks, arcs in self._tours:
             for index, tour in enumerate(_routes(solver, arcs)):
                 robot |= {tasks[node - 1]: team.robots[index] for node in tour}
-        order = TopologicalSorter[Task]({task: () for task in number})
+        order = TopologicalSorter[Task](dict.fromkeys(number, ()))
         for before, task, when in self.tasks.follows:
             if all(solver.boolean_value(literal) for literal in when):
                 order.add(task, before)
@@ -97,7 +98,7 @@ class TransportModel:
         least, robots, start = self.tasks.least, len(team.robots), self.cell.robots[team.robots[0]].start
         at, alone = self.cell.index(start), len(self.cell.robots) == 1
         arcs, spent = Arcs(), [least.takes(task.option) * task.done for task in tasks]
-        travels = list(spent)
+        travels, rests = list(spent), list[cp_model.LinearExpr]()
         for number, task in enumerate(tasks, 1):
             place, option = task.place, task.option
             before = least.by_servers(self.cell.begin_at[task.part])
@@ -110,23 +111,24 @@ class TransportModel:
             reached = least.by_servers(option.to)
             if not alone or any(not self.cell.positions[to].options for to in reached):
                 arc = arcs[number, 0] = self.model.new_bool_var("last")
-                spent.append(least.tail[option.to] * arc)
+                rests.append(least.tail[option.to] * arc)
             for other, then in enumerate(tasks, 1):
-                gap = self._gap(task, then, alone) if other != number else None
-                if gap is not None:
+                between = self._gap(task, then, alone) if other != number else None
+                if between is not None:
                     travel = self.times.travel(option.target, then.option.origin, team.robots[0])
                     arc = self._arc(arcs, number, other, task, then, travel)
-                    spent.append(max(gap, travel) * arc)
+                    spent.append(max(between, travel) * arc)
                     travels.append(travel * arc)
         self._chain(tasks, arcs, robots)
         self._tours.append((team, tasks, arcs))
-        self.model.add(robots * self._end >= sum(spent))
+        self.model.add(robots * self._end >= sum(spent) + sum(rests))
         if len(tasks) > robots:
             spans = [self._span(task) for task in tasks]
             self.model.add_cumulative(spans, [1] * len(spans), robots)
         if objective == "robot-idle":
-            self._idle += self._last(tasks, arcs)
-            self._idle.append(-sum(travels))
+            ends = self._last(tasks, arcs)
+            self.model.add(sum(ends) >= sum(spent))
+            self._idle += [*ends, -sum(travels)]
 
     def _gap(self, task: Task, then: Task, alone: bool) -> int | None:
         """What passes at least between two tasks of a robot because of the part itself; None: they cannot follow each other."""
@@ -134,7 +136,7 @@ class TransportModel:
             return 0
         least, to = self.tasks.least, task.option.to
         gap = least.between(to, then.place)
-        if gap is None or alone and then.place not in least.by_servers(to):
+        if gap is None or (alone and then.place not in least.by_servers(to)):
             return None
         return gap + (least.stay[then.place] if then.option.waits else 0)
 
@@ -195,9 +197,12 @@ class TransportModel:
     def _add_order(self, objective: str) -> None:
         """Parts that arrive are taken in their order; of parts that are alike in all, the first in number goes first."""
         cell = self.cell
-        first = {part - 1: [t for t in self.tasks.of(part - 1) if t.place == cell.begin_at[part - 1]] for part in cell.unfinished}
+        first = {
+            part - 1: [t for t in self.tasks.of(part - 1) if t.place == cell.begin_at[part - 1]]
+            for part in cell.unfinished
+        }
         coming = [part - 1 for part in cell.coming] if cell.arrivals is not None else []
-        for part, then in zip(coming[:-1], coming[1:], strict=True):
+        for part, then in pairwise(coming):
             for before in first[part]:
                 for task in first[then]:
                     self.tasks.after(task, before, before.done, task.done)

@@ -20,7 +20,7 @@ from lab.sequencing.methods.cp_sat_times import Times
 from lab.sequencing.simulate.run import Run, simulate
 
 if TYPE_CHECKING:
-    from lab.sequencing.methods.one_robot_kernels import Layer, Work
+    from lab.sequencing.methods.one_robot_kernels import Work
 
 TIME_LIMIT_S = 60.0
 FIRST_WIDTH = 1000  # states kept of a layer, the most promising; ten times as many whenever that was no proof
@@ -61,15 +61,17 @@ def why_not(cell: Cell) -> str:
     found = next((reason for reason, holds in reasons.items() if holds), "")
     if found or _sizes(cell) <= MOST_RESTS:
         return found
-    return f"too many states: the order has {_sizes(cell)} combinations of how far each part is, allowed are {MOST_RESTS}"
+    return (
+        f"too many states: the order has {_sizes(cell)} combinations of how far each part is, allowed are {MOST_RESTS}"
+    )
 
 
 def one_robot(cell: Cell, time_limit_s: float = TIME_LIMIT_S) -> OneRobot:
     """The shortest makespan, proven, unless the time limit [s] or memory ends it: then the best found and the bound.
 
     The first pass, of a second, is always made; the first use of all compiles, which takes half a minute.
-    Raises BadInput for a cell that it does not know (`why_not`). Source: dynamic programming of job shops with bounding, Gromicho et
-    al. 2012, as a beam search that is widened until what it left out cannot be better; bounds by `one_robot_kernels`.
+    Raises BadInput for a cell that it does not know (`why_not`). Source: dynamic programming of job shops with bounding, Gromicho
+    et al. 2012, as a beam search that is widened until what it left out cannot be better; bounds by `one_robot_kernels`.
     """
     reason = why_not(cell)
     if reason:
@@ -157,12 +159,15 @@ class _Search:
             found.append(entry(part + 1, 0, parts))
             run.move(found[-1])
 
+        def when(part: int) -> tuple[int, int]:
+            end = ends[part, at[part]]
+            return end, end - int(work.process[part, at[part]])
+
         def serve(part: int) -> None:
             """The machine of a part does all that it has to do before, and the part."""
-            machine = int(work.at[part, at[part]])
-            mine = ends[part, at[part]]
-            own = [j for j in range(parts) if at[j] and work.at[j, at[j]] == machine and ends[j, at[j]] <= mine]
-            for j in sorted(own, key=lambda j: (ends[j, at[j]], j == part)):
+            machine, own_s = work.at[part, at[part]], when(part)
+            own = [j for j in range(parts) if at[j] and work.at[j, at[j]] == machine and when(j) <= own_s]
+            for j in sorted(own, key=when):
                 if _is_served(self._cell, run.locations[j]) and (j, at[j]) not in served:
                     served.add((j, at[j]))
                     decide(j)

@@ -1,8 +1,8 @@
 """The states of a cell of one robot and machines with queues, compiled with numba: what follows them, and which are needless.
 
-A state: how far each part is (`code`, a mixed radix of `weight`), which part the robot dropped last, and when, and when each part is
-ready (its machine done with it). A part that is dropped is put at once into the order of its machine's queue, before any that are
-not done yet; those behind it are put off. Parts, operations and stations are numbered from 0, times whole.
+A state: how far each part is (`code`, a mixed radix of `weight`), which part the robot dropped last, and when, and when each
+part is ready (its machine done with it). A part that is dropped is put at once into the order of its machine's queue, before any
+that are not done yet; those behind it are put off. Parts, operations and stations are numbered from 0, times whole.
 """
 
 from typing import NamedTuple
@@ -18,9 +18,9 @@ Whole = NDArray[np.int64]
 class Work(NamedTuple):
     """What is to be done: counts (part) of moves; at (part, n), where a part is after n moves; process and carry beside it.
 
-    carry: the move that leaves it, service included. empty, least (station, station): the empty way, and the shortest way at all.
-    queues (station): whether one part after the other is worked on there. ready (part): when a part may be taken first. tail: from
-    when a part is ready until it is finished. weight (part): of its moves in a state's code.
+    carry: the move that leaves it, service included. empty, least (station, station): the empty way, and the shortest way at
+    all. queues (station): whether one part after the other is worked on there. ready (part): when a part may be taken first.
+    tail: from when a part is ready until it is finished. weight (part): of its moves in a state's code.
     """
 
     counts: Whole
@@ -72,8 +72,8 @@ def machine_bound(work: Work, c: Whole, ready: Whole, now: int, here: int) -> in
 def least_rest(work: Work) -> Whole:
     """(code, part): from when the robot dropped that part until the end at least, if nothing else were being worked on.
 
-    The best tour through all moves that are left, by dynamic programming (Held and Karp 1962, with the order of each part's moves);
-    a part that is fetched right after it was dropped is waited for; parts and machines need their time.
+    The best tour through all moves that are left, by dynamic programming (Held and Karp 1962, here with an order of each part's
+    moves); a part that is fetched right after it was dropped is waited for; parts and machines need their time.
     """
     counts, at, carry = work.counts, work.at, work.carry
     parts, size = len(counts), 1
@@ -141,11 +141,11 @@ def bound(work: Work, rest: Whole, code: int, last: int, now: int, c: Whole, rea
             least = min(least, pick + work.carry[i, c[i]] + rest[code + work.weight[i], i])
     if not all_done:
         most = max(most, least)
-    return max(most, machine_bound(work, c, ready, now, here))
+    return int(max(most, machine_bound(work, c, ready, now, here)))
 
 
 class Layer(NamedTuple):
-    """States with as many moves made: code, last and now (n,), ready (n, parts), bound (n,), and what made them of the layer before.
+    """States with as many moves made: code, last, now and bound (n,), ready (n, parts), and what made them of the layer before.
 
     made (n, 3): the state's number there, the part, and its place in the queue.
     """
@@ -217,7 +217,9 @@ def needed(work: Work, layer: Layer, order: Whole) -> NDArray[np.bool_]:
     keep, c = np.ones(n, np.bool_), np.empty(parts, np.int64)
     while low < n:
         first, high = order[low], low
-        while high < n and layer.code[order[high]] == layer.code[first] and layer.last[order[high]] == layer.last[first]:
+        while (
+            high < n and layer.code[order[high]] == layer.code[first] and layer.last[order[high]] == layer.last[first]
+        ):
             high += 1
         for j in range(parts):
             c[j] = layer.code[first] // work.weight[j] % (work.counts[j] + 1)
@@ -242,7 +244,7 @@ def _as_good(work: Work, layer: Layer, c: Whole, x: int, y: int) -> bool:
         if c[j] == 0 or not work.queues[work.at[j, c[j]]] or one[j] <= now:
             continue
         for i in range(j):
-            if c[i] > 0 and work.at[i, c[i]] == work.at[j, c[j]] and one[i] > now:
-                if (one[i] < one[j]) != (other[i] < other[j]):
-                    return False
+            both = c[i] > 0 and work.at[i, c[i]] == work.at[j, c[j]] and one[i] > now
+            if both and (one[i] < one[j]) != (other[i] < other[j]):
+                return False
     return True
