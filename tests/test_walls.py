@@ -38,7 +38,7 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     },
     "PIL": set(),
     "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
-    "ortools": {"lab.sequencing.methods.cp_sat", "lab.sequencing.methods.cp_sat_model"},
+    "ortools": {f"lab.sequencing.methods.cp_sat{part}" for part in ("", "_model", "_tasks", "_rooms", "_transport")},
     "pymoo": {"lab.sequencing.methods.genetic"},
     "starlette": {"lab.view.server", "lab.view.server_page"},
     "uvicorn": {"lab.view.server"},

@@ -8,8 +8,9 @@ that are not done yet; those behind it are put off. Parts, operations and statio
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from lab.learning.compiled import compiled
 
 FAR = 1 << 40
 Whole = NDArray[np.int64]
@@ -35,7 +36,7 @@ class Work(NamedTuple):
     weight: Whole
 
 
-@njit(cache=True)
+@compiled
 def machine_bound(work: Work, c: Whole, ready: Whole, now: int, here: int) -> int:
     """No end is before this, for what each machine still has to do: heads, work, the least tail (Carlier 1982)."""
     counts, at, process, carry = work.counts, work.at, work.process, work.carry
@@ -68,7 +69,7 @@ def machine_bound(work: Work, c: Whole, ready: Whole, now: int, here: int) -> in
     return worst
 
 
-@njit(cache=True)
+@compiled
 def least_rest(work: Work) -> Whole:
     """(code, part): from when the robot dropped that part until the end at least, if nothing else were being worked on.
 
@@ -101,7 +102,7 @@ def least_rest(work: Work) -> Whole:
     return rest
 
 
-@njit(cache=True)
+@compiled
 def queue_at(work: Work, c: Whole, ready: Whole, part: int, now: int) -> Whole:
     """The parts that a machine is not done with at a time, in their order: where a part goes with its next move."""
     queue, n = np.empty(len(c), np.int64), 0
@@ -118,7 +119,7 @@ def queue_at(work: Work, c: Whole, ready: Whole, part: int, now: int) -> Whole:
     return queue[:n]
 
 
-@njit(cache=True)
+@compiled
 def put(work: Work, c: Whole, ready: Whole, part: int, now: int, queue: Whole, place: int) -> None:
     """`part`, dropped now at its position c, is worked on after so many of the queue: `ready` becomes so."""
     end = now if place == 0 else ready[queue[place - 1]]
@@ -129,7 +130,7 @@ def put(work: Work, c: Whole, ready: Whole, part: int, now: int, queue: Whole, p
         ready[i] = end
 
 
-@njit(cache=True)
+@compiled
 def bound(work: Work, rest: Whole, code: int, last: int, now: int, c: Whole, ready: Whole) -> int:
     """No end of this state is before."""
     here, least, all_done, most = work.at[last, c[last]], FAR, True, now + rest[code, last]
@@ -158,7 +159,7 @@ class Layer(NamedTuple):
     made: Whole
 
 
-@njit(cache=True)
+@compiled
 def expand(work: Work, rest: Whole, layer: Layer, start: int, below: int) -> Layer:
     """All states after these whose bound is below a value; `start`: where the robot stands in the first state."""
     parts, n, cap = len(work.counts), 0, max(64, 2 * len(layer.code))
@@ -200,14 +201,14 @@ def expand(work: Work, rest: Whole, layer: Layer, start: int, below: int) -> Lay
     )
 
 
-@njit(cache=True)
+@compiled
 def _longer(array: Whole, rows: int) -> Whole:
     longer = np.empty((rows, array.shape[1]), np.int64)
     longer[: len(array)] = array
     return longer
 
 
-@njit(cache=True)
+@compiled
 def needed(work: Work, layer: Layer, order: Whole) -> NDArray[np.bool_]:
     """Which states, in an order with equal codes and last parts together, none before is at least as good as.
 
@@ -232,7 +233,7 @@ def needed(work: Work, layer: Layer, order: Whole) -> NDArray[np.bool_]:
     return keep
 
 
-@njit(cache=True)
+@compiled
 def _as_good(work: Work, layer: Layer, c: Whole, x: int, y: int) -> bool:
     one, other, now = layer.ready[x], layer.ready[y], layer.now[y]
     if layer.now[x] > now:
