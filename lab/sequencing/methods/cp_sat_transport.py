@@ -26,17 +26,18 @@ Arcs = dict[tuple[int, int], cp_model.LiteralT]
 class TransportModel:
     """The variables and constraints. worth: what a unit of the model's objective is in the cell's.
 
-    blur: by how many units rounding may change a sequence's cost; 0 when no time is rounded. Where a station has room for several
-    parts, or several servers, the model lets any of them be taken; a `Run` takes the first: what is proven is a bound.
+    below: only makespans shorter than the hint's are looked for. blur: by how many units rounding may change a sequence's cost;
+    0 when no time is rounded. Where a station has room for several parts, or several servers, the model lets any of them be
+    taken; a `Run` takes the first: what is proven is a bound.
     """
 
-    def __init__(self, cell: Cell, objective: str, hint: Sequence[int]) -> None:
+    def __init__(self, cell: Cell, objective: str, hint: Sequence[int], below: bool = False) -> None:
         self.cell, self.model, self.times = cell, cp_model.CpModel(), Times(cell, shortest=0)
         known = _known(cell, self.times, hint) if hint else {}
         rounding = 2 * cell.possible_moves if self.times.rounded_s else 0
         horizon = self.times.whole(cell.longest_s) + cell.possible_moves
         if objective == MAKESPAN and known:
-            horizon = max(drop for _, drop in known.values()) + rounding
+            horizon = max(drop for _, drop in known.values()) + (-1 if below else rounding)
         self.tasks = Tasks(cell, self.model, self.times, horizon)
         self._end = self.tasks.moment("makespan")
         self._tours: list[tuple[Team, list[Task], Arcs]] = []
