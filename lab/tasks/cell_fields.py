@@ -1,9 +1,9 @@
 """What cell files are made of: robot, stations, products, arrivals, chance, and how a sequence is looked for."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, WrapValidator
 
 from lab.errors import unknown
 from lab.sequencing.cell.chance import LAWS, Chance
@@ -33,6 +33,11 @@ def _as_stage(value: object) -> object:
     return {"station": value} if isinstance(value, str) else value
 
 
+def _unlimited(value: object, checked: Callable[[object], int]) -> int:
+    """A capacity, or the word for one that is never reached."""
+    return UNLIMITED if value == "unlimited" else checked(value)
+
+
 class CellRobot(Record):
     """A transfer robot, or a vehicle: the station where it stands at time 0.
 
@@ -60,7 +65,7 @@ class CellStation(Record):
 
     name: Name
     kind: Annotated[Literal["storage", "buffer", "machine"], _known("kind", STATION_KINDS, "station")]
-    capacity: Room | Literal["unlimited"]
+    capacity: Annotated[Room, WrapValidator(_unlimited)]
     processing_s: Seconds | None = None
     at_most_s: Seconds | None = None
     servers: Room | None = None
@@ -68,9 +73,10 @@ class CellStation(Record):
 
     def built(self) -> Station:
         """As the sequencer has it."""
-        room = UNLIMITED if self.capacity == "unlimited" else self.capacity
         setups = tuple((a, b, seconds) for a, row in self.setup_s.items() for b, seconds in row.items())
-        return Station(self.name, self.kind, room, self.processing_s or 0.0, self.at_most_s, self.servers, setups)
+        return Station(
+            self.name, self.kind, self.capacity, self.processing_s or 0.0, self.at_most_s, self.servers, setups
+        )
 
 
 class CellStage(Record):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.stations import Product, Stage, Station
+from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.tasks.task import Order
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
@@ -83,7 +83,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Order, int]]:
         step = np.ones((3, 3)) - np.eye(3)
         route = (Stage("in"), Stage("hot"), Stage("out"))
         made = tuple(Product(kind, (route,)) for kind in dict.fromkeys(order))
-        return SimpleNamespace(cell=Cell(stations, made, order, step, 2 * step, "in"))
+        return SimpleNamespace(cell=Cell(stations, made, order, step, 2 * step, one_robot("in")))
 
     monkeypatch.setattr("lab.skills.prepared_scene.prepare", prepare)
     monkeypatch.setattr("lab.production.run.teach_all", cell)

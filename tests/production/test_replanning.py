@@ -5,7 +5,7 @@ import pytest
 
 from lab.production.replanning import in_another, plan_again
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.stations import Product, Stage, Station
+from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.sequencing.simulate.rest import Mishaps
 from lab.sequencing.simulate.run import Run
 
@@ -15,7 +15,7 @@ def oven(seconds: float = 10.0) -> Cell:
     stations = (Station("in", "storage", 9), Station("hot", "machine", 1, seconds), Station("out", "storage", 9))
     step = np.ones((3, 3)) - np.eye(3)
     route = (Stage("in"), Stage("hot"), Stage("out"))
-    return Cell(stations, (Product("toast", (route,)),), ("toast", "toast"), step, 2 * step, "in")
+    return Cell(stations, (Product("toast", (route,)),), ("toast", "toast"), step, 2 * step, one_robot("in"))
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from lab.sequencing.cell.cell import Cell, needed_moves
-from lab.sequencing.cell.stations import Arrivals, Product, Route, Stage, Station, one_robot
+from lab.sequencing.cell.stations import UNLIMITED, Arrivals, Product, Robot, Route, Stage, Station, one_robot
 from lab.sequencing.simulate.run import Run, branch
 
 X = math.nan
@@ -211,6 +211,39 @@ def _random_route(
         stations.append(Station(f"stage {label}", kind, room, time_s if kind == "machine" else 0.0))  # type: ignore[arg-type]
         route.append(Stage(f"stage {label}", buffer))
     return (*route, Stage(draw(st.sampled_from(["out", "in"])) if many else "out"))
+
+
+@st.composite
+def random_shops(draw: st.DrawFn, max_parts: int = 3) -> Cell:
+    """A small cell with robots, several or none, machines with queues, and changeovers; some rooms are limited."""
+    seconds = st.integers(0, 12).map(float)
+    machines = [f"m{n}" for n in range(draw(st.integers(1, 3)))]
+    robots = [f"robot {n}" for n in range(draw(st.integers(0, 3)))]
+    names = [f"job {n}" for n in range(draw(st.integers(1, max_parts)))]
+    stations = [Station("in", "storage", UNLIMITED), Station("out", "storage", UNLIMITED)]
+    for name in machines:
+        room = draw(st.sampled_from([UNLIMITED, UNLIMITED, 1, 2])) if robots else UNLIMITED
+        served = not robots or draw(st.booleans())
+        servers = draw(st.integers(1, min(room, 2))) if served else None
+        setups = tuple((a, b, draw(seconds)) for a in names for b in names) if served and draw(st.booleans()) else ()
+        stations.append(Station(name, "machine", room, 0.0, None, servers, setups))
+    with_servers = [one.name for one in stations if one.servers is not None]
+    products = []
+    for name in names:
+        visited = draw(st.permutations(machines))[: draw(st.integers(1, len(machines)))]
+        stages = [Stage(machine, processing_s=draw(seconds)) for machine in visited]
+        last = [Stage("out")] if visited[-1] not in with_servers or (robots and draw(st.booleans())) else []
+        products.append(Product(name, ((Stage("in"), *stages, *last),)))
+    size = len(stations)
+    table = np.array([[draw(seconds) if a != b else 0.0 for b in range(size)] for a in range(size)])
+    own = tuple(Robot(name, draw(st.sampled_from(stations)).name, draw(st.sampled_from([1.0, 2.0]))) for name in robots)
+    order = tuple(draw(st.sampled_from(names)) for _ in range(draw(st.integers(1, max_parts))))
+    return Cell(tuple(stations), tuple(products), order, table, 2.0 * table, own)
+
+
+@pytest.fixture(scope="session")
+def shops() -> Callable[..., SearchStrategy[Cell]]:
+    return random_shops
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Activity, Schedule
-from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
+from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
 from lab.sequencing.simulate.run import Run, simulate
 from lab.view.canvas import BLUE, GREEN, ORANGE, RED, SKY
 from lab.view.gantt import _draw_limits, gantt
@@ -57,7 +57,7 @@ def milled() -> Schedule:
 
     products = (product("sign", "mill", 4.0), product("rook", "lathe", 0.0))
     table = np.ones((8, 8)) - np.eye(8)
-    cell = Cell(stations, products, ("sign", "rook"), table, 2 * table, "in", Arrivals((3.0, 3.0), "pick"))
+    cell = Cell(stations, products, ("sign", "rook"), table, 2 * table, one_robot("in"), Arrivals((3.0, 3.0), "pick"))
     return simulate(cell, [1, 1, 1, 2, 2, 2, 1, 1, 2, 2])
 
 

@@ -123,9 +123,10 @@ class Run:
             self._fetch(pick_s)
         if not cell.serial:
             drop_s = max(drop_s, self._room_s(option.needs))
+            self.waited_s += drop_s - carried_s
         self._leave(part, option, pick_s)
         self.robots_at[robot], self.robots_s[robot] = option.target, drop_s
-        self.waited_s += ready_s - reach_s + drop_s - carried_s
+        self.waited_s += ready_s - reach_s
         process_s = 0.0
         if there.processing_s is not None:
             process_s = self.times.processing_s(part, option.to)

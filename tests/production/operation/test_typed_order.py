@@ -6,7 +6,7 @@ import pytest
 from lab.errors import BadInput
 from lab.production.operation.typed_order import checked
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.stations import Product, Stage, Station
+from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.sequencing.simulate.run import Run
 
 
@@ -16,7 +16,7 @@ def state() -> Run:
     stations = (Station("in", "storage", 9), Station("hot", "machine", 1, 10.0), Station("out", "storage", 9))
     step = np.ones((3, 3)) - np.eye(3)
     route = (Stage("in"), Stage("hot"), Stage("out"))
-    return Run(Cell(stations, (Product("toast", (route,)),), ("toast", "toast"), step, 2 * step, "in"))
+    return Run(Cell(stations, (Product("toast", (route,)),), ("toast", "toast"), step, 2 * step, one_robot("in")))
 
 
 def test_an_order_that_may_be_taken_is_held_against_the_optimum(state: Run) -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, WITH_DUE_TIMES, check_objective, cost, machine_places, stuck_cost
-from lab.sequencing.cell.stations import Product, Stage, Station
+from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
 from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
@@ -75,7 +75,7 @@ def test_the_way_into_a_deadlock_costs_more_than_any_that_ends() -> None:
     ways = [tuple(Stage(name) for name in way) for way in (names, ("in", "n", "m", "out"))]
     products = tuple(Product(name, (way,)) for name, way in zip("ab", ways, strict=True))
     table = 1.0 - np.eye(4)
-    cell = Cell(tuple(stations), products, ("a", "b"), table, table, "in", due_s=(1.0, 1.0))
+    cell = Cell(tuple(stations), products, ("a", "b"), table, table, one_robot("in"), due_s=(1.0, 1.0))
     stuck, done = ran(cell, 1, 2), ran(cell, 1, 1, 1, 2, 2, 2)
     assert not stuck.allowed()
     for objective in OBJECTIVES:

@@ -22,7 +22,7 @@ def cell() -> Cell:
     empty, loaded = np.full((3, 3), 1.0), np.full((3, 3), 2.0)
     for table in (empty, loaded):
         np.fill_diagonal(table, 0.0)
-    return Cell(STATIONS, (Product("toast", (route,)),), ("toast",), empty, loaded, "in")
+    return Cell(STATIONS, (Product("toast", (route,)),), ("toast",), empty, loaded, one_robot("in"))
 
 
 def test_the_rows_of_one_toast_by_hand(cell: Cell) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
+from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
 from lab.sequencing.methods.fifo import fifo, first_in_first_out
 from lab.sequencing.search import Search
 from lab.sequencing.simulate.execution import carry_out
@@ -26,7 +26,7 @@ def far_oven(interval_s: float) -> Cell:
     table = 1.0 - np.eye(3)
     route = (Stage("in"), Stage("oven"), Stage("out"))
     arrivals = Arrivals((interval_s, interval_s))
-    return Cell(stations, (Product("a", (route,)),), ("a", "a"), 3 * table, 2 * table, "oven", arrivals)
+    return Cell(stations, (Product("a", (route,)),), ("a", "a"), 3 * table, 2 * table, one_robot("oven"), arrivals)
 
 
 def test_fifo_takes_what_has_been_ready_longest(oven_cell: CellMaker, toast_cell: CellMaker) -> None:

@@ -26,7 +26,7 @@ def far_oven(interval_s: float) -> Cell:
     table = 1.0 - np.eye(3)
     route = (Stage("in"), Stage("oven"), Stage("out"))
     arrivals = Arrivals((interval_s, interval_s))
-    return Cell(stations, (Product("a", (route,)),), ("a", "a"), 3 * table, 2 * table, "oven", arrivals)
+    return Cell(stations, (Product("a", (route,)),), ("a", "a"), 3 * table, 2 * table, one_robot("oven"), arrivals)
 
 
 def test_it_keeps_the_best(toast_cell: CellMaker) -> None:

@@ -55,7 +55,7 @@ def test_keys_by_stations_know_which_machine_has_finished(fms_cell: CellMaker) -
     before = key_of(run, 1, both[1])[0]  # the pallet on: still turning
     finished = len(before) - len(timed_positions(run.cell))
     assert sum(before[finished:]) == 0
-    run.now_s += 185.0
+    run.wait(run.now_s + 185.0)
     assert sum(key_of(run, 1, both[1])[0][finished:]) == 1
     assert sum(key_of(run, 1, both[0])[0][finished:]) == 1
 

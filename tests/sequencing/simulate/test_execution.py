@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lab.errors import BadInput, WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
-from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station
+from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
 from lab.sequencing.methods.rollout import by_rule, rollout
 from lab.sequencing.methods.rules import RULES
 from lab.sequencing.simulate.execution import WAIT, Execution, Observed, carry_out, replicate
@@ -47,7 +47,7 @@ def two_ovens(arrivals: Arrivals | None = None, parts: int = 2) -> Cell:
     products = tuple(Product(name, ((Stage("in"), Stage(name), Stage("out")),)) for name in ("one", "two"))
     table = 1.0 - np.eye(4)
     order = ("one", "two", "one")[:parts]
-    return Cell(stations, products, order, table, 2.0 * table, "in", arrivals)
+    return Cell(stations, products, order, table, 2.0 * table, one_robot("in"), arrivals)
 
 
 def after(cell: Cell, times: Episode, *decisions: int) -> Execution:

@@ -73,10 +73,21 @@ def test_it_is_the_readable_run(cells: Callable[..., SearchStrategy[Cell]], data
         assert kernels.cost(judged, there) == pytest.approx(objectives.cost(run, name)), name
 
 
+@settings(max_examples=80, deadline=None)
+@given(data=st.data())
+def test_robots_and_servers_too(shops: Callable[..., SearchStrategy[Cell]], data: DataObject) -> None:
+    cell = with_due_times(data.draw(shops()), data.draw(st.floats(0, 100)))
+    chance = Chance(data.draw(st.sampled_from(sorted(LAWS))), "constant", data.draw(st.floats(0, 1)))
+    choices = data.draw(st.randoms(use_true_random=False))
+    run, _, there = walk_both(cell, chance, data.draw(SEEDS), choices.randrange)
+    for name in objectives.OBJECTIVES:
+        assert kernels.cost(cell_arrays(cell, name), there) == pytest.approx(objectives.cost(run, name)), name
+
+
 def test_without_chance_the_times_are_the_same_to_the_last_bit(fms_cell: CellMaker) -> None:
     run, _, there = walk_both(fms_cell("RSRRS"), NO_CHANCE, 0, lambda count: count - 1)
     assert run.done
-    assert [run.now_s, run.waited_s, run.processed_s] == there.clock.tolist()
+    assert [run.now_s, run.waited_s, run.processed_s, run.end_s] == there.clock.tolist()
 
 
 def test_a_deadlock_costs_more_than_any_finished_run(crossing_cell: Callable[[], Cell]) -> None:

@@ -121,7 +121,7 @@ def test_the_kernels_begin_there_too(cells: Cells, data: DataObject) -> None:
         assert run.locations == there.locations.tolist()
         assert there.ready_s.tolist() == pytest.approx(run.ready_s)
         assert there.whole[1] == run.finished_s.count(None)
-        assert there.clock.tolist() == pytest.approx([run.now_s, run.waited_s, run.processed_s])
+        assert there.clock.tolist() == pytest.approx([run.now_s, run.waited_s, run.processed_s, run.end_s])
         if count == 0:
             break
         i = data.draw(st.integers(0, count - 1))
@@ -271,7 +271,7 @@ def test_ways_that_nobody_has_timed() -> None:
     loaded = np.full((4, 4), np.nan)
     loaded[0, 1] = loaded[1, 2] = 2.0
     route = (Stage("in"), Stage("left"), Stage("out"))
-    cell = Cell(stations, (Product("toast", (route,)),), ("toast",) * 2, empty, loaded, "in")
+    cell = Cell(stations, (Product("toast", (route,)),), ("toast",) * 2, empty, loaded, one_robot("in"))
     with pytest.raises(BadInput, match="empty_s 'rack' -> 'in' is missing"):
         rest_of(Run(cell), Mishaps(robot="rack"))
     assert optimum(made(rest_of(Run(cell), Mishaps(robot="rack"), 7.0))).cost == 7.0 + 14.0 + 15.0
@@ -297,7 +297,7 @@ def test_a_stay_as_long_as_all_the_work() -> None:
     route = (Stage("in"), Stage("left"), Stage("shelf"), Stage("out"))
     far = 1.0 - np.eye(4)
     far[2:, :2] = 90.0
-    cell = Cell(stations, (Product("toast", (route,)),), ("toast",) * 2, far, far, "in")
+    cell = Cell(stations, (Product("toast", (route,)),), ("toast",) * 2, far, far, one_robot("in"))
     run = Run(cell)
     rest = made(rest_of(run, Mishaps(moved={2: "shelf"})))
     assert cp_sat(rest, hint=optimum(rest).sequence).cost == optimum(rest).cost

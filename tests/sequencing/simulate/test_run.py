@@ -1,6 +1,7 @@
 """One pass through a cell: service, pallets, arrivals, routes to choose, free buffers, deadlocks, all by hand."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import Chance, Episode
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.cell.stations import Arrivals, Product, Route, Stage, Station, one_robot
+from lab.sequencing.cell.stations import UNLIMITED, Arrivals, Product, Robot, Route, Stage, Station, one_robot
 from lab.sequencing.simulate.run import Run, simulate
 
 CellMaker = Callable[..., Cell]
@@ -247,3 +248,101 @@ def test_the_run_and_its_schedule_agree(cells: Callable[..., st.SearchStrategy[C
     assert total("robot", "wait") == pytest.approx(run.waited_s, abs=1e-6)
     assert total("machines", "process") == pytest.approx(run.processed_s, abs=1e-6)
     assert total("robot", "carry") == pytest.approx(total("parts", "carry"), abs=1e-6)
+
+
+def shop(parts: int = 2, vehicles: int = 1, **change: object) -> Cell:
+    """Jobs a and b, 10 s on machine m and then 5 s on n, one at a time each, with room to wait; all ways take 2 s."""
+    stations = [Station("in", "storage", UNLIMITED)]
+    stations += [Station(name, "machine", UNLIMITED, seconds, servers=1) for name, seconds in (("m", 10.0), ("n", 5.0))]
+    route = (Stage("in"), Stage("m"), Stage("n"))
+    table = 2.0 * (1.0 - np.eye(3))
+    described: dict[str, object] = {
+        "stations": tuple(stations),
+        "products": tuple(Product(name, (route,)) for name in "ab"),
+        "order": ("a", "b")[:parts],
+        "empty_s": table,
+        "loaded_s": table,
+        "robots": tuple(Robot(f"robot {number}", "in") for number in range(1, vehicles + 1)),
+    }
+    return Cell(**(described | change))  # type: ignore[arg-type]
+
+
+def test_a_part_waits_in_its_machines_room_until_a_server_takes_it() -> None:
+    """a there at 2 s; the robot is back for b at 4 s, b there at 6 s, and b may go first: from 6 to 16 s, a until 26 s."""
+    run = Run(shop())
+    moves = moved(run, 1, 2, 2, 1)
+    assert [(move.by, move.pick_s, move.drop_s, move.end_s) for move in moves] == [
+        ("robot 1", 0.0, 2.0, 2.0),
+        ("robot 1", 4.0, 6.0, 6.0),
+        ("m", 6.0, 6.0, 16.0),
+        ("m", 16.0, 16.0, 26.0),
+    ]
+    assert (run.ready_s, run.now_s, run.end_s) == ([26.0, 16.0], 6.0, 26.0)
+
+
+def test_a_route_may_end_with_the_work_of_a_machine() -> None:
+    """Out of m at 12 s, in n at 14 s, done at 19 s; nobody fetches it."""
+    schedule = simulate(shop(1), (1, 1, 1, 1))
+    assert schedule.makespan_s == 19.0
+    assert [(a.resource, a.kind, a.start_s, a.end_s) for a in schedule.machines] == [
+        ("m", "process", 2.0, 12.0),
+        ("n", "process", 14.0, 19.0),
+    ]
+    assert [(a.kind, a.start_s, a.end_s) for a in schedule.robot] == [
+        ("carry", 0.0, 2.0),
+        ("wait", 2.0, 12.0),
+        ("carry", 12.0, 14.0),
+    ]
+
+
+def test_two_robots_carry_at_the_same_time() -> None:
+    """Decision 4 is b by robot 2: both are there at 2 s, and what was decided second begins when m is free."""
+    run = Run(shop(vehicles=2))
+    moves = moved(run, 1, 4, 1, 2)
+    assert [(move.by, move.pick_s, move.end_s) for move in moves] == [
+        ("robot 1", 0.0, 2.0),
+        ("robot 2", 0.0, 2.0),
+        ("m", 2.0, 12.0),
+        ("m", 12.0, 22.0),
+    ]
+
+
+def test_robots_may_be_faster_and_serve_some_stations_only() -> None:
+    """The second one takes half the time, and never goes to n: only the first can bring a part there."""
+    robots = (Robot("slow", "in"), Robot("fast", "in", 2.0, ("in", "m")))
+    run = Run(shop(robots=robots))
+    assert run.move(4).drop_s == 1.0
+    run.move(2)
+    assert run.allowed() == (1, 2, 3)  # a by either, b by the slow one only
+    with pytest.raises(BadInput, match="no robot can carry from 'm' to 'n': none serves both"):
+        Run(shop(robots=robots[1:]))
+
+
+def test_without_robots_parts_go_on_by_themselves() -> None:
+    """m: a until 10 s, b until 20 s; n: a until 15 s, b until 25 s. Two decisions a part."""
+    schedule = simulate(shop(vehicles=0), (1, 2, 1, 2))
+    assert (schedule.makespan_s, schedule.robot) == (25.0, ())
+
+
+def test_a_robot_waits_with_its_part_until_there_is_room() -> None:
+    """m holds one: b is there at 2 s, but a is only taken out by robot 1 at 12 s."""
+    stations = list(shop().stations)
+    stations[1] = replace(stations[1], capacity=1)
+    run = Run(shop(vehicles=2, stations=tuple(stations)))
+    moves = moved(run, 1, 1, 1, 4)
+    assert [(move.by, move.pick_s, move.drop_s) for move in moves] == [
+        ("robot 1", 0.0, 2.0),
+        ("m", 2.0, 2.0),
+        ("robot 1", 12.0, 14.0),
+        ("robot 2", 0.0, 12.0),
+    ]
+    assert run.waited_s == 20.0
+
+
+def test_a_server_changes_over_between_products() -> None:
+    """From a to b takes 3 s more, after what it did before; the first product takes none."""
+    stations = list(shop().stations)
+    stations[1] = replace(stations[1], setups=(("a", "b", 3.0), ("b", "a", 4.0)))
+    cell = shop(stations=tuple(stations), vehicles=0)
+    assert [move.pick_s for move in moved(Run(cell), 1, 2)] == [0.0, 13.0]
+    assert [move.pick_s for move in moved(Run(cell), 2, 1)] == [0.0, 14.0]
