@@ -14,6 +14,7 @@ from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, check_built_in, check_objective, cost
 from lab.sequencing.methods.cp_sat_model import Model
+from lab.sequencing.methods.cp_sat_tasks import possible_tasks
 from lab.sequencing.methods.cp_sat_transport import TransportModel
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.search import SAME, Search, SequenceResult, only_one
@@ -71,7 +72,7 @@ def cp_sat(
     check_built_in(objective, "CP-SAT")
     if not fits(cell):
         allowed = f"allowed are {MOST_MOVES}; order fewer parts"
-        raise BadInput(f"CP-SAT: the {cell.parts} parts have {cell.possible_moves} moves to choose from; {allowed}")
+        raise BadInput(f"CP-SAT: the {cell.parts} parts have {possible_tasks(cell)} moves to choose from; {allowed}")
     if not (isfinite(time_limit_s) and time_limit_s > 0):
         raise BadInput(f"time limit = {time_limit_s} s: allowed are finite times above 0")
     if workers < 1:
@@ -174,4 +175,4 @@ def _spoils(cell: Cell, sequence: Sequence[int]) -> bool:
 
 def fits(cell: Cell) -> bool:
     """Whether the cell is not too large for a model."""
-    return cell.possible_moves <= MOST_MOVES
+    return possible_tasks(cell) <= MOST_MOVES

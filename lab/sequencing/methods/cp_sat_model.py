@@ -53,7 +53,7 @@ class Model:
         most = longest(cell, self.times, self._ways)
         self._longest = known[-1].drop if objective == MAKESPAN and known else most
         self._holds = [[s in place.holds for place in cell.positions] for s in range(len(cell.stations))]
-        self._distances = distances(cell, self.times.per_s / cell.robots[0].speed)
+        self._distances = distances(cell, self.times.per_s)
         self._tasks: list[Task] = []
         self._arcs: dict[tuple[int, int], cp_model.IntVar] = {}
         self._come: dict[tuple[int, int], cp_model.IntVar] = {}

@@ -100,6 +100,14 @@ def teams_of(cell: Cell) -> list[Team]:
     return [Team(tuple(robots)) for robots in alike.values()]
 
 
+def possible_tasks(cell: Cell) -> int:
+    """How many tasks all parts may have: `Cell.possible_moves`, those of alike robots counted once."""
+    team = {robot: number for number, own in enumerate(teams_of(cell)) for robot in own.robots} | {SERVER: SERVER}
+    tasks = [len({(team[way.robot], *_same(way)) for way in place.options}) for place in cell.positions]
+    ahead = {at: reached_from(cell.positions, {at}) for at in set(cell.begin_at)}
+    return sum(tasks[place] for at in cell.begin_at for place in ahead[at])
+
+
 class Tasks:
     """The tasks of all parts: each part takes one way from its begin to an end, and each task begins when it may.
 

@@ -230,7 +230,7 @@ def _work_of(cell: Cell, times: Times) -> "Work":
         for k in range(n - 1, -1, -1):
             tail[part, k] = carry[part, k] + process[part, k + 1] + tail[part, k + 1]
     empty = np.array([[times.travel(a, b) if times.known(a, b) else FAR for b in stations] for a in stations], np.int64)
-    least = np.array(distances(cell, times.per_s / cell.robots[0].speed), np.int64)
+    least = np.array(distances(cell, times.per_s), np.int64)
     ready = np.array([times.whole(seconds) for seconds in cell.begin_s], np.int64)
     weight = np.cumprod(np.concatenate([[1], counts[:-1] + 1])).astype(np.int64)
     return Work(counts, at, process, carry, empty, least, queues, ready, tail, weight)

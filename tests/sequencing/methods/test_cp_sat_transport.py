@@ -13,6 +13,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, cost
 from lab.sequencing.cell.stations import Arrivals, Product, Robot, Stage, Station
 from lab.sequencing.methods.cp_sat import cp_sat
+from lab.sequencing.methods.cp_sat_tasks import possible_tasks
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.simulate.run import Run, follow, simulate
 
@@ -110,13 +111,14 @@ def drawn_cells(draw: st.DrawFn) -> Cell:
         stages = [Stage(name, "buffer" if waits and n == 0 else None) for n, name in enumerate(middle)]
         routes.append((Stage("in"), *stages, Stage("out")))
     robots = tuple(Robot(name, draw(st.sampled_from(["in", "A"]))) for name in ("r1", "r2")[: draw(st.integers(1, 2))])
-    tables = [
+    empty_s, loaded_s = (
         np.array([[0.0 if a == b else 1.0 + draw(seconds) for b in range(5)] for a in range(5)]) for _ in range(2)
-    ]
+    )
     arrivals = draw(st.sampled_from([None, Arrivals((2.0, 5.0), "clock"), Arrivals((2.0, 5.0), "pick")]))
     buffers = draw(st.sampled_from(["busy", "free"]))
     product = Product("part", tuple(routes))
-    return Cell(tuple(stations), (product,), ("part", "part"), *tables, robots, arrivals, buffers, (20.0, 25.0))  # type: ignore[arg-type, misc]
+    place = tuple(stations), (product,), ("part", "part"), empty_s, loaded_s, robots, arrivals, buffers, (20.0, 25.0)
+    return Cell(*place)  # type: ignore[arg-type]
 
 
 @settings(max_examples=25, deadline=None)
@@ -128,7 +130,8 @@ def test_random_cells(ends: Ends, cell: Cell, objective: str) -> None:
     if best is None:
         assert found.status == "impossible"
     else:
-        assert (found.status, found.cost) == ("optimal", pytest.approx(best, abs=1e-6))
+        assert found.status == "optimal"
+        assert found.cost == pytest.approx(best, abs=1e-6)
         assert found.cost == cost(follow(cell, found.sequence), objective)
 
 
@@ -155,3 +158,11 @@ def test_times_that_are_not_whole(job_shop: CellMaker) -> None:
     found = cp_sat(cell)
     assert found.rounded_s > 0
     assert found.cost == pytest.approx(1 + 2 / 3)
+
+
+def test_alike_robots_are_counted_once(job_shop: CellMaker) -> None:
+    """Two moves to carry it and two to work on it, whoever carries; two that are not alike are to choose from."""
+    jobs = [[(1, 1.0), (2, 1.0)]]
+    assert possible_tasks(job_shop(jobs, NEAR, 1)) == possible_tasks(job_shop(jobs, NEAR, 9)) == 4
+    robots = (Robot("fast", "LU", 2.0), Robot("slow", "LU"))
+    assert possible_tasks(job_shop(jobs, NEAR, robots=robots)) == 6
