@@ -64,9 +64,10 @@ def cp_sat(
     """The best sequence that CP-SAT finds within the time limit [s], by the cell's own times.
 
     hint: a complete sequence to begin with (None: `first_come`). workers: threads; with one, the same seed gives the same
-    result, unless the time limit cuts it off. Before it begins, the model takes up to half a minute to build. Raises BadInput for
-    an objective that the cell has no times for, for a time limit that is not above 0, for a hint that cannot be, and for
-    more than MOST_MOVES moves. Source: circuit and interval constraints of OR-Tools CP-SAT.
+    result, unless the time limit cuts it off; with several robots six are worth while, even on two cores. Before it begins, the
+    model takes up to half a minute to build. Raises BadInput for an objective that the cell has no times for, for a time limit
+    that is not above 0, for a hint that cannot be, and for more than MOST_MOVES moves.
+    Source: circuit and interval constraints of OR-Tools CP-SAT.
     """
     check_objective(objective, cell)
     check_built_in(objective, "CP-SAT")
@@ -78,11 +79,9 @@ def cp_sat(
     if workers < 1:
         raise BadInput(f"workers = {workers}: allowed are whole numbers from 1")
     known = first_come(cell) if hint is None else hint
+    model = Model(cell, objective, known) if cell.serial else TransportModel(cell, objective, known)
     asked = _Asked(cell, objective, seed, workers, perf_counter() + time_limit_s)
-    if cell.serial:
-        return _result(asked, Model(cell, objective, known))
-    model = TransportModel(cell, objective, known)
-    if objective != MAKESPAN or model.times.rounded_s:
+    if isinstance(model, Model) or objective != MAKESPAN or model.times.rounded_s:
         return _result(asked, model)
     return _narrowed(asked, model)
 
