@@ -81,9 +81,13 @@ def cp_sat(
     known = first_come(cell) if hint is None else hint
     model = Model(cell, objective, known) if cell.serial else TransportModel(cell, objective, known)
     asked = _Asked(cell, objective, seed, workers, perf_counter() + time_limit_s)
-    if isinstance(model, Model) or objective != MAKESPAN or model.times.rounded_s:
+    if isinstance(model, Model):
         return _result(asked, model)
-    return _narrowed(asked, model)
+    narrows = objective == MAKESPAN and not model.times.rounded_s
+    found = _narrowed(asked, model) if narrows else _result(asked, model)
+    if found.status == "unknown" and known:
+        return replace(found, status="feasible", cost=cost(follow(cell, known), objective), sequence=tuple(known))
+    return found
 
 
 @dataclass(frozen=True)

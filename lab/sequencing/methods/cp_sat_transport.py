@@ -20,7 +20,7 @@ from lab.sequencing.methods.cp_sat_tasks import Task, Tasks, Team
 from lab.sequencing.methods.cp_sat_times import Times
 from lab.sequencing.simulate.run import Run
 
-Arcs = dict[tuple[int, int], cp_model.LiteralT]
+Arcs = dict[tuple[int, int], cp_model.IntVar]
 
 
 class TransportModel:
@@ -80,16 +80,27 @@ class TransportModel:
 
     def _suggest(self, known: dict[tuple[int, int, int], tuple[int, int]]) -> None:
         """Give the solver a sequence to begin with."""
-        hints = dict[int, tuple[cp_model.IntVar, int]]()
+        hints, last = dict[int, tuple[cp_model.IntVar, int]](), dict[int, Task]()
+        follows = set[tuple[Task | None, Task | None]]()
         for rank, ((part, place, choice), (begin, _)) in enumerate(known.items()):
             for task in self.tasks.all:
-                if (task.part, task.place) == (part, place):
-                    fits = any(way.choice == choice for way in task.options)
-                    hints[task.done.index] = task.done, fits
-                    if fits:
-                        hints[task.begin.index] = task.begin, begin
-                    if fits and task.rank is not None:
-                        hints[task.rank.index] = task.rank, rank
+                if (task.part, task.place) != (part, place):
+                    continue
+                robot = next((way.robot for way in task.options if way.choice == choice), None)
+                hints[task.done.index] = task.done, robot is not None
+                if robot is None:
+                    continue
+                hints[task.begin.index] = task.begin, begin
+                if task.rank is not None:
+                    hints[task.rank.index] = task.rank, rank
+                if robot != SERVER:
+                    follows.add((last.get(robot), task))
+                    last[robot] = task
+        follows |= {(task, None) for task in last.values()}
+        for _, tasks, arcs in self._tours:
+            nodes = [None, *tasks]
+            for (left, then), arc in arcs.items():
+                hints[arc.index] = arc, (nodes[left], nodes[then]) in follows
         for variable, value in hints.values():
             self.model.add_hint(variable, value)
 
@@ -164,7 +175,7 @@ class TransportModel:
 
     def _chain(self, tasks: Sequence[Task], arcs: Arcs, chains: int) -> None:
         """Every task that is done is in one chain of these arcs; there are so many chains at the most."""
-        nodes = [(left, then, arc) for (left, then), arc in arcs.items()]
+        nodes: list[tuple[int, int, cp_model.LiteralT]] = [(left, then, arc) for (left, then), arc in arcs.items()]
         nodes += [(number, number, ~task.done) for number, task in enumerate(tasks, 1)]
         add_chains(self.model, nodes, len(tasks), chains)
 

@@ -146,6 +146,13 @@ def test_it_begins_with_the_sequence_it_is_given(ex11: Callable[[int], Cell]) ->
         cp_sat(cell, hint=first_come(cell)[:-1])
 
 
+def test_without_time_the_hint_is_what_there_is(ex11: Callable[[int], Cell]) -> None:
+    cell = ex11(2)
+    found = cp_sat(cell, time_limit_s=1e-6)
+    assert (found.status, found.sequence) == ("feasible", first_come(cell))
+    assert found.bound <= 96.0 < found.cost == simulate(cell, found.sequence).makespan_s
+
+
 def test_workers(ex11: Callable[[int], Cell]) -> None:
     assert cp_sat(ex11(2), workers=2).cost == 96.0
     with pytest.raises(BadInput, match="workers"):
