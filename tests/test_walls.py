@@ -38,7 +38,10 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     },
     "PIL": set(),
     "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
-    "ortools": {f"lab.sequencing.methods.cp_sat{part}" for part in ("", "_model", "_tasks", "_rooms", "_transport")},
+    "ortools": {
+        *(f"lab.sequencing.methods.cp_sat{part}" for part in ("", "_model", "_tasks", "_rooms", "_transport")),
+        "lab.sequencing.cyclic.model",
+    },
     "pymoo": {"lab.sequencing.methods.genetic"},
     "starlette": {"lab.view.server", "lab.view.server_page"},
     "uvicorn": {"lab.view.server"},
@@ -256,7 +259,7 @@ def faults(module: str, source: str) -> list[str]:
         (
             "lab.sequencing.methods.exact",
             "from ortools.sat.python import cp_model",
-            "allowed in ['lab.sequencing.methods.cp_",
+            "allowed in ['lab.sequencing.cyclic.model', ",
         ),
         ("lab.sequencing.methods.fifo", "def f():\n    import pymoo", "allowed in ['lab.sequencing.methods.genetic']"),
         ("lab.mdp", "import random", "allowed in no module"),

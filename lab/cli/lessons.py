@@ -41,6 +41,8 @@ def lesson_seat(
 
             shown = stack.enter_context(SeatPage(port, wait_s=wait_s))
             progress.console.print(f"page: {shown.url}\nfrom another machine: {shown.hint}", soft_wrap=True)
+            if not {"web", "terminal"} & {*names}:
+                shown.asks_nobody()
         prompt = TeachingPrompt(progress.console, plain=plain) if "terminal" in names else None
         seat = LessonSeat(progress, prompt, shown)
         stack.callback(seat.clear_scene)

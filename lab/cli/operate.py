@@ -10,8 +10,9 @@ from lab.cli.options import Json, Parts, Port, Seed, ShowPage, Toasts, ToolboxPl
 from lab.cli.output import complain, end, show, write
 
 if TYPE_CHECKING:
+    from lab.production.operation.at_once import Done
     from lab.production.operation.desk import Desk
-    from lab.production.operation.operation import Done, Operation
+    from lab.production.operation.operation import Operation
 
 
 def operate(
@@ -24,7 +25,9 @@ def operate(
     port: Port = 0,
     speed: Annotated[
         str | None,
-        typer.Option("--speed", help="Simulated seconds per second, or max; default: 4 at a terminal, else max."),
+        typer.Option(
+            "--speed", help="Simulated seconds per second, or max; default: 4 at a terminal or with --page, else max."
+        ),
     ] = None,
     faults: Annotated[
         int | None, typer.Option("--faults", min=0, help="Draw faults for the run with this seed; default: none.")
@@ -39,14 +42,14 @@ def operate(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Run a task by hand: order, pause, stop, jog, grasp, learn, in a live console or line by line from a pipe."""
+    """Run a task by hand: order, pause, stop, jog, grasp, learn, in a live console, on a page, or from a pipe."""
     import sys
     from dataclasses import replace
 
     from lab.files import check_out
     from lab.production.conditions import Conditions
     from lab.production.controls import Controls
-    from lab.production.operation.commands import spoken
+    from lab.production.operation.commands import pace
     from lab.production.operation.desk import Desk
     from lab.production.operation.operation import Operation
     from lab.production.run_journal import RunJournal
@@ -56,8 +59,8 @@ def operate(
     from lab.teaching.lesson_options import DEFAULT_ADVISORS
 
     live = sys.stdin.isatty() and sys.stderr.isatty()
-    pace = spoken(f"speed {speed or ('4' if live else 'max')}").argument
-    assert not isinstance(pace, str | tuple)
+    watched = live or page
+    speed_now = pace(speed or ("4" if watched else "max"))
     options = RunOptions(task or "", toasts, parts, seed=seed, faults=faults)
     if resume is None:
         options = replace(options, task=task or "toast", advisors=DEFAULT_ADVISORS)
@@ -72,10 +75,15 @@ def operate(
             if live:
                 seat.progress.hear = unheard  # type: ignore[method-assign]  # the panel tells
             teacher = teacher_of(toolbox, options.lessons(), seat)
-            conditions = Conditions(1.0, seat.page, Controls(pace), journal, fault_seed=options.faults)
+            conditions = Conditions(1.0, seat.page, Controls(speed_now), journal, fault_seed=options.faults)
             operation = Operation(loaded, order, options.seed, teacher, conditions)
+            desk = Desk(operation, attended=watched, known=journal.known)
+            if seat.page is not None:
+                shown = seat.page
+                operation.on_done.append(lambda done: shown.ran())
+                shown.steer(desk, desk.leave)
             try:
-                bad = _at_console(Desk(operation, attended=live, known=journal.known), live, as_json)
+                bad = _at_console(desk, live, as_json, stay=page)
             finally:
                 document = _kept(operation, folder)
                 operation.close()
@@ -86,8 +94,8 @@ def operate(
         end(bad.refused or bad.failed, 2 if bad.refused else 1)
 
 
-def _at_console(desk: "Desk", live: bool, as_json: bool) -> "Done | None":
-    """The command that ended a pipe, None for none."""
+def _at_console(desk: "Desk", live: bool, as_json: bool, stay: bool) -> "Done | None":
+    """The command that ended a pipe, None for none; stay: beside a page, which goes on when the pipe has ended."""
     import sys
 
     if live:
@@ -97,7 +105,8 @@ def _at_console(desk: "Desk", live: bool, as_json: bool) -> "Done | None":
         return None
     from lab.seat.terminal.console_plain import PlainConsole
 
-    return PlainConsole(desk, complain if as_json else lambda line: write(f"{line}\n")).run(sys.stdin)
+    console = PlainConsole(desk, complain if as_json else lambda line: write(f"{line}\n"))
+    return console.run(sys.stdin, stay=stay)
 
 
 def _kept(operation: "Operation", folder: Path) -> dict[str, Any]:

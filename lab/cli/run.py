@@ -22,6 +22,10 @@ def run(
     asked: Asked = "together",
     decide: Decide = "trust-weighted",
     page: ShowPage = False,
+    speed: Annotated[
+        str | None,
+        typer.Option("--speed", help="Simulated seconds per second, or max; default: 4 with a page, else max."),
+    ] = None,
     view: Annotated[bool, typer.Option("--view/--no-view", hidden=True)] = False,  # the old word for --page
     port: Port = 0,
     wait: Wait = None,
@@ -35,6 +39,9 @@ def run(
     order: Annotated[
         str | None, typer.Option("--order", help="The order of the moves by part numbers, such as 1,2,1,1,2,2.")
     ] = None,
+    cyclic: Annotated[
+        bool, typer.Option("--cyclic", help="Repeat the robot's shortest cycle, and measure its period.")
+    ] = False,
     seed: Seed = 0,
     toolbox: ToolboxPlace = None,
     resume: Annotated[
@@ -50,6 +57,9 @@ def run(
 
     from lab.files import check_out
     from lab.production.conditions import Conditions
+    from lab.production.controls import Controls
+    from lab.production.operation.commands import pace
+    from lab.production.operation.run_desk import RunDesk
     from lab.production.run import run as run_task
     from lab.production.run_advice import RunAdvice
     from lab.production.run_journal import RunJournal
@@ -59,7 +69,11 @@ def run(
     from lab.teaching.lesson_options import DEFAULT_ADVISORS
     from lab.view.summary import delivered_in_words, run_summary
 
-    given = RunOptions(task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order)
+    if cyclic and order is not None:
+        raise BadInput(f"--cyclic and --order {order}: an order is one or the other")
+    given = RunOptions(
+        task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order, cyclic
+    )
     if resume is None:
         options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
         loaded = load(options.task)
@@ -67,6 +81,8 @@ def run(
         options, loaded = gone_on(given, resume, out)
     folder = resume or out or Path(f"{loaded.name}-run")
     check_out(folder)
+    watched = page or view or "web" in options.advisors
+    controls = Controls(pace(speed or ("4" if watched else "max")))
     lessons = options.lessons()
     lessons.advising()
     prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed)
@@ -74,10 +90,14 @@ def run(
     try:
         with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
             teacher = teacher_of(toolbox, lessons, seat)
-            advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "")
+            advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "", cyclic=options.cyclic)
             teacher = replace(teacher, keep=advice.keep)
             share = options.override / 100
-            conditions = Conditions(share, seat.page, journal=journal, fault_seed=options.faults, advice=advice)
+            conditions = Conditions(share, seat.page, controls, journal, fault_seed=options.faults, advice=advice)
+            if seat.page is not None:
+                desk = RunDesk(loaded, prepared.order, controls, journal, seat.hear)
+                conditions = replace(conditions, on_floor=desk.on_floor)
+                seat.page.steer(desk)
             with seat.progress:
                 report = run_task(prepared, teacher, folder, conditions)
     except BadInput:

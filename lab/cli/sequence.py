@@ -5,10 +5,12 @@ from typing import Annotated
 
 import typer
 
+from lab.cli.cyclic import cyclic_found
 from lab.cli.families import offers
 from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Parts, Plain, Port, Seed, ShowPage, ToolboxPlace, Wait
 from lab.cli.output import end, show
+from lab.errors import BadInput
 
 
 def sequence(
@@ -50,6 +52,12 @@ def sequence(
     gate: Annotated[
         str, typer.Option("--gate", help="When srl asks: {order gates}.", autocompletion=offers("order gates"))
     ] = "ccrl",
+    cyclic: Annotated[
+        bool,
+        typer.Option(
+            "--cyclic", help="The shortest cycle that the robot can repeat; -n, --parts, --case: of one cycle."
+        ),
+    ] = False,
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the advice in this folder, as it was begun.")
     ] = None,
@@ -71,16 +79,22 @@ def sequence(
     """
     from lab.teaching.kept_order import OrderOptions, OrderSession, gone_on
     from lab.toolbox.registry import Toolbox
+    from lab.view.cyclic_summary import cyclic_summary
     from lab.view.summary import sequence_summary
 
     given = OrderOptions(
         task or "", case, toasts, method, objective, episodes, sessions, stochastic, advisor, gate, seed, parts
     )
+    files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
+    if cyclic:
+        if resume is not None:
+            raise BadInput(f"--cyclic beside --resume {resume}: nobody is asked about a cycle: leave one of them away")
+        show(cyclic_found(given.complete(), toolbox, files), as_json, cyclic_summary)
+        return
     box = Toolbox(toolbox)
     kept = OrderSession(given.complete(), box) if resume is None else gone_on(given, resume, box)
     if resume is not None:
         say_read(kept, "--resume")
-    files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
     try:
         with lesson_seat(kept.options.advisors, page=page, port=port, wait_s=wait, plain=plain) as seat, seat.progress:
             document = sequenced(kept, seat.people(), seat, toolbox, files)

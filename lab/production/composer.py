@@ -1,7 +1,8 @@
 """Sequence + skills -> motions: carries the order of transfers out in physics, and goes on from whatever was reached."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 from lab.errors import LabError, WorkFailed
 from lab.export.recorder import MotionRecorder
@@ -26,6 +27,8 @@ from lab.sim.frames import Recording
 from lab.sim.world import World
 from lab.skills.prepared_scene import Prepared
 from lab.teaching.events import Event, MachineDone, MoveMade, PlanMade, Tell, TroubleMet, unheard
+
+NOBODY: Mapping[int, int] = MappingProxyType({})
 
 
 @dataclass
@@ -58,10 +61,8 @@ class Production:
                 if not self._next():
                     return self.recovery.failure()
             except RunStopped as stopped:
-                if not self.floor.controls.attended:
+                if not self.floor.protected(f"{stopped}; put it right, then go on"):
                     return str(stopped)
-                self.floor.controls.protective(f"{stopped}; put it right, then go on")
-                self.floor.held()
                 self.recovery.forget()
                 self.replan("a person has put things right")
 
@@ -82,14 +83,18 @@ class Production:
         self.floor.controls.move_ended()
         return True
 
-    def replan(self, why: str) -> None:
-        """Order the work that remains anew, from the state that was reached. Raises RunStopped where no order ends it."""
+    def replan(self, why: str, back: Mapping[int, int] = NOBODY) -> None:
+        """Order the work that remains anew, from the state that was reached. Raises RunStopped where no order ends it.
+
+        back: parts that had been given up and are to be brought on after all, and their positions.
+        """
         work, recovery, now_s = self.work, self.recovery, self.floor.now_s
         first = self.sequence[0] if self.sequence and self.floor.bench.held is not None else None
         ready_s = {
             part: work.left_s(part) for part in range(1, self.cell.parts + 1) if work.machine_of(part) is not None
         }
-        mishaps = Mishaps(frozenset(recovery.lost), tuple(recovery.out), ready_s)
+        ready_s |= dict.fromkeys(back, 0.0)
+        mishaps = Mishaps(frozenset(recovery.lost), tuple(recovery.out), ready_s, back)
         try:
             found = plan_again(work.plan, mishaps, first)
         except LabError as error:
@@ -188,6 +193,7 @@ def carry_out(
         floor.controls = conditions.controls
         floor.stops.note = journal.note_stops
         floor.stops.again(journal.stops(), journal.last_step())
+        conditions.on_floor(floor)
         production = Production(floor, cell, noted, relearner)
         interrupted = False
         try:

@@ -1,6 +1,8 @@
 """Under which conditions a prepared task is carried out: at which speed, who watches and may stop it, and what is kept of it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from lab.production.controls import Controls
 from lab.production.recorder import Viewer
@@ -8,13 +10,20 @@ from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import RunJournal
 from lab.tasks.fault_fields import FaultFields
 
+if TYPE_CHECKING:
+    from lab.production.floor import Floor
+
+
+def nobody(floor: "Floor") -> None:
+    """Nobody looks at it."""
+
 
 @dataclass(frozen=True)
 class Conditions:
     """override: the share of the task's speed and acceleration with which the arm moves. viewer: who watches live.
 
     faults: what goes wrong in it; fault_seed: draws more of that, None: nothing more. advice: who is asked, None: nobody
-    about the order.
+    about the order. on_floor: called with the floor when it is ready.
     """
 
     override: float = 1.0
@@ -24,3 +33,4 @@ class Conditions:
     faults: tuple[FaultFields, ...] = ()
     fault_seed: int | None = None
     advice: RunAdvice | None = None
+    on_floor: "Callable[[Floor], None]" = nobody

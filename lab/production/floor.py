@@ -169,6 +169,17 @@ class Floor:
         self.between_moves()
         return why
 
+    def protected(self, why: str) -> bool:
+        """A protective stop until somebody has gone on; False, and nothing is stopped, where nobody is there who could.
+
+        In a run that is done again, somebody was there if it was stopped here.
+        """
+        if not self.stops.folding:
+            if not self.controls.attended:
+                return False
+            self.controls.protective(why)
+        return bool(self.held())
+
     def between_moves(self) -> None:
         """Wait as long as there is a pause, without any time going by."""
         while self.meanwhile() or (self.stops.look(self.steps, self.controls) and self.stops.pauses(self.controls)):
@@ -245,9 +256,7 @@ class Floor:
         if too_hard := self._too_hard():
             self.scene.robot.brake()
             self._back_off()
-            if self.controls.attended:
-                self.controls.protective(too_hard)
-                self.held()
+            self.protected(too_hard)
             return f"{StopKind.PROTECTIVE} stop: {too_hard}"
         return ""
 

@@ -16,11 +16,13 @@ from lab.learning.requests import Ask
 from lab.learning.session_events import EpisodeEnded
 from lab.learning.session_events import Event as SessionEvent
 from lab.learning.settings import GateSettings
+from lab.production.cyclic_order import cyclic_order
 from lab.sequencing import find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move
+from lab.sequencing.cyclic.cycle import Cycle
 from lab.sequencing.methods.exact import Optimum, optimum
 from lab.sequencing.search import SAME, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import Run, branch, follow
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
 NOBODY = AdvisorName.of("none")
 KeepOrder = Callable[[Cell, str], Journal]  # given the cell and the objective
 SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
-ADVISED, GIVEN, EXACT = "advised", "given", "exact"  # by whom an order is, beside the methods' names
+ADVISED, GIVEN, EXACT, CYCLIC = "advised", "given", "exact", "cyclic"  # by whom an order is, beside the methods' names
 
 
 def checked_order(cell: Cell, words: str, where: str = "--order") -> tuple[int, ...]:
@@ -83,8 +85,8 @@ def _allowed(run: Run) -> str:
 class OrderAdvice:
     """Whose word counts on the order: one that is given whole, or whom SRL may ask which part to move next, and when.
 
-    given: the words of an order, "" for none. people: those behind such names as "terminal"; keep: gives the journal of what
-    they say, by default one that is not written.
+    given: the words of an order, "" for none. cyclic: the order is to repeat the shortest cycle, and nobody is asked. people:
+    those behind such names as "terminal"; keep: gives the journal of what they say, by default one that is not written.
     """
 
     given: str = ""
@@ -92,6 +94,7 @@ class OrderAdvice:
     gate: str = "ccrl"
     people: Mapping[str, Ask] = field(default_factory=dict)
     keep: KeepOrder = lambda cell, objective: Journal()
+    cyclic: bool = False
 
 
 def person_of(names: Sequence[str]) -> AdvisorName:
@@ -103,7 +106,8 @@ def person_of(names: Sequence[str]) -> AdvisorName:
 class Ordered:
     """The order that is used, and by whom it is; what each order that was found costs; what the advice was worth.
 
-    receipt: None where nobody was asked and nothing was given; `guided_best` in it: the cheapest episode with advice.
+    receipt: None where nobody was asked and nothing was given; `guided_best` in it: the cheapest episode with advice. cycle: what
+    the order repeats, where that was asked for.
     """
 
     found: SequenceResult
@@ -111,14 +115,15 @@ class Ordered:
     used: str
     costs: dict[str, float]
     receipt: dict[str, Any] | None = None
+    cycle: Cycle | None = None
 
 
 def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, tell: Tell = unheard) -> Ordered:
     """The order of a job, beside what cannot be beaten: the given one, or the best of those that were found.
 
-    With advice, SRL looks for one with it, and the settings' method for one alone; the exact search gives one, too. Of orders
-    that cost the same the advised one is used, then the method's. Raises BadInput as `checked_order` and `advised_srl` do,
-    WorkFailed and KeyboardInterrupt.
+    A cyclic order is used as a given one is. With advice, SRL looks for one with it, and the settings' method for one alone; the
+    exact search gives one, too. Of orders that cost the same the advised one is used, then the method's. Raises BadInput as
+    `checked_order`, `advised_srl` and `cyclic_order` do, WorkFailed and KeyboardInterrupt.
     """
     search, proven = search_for(settings), optimum(cell)
     is_timed = search.objective == MAKESPAN
@@ -128,20 +133,25 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
         taken = checked_order(cell, advice.given)
         own = cost(follow(cell, taken), search.objective)
         orders[GIVEN] = SequenceResult(taken, own, (own,))
+    cycle = None
+    if advice.cyclic:
+        cycle, repeated = cyclic_order(cell, seed)
+        own = cost(follow(cell, repeated.sequence), search.objective)
+        orders[CYCLIC] = SequenceResult(repeated.sequence, own, (own,))
     said: dict[str, Any] = {}
-    if advice.advisor.row != "none" and not advice.given:
+    if advice.advisor.row != "none" and not orders:
         orders[ADVISED], said = _with_advice(cell, search, advice, seed, known, tell)
     orders[settings.method] = find_sequence(cell, settings.method, search, seed)
     if is_timed and len(orders) > 1 and proven.sequence:
         orders[EXACT] = SequenceResult(proven.sequence, proven.cost, (proven.cost,))
-    used = GIVEN if advice.given else _cheapest(orders)
+    used = next((name for name in (GIVEN, CYCLIC) if name in orders), None) or _cheapest(orders)
     costs = {name: order.cost for name, order in orders.items()}
     tell(SequenceFound(orders[used], known))
     if len(orders) == 1:
         return Ordered(orders[used], proven, used, costs)
     tell(OrderChosen(used, costs, search.objective))
     worth = {"used": used, "costs": costs, "objective": search.objective, "bound": known.bound}
-    return Ordered(orders[used], proven, used, costs, worth | said)
+    return Ordered(orders[used], proven, used, costs, worth | said, cycle)
 
 
 def reference(cell: Cell, objective: str) -> Reference:

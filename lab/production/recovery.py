@@ -21,47 +21,56 @@ BLIND_S = 120.0  # so long a skill waits until the camera sees again
 MOST_TROUBLES = 40  # in one run; then it is stopped
 LOST = ("part fallen", "part gone", "part out of reach")
 FIXED = ("obstacle moved", "obstacle gone", "obstacle new", "station moved")
+TO_DO = {  # by a person, with a part that is left
+    "part fallen": "stand it up",
+    "part gone": "bring it back",
+    "part out of reach": "put it within reach",
+    "part moved": "move it away from there",
+}
 
 
 @dataclass
 class Recovery:
     """The answers to trouble, for parts that are being brought on.
 
-    replan: orders the rest of the work anew, given why. relearn: learns what changed in the scene, given what was seen.
+    replan: orders the rest of the work anew, given why, and parts that are back in play, with their positions.
+    relearn: learns what changed in the scene, given what was seen.
     lost: why a part was given up, by its number. out: why nothing is brought to a station any more.
     """
 
     work: Transfers
-    replan: Callable[[str], None]
+    replan: Callable[..., None]
     relearn: Callable[[Sequence[Deviation]], None]
     lost: dict[int, str] = field(default_factory=dict)
     out: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     _strange: dict[str, str] = field(default_factory=dict)  # what belongs to nobody, and the station that it closes
-    _missing: set[int] = field(default_factory=set)  # parts that were given up because they cannot be taken up
+    _missing: dict[int, int] = field(
+        default_factory=dict
+    )  # parts that cannot be taken up, and how far on their routes they are
     _tries: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     _first: dict[str, str] = field(default_factory=dict)
     _looked_s: float = -LOOK_S
 
     def find_again(self) -> bool:
         """Take parts up again that were given up because they could not be taken up, and now can; whether there are any."""
-        found = [one for one in self._missing if self._can_be_taken_up(one)]
+        found = {part: place for part, place in self._missing.items() if self._can_be_taken_up(part)}
         for part in found:
-            self._missing.discard(part)
-            del self.lost[part]
+            del self._missing[part], self.lost[part]
             self.work.left_lying.discard(self.work.name(part))
             name = self.work.name(part)
             self.work.spot_of[name] = seen_at(self.work.floor, name)
             self._tell(Trouble("it can be taken up again", name), "goes on with it")
         if found:
-            self.replan("a part can be taken up again")
+            self.replan("a part can be taken up again", found)
         return bool(found)
 
     def _can_be_taken_up(self, part: int) -> bool:
         floor, name = self.work.floor, self.work.name(part)
         at = seen_at(floor, name)
         reached = floor.scene.robot.arm.inverse(floor.bench.part_pose(name)) is not None
-        return not floor.world.dark and at.z > BELOW_M and floor.bench.upright(name) >= UPRIGHT and reached
+        stands = at.z > BELOW_M and floor.bench.upright(name) >= UPRIGHT and not too_near(floor.bench, name)
+        return not floor.world.dark and stands and reached
 
     def forget(self) -> None:
         """A person has put things right: what was out of use is used again, and tries are counted anew."""
@@ -182,12 +191,14 @@ class Recovery:
     def _leave(self, part: int, seen: Deviation) -> None:
         """A part that cannot be taken up is left; where it lies in a machine, that is closed."""
         machine = self.work.machine_of(part)
+        place = self.work.plan.locations[part - 1]
+        if (machine is None or machine.done(self.work.floor.now_s)) and place < len(self.work.cell.laid_out):
+            self._missing[part] = place
         if machine is not None and seen.sort == "part fallen":
             self.out[machine.station] = f"{seen.name} lies in '{machine.station}'"
         if machine is not None:
             machine.clear()
-        self._lose(part, seen.words)
-        self._missing.add(part)
+        self._lose(part, f"{seen.words}: {TO_DO[seen.sort]}")
         self._tell_seen(seen, "leaves it")
 
     def _follow(self, part: int, seen: Deviation) -> None:
@@ -234,7 +245,8 @@ class Recovery:
         """Give parts up that cannot be finished any more."""
         for part, why in stuck.items():
             if part not in self.lost:
-                self._lose(part, f"{why}: {'; '.join(self.out.values())}" if self.out else why)
+                reasons = ", ".join(f"'{station}': {what}" for station, what in self.out.items())
+                self._lose(part, f"{why}: {reasons}" if reasons else why)
 
     def _lose(self, part: int, why: str) -> None:
         self.lost[part] = why
@@ -262,7 +274,7 @@ class Recovery:
         part = self._part_of(one.name)
         if part is None:
             return one.name in self._strange and one.sort != "part gone"
-        return part in self.lost or part in self.work.to_put_back
+        return part in self.lost or (part in self.work.to_put_back and one.sort == "part moved")
 
     def _part_of(self, body: str) -> int | None:
         """The number of the part that a body is, or whose pallet."""

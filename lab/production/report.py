@@ -10,11 +10,13 @@ from typing import Any
 from lab.errors import WorkFailed
 from lab.export.program import PROGRAM, TRAJECTORY
 from lab.files import draft
+from lab.production.cyclic_order import measured_period
 from lab.production.outcome import Outcome
 from lab.production.run_story import story_of
 from lab.production.taught import Taught
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.cell.schedule_rows import csv_of, rows_of
+from lab.sequencing.cyclic.cycle import Cycle
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
@@ -53,6 +55,7 @@ class Report:
     wall_s: float = 0.0
     files: dict[str, str] = field(default_factory=dict)
     receipts: dict[str, Any] | None = None
+    cycle: Cycle | None = None
 
     @property
     def success(self) -> bool:
@@ -93,9 +96,17 @@ class Report:
             "outcome": verdict.came,
             "interrupted": outcome.interrupted,
             "receipts": self.receipts,
+            "cyclic": self._cyclic(),
             "wall_s": self.wall_s,
             "files": self.files,
         }
+
+    def _cyclic(self) -> dict[str, Any] | None:
+        """The cycle that was carried out, and its period as planned and as measured; None where none was asked for."""
+        if self.cycle is None:
+            return None
+        planned = simulate(self.taught.cell, self.sequenced.sequence)
+        return measured_period(self.cycle, planned, self.outcome.schedule)
 
 
 def write_files(report: Report, out: Path) -> None:

@@ -107,7 +107,9 @@ def run(prepared: Prepared, teacher: Teacher, out: Path, conditions: Conditions 
     conditions, relearner = replace(conditions, faults=faults), Relearner(prepared, taught, teacher)
     outcome, recording = carry_out(prepared, taught.cell, order.found.sequence, conditions, teacher.tell, relearner)
     receipts = None if advice is None else advice.receipts(order)
-    report = Report(prepared, taught, order.found, order.proven, outcome, recording, began, receipts=receipts)
+    report = Report(
+        prepared, taught, order.found, order.proven, outcome, recording, began, receipts=receipts, cycle=order.cycle
+    )
     teacher.tell(PhaseBegan("draw", 1))
     write_files(report, out)
     if not outcome.interrupted:

@@ -23,7 +23,8 @@ from lab.toolbox.registry import Toolbox
 class RunAdvice:
     """Who is asked in a run; where people are, what they say is kept in the toolbox's sessions, each named in the run's journal.
 
-    given: the words of an order that is not to be looked for, "" for none; gate: when SRL asks about the order. Of a run that is
+    given: the words of an order that is not to be looked for, "" for none; gate: when SRL asks about the order;
+    cyclic: the order is to repeat the shortest cycle. Of a run that is
     gone on with, the sessions that it began go on.
     """
 
@@ -32,6 +33,7 @@ class RunAdvice:
     journal: RunJournal = field(default_factory=RunJournal)
     given: str = ""
     gate: str = "ccrl"
+    cyclic: bool = False
     sessions: dict[str, SessionInFolder] = field(default_factory=dict)
 
     @property
@@ -72,7 +74,7 @@ class RunAdvice:
                 self.journal.write(SessionKept(ORDER, str(session.folder)))
             return made
 
-        return OrderAdvice(self.given, person_of(self.options.advisors), self.gate, people, keep)
+        return OrderAdvice(self.given, person_of(self.options.advisors), self.gate, people, keep, self.cyclic)
 
     def _new_order(self, durations: Mapping[str, Any]) -> OrderSession:
         options = OrderOptions(

@@ -34,6 +34,7 @@ class RunOptions(SessionOptions):
     seed: Annotated[int, Ge(0)] = 0
     faults: Annotated[int, Ge(0)] | None = None
     order: str | None = None
+    cyclic: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """A plain dict, files by their whole paths, so that they are found from another folder."""

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
+from lab.production.controls import Controls
 from lab.sequencing.cell.schedule import Activity, robot_activities
 from lab.tasks.task import Order, Task
 from lab.teaching.events import (
@@ -116,6 +117,7 @@ class RunStatus:
     speed: float | None = None
     _target: str = ""  # of the move under way
     _grasped: str = ""  # the part that the robot is taking up
+    _grasped_s: float = 0.0  # when that began
     _made: int = 0  # moves
 
     @classmethod
@@ -161,7 +163,9 @@ class RunStatus:
             case SkillBegan():
                 if part.state in ("waiting", "in machine") and self._grasped == event.part:
                     part.state, self.next_station = "carried", self._target
+                    self._fetched(part.station, event.part, self._grasped_s)
                 self._grasped = event.part if event.name.startswith(TAKES_UP) else ""
+                self._grasped_s = event.at_s
                 self.words = event.words
             case MoveMade(move):
                 self._made, self.words, self._grasped, self.next_station = self._made + 1, "", "", ""
@@ -232,6 +236,13 @@ class RunStatus:
         """What was measured, with what machines are doing now."""
         under_way = (self._work(machine, self.now_s) for machine in self.machines if machine.part)
         return [*self.measured, *(activity for work in under_way for activity in work)]
+
+    def under(self, controls: Controls) -> "RunStatus":
+        """With a stop as soon as it is pressed, and the pace."""
+        held = controls.held
+        self.held = None if held is None else HeldStatus(held.kind, held.why, held.by)
+        self.speed = controls.speed
+        return self
 
     def copied(self) -> "RunStatus":
         """As it is now, for another thread to show while this one goes on."""

@@ -1,59 +1,59 @@
 """Where parts stand, and where there is room to set one down."""
 
 from collections.abc import Collection
-from math import cos, hypot, sin
+from math import hypot
 
 from lab.production.trouble import Trouble
+from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.kinds import Spot, comes_as
+from lab.sim.scene.places import Rectangle
 from lab.sim.scene.scene import Scene, pallet_of
 from lab.skills.skill import UPRIGHT, Bench
 from lab.skills.skillset import Carried, SkillSet
 
 ASTRAY_M = 0.15  # a part this near to a spot of a station is taken up by the station's own way
 DELIVERED_M = 0.02  # a part this near to its spot has been delivered
-FREE_M = 0.03  # around a part where it is set down, of what lies about: the fingers need it, too
-BESIDE_M = 0.004  # between the open fingers and what stands beside a part that they come down to
+BESIDE_M = 0.004  # between a part, or the open fingers, and what stands beside it
 
 
 def free_spot(scene: Scene, name: str, way: Carried, taken: Collection[Spot], lying: Collection[str]) -> Spot:
     """The first spot at the end of a way that is not taken, and on which nothing of what lies about is. Raises Trouble."""
-    blocked = ""
-    for spot in scene.places.spots(scene.task.station(way.target)):
-        if spot not in taken:
-            blocked = blocked_by(scene, name, way, spot, lying)
-            if not blocked:
-                return spot
+    kind, blocked = scene.kinds[way.kind], ""
+    length, across = kind.footprint_m()
+    for spot in scene.places.used_spots(scene.task.station(way.target), len(scene.order)):
+        if spot in taken:
+            continue
+        room = Rectangle(spot.x, spot.y, length + BESIDE_M, across + BESIDE_M, spot.yaw)
+        blocked = _standing_in(scene, room, spot.z, lying) or in_fingers_way(scene, kind.held_at(spot), lying)
+        if not blocked:
+            return spot
     why = f": {blocked} is there" if blocked else ""
     raise Trouble(f"no spot of '{way.target}' is free{why}", name, way.target, final=True)
 
 
-def blocked_by(scene: Scene, name: str, way: Carried, spot: Spot, lying: Collection[str]) -> str:
-    """Which of the bodies that lie about is where a part is to be set down; "" for none."""
-    shape = scene.kinds[way.kind].shape
-    half = max(abs(shape.low[0]), abs(shape.high[0])), max(abs(shape.low[1]), abs(shape.high[1]))
-    c, s = abs(cos(spot.yaw)), abs(sin(spot.yaw))
-    x, y = c * half[0] + s * half[1] + FREE_M, s * half[0] + c * half[1] + FREE_M
-    for body in lying:
-        low, high = scene.world.bounds(body)
-        aside = low[0] > spot.x + x or high[0] < spot.x - x or low[1] > spot.y + y or high[1] < spot.y - y
-        if not aside and high[2] > spot.z and body != name:
-            return body
-    return ""
-
-
 def too_near(bench: Bench, body: str) -> str:
     """What stands so near to a part that the open fingers would touch it; "" for nothing."""
-    scene, goal = bench.scene, bench.part_pose(body)
+    scene = bench.scene
+    own = {body, pallet_of(body), body.removesuffix("'s pallet")}
+    fixed = [obstacle.name for obstacle in scene.task.obstacles] + [station.name for station in scene.task.stations]
+    return in_fingers_way(scene, bench.part_pose(body), [one for one in (*scene.kind_of, *fixed) if one not in own])
+
+
+def in_fingers_way(scene: Scene, tool: ToolPose, bodies: Collection[str]) -> str:
+    """Which of the bodies the open fingers would touch at a tool pose; "" for none."""
     gripper = scene.robot.arm.gripper
-    across, along = gripper.opening_m / 2 + gripper.thick_m, gripper.width_m / 2
-    c, s = abs(cos(goal.yaw)), abs(sin(goal.yaw))
-    x, y = c * along + s * across + BESIDE_M, s * along + c * across + BESIDE_M
-    others = [*scene.kind_of, *(obstacle.name for obstacle in scene.task.obstacles)]
-    for other in others:
-        low, high = scene.world.bounds(other)
-        aside = low[0] > goal.x + x or high[0] < goal.x - x or low[1] > goal.y + y or high[1] < goal.y - y
-        if other not in (body, pallet_of(body), body.removesuffix("'s pallet")) and not aside and high[2] > goal.z:
-            return other
+    across = gripper.opening_m / 2 + gripper.thick_m + BESIDE_M
+    room = Rectangle(tool.x, tool.y, gripper.width_m / 2 + BESIDE_M, across, tool.yaw)
+    return _standing_in(scene, room, tool.z, bodies)
+
+
+def _standing_in(scene: Scene, room: Rectangle, above_m: float, bodies: Collection[str]) -> str:
+    """Which of the bodies reaches into a piece of ground, above a height [m]; "" for none."""
+    for body in bodies:
+        low, high = scene.world.bounds(body)
+        middle, half = (low + high) / 2, (high - low) / 2
+        if high[2] > above_m and room.meets(Rectangle(middle[0], middle[1], half[0], half[1], 0.0)):
+            return body
     return ""
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from lab.errors import BadInput
 from lab.sequencing.cell.schedule import Schedule
+from lab.sequencing.cyclic.steady import Steady
 from lab.view.canvas import GREY, INK, RED, picture_bytes, picture_file, seconds, tip
-from lab.view.gantt_bars import LOOKS, Bar, Chart, mixed
+from lab.view.gantt_bars import LOOKS, Bar, Chart, CycleChart, mixed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,25 +34,40 @@ def gantt(schedule: Schedule, path: Path, predicted: Schedule | None = None) -> 
     Raises BadInput for a schedule without activities and as all plots here do: for a path that is no picture or cannot be
     written. Source: thesis fig. IV.1.
     """
-    draw, size_inch = _drawing(schedule, predicted)
+    draw, size_inch = _drawing(Chart(schedule), predicted)
+    with picture_file(path, *size_inch) as figure:
+        draw(figure)
+
+
+def cycle_gantt(shown: Steady, path: Path) -> None:
+    """Stations and robot over a few periods [s] of what repeats, the periods' ends marked. Files and errors as `gantt`."""
+    period_s, named = shown.cycle.period_s, "the period"
+    ends = [(n * period_s, "-", named if n == 1 else "") for n in range(1, shown.periods + 1)]
+    draw, size_inch = _drawing(CycleChart(shown.schedule, shown), None, ends)
     with picture_file(path, *size_inch) as figure:
         draw(figure)
 
 
 def gantt_picture(schedule: Schedule) -> bytes:
     """The same as SVG bytes; BadInput for a schedule without activities."""
-    draw, size_inch = _drawing(schedule, None)
+    draw, size_inch = _drawing(Chart(schedule), None)
     return picture_bytes(draw, *size_inch)
 
 
-def _drawing(schedule: Schedule, predicted: Schedule | None) -> tuple[Callable[["Figure"], None], tuple[float, float]]:
-    """What draws the chart on a figure, and the figure's width and height [inch]."""
+def _drawing(
+    chart: Chart, predicted: Schedule | None, ends: list[tuple[float, str, str]] | None = None
+) -> tuple[Callable[["Figure"], None], tuple[float, float]]:
+    """What draws the chart on a figure, and the figure's width and height [inch].
+
+    ends: what is marked by a line: when [s], its dashes and its name, "" for none; None: the makespan.
+    """
+    schedule = chart.schedule
     if not schedule.robot:
         raise BadInput("Gantt chart: the schedule has no activities")
-    chart = Chart(schedule)
     width_inch, height_inch = chart.page_inch(predicted is not None)
     bars = chart.bars(schedule, -0.31 if predicted is None else -0.38, 0.62)
-    ends = [(schedule.makespan_s, "-", "makespan" if predicted is None else "makespan, measured")]
+    if ends is None:
+        ends = [(schedule.makespan_s, "-", "makespan" if predicted is None else "makespan, measured")]
     strips: list[Bar] = []
     if predicted is not None:
         strips = [bar for bar in chart.bars(predicted, 0.28, 0.13) if bar.look != "outside"]
@@ -61,7 +77,7 @@ def _drawing(schedule: Schedule, predicted: Schedule | None) -> tuple[Callable[[
         axes = figure.add_subplot()
         for bar in (*bars, *strips):
             _draw_bar(axes, bar, chart)
-        lines = [_draw_end(axes, *end) for end in ends]
+        lines = [line for end in ends if (line := _draw_end(axes, *end)) and end[2]]
         last_s = max(*(bar.activity.end_s for bar in (*bars, *strips)), *(end_s for end_s, _, _ in ends))
         _dress(axes, chart, 1.01 * last_s, width_inch)
         marks = [*_draw_arrivals(axes, chart), *_draw_limits(axes, chart)]
@@ -87,7 +103,7 @@ def _dress(axes: "Axes", chart: Chart, last_s: float, width_inch: float) -> None
     """Names of the rows, bands to follow them by, and the axis of time."""
     from matplotlib.ticker import MaxNLocator
 
-    rows, parts = chart.rows, len(chart.names)
+    rows, parts = chart.rows, len({activity.resource for activity in chart.schedule.parts})
     for row in range(1, len(rows), 2):
         axes.axhspan(row - 0.5, row + 0.5, color=BAND, linewidth=0, zorder=0.5)
     for edge in (parts, len(rows) - 1):

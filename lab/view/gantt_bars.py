@@ -7,6 +7,7 @@ from functools import cached_property
 from lab.errors import counted
 from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.sequencing.cell.stations import ROBOT
+from lab.sequencing.cyclic.steady import Steady
 from lab.view.canvas import BLUE, GREEN, INK, ORANGE, PALE_GREY, PURPLE, RED, SKY, YELLOW, seconds
 
 TOUCHING_S = 1e-3  # measured activities that overlap by less follow one another
@@ -167,6 +168,30 @@ class Chart:
             "store": f"at {activity.target}",
         }[activity.kind]
         return f"{activity.resource}: {does.strip()}, {span}"
+
+
+@dataclass(frozen=True)
+class CycleChart(Chart):
+    """The chart of a few periods of a cycle: no rows for parts, only names."""
+
+    shown: Steady
+
+    @cached_property
+    def names(self) -> dict[int, str]:
+        """What each part is called, by its number."""
+        return self.shown.names
+
+    def title(self) -> str:
+        """What repeats, and in which period."""
+        cycle = self.shown.cycle
+        mix = [cycle.product(move) for move in {move.slot: move for move in cycle.line.moves}.values()]
+        counts = [f"{mix.count(name)} × {name}" for name in dict.fromkeys(mix)]
+        what = f"{', '.join(counts)} in a period of {seconds(cycle.period_s)}"
+        return f"{what}, {counted(self.shown.periods, 'period')} of what repeats for ever"
+
+    def page_inch(self, strips: bool) -> tuple[float, float]:
+        """Width and height of the page [inch]."""
+        return super().page_inch(strips)[0], 1.7 + 0.42 * len(self.rows)
 
 
 def _ends(parts: Sequence[Activity]) -> set[Activity]:

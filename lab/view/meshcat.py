@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from lab.view.story import Story
 
 HERE = Path(__file__).parent
+GANTT_SCRIPT = HERE / "gantt.js"
 # meshcat's viewer, and dat.gui in it, bring their styles as elements of their own: nothing else may be inline when served
 SERVED = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "
@@ -182,7 +183,7 @@ def replay_html(
     script = viewer_script()
     scripts = "\n".join(
         f"<script>{part.read_text(encoding='utf-8')}</script>"
-        for part in (script, *(HERE / name for name in ("gantt.js", "replay.js", "page.js")))
+        for part in (script, GANTT_SCRIPT, HERE / "replay.js", HERE / "page.js")
     )
     styles = f"<style>{(HERE / 'page.css').read_text(encoding='utf-8')}</style>"
     notice = script.with_name(f"{script.name}.LICENSE.txt")

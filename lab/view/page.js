@@ -200,6 +200,7 @@ function follow(pause = 300) {
       setTimeout(keepUp, 0, PLAINER);
     }
     if (frame && frame.time_s !== null) note(frame.time_s ? `${frame.time_s.toFixed(1)} s` : "");
+    if (panel && frame && frame.time_s !== null) panel.clock(frame.time_s);
     if (panel && scene) panel.hasScene();
     if (panel && parts) panel.update(parts);
     if (panel && refusal) panel.refused(refusal);

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from lab.errors import counted
+from lab.view.cyclic_summary import period_in_words
 from lab.view.figures import beside, gap_of
 
 _STUDY_ROWS = 30
@@ -52,6 +53,8 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     table.add_row("makespan", text)
     proven = "proven optimum" if report["optimum_proven"] else "proven bound"
     table.add_row(proven, f"{bound}, gap {gap_of(report['optimality_gap'], 2)}")
+    if report["cyclic"] is not None:
+        table.add_row("period", period_in_words(report["cyclic"]))
     for what, lines in _worth(report["receipts"] or {}):
         table.add_row(what, Text("\n".join(lines)))
     rate = report["sim_s"] / report["wall_s"] if report["wall_s"] else 0.0

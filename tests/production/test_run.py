@@ -44,7 +44,18 @@ RUN_FIELDS = (
     *("task", "seed", "toasts", "parts", "success", "delivered", "dropped", "failure", "retries", "skills", "sequence"),
     *("predicted_makespan_s", "measured_makespan_s", "optimal_makespan_s", "bound_s"),
     *("optimality_gap", "optimum_proven"),
-    *("camera_deviation_m", "sim_s", "skipped_s", "faults", "outcome", "interrupted", "receipts", "wall_s", "files"),
+    *(
+        "camera_deviation_m",
+        "sim_s",
+        "skipped_s",
+        "faults",
+        "outcome",
+        "interrupted",
+        "receipts",
+        "cyclic",
+        "wall_s",
+        "files",
+    ),
 )
 SKILL_FIELDS = {"name", "subtask", "source", "policy", "episodes", "requests", "helped_steps", "solved"} | {
     *("reason", "from_task", "parent", "saved_episodes", "saved_helped_steps", "fitness")

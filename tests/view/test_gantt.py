@@ -16,9 +16,12 @@ from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Activity, Schedule
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
+from lab.sequencing.cyclic.cycle import best_cycle
+from lab.sequencing.cyclic.steady import steady
 from lab.sequencing.simulate.run import Run, simulate
+from lab.tasks.task_file import load_cell
 from lab.view.canvas import BLUE, GREEN, ORANGE, RED, SKY
-from lab.view.gantt import _draw_limits, gantt
+from lab.view.gantt import _draw_limits, cycle_gantt, gantt
 from lab.view.gantt_bars import WIDEST_INCH, Chart, mixed
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -244,3 +247,20 @@ def test_a_part_that_is_stuck_in_a_buffer_is_not_finished() -> None:
 
 def test_mixed_with_white() -> None:
     assert [mixed("#0072B2", strength) for strength in (1, 0.5, 0)] == ["#0072B2", "#80B8D8", "#FFFFFF"]
+
+
+def test_the_cycle_of_a_mix_is_drawn_with_its_period(tmp_path: Path) -> None:
+    """Two products in two colours, no rows for parts, and a line at the end of each period."""
+    cell = load_cell("fms").cell(("rook", "sign"))
+    cycle = best_cycle(replace(cell, arrivals=None, due_s=None, stations=_roomy(cell)), ("rook", "sign"))
+    cycle_gantt(steady(cycle, 2), tmp_path / "cycle.svg")
+    text = (tmp_path / "cycle.svg").read_text(encoding="utf-8")
+    assert f"the period: {cycle.period_s:g} s" in text
+    assert f"1 × rook, 1 × sign in a period of {cycle.period_s:g} s, 2 periods of what repeats for ever" in text
+    assert re.search(r"in process \((rook, sign|sign, rook)\)", text)
+    assert ">robot<" in text
+    assert text.count(f"stroke: {RED.lower()}") >= 2
+
+
+def _roomy(cell: Cell) -> tuple[Station, ...]:
+    return tuple(replace(one, capacity=9) if one.kind == "storage" else one for one in cell.stations)

@@ -51,6 +51,7 @@ RUN: dict[str, Any] = {
     "failure": None,
     "faults": [],
     "receipts": None,
+    "cyclic": None,
     "retries": [],
     "skills": [skill("learned", 30), skill("continued", 12), skill("reused")],
     "sequence": [1, 2, 1, 2],

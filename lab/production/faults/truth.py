@@ -16,7 +16,8 @@ MACHINE = ("machine slow", "machine fails")
 # stands elsewhere is in many ways; the first that fits counts
 CLAIMS: tuple[tuple[str, tuple[str, ...], bool], ...] = (
     (r"not done|takes longer|out of order", MACHINE, False),
-    (r"not of this order|no spot of .* is free|is taken", ("station full",), False),
+    (r"no spot of .* is free", ("station full", *PART), False),
+    (r"not of this order|is taken", ("station full",), False),
     (r"camera sees nothing", ("camera blind",), True),
     (r"camera does not see|camera sees", (*FIXED, "camera blind", "station full"), True),
     (r"was surveyed|something new|is gone from|since it was learned|since '.*' was learned|in the way", FIXED, True),

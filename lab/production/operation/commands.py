@@ -110,6 +110,14 @@ def _speed(rest: str) -> float | None:
     return _number(rest, MOST_SPEED, "times real time, or max", least=0.1)
 
 
+def pace(text: str) -> float | None:
+    """Simulated seconds per second that an option `--speed` means, None: as fast as it can. Raises BadInput."""
+    try:
+        return _speed(text)
+    except BadInput as error:
+        raise BadInput(f"speed: {error}") from None
+
+
 def _order(rest: str) -> tuple[int, ...]:
     words = rest.replace(",", " ").split()
     if not words:

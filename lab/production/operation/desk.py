@@ -1,17 +1,20 @@
 """Where commands are said while another thread simulates: stops act at once, the rest is carried out in its turn."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from threading import Condition
 
 from lab.errors import BadInput, LabError
-from lab.production.controls import RESET_FIRST, StopKind
-from lab.production.operation.commands import Spoken, spoken
+from lab.production.controls import RESET_FIRST, Controls, StopKind
+from lab.production.operation.at_once import OPERATOR, Done
+from lab.production.operation.commands import COMMANDS, Spoken, spoken
 from lab.production.operation.operated_scene import Left
-from lab.production.operation.operation import OPERATOR, Done, Operation
+from lab.production.operation.operation import Operation
 from lab.production.run_journal import Entry
 from lab.production.run_status import RunStatus
+from lab.teaching.events import Event
 
 AT_WORK = "the robot is at work: pause first"
+LISTEN_S = 0.2  # the longest stretch of waiting, so that Ctrl-C is heard
 
 
 class Desk:
@@ -27,6 +30,26 @@ class Desk:
         self.busy, self.closed = "lays the scene out", False
         self._changed = Condition()
         operation.controls.attended = attended
+
+    @property
+    def controls(self) -> Controls:
+        """The stops and the pace."""
+        return self.operation.controls
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The commands that are taken here."""
+        return tuple(COMMANDS)
+
+    @property
+    def names(self) -> Mapping[str, Sequence[str]]:
+        """What may follow some commands, by the command."""
+        return self.operation.scene.names()
+
+    @property
+    def done(self) -> Sequence[Done]:
+        """What came of all that was said."""
+        return self.operation.done
 
     def now(self) -> RunStatus:
         """Where the run stands."""
@@ -51,6 +74,8 @@ class Desk:
                 return None
         except LabError as error:
             return self.operation.refuse(line, str(error), by)
+        except Left:  # said while another left
+            return None
         return done
 
     @property
@@ -67,6 +92,18 @@ class Desk:
         """Break off what is under way, and end."""
         self.closed = self.operation.scene.leaving = True
         self._wake()
+
+    def stay(self) -> None:
+        """Wait until somebody leaves. To be called in another thread than `serve`."""
+        with self._changed:
+            while not self.closed:
+                self._changed.wait(LISTEN_S)
+
+    def watched(self, pages: int) -> None:
+        """So many pages are open: whether somebody attends the session does not depend on that."""
+
+    def hear(self, event: Event) -> None:
+        """The scene itself hears what happens."""
 
     def settle(self) -> None:
         """Wait until all that was said is done, or waits in a pause. To be called in another thread than `serve`."""

@@ -134,6 +134,18 @@ class OperatedScene:
         with self.lock:
             return self._status.copied()
 
+    def names(self) -> dict[str, list[str]]:
+        """What may follow some commands: kinds of parts, and the skills that are there to be learned and carried out."""
+        if self._world is None:
+            return {}
+        problems = self.prepared.problems
+        families = dict.fromkeys(problem.subtask for problem in problems.values())
+        return {
+            "parts": [part.name for part in self.task.made],
+            "learn": [*families, *problems],
+            "execute": [*problems],
+        }
+
     def trouble(self, why: str) -> None:
         """Tell what went wrong in something that the operator said."""
         self.floor.tell(TroubleMet(why, "waits for the operator", "", "", self.floor.now_s))

@@ -8,37 +8,21 @@ options and seed give the same scene again, bit for bit. The steps are counted f
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeGuard
 
 from lab.errors import LabError, WorkFailed
 from lab.production.conditions import Conditions
+from lab.production.operation.at_once import OPERATOR, Done, press
 from lab.production.operation.commands import Spoken, spoken
 from lab.production.operation.operated_scene import OperatedScene
 from lab.production.report import Report
 from lab.production.run_journal import Commanded, Entry, Stopped, stops_of
-from lab.production.run_status import HeldStatus, RunStatus
+from lab.production.run_status import RunStatus
 from lab.production.stop_record import StopsChanged
 from lab.tasks.task import Order, Task
 from lab.teaching.events import OperatorActed
 from lab.teaching.teacher import Teacher
-
-OPERATOR = "operator"
-
-
-@dataclass(frozen=True)
-class Done:
-    """What came of a command: refused, why it was not begun; failed, why it did not come to its end; said, what it came to."""
-
-    words: str
-    refused: str = ""
-    failed: str = ""
-    said: str = ""
-
-    @property
-    def well(self) -> bool:
-        """Whether it was carried out."""
-        return not (self.refused or self.failed)
 
 
 class Operation:
@@ -56,7 +40,7 @@ class Operation:
         self.controls, self._journal = conditions.controls, conditions.journal
         self.waiting: deque[tuple[Spoken, str]] = deque()
         self.done: list[Done] = []
-        self.on_done: Callable[[Done], None] = lambda done: None
+        self.on_done: list[Callable[[Done], None]] = []
         self._began = time.perf_counter()
         self._unwritten = deque[Commanded]()
         self._script = deque[Stopped | Commanded]()  # of a journal, what is still to be done again
@@ -73,10 +57,7 @@ class Operation:
 
     def now(self) -> RunStatus:
         """Where the run stands, to be looked at in any thread; a stop shows as soon as it is pressed."""
-        shown, held = self.scene.now(), self.controls.held
-        shown.held = None if held is None else HeldStatus(held.kind, held.why, held.by)
-        shown.speed = self.controls.speed
-        return shown
+        return self.scene.now().under(self.controls)
 
     def do(self, line: str | Spoken, by: str = OPERATOR) -> Done:
         """Carry a command out, in the thread that simulates; what is wrong with it is in what comes back."""
@@ -99,26 +80,7 @@ class Operation:
 
     def at_once(self, said: Spoken, by: str = OPERATOR) -> Done:
         """A stop, or what releases it, or the pace: in any thread, without waiting for anything."""
-        why = self._pressed(said, by)
-        return self._aside(Done(said.words, refused=why), by)
-
-    def _pressed(self, said: Spoken, by: str) -> str:
-        controls = self.controls
-        match said.word:
-            case "stop":
-                controls.emergency(by=by)
-            case "pause":
-                controls.pause(by)
-            case "reset":
-                return controls.reset()
-            case "go":
-                return controls.go_on()
-            case "step":
-                return controls.step()
-            case "speed":
-                assert not isinstance(said.argument, str | tuple)
-                controls.set_speed(said.argument)
-        return ""
+        return self._aside(Done(said.words, refused=press(self.controls, said, by)), by)
 
     def _noted(self, done: Done, by: str) -> Done:
         """Write a command down before it takes effect, and tell it."""
@@ -148,7 +110,8 @@ class Operation:
     def _kept(self, done: Done) -> Done:
         with self.scene.lock:
             self.done.append(done)
-        self.on_done(done)
+        for told in self.on_done:
+            told(done)
         return done
 
     def _meanwhile(self) -> bool:

@@ -46,7 +46,17 @@ class Pace:
     word: str
 
 
-def understood(message: str | bytes) -> Answer | Wish | Layer | Pace:
+@dataclass(frozen=True)
+class Command:
+    """The page gives the run a command, in words of `lab.production.operation.commands`."""
+
+    words: str
+
+
+Message = Answer | Wish | Layer | Pace | Command
+
+
+def understood(message: str | bytes) -> Message:
     """What a page says. Raises Refused for anything else."""
     if isinstance(message, bytes) or len(message) > MAX_CHARS:
         raise Refused(f"That was no message of this page: text of at most {MAX_CHARS} characters is wanted.")
@@ -68,6 +78,8 @@ def understood(message: str | bytes) -> Answer | Wish | Layer | Pace:
             return Wish(wish)
         case {"replay": str(word), **more} if not more and word in REPLAY_WORDS:
             return Pace(word)
+        case {"command": str(words), **more} if not more and words.strip() and words.isprintable():
+            return Command(words)
         case {"layer": int() | None as layer, **more} if not more and not isinstance(layer, bool):
             return Layer(layer)
     raise Refused("That was no message of this page: it is ignored.")

@@ -10,11 +10,16 @@ from pathlib import Path
 from typing import Any
 
 from lab.learning.requests import AdviceRequest, Request
+from lab.production.operation.at_once import OPERATOR
 from lab.seat.grid_text import ARROWS, direction_of
-from lab.seat.page.page_messages import Answer, Chair, Layer, Pace, Refused, Wish, understood
+from lab.seat.page.page_console import ONLOOKER, STOP, held_of
+from lab.seat.page.page_console import PARTS as RUN_PARTS
+from lab.seat.page.page_messages import Answer, Chair, Command, Layer, Message, Pace, Refused, Wish, understood
 from lab.seat.page.page_state import PARTS, Known, Pending, layer_of
+from lab.view.meshcat import GANTT_SCRIPT
 
 SLICE_EVERY_S = 0.1  # a layer's values are sent at most ten times a second,
+RUN_EVERY_S = 0.1  # and where a run stands, too
 SLICE_SHARE = 30  # and working them out takes at most this part of the time
 CLOSED = Answer(0, None, "closed")
 LISTEN_S = 0.2  # the longest stretch of waiting, so that Ctrl-C is heard
@@ -30,21 +35,27 @@ class _Seen:
     layer_version: int = 0
     layer_due_s: float = 0.0
     refusal: str = ""
+    held: str = ""
+    run_due_s: float = 0.0
 
 
 class SeatPanel:
     """What is known, who has the seat, the question that waits, and its answer; `lock` guards all of it.
 
     on_word: told, in the server's thread, in a word of the terminal what was answered to a question that nobody waits
-    for here. on_pace: told in a word how a session that is shown again is to go on.
+    for here. on_pace: told in a word how a session that is shown again is to go on. on_quit: told that the run's console
+    is to be left.
     """
 
-    files: Sequence[Path] = tuple(
-        Path(__file__).with_name(name)
-        for name in (
-            *("teaching.html", "teaching.css"),
-            *("teaching_draw.js", "teaching_status.js", "teaching_map.js", "teaching_question.js"),
-        )
+    files: Sequence[Path] = (
+        GANTT_SCRIPT,
+        *(
+            Path(__file__).with_name(name)
+            for name in (
+                *("teaching.html", "teaching.css", "console.css"),
+                *("teaching_draw.js", "teaching_status.js", "teaching_map.js", "console.js", "teaching_question.js"),
+            )
+        ),
     )
 
     def __init__(self, title: str) -> None:
@@ -54,12 +65,14 @@ class SeatPanel:
         self.chair = Chair()
         self.on_word: Callable[[str], None] | None = None
         self.on_pace: Callable[[str], None] | None = None
+        self.on_quit: Callable[[], None] | None = None
         self._answer: Answer | None = None
         self._ended = False
         self._pages: dict[int, _Seen] = {}
         self._texts: dict[str, tuple[int, str]] = {}  # part, or layer -> its version and its JSON
         self._stirred = 0
-        self._late = False  # a layer was held back
+        self._late = False  # something was held back
+        self._busy = ""  # the console's command under way when it was looked at last
 
     # ---- called by the session's thread
 
@@ -106,33 +119,68 @@ class SeatPanel:
         with self.lock:
             self._pages[page] = _Seen()
             self.chair.joined(page)
+            self._count()
 
     def left(self, page: int) -> None:
         """A browser has left; what waits goes on waiting."""
         with self.lock:
             self._pages.pop(page, None)
             self.chair.left(page)
+            self._count()
+
+    def _count(self) -> None:
+        if self.known.console is not None:
+            self.known.console.watched(len(self.chair.pages))
 
     def stirred(self) -> bool:
         """Whether there is something new since this was asked last."""
         with self.lock:
+            busy = "" if self.known.console is None else self.known.console.busy
+            if busy != self._busy:
+                self._busy = busy
+                self.known.changed("run")
             version = self.known.settle()
             new = version != self._stirred or self._late
             self._stirred, self._late = version, False
             return new
 
     def said(self, page: int, message: str | bytes) -> None:
-        """Do what a page says, or refuse it in a line on that page."""
+        """Do what a page says, or refuse it in a line on that page. An emergency stop waits for nothing and nobody."""
         word = ""
-        with self.lock:
-            try:
-                word = self._do(page, understood(message))
-            except Refused as reason:
+        try:
+            meant = understood(message)
+            if isinstance(meant, Command):
+                self._command(page, meant)
+                return
+            with self.lock:
+                word = self._do(page, meant)
+        except Refused as reason:
+            with self.lock:
                 self._pages[page].refusal = str(reason)
         if word and self.on_word is not None:
             self.on_word(word)
 
-    def _do(self, page: int, meant: Answer | Wish | Layer | Pace) -> str:
+    def _command(self, page: int, meant: Command) -> None:
+        """Say it to the run, without the lock: who hears what comes of it takes it, too."""
+        console, first = self.known.console, meant.words.split()[0].lower()
+        if console is None:
+            raise Refused("Nothing is carried out here that takes commands.")
+        has_seat = self.chair.holder == page  # only this thread changes it
+        if first == STOP:
+            console.say(STOP, OPERATOR if has_seat else ONLOOKER)
+        elif not has_seat:
+            free = self.chair.holder is None
+            raise Refused(
+                "Nobody operates yet: press 'Operate here' first."
+                if free
+                else "Another page operates: here only the emergency stop works."
+            )
+        elif first == "quit" and self.on_quit is not None:
+            self.on_quit()
+        else:
+            console.say(meant.words, OPERATOR)
+
+    def _do(self, page: int, meant: Message) -> str:
         """The terminal's word for the answer to a question that was only offered, "" for everything else."""
         if isinstance(meant, Layer):
             self._pages[page].layer, self._pages[page].layer_version = meant.layer, 0
@@ -145,6 +193,7 @@ class SeatPanel:
         if isinstance(meant, Wish):
             self.chair.wish(page, meant)
             return ""
+        assert isinstance(meant, Answer)
         pending = self._checked(page, meant)
         self._answer = meant
         self.known.pending = None
@@ -180,8 +229,10 @@ class SeatPanel:
             if seen is None:
                 return ""
             version = self.known.settle()
-            parts = {part: self._text(part, now_s) for part in self.known.since(seen.versions)}
+            parts = {part: self._text(part, now_s) for part in self._due(seen, now_s)}
             seen.versions |= dict.fromkeys(parts, version)
+            if self.known.console is not None and (held := json.dumps(held_of(self.known.console))) != seen.held:
+                parts["held"] = seen.held = held
             you = json.dumps(self.chair.view(page))
             if you != seen.you:
                 parts["you"] = seen.you = you
@@ -192,6 +243,17 @@ class SeatPanel:
             parts
         )
         return ", ".join(members + [f'"refusal": {json.dumps(refusal)}'] * bool(refusal))
+
+    def _due(self, seen: _Seen, now_s: float) -> list[str]:
+        """The parts that have changed; where a run stands is held back when it was told just now."""
+        new = self.known.since(seen.versions)
+        if self.known.console is None or not {*new} & {*RUN_PARTS}:
+            return new
+        if now_s < seen.run_due_s:
+            self._late = True
+            return [part for part in new if part not in RUN_PARTS]
+        seen.run_due_s = now_s + RUN_EVERY_S
+        return new
 
     def _text(self, part: str, now_s: float) -> str:
         version, text = self._texts.get(part, (-1, ""))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from lab.seat.event_text import PARTS_DONE, run_text
+from lab.seat.page.page_console import changed_by
 from lab.seat.page.page_order import bars_of
 from lab.seat.page.page_state import MOST_LINES, Known, Progress, ShownLesson
 from lab.sequencing.search import EpisodeSequenced
@@ -18,6 +19,9 @@ from lab.teaching.events import (
 
 def hear_run(known: Known, event: Event) -> None:
     """Take over what happens in a run: a line in the panel, the moves so far, the costs of a sequencer's episodes."""
+    if known.console is not None:
+        known.console.hear(event)
+        known.changed(*changed_by(event))
     text, before = run_text(event), known.progress or Progress()
     match event:
         case PhaseBegan():

@@ -15,6 +15,7 @@ from lab.learning.updates import Table
 from lab.mdp import TabularMDP
 from lab.seat.event_text import SessionText, Told
 from lab.seat.grid_views import StateWords
+from lab.seat.page.page_console import Console, measured_of, plan_of, run_of
 from lab.seat.page.page_curve import Curve
 from lab.seat.page.page_grid import place_of, slice_of, spot
 from lab.seat.page.page_question import question_of
@@ -123,6 +124,8 @@ class Known:
     members: list[Json] = field(default_factory=list)
     receipt: Json | None = None
     ended: str = ""
+    asks: bool = True  # somebody who teaches may be asked here
+    console: Console | None = None  # of a run that is steered here
     replay: Json | None = None  # of a session that is shown again: its pace, and what was answered last
     questions: int = 0
     version: int = 1
@@ -156,6 +159,7 @@ def _lesson(known: Known, now_s: float) -> Json:
     return {
         "title": learning.title,
         "page": known.title,
+        "asks": known.asks,
         "kind": learning.kind,
         "unit": "s" if learning.kind == "order" else "steps",
         "episodes": learning.episodes,
@@ -222,6 +226,9 @@ PARTS: dict[str, Callable[[Known, float], Any]] = {
     "receipt": lambda known, now_s: known.receipt,
     "ended": lambda known, now_s: known.ended,
     "replay": lambda known, now_s: known.replay,
+    "run": lambda known, now_s: run_of(known.console),
+    "plan": lambda known, now_s: plan_of(known.console),
+    "measured": lambda known, now_s: measured_of(known.console),
 }
 
 

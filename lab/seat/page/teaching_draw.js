@@ -243,28 +243,5 @@ const seatDraw = (() => {
     return svg;
   }
 
-  // Bars [row, kind, part, start, end] by row, and the time now
-  function bars(svg, { rows, bars: all, now_s, end_s }) {
-    const wide = svg.clientWidth || 400, left = 96, height = 22, last = Math.max(end_s, now_s, 1);
-    svg.style.height = `${rows.length * height + 22}px`;
-    const x = (seconds) => left + ((wide - left - 8) * seconds) / last;
-    const parts = rows.map((row, k) => node("text", { x: left - 8, y: k * height + 15, "text-anchor": "end", fill: "#4f5a64" }, row.length > 14 ? `${row.slice(0, 13)}…` : row));
-    for (const [row, kind, part, start, end] of all) {
-      const wait = kind === "wait", top = rows.indexOf(row) * height + (wait ? 8 : 3);
-      const bar = node("rect", { x: x(start), y: top, width: Math.max(1, x(end) - x(start)), height: wait ? 6 : height - 7, class: `k-${kind}` });
-      bar.append(node("title", {}, `${row}: ${kind === "pallet" ? "carry an empty pallet" : kind}${kind === "empty" ? "" : `, part ${part}`}, ${start} to ${end} s`));
-      parts.push(bar);
-      if (x(end) - x(start) > 14 && ["carry", "pallet", "process"].includes(kind)) {
-        parts.push(node("text", { x: (x(start) + x(end)) / 2, y: top + 12, "text-anchor": "middle", fill: kind === "carry" ? "#ffffff" : "#222222" }, part));
-      }
-    }
-    const foot = rows.length * height;
-    parts.push(node("line", { x1: x(now_s), x2: x(now_s), y1: 0, y2: foot + 4, stroke: "#222222", "stroke-dasharray": "3 3" }));
-    parts.push(node("text", { x: Math.min(x(now_s), wide - 40), y: foot + 16, "text-anchor": "middle", fill: "#222222" }, `${Math.round(now_s)} s`));
-    svg.replaceChildren(...parts);
-    const moves = all.filter((bar) => ["carry", "pallet"].includes(bar[1])).length;
-    svg.setAttribute("aria-label", `${seatStatus.count(moves, "move")} so far, ${Math.round(now_s)} s`);
-  }
-
-  return { grid, curve, rate, bars, trust, nice };
+  return { grid, curve, rate, trust, nice };
 })();

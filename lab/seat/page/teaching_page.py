@@ -17,6 +17,8 @@ from lab.learning.requests import AdviceRequest, AdvisorLeft, Request
 from lab.mdp import NoPath, shortest_steps
 from lab.seat.event_text import Told
 from lab.seat.grid_views import StateWords
+from lab.seat.page.page_console import PARTS as RUN_PARTS
+from lab.seat.page.page_console import Console
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_messages import Answer
 from lab.seat.page.page_order import bars_of, made_until
@@ -111,6 +113,27 @@ class SeatPage(LiveView):
 
         pace.on_change, self._panel.on_pace = changed, pace.do
         changed(pace.now())
+
+    def steer(self, console: Console, on_quit: Callable[[], None] | None = None) -> None:
+        """Pages steer this run: they show where it stands and give its commands; on_quit: it can be left."""
+        self._panel.on_quit = on_quit
+        with self._panel.lock:
+            self._panel.known.console = console
+            console.watched(len(self._panel.chair.pages))
+        console.controls.on_change.append(self._wake)
+        self.ran()
+
+    def ran(self) -> None:
+        """Something came of a command to the run: pages look again."""
+        with self._panel.lock:
+            self._panel.known.changed(*RUN_PARTS)
+        self._wake()
+
+    def asks_nobody(self) -> None:
+        """Nobody who looks at this page is asked anything."""
+        with self._panel.lock:
+            self._panel.known.asks = False
+            self._panel.known.changed("lesson")
 
     def replayed(self, request: Request, action: int | None) -> None:
         """Show a question of a session that is shown again, with what was answered; None: it was left to the learner."""

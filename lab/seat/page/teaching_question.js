@@ -6,9 +6,9 @@ const seat = (() => {
   const PLACES = ["1 / 2", "3 / 2", "2 / 1", "2 / 3", "3 / 5", "1 / 5"]; // row and column of each direction's button
   const LETTERS = { y: "own", Enter: "own", s: "skip", u: "undo", w: "why", a: "auto", q: "quit" };
   const PACES = { " ": "pause", n: "step", "-": "slower", "+": "faster", "=": "faster" };
-  const SURE_MS = 3000, REFUSAL_MS = 6000, SLOW_PAUSE_MS = 600, URGENT = new Set(["question", "you", "ended"]);
+  const SURE_MS = 3000, REFUSAL_MS = 6000, SLOW_PAUSE_MS = 600, URGENT = new Set(["question", "you", "ended", "held"]);
   const el = (id) => document.getElementById(id);
-  const state = { place: null, slice: null, work: null }, dirty = new Set(), title = document.title;
+  const state = { place: null, slice: null, work: null, run: null, plan: null, measured: [] }, dirty = new Set(), title = document.title;
   let finished = false, whyOpen = false, slow = false, lastDrawn = 0, later = 0, send = null, shown = null, sent = 0, until = null, armed = "", disarm = 0, fade = 0, moveButtons = new Map();
 
   function update(parts) {
@@ -29,7 +29,7 @@ const seat = (() => {
   }
 
   const RENDERERS = [
-    [["you", "question", "lesson", "ended", "standing", "curve", "progress", "replay"], showQuestion],
+    [["you", "question", "lesson", "ended", "standing", "curve", "progress", "replay", "run"], showQuestion],
     [["question", "lesson"], showMoves],
     [["question", "you", "lesson"], enable],
     [["replay", "question", "ended"], showReplay],
@@ -45,6 +45,7 @@ const seat = (() => {
     shown = state.question || null;
     for (const [names, draw] of RENDERERS) if (names.some((name) => parts.has(name))) draw();
     seatStatus.show(state, parts);
+    seatConsole.show(state, parts, send);
   }
 
   const { make, percent } = seatStatus;
@@ -57,13 +58,12 @@ const seat = (() => {
     document.body.classList.toggle("waiting", Boolean(shown));
     document.body.classList.toggle("mine", Boolean(you.seat));
     document.title = `${shown && you.seat ? "● " : ""}${title}`;
-    el("lesson").textContent = lesson.title || lesson.page;
-    const chair = finished || (send && state.replay) ? "" : !send ? "connection lost: trying again" : you.seat ? `You answer here${you.pages > 1 ? `; ${seatStatus.count(you.pages - 1, "other page")} watching` : ""}` : you.free ? "No page answers yet" : "You are watching: another page answers";
-    el("chair-text").textContent = chair;
+    el("lesson").textContent = state.run && !shown && state.run.words ? state.run.phase_words : lesson.title || lesson.page;
+    el("chair-text").textContent = finished ? "" : seatStatus.chair(state, Boolean(send));
     el("chair").classList.toggle("yours", Boolean(you.seat && send));
     const button = el("chair-button");
-    button.hidden = Boolean(state.replay) || !(send && (you.seat ? you.pages > 1 : you.free));
-    button.textContent = you.seat ? "Hand over" : "Answer here";
+    button.hidden = Boolean(state.replay) || !(lesson.asks || state.run) || !(send && (you.seat ? you.pages > 1 : you.free));
+    button.textContent = you.seat ? "Hand over" : lesson.asks ? "Answer here" : "Operate here";
     el("says").textContent = shown ? shown.title : state.ended || idle();
     el("where").textContent = shown ? shown.where || "" : "";
     el("detail").textContent = shown ? detail() : "";
@@ -78,10 +78,10 @@ const seat = (() => {
   function idle() {
     const { standing, curve, lesson, progress } = state;
     if (progress && !standing.requests) return `${progress.phase}: ${Math.min(progress.done, progress.parts)} of ${progress.parts}.`;
-    if (!curve.count && !lesson.title) return "Nothing is being learned yet. The learner will ask here when it wants advice.";
+    if (!curve.count && !lesson.title) return `Nothing is being learned yet.${lesson.asks ? " The learner will ask here when it wants advice." : ""}`;
     const episode = `${lesson.kind === "order" ? "Order" : "Episode"} ${curve.count}${lesson.episodes ? ` of ${lesson.episodes}` : ""}`;
     const why = { rejected: "it takes no more advice", converged: "it asks no more", left: "it goes on alone" }[standing.verdict];
-    return `${episode}: ${why || "it works alone, and asks when it stops improving"}.`;
+    return `${episode}: ${why || `it works alone, and asks ${lesson.asks ? "" : "its advisor "}when it stops improving`}.`;
   }
 
   const detail = () => `${shown.would}${shown.why ? ` It asks because ${shown.why}.` : ""}${shown.offered && !state.replay ? " The terminal asks, too." : ""}`;
@@ -261,6 +261,7 @@ const seat = (() => {
   const paced = (word) => send && send({ replay: word });
 
   function pressed(event) {
+    if (seatConsole.pressed(event, { busy: Boolean(shown), drawn: Boolean(shown) && seatMap.drawn().length > 0 })) return;
     if (event.key === "Escape" && !seatMap.drop()) event.target.blur();
     const pace = state.replay && !state.ended && !event.ctrlKey && !event.target.matches("input, button") ? PACES[event.key] : undefined;
     if (pace) {
@@ -293,6 +294,7 @@ const seat = (() => {
     renew("you");
   }
 
+  seatConsole.refusing(refused);
   document.addEventListener("keydown", pressed);
   document.getElementById("page").classList.add("bare");
   el("words").addEventListener("click", (event) => {
@@ -319,6 +321,7 @@ const seat = (() => {
       online(how);
       seatMap.tell({ go, look: (layer) => how({ layer }), can: canAnswer });
     },
+    clock: (time_s) => seatConsole.clock(time_s),
     lost: () => online(null),
     spare() {
       slow = true;

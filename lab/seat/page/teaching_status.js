@@ -69,10 +69,12 @@ const seatStatus = (() => {
   }
 
   function showWork({ work }) {
-    el("work").hidden = !work || !work.bars.length;
+    el("work").hidden = !work || !work.measured.length;
     if (el("work").hidden) return;
-    el("work").querySelector("[data-kind=pallet]").hidden = !work.bars.some((bar) => bar[1] === "pallet");
-    seatDraw.bars(el("bars"), work);
+    el("work").querySelector("[data-kind=pallet]").hidden = !work.measured.some((one) => one.kind === "pallet");
+    labGantt.draw(el("bars"), { ...work, planned: work.measured, marks: [], end_s: Math.max(work.end_s, work.now_s) }).grow(work.now_s);
+    const moves = work.measured.filter((one) => ["carry", "pallet"].includes(one.kind)).length;
+    el("bars").setAttribute("aria-label", `${count(moves, "move")} so far, ${Math.round(work.now_s)} s`);
   }
 
   function receiptRows(of) {
@@ -104,5 +106,15 @@ const seatStatus = (() => {
     box.querySelector("ol").replaceChildren(...[...progress.lines].reverse().map((line) => make("li", line)));
   }
 
-  return { show, make, percent, count };
+  // Who answers, or, where nobody is asked, who operates; live: the page hears the run
+  function chair({ you = {}, lesson: { asks }, run, replay }, live) {
+    if (live && replay) return "";
+    if (!live) return "connection lost: trying again";
+    if (!asks && !run) return "Nobody is asked here";
+    if (you.seat) return `${asks ? "You answer here" : "You operate this run"}${you.pages > 1 ? `; ${count(you.pages - 1, "other page")} watching` : ""}`;
+    if (you.free) return asks ? "No page answers yet" : "Nobody operates yet";
+    return `You are watching: another page ${asks ? "answers" : "operates"}`;
+  }
+
+  return { show, chair, make, percent, count };
 })();

@@ -9,9 +9,9 @@ from rich.console import Console
 from rich.text import Text
 
 from lab.errors import printable
+from lab.production.operation.at_once import Done
 from lab.production.operation.commands import COMMANDS, help_lines
 from lab.production.operation.desk import Desk
-from lab.production.operation.operation import Done
 from lab.seat.terminal.console_view import plain_lines, view
 from lab.seat.terminal.screen import folded
 
@@ -59,7 +59,7 @@ class OperatorConsole:
         self._log: list[tuple[str, str]] = []
         self._answer = 0  # lines of the log that the last command was answered with
         self._error: BaseException | None = None
-        desk.operation.on_done = self._done
+        desk.operation.on_done.append(self._done)
         self._app = self._made(keys, screen)
 
     def run(self) -> None:

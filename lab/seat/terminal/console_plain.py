@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterable
 from threading import Thread
 
+from lab.production.operation.at_once import Done
 from lab.production.operation.commands import help_lines
 from lab.production.operation.desk import Desk
-from lab.production.operation.operation import Done
 from lab.seat.terminal.console_view import plain_lines
 
 Write = Callable[[str], None]
@@ -21,33 +21,48 @@ def told(done: Done) -> str:
 class PlainConsole:
     """Reads a line when the one before is done, or waits in a pause; ends at the first that was not carried out.
 
+    Beside a page, where more may be said, nothing ends it but `quit`.
+
     write: where the lines go that tell what came of it.
     """
 
     def __init__(self, desk: Desk, write: Write) -> None:
         self._desk, self._write = desk, write
         self._bad: Done | None = None
+        self._stays = False
         self._error: Exception | None = None
-        desk.operation.on_done = self._done
+        desk.operation.on_done.append(self._done)
 
-    def run(self, lines: Iterable[str]) -> Done | None:
-        """The command that was refused or failed, None when all went well. Raises what the simulation raised."""
+    def run(self, lines: Iterable[str], *, stay: bool = False) -> Done | None:
+        """The command that was refused or failed, None when all went well. Raises what the simulation raised.
+
+        stay: until somebody leaves, whatever becomes of the lines.
+        """
+        self._stays = stay
         worker = Thread(target=self._simulate, name="simulation", daemon=True)
         worker.start()
         try:
-            self._desk.settle()
-            for line in lines:
-                if self._error is not None or not self._said(line.strip()):
-                    break
-                self._desk.settle()
-                if self._bad is not None:
-                    break
+            if stay:
+                Thread(target=self._read, args=(lines,), name="commands", daemon=True).start()
+                self._desk.stay()
+            else:
+                self._read(lines)
         finally:
             self._desk.leave()
             worker.join()
         if self._error is not None:
             raise self._error
         return self._bad
+
+    def _read(self, lines: Iterable[str]) -> None:
+        self._desk.settle()
+        for line in lines:
+            if self._error is not None or not self._said(line.strip()):
+                self._desk.leave()
+                break
+            self._desk.settle()
+            if self._bad is not None:
+                break
 
     def _simulate(self) -> None:
         try:
@@ -74,5 +89,5 @@ class PlainConsole:
 
     def _done(self, done: Done) -> None:
         self._write(told(done))
-        if not done.well and self._bad is None:
+        if not done.well and self._bad is None and not self._stays:
             self._bad = done

@@ -128,7 +128,7 @@ def test_the_order_is_advised(tab: "Page", page: SeatPage, until: Until) -> None
     until(tab, "!document.querySelector('#moves button:enabled')")
     asked = ThreadPoolExecutor(1).submit(page.ask, request)
     until(tab, "document.getElementById('says').textContent.includes('57 s: the robot is at toaster')")
-    until(tab, "document.querySelectorAll('#bars rect').length === 3")
+    until(tab, "document.querySelectorAll('#bars g rect').length === 3")
     tab.click("#moves >> text=toast 2")
     assert asked.result(20) == 2
 
@@ -161,7 +161,7 @@ def test_a_pallets_move_is_no_carry(tab: "Page", page: SeatPage, until: Until) -
     ThreadPoolExecutor(1).submit(page.ask, replace(request, run=run, allowed=run.allowed() or (1,), made=tuple(made)))
     until(tab, "document.querySelectorAll('#bars .k-pallet').length === 1")
     assert tab.is_visible("#work [data-kind=pallet]")
-    assert "carry an empty pallet" in (tab.text_content("#bars .k-pallet title") or "")
+    assert "carries an empty pallet" in (tab.text_content("#bars .k-pallet title") or "")
 
 
 def test_the_receipt_is_shown(tab: "Page", page: SeatPage, until: Until) -> None:

@@ -6,7 +6,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.seat.page.page_messages import MAX_CHARS, MOST_MOVES, Answer, Chair, Layer, Pace, Refused, Wish, understood
+from lab.seat.page.page_messages import (
+    MAX_CHARS,
+    MOST_MOVES,
+    Answer,
+    Chair,
+    Command,
+    Layer,
+    Message,
+    Pace,
+    Refused,
+    Wish,
+    understood,
+)
 
 
 @pytest.mark.parametrize(
@@ -18,6 +30,7 @@ from lab.seat.page.page_messages import MAX_CHARS, MOST_MOVES, Answer, Chair, La
         ({"answer": {"question": 3, "path": [3, 1, 3]}}, Answer(3, 3, path=(3, 1, 3))),
         ({"answer": {"question": 3, "path": [0] * MOST_MOVES}}, Answer(3, 0, path=(0,) * MOST_MOVES)),
         ({"replay": "step"}, Pace("step")),
+        ({"command": "jog +x 10"}, Command("jog +x 10")),
         ({"seat": "take"}, Wish("take")),
         ({"seat": "give"}, Wish("give")),
         ({"layer": 4}, Layer(4)),
@@ -54,6 +67,11 @@ def test_what_a_page_says_is_understood(message: object, meant: object) -> None:
         json.dumps({"answer": {"question": 1, "path": [0] * (MOST_MOVES + 1)}}),
         '{"replay": "backwards"}',
         '{"replay": "step", "seat": "take"}',
+        '{"command": ""}',
+        '{"command": " "}',
+        '{"command": 3}',
+        '{"command": "stop\\n"}',
+        '{"command": "stop", "seat": "take"}',
         "[" * MAX_CHARS,
         '{"layer": ' + "1" * MAX_CHARS + "}",
         b'{"layer": 1}',
@@ -68,9 +86,19 @@ def test_anything_else_is_refused_in_a_line(message: str | bytes) -> None:
 @given(st.text() | st.binary() | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(json.dumps))
 def test_nothing_else_can_come_of_a_message(message: str | bytes) -> None:
     try:
-        assert isinstance(understood(message), Answer | Wish | Layer | Pace)
+        assert isinstance(understood(message), Message)
     except Refused:
         return
+
+
+@given(st.text() | st.sampled_from(["stop", "jog +x 10", "\u2028", "\x00stop", " "]))
+def test_a_command_is_one_printable_line(words: str) -> None:
+    try:
+        meant = understood(json.dumps({"command": words}))
+    except Refused:
+        assert not words.strip() or not words.isprintable() or len(words) > MAX_CHARS // 8
+    else:
+        assert meant == Command(words)
 
 
 def test_the_first_page_has_the_seat() -> None:

@@ -1,5 +1,7 @@
 """The order of the transfers on the teaching page: what may be moved, and how the work so far is made out."""
 
+from dataclasses import astuple
+
 import numpy as np
 import pytest
 
@@ -79,11 +81,11 @@ def test_bars_are_those_of_the_schedule(name: str, order: int | tuple[str, ...])
     schedule = simulate(cell, decisions)
     run = Run(cell)
     shown = bars_of([run.move(decision) for decision in decisions])
-    robot = [tuple(bar[1:2] + bar[3:]) for bar in shown["bars"] if bar[0] == "robot"]
+    robot = [(bar["kind"], bar["start_s"], bar["end_s"]) for bar in shown["measured"] if bar["resource"] == "robot"]
     assert robot == [(a.kind, a.start_s, a.end_s) for a in schedule.robot]
-    assert ("pallet" in {bar[1] for bar in shown["bars"]}) == (name == "fms")
-    machines = sorted(tuple(bar) for bar in shown["bars"] if bar[0] != "robot")
-    assert machines == sorted((a.resource, a.kind, a.part, a.start_s, a.end_s) for a in schedule.machines)
+    assert ("pallet" in {bar["kind"] for bar in shown["measured"]}) == (name == "fms")
+    machines = [tuple(bar.values()) for bar in shown["measured"] if bar["resource"] != "robot"]
+    assert sorted(machines) == sorted(astuple(activity) for activity in schedule.machines)
     assert shown["end_s"] == schedule.makespan_s == shown["now_s"]
 
 
@@ -91,4 +93,4 @@ def test_work_under_way_reaches_beyond_now() -> None:
     shown = bars_of(moves_of(1))
     assert (shown["now_s"], shown["end_s"]) == (57.0, 117.0)  # 60 s in the toaster
     assert shown["rows"] == ["robot", "toaster"]
-    assert bars_of([]) == {"rows": ["robot"], "bars": [], "now_s": 0.0, "end_s": 0.0}
+    assert bars_of([]) == {"rows": ["robot"], "measured": [], "now_s": 0.0, "end_s": 0.0}

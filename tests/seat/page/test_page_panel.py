@@ -1,6 +1,7 @@
 """What the panel sends to whom and when, without a server: big tables rarely, everything else once."""
 
 import json
+import threading
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,16 @@ import pytest
 from lab.learning.requests import AdviceRequest
 from lab.learning.session_events import EpisodeEnded
 from lab.mdp import TabularMDP, grid
+from lab.production.controls import Controls, Held, StopKind
+from lab.production.operation.run_desk import RunDesk
+from lab.production.run_journal import RunJournal
 from lab.seat.page.page_events import hear
 from lab.seat.page.page_messages import Answer
 from lab.seat.page.page_panel import SeatPanel, plain_json, word_of
+from lab.seat.page.page_run import hear_run
 from lab.seat.page.page_state import PARTS, Pending, ShownLesson
+from lab.tasks.task_file import load
+from lab.teaching.events import SkillBegan
 
 LABELS = ("up", "down", "left", "right")
 
@@ -133,3 +140,101 @@ def test_the_terminal_hears_labels(panel: SeatPanel, mdp: TabularMDP) -> None:
     number = panel.pose(Pending(request)).number  # somebody waits for this one here
     panel.said(1, json.dumps({"answer": {"question": number, "action": 0}}))
     assert words == ["up"]
+
+
+# ---- a run that is steered here
+
+
+@pytest.fixture
+def desk(panel: SeatPanel) -> RunDesk:
+    """The console of a run of one slice; pages 1, which has the seat, and 2."""
+    task = load("toast")
+    made = RunDesk(task, task.ordered(1), Controls(), RunJournal(), lambda event: hear_run(panel.known, event))
+    panel.known.console = made
+    panel.joined(2)
+    return made
+
+
+def say(panel: SeatPanel, words: str, page: int = 1) -> str:
+    """Give a command; why it was ignored."""
+    panel.said(page, json.dumps({"command": words}))
+    refusal = told(panel, page).get("refusal", "")
+    assert isinstance(refusal, str)
+    return refusal
+
+
+def test_only_who_has_the_seat_commands_but_anybody_stops(panel: SeatPanel, desk: RunDesk) -> None:
+    assert say(panel, "pause", 2) == "Another page operates: here only the emergency stop works."
+    assert not desk.controls.stops
+    assert say(panel, "stop", 2) == ""
+    assert desk.controls.held == Held(StopKind.EMERGENCY, "pressed by hand", "onlooker")
+    assert say(panel, "reset", 2)
+    assert say(panel, "reset") == ""
+    assert [*desk.controls.stops] == [StopKind.PAUSE]
+    panel.left(1)
+    assert say(panel, "go", 2) == "Nobody operates yet: press 'Operate here' first."
+    assert say(panel, "stop", 2) == ""
+    assert StopKind.EMERGENCY in desk.controls.stops
+
+
+def test_an_emergency_stop_does_not_wait_for_the_lock(panel: SeatPanel, desk: RunDesk) -> None:
+    """The session's thread is busy with the panel meanwhile."""
+    with panel.lock:
+        server = threading.Thread(target=panel.said, args=(2, '{"command": "stop"}'))
+        server.start()
+        pressed = threading.Event()
+        desk.controls.on_change.append(pressed.set)
+        assert pressed.wait(20) or desk.controls.holds_arm
+        assert desk.controls.holds_arm
+    server.join(20)
+    assert not server.is_alive()
+
+
+def test_what_a_run_does_not_take_is_among_what_came_of_commands(
+    panel: SeatPanel, desk: RunDesk, clock: list[float]
+) -> None:
+    told(panel)
+    clock[0] += 1.0
+    panel.said(1, '{"command": "jog +x 10"}')
+    run = told(panel)["seat"]["run"]
+    assert run["said"] == 1
+    assert "this run carries itself out" in run["done"][0]["refused"]
+    assert run["commands"] == ["pause", "step", "go", "stop", "reset", "speed"]
+
+
+def test_without_a_run_no_command_is_taken(panel: SeatPanel) -> None:
+    assert say(panel, "stop") == "Nothing is carried out here that takes commands."
+
+
+def test_where_a_run_stands_is_sent_ten_times_a_second_but_a_stop_at_once(
+    panel: SeatPanel, desk: RunDesk, clock: list[float]
+) -> None:
+    told(panel)
+    clock[0] += 1.0
+    sent = 0
+    for step in range(100):  # a second and an event each 10 ms
+        clock[0] += 0.01
+        hear_run(panel.known, SkillBegan("home", f"goes home, {step}", "slice 1", step / 100))
+        sent += '"run"' in panel.news(1)
+    desk.controls.emergency()
+    assert told(panel)["seat"]["held"]["kind"] == "emergency"
+    assert panel.stirred()
+    clock[0] += 1.0
+    assert told(panel)["seat"]["run"]["words"] == "goes home, 99"
+    assert panel.news(1) == ""
+    assert sent in (9, 10)
+
+
+def test_a_run_without_news_sends_nothing(panel: SeatPanel, desk: RunDesk, clock: list[float]) -> None:
+    told(panel)
+    for _ in range(5):
+        clock[0] += 1.0
+        panel.stirred()
+        assert panel.news(1) == ""
+
+
+def test_pages_that_come_and_go_are_who_attends(panel: SeatPanel, desk: RunDesk) -> None:
+    assert desk.controls.attended
+    panel.left(1)
+    panel.left(2)
+    assert not desk.controls.attended

@@ -143,6 +143,7 @@ def test_the_lesson_and_the_map_are_there_before_any_question(known: Known) -> N
     assert shown["lesson"] == {
         "title": "maze",
         "page": "the page",
+        "asks": True,
         "kind": "steps",
         "unit": "steps",
         "episodes": 9,

@@ -513,4 +513,11 @@ def test_a_whole_run_is_told_in_the_panel(page: SeatPage, opens: "Opens") -> Non
         page.hear(PhaseBegan("carry out", 1))
         page.hear(MoveMade(Move(1, "plate", "plate", "toaster", 0.0, 0.0, 1.0, 4.0, 60.0), "slice 1"))
         seat = browser.hear_until(lambda seat: seat["work"])
-        assert seat["work"]["bars"][-1] == ["toaster", "process", 1, 4.0, 64.0]
+        last = seat["work"]["measured"][-1]
+        assert (last["resource"], last["kind"], last["part"], last["start_s"], last["end_s"]) == (
+            "toaster",
+            "process",
+            1,
+            4.0,
+            64.0,
+        )

@@ -1,0 +1,36 @@
+"""What `lab sequence --cyclic` runs."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lab.cli.lessons import lesson_seat, teacher_of
+from lab.errors import BadInput
+
+if TYPE_CHECKING:
+    from lab.teaching.kept_order import OrderOptions
+
+OF_A_CYCLE = ("task", "case", "toasts", "parts", "seed")
+
+
+def cyclic_found(given: "OrderOptions", toolbox: str | None, files: dict[str, Path]) -> dict[str, Any]:
+    """The document of the shortest cycle; BadInput for options that say how an order is looked for, which a cycle is not."""
+    from dataclasses import asdict
+
+    from lab.production.cyclic_job import CyclicWanted, cyclic_named
+    from lab.teaching.kept_order import OrderOptions
+    from lab.teaching.lesson_options import DEFAULT_ADVISORS, LessonOptions
+
+    none = asdict(OrderOptions())
+    for name, value in asdict(given).items():
+        if name not in OF_A_CYCLE and value != none[name]:
+            said = "" if value is True else f" {value}"
+            raise BadInput(
+                f"--cyclic beside --{name}{said}: the shortest cycle is found and proven, by its period alone"
+            )
+    if "plot" in files:
+        raise BadInput(f"--cyclic beside --plot {files['plot']}: a cycle has no episodes; --gantt draws it")
+    options = LessonOptions(advisors=DEFAULT_ADVISORS, seed=given.seed)
+    with lesson_seat(()) as seat, seat.progress:
+        teacher = teacher_of(toolbox, options, seat)
+        wanted = CyclicWanted(given.case, given.toasts, given.parts, given.seed)
+        return cyclic_named(given.task, wanted, teacher, files)

@@ -1,0 +1,124 @@
+"""The best steady rhythm of a cell or of a task: what `lab sequence --cyclic` does."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+from lab.errors import BadInput, LabError
+from lab.production.cyclic_order import cycle_document, mix_of
+from lab.production.run import teach_all
+from lab.sequencing.cell.cell import MAX_PARTS, Cell
+from lab.sequencing.cyclic.cycle import Cycle, best_cycle
+from lab.sequencing.cyclic.steady import steady
+from lab.sequencing.cyclic.unrolled import of_parts, unrolled
+from lab.sequencing.methods.exact import optimum
+from lab.skills.prepared_scene import prepare
+from lab.tasks.cell_file import CellFile, order_from_word, toast_case
+from lab.tasks.grid_world import GridWorld
+from lab.tasks.task import Task
+from lab.tasks.task_file import load_any
+from lab.teaching.events import PhaseBegan
+from lab.teaching.teacher import Teacher
+
+SHOWN_PERIODS = 3
+FEWEST_CYCLES = 6  # of the finite order that is shown beside: enough for the line to be full
+MAX_EXPANDED = 50_000  # states, for the best finite order
+
+
+@dataclass(frozen=True)
+class CyclicWanted:
+    """What is asked for: which parts enter in a cycle, as `lab sequence` names an order; the seed."""
+
+    case: str | None = None
+    toasts: int | None = None
+    parts: str | None = None
+    seed: int = 0
+
+
+def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[str, Path]) -> dict[str, Any]:
+    """The document of `lab sequence --cyclic` on a cell file, or on a task over durations measured in simulation.
+
+    Without a word on the order one part enters in a cycle, or, of several products, what the file orders. Raises BadInput for
+    what has no cycle, WorkFailed when none was found.
+    """
+    from lab.view.canvas import check_picture
+
+    for path in files.values():
+        check_picture(path)
+    case = wanted.case
+    if case is not None and name == "toast":
+        name, case = toast_case(case), None
+    loaded = load_any(name)
+    if isinstance(loaded, GridWorld):
+        raise BadInput(f"{name}: it is a world, there is nothing to sequence: learn it with lab teach {name}")
+    mix, own = _mix(loaded, case, wanted)
+    most = max(FEWEST_CYCLES, ceil(own / len(mix))) * len(mix)
+    cell = _largest(lambda parts: _cell(loaded, mix, parts, teacher), most, len(mix))
+    teacher.tell(PhaseBegan("sequence", 1))
+    cycle = best_cycle(cell, mix, seed=wanted.seed)
+    document = {"task": loaded.name, "seed": wanted.seed} | cycle_document(cycle) | {"finite": _finite(cycle, cell)}
+    if "gantt" in files:
+        from lab.view.gantt import cycle_gantt
+
+        cycle_gantt(steady(cycle, SHOWN_PERIODS), files["gantt"])
+    return document | {"files": {name: str(path) for name, path in files.items()}}
+
+
+def _mix(loaded: CellFile | Task, case: str | None, wanted: CyclicWanted) -> tuple[tuple[str, ...], int]:
+    """The products that enter in a cycle, and how many parts the file orders itself."""
+    if isinstance(loaded, CellFile):
+        if wanted.parts is not None:
+            raise BadInput(f"--parts {wanted.parts}: '{loaded.name}' is a cell: give its cycle with --case or --toasts")
+        if case is not None and wanted.toasts is not None:
+            raise BadInput(f"--case {case} and --toasts {wanted.toasts}: a cycle is one or the other")
+        own = loaded.ordered()
+        asked = order_from_word(loaded, case) if case is not None else wanted.toasts
+        return (loaded.ordered(asked) if asked is not None else mix_of(own)), len(own)
+    if case is not None:
+        raise BadInput(
+            f"case '{case}' (--case): task '{loaded.name}' has none; toast has I, II and III, a cell its orders"
+        )
+    own = loaded.ordered()
+    if wanted.toasts is None and wanted.parts is None:
+        return mix_of(own), len(own)
+    return tuple(loaded.ordered(wanted.toasts, wanted.parts)), len(own)
+
+
+def _cell(loaded: CellFile | Task, mix: Sequence[str], parts: int, teacher: Teacher) -> Cell:
+    """The cell for so many parts, in whole cycles."""
+    if isinstance(loaded, CellFile):
+        return of_parts(loaded.cell([mix[number % len(mix)] for number in range(parts)]), mix, parts)
+    counts = {name: count * parts // len(mix) for name, count in Counter(mix).items()}
+    order = loaded.order(None, counts)
+    return teach_all(prepare(loaded, order, teacher.seed), teacher).cell
+
+
+def _largest(make: Callable[[int], Cell], most: int, step: int) -> Cell:
+    """The cell for as many whole cycles as there is room for."""
+    for parts in range(min(most, MAX_PARTS // step * step), step, -step):
+        try:
+            return make(parts)
+        except BadInput:
+            continue
+    return make(step)
+
+
+def _finite(cycle: Cycle, cell: Cell) -> dict[str, Any]:
+    """The cycle carried out for the cell's parts, beside the best order of as many; None for what was not found, and why."""
+    parts = cell.parts
+    found: dict[str, Any] = {"parts": parts, "why_not": None}
+    names = ("cyclic_makespan_s", "cyclic_sequence", "waits_on_purpose", "best_s", "best_per_part_s", "best_proven")
+    found |= dict.fromkeys(names)
+    try:
+        made = unrolled(cycle, cell)
+        found["cyclic_makespan_s"], found["cyclic_sequence"] = made.schedule.makespan_s, list(made.sequence)
+        found["waits_on_purpose"] = made.waits
+        best = optimum(cell, MAX_EXPANDED)
+        found["best_s"], found["best_proven"] = best.cost, best.proven
+        found["best_per_part_s"] = best.cost / parts
+    except LabError as error:
+        found["why_not"] = str(error)
+    return found

@@ -1,0 +1,115 @@
+"""The operator's console on the page: what it steers, and the documents that say where the run stands."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any, Protocol
+
+from lab.production.controls import Controls, StopKind
+from lab.production.operation.at_once import Done
+from lab.production.run_status import RunStatus
+from lab.seat.event_text import PHASES
+from lab.seat.page.page_order import chart_row
+from lab.sequencing.cell.stations import ROBOT
+from lab.teaching.events import Event, MoveMade, PartLost, PlanMade, SkillBegan
+
+Json = dict[str, Any]
+MOST_DONE = 20  # commands that are shown with what came of them
+ONLOOKER = "onlooker"  # who stops in an emergency without having the seat
+PARTS = ("run", "plan", "measured")
+STOP = "stop"
+
+
+class Console(Protocol):
+    """What a page steers: all but `hear` is called in the server's thread.
+
+    words: the commands that are taken; names: what may follow some of them. busy: the command under way, "" for none.
+    done: what came of all that was said.
+    """
+
+    @property
+    def controls(self) -> Controls: ...
+    @property
+    def words(self) -> Sequence[str]: ...
+    @property
+    def names(self) -> Mapping[str, Sequence[str]]: ...
+    @property
+    def done(self) -> Sequence[Done]: ...
+    @property
+    def busy(self) -> str: ...
+
+    def now(self) -> RunStatus:
+        """Where the run stands."""
+
+    def say(self, line: str, by: str) -> Done | None:
+        """Take a command; returns at once."""
+
+    def watched(self, pages: int) -> None:
+        """So many pages are open."""
+
+    def hear(self, event: Event) -> None:
+        """What happens, in the session's thread."""
+
+
+def changed_by(event: Event) -> tuple[str, ...]:
+    """The parts of the page's document that an event has changed."""
+    match event:
+        case PlanMade():
+            return ("run", "plan")
+        case MoveMade() | PartLost() | SkillBegan():
+            return ("run", "measured")
+    return ("run",)
+
+
+def run_of(console: Console | None) -> Json | None:
+    """Where the run stands, and what may be said; without what has an own part."""
+    if console is None:
+        return None
+    status, done = console.now(), console.done
+    return {
+        "now_s": status.now_s,
+        "phase": status.phase,
+        "phase_words": PHASES.get(status.phase, status.phase),
+        "words": status.words,
+        "next_station": status.next_station,
+        "move": status.move,
+        "moves": status.moves,
+        "finished": status.finished,
+        "parts": [asdict(part) for part in status.parts],
+        "machines": [asdict(machine) for machine in status.machines],
+        "trouble": [asdict(one) for one in status.trouble],
+        "commands": list(console.words),
+        "names": {word: list(names) for word, names in console.names.items()},
+        "busy": console.busy,
+        "said": len(done),
+        "done": [asdict(one) for one in done[-MOST_DONE:]],
+    }
+
+
+def plan_of(console: Console | None) -> Json | None:
+    """The plan in use: of the robot and the machines, without the parts' own rows."""
+    status = None if console is None else console.now()
+    if status is None or status.plan is None:
+        return None
+    plan, rows = status.plan, {ROBOT, *(machine.station for machine in status.machines)}
+    return {
+        "makespan_s": plan.makespan_s,
+        "gap": plan.gap,
+        "proven": plan.proven,
+        "why": plan.why,
+        "rows": [chart_row(one) for one in plan.rows if one.resource in rows],
+    }
+
+
+def measured_of(console: Console | None) -> list[Json]:
+    """What was done so far, without what machines are doing now."""
+    return [] if console is None else [chart_row(one) for one in console.now().measured]
+
+
+def held_of(console: Console) -> Json:
+    """What stops the run now, what may be said next ("": nothing has to be), and the pace."""
+    controls = console.controls
+    held = controls.held
+    if held is None:
+        return {"kind": "", "speed": controls.speed}
+    after = "reset" if held.kind is StopKind.EMERGENCY else "go"
+    return {"kind": held.kind, "why": held.why, "by": held.by, "next": after, "speed": controls.speed}

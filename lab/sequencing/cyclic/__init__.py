@@ -1,0 +1,1 @@
+"""Cyclic orders: what the robot repeats for ever, and the shortest period in which it can."""

@@ -1,0 +1,160 @@
+"""The shortest period of a repeating order of the robot's moves, and the order: the best of all the parts' ways."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import floor, inf
+from typing import Any
+
+from lab.errors import BadInput, WorkFailed, counted
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cyclic.line import CycleMove, Line, at_speed, away_s, lines
+from lab.sequencing.cyclic.model import CycleModel, Units
+from lab.sequencing.cyclic.times import shortest_period
+
+TIME_LIMIT_S = 60.0
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """What the robot repeats: the line's moves in their order, the first at 0, and the period [s].
+
+    begin_s: of each of the line's moves in the period, when the robot begins it (the service first). wraps: by stay of the line,
+    how many cycles begin while a part stays. recurs: see `Timed`. bound_s: no period of an order that repeats with as many parts
+    a cycle is shorter; proven: none is shorter than this one, to some microseconds.
+    """
+
+    line: Line
+    period_s: float
+    begin_s: tuple[float, ...]
+    order: tuple[int, ...]
+    wraps: tuple[int, ...]
+    recurs: int = 1
+    bound_s: float = 0.0
+    proven: bool = False
+    wall_s: float = 0.0
+
+    @property
+    def parts(self) -> int:
+        """How many parts enter, and leave, in a cycle."""
+        return len(self.line.paths)
+
+    @cached_property
+    def passed(self) -> tuple[int, ...]:
+        """How many cycles have begun since the part entered, by move."""
+        over, found, stays = 0, list[int](), {stay.pick: n for n, stay in enumerate(self.line.stays)}
+        for number in range(len(self.line.moves)):
+            over = over + self.wraps[stays[number]] if number in stays else 0
+            found.append(over)
+        return tuple(found)
+
+    def at_s(self, move: int, cycle: int = 0) -> float:
+        """When a move of a part that enters in a cycle begins, that cycle's begin counted as cycle * period."""
+        return self.begin_s[move] + (self.passed[move] + cycle) * self.period_s
+
+    @cached_property
+    def most_in_work(self) -> int:
+        """How many parts are between their first pick and their last drop at once, at the most."""
+        ends = [(own[0], own[-1]) for own in self._of_slots()]
+        spans = [(self.at_s(first), self.at_s(last) + self.line.moves[last].work_s) for first, last in ends]
+        period_s = self.period_s
+
+        def there(at_s: float) -> int:
+            return sum(floor((at_s - a) / period_s + 1e-9) - floor((at_s - b) / period_s + 1e-9) for a, b in spans)
+
+        return max(there(at_s) for at_s, _ in spans)
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """The moves in their order: who is moved where, when in the period, and after how many periods in the cell."""
+        names, moves = self.line.cell.names, self.line.moves
+
+        def row(number: int) -> dict[str, Any]:
+            move, begin_s = moves[number], self.begin_s[number]
+            return {
+                "part": move.slot + 1,
+                "product": self.product(move),
+                "origin": names[move.option.origin],
+                "target": names[move.option.target],
+                "carries": move.option.carries,
+                "pick_s": begin_s + move.option.service_s,
+                "drop_s": begin_s + move.work_s,
+                "periods": self.passed[number],
+            }
+
+        return [row(number) for number in self.order]
+
+    def product(self, move: CycleMove) -> str:
+        """The name of the product that a move moves."""
+        cell = self.line.cell
+        return cell.products[cell.positions[move.place].product].name
+
+    def _of_slots(self) -> list[list[int]]:
+        found: list[list[int]] = [[] for _ in self.line.paths]
+        for number, move in enumerate(self.line.moves):
+            found[move.slot].append(number)
+        return found
+
+
+def best_cycle(cell: Cell, mix: Sequence[str], time_limit_s: float = TIME_LIMIT_S, seed: int = 0) -> Cycle:
+    """The shortest period in which one robot can repeat its moves for ever, `mix` (products) entering in each cycle.
+
+    The cell's order gives its products only; its parts all wait at the beginning of their routes, and the robot may wait on
+    purpose. Every way that the parts can take is a line with a model of its own; what cannot beat the best so far is left out.
+    Raises BadInput for a cell that has no such cycle (`check_cyclic`) or too large a one, WorkFailed when none was found.
+    Source: Phillips and Unger 1976, AIIE Transactions 8(2) (one hoist, time windows).
+    """
+    began = time.perf_counter()
+    check_cyclic(cell, mix)
+    cell = at_speed(cell)
+    away = away_s(cell)
+    # Of equal periods that with the fewest moves is found first, and stays.
+    ahead = [(len(line.moves), line.bound_s(away), n, line) for n, line in enumerate(lines(cell, mix))]
+    ahead.sort(key=lambda one: one[:3])
+    best: Cycle | None = None
+    above_s, resolution_s = inf, 0.0
+    for _, least_s, _, line in ahead:
+        units = Units.of(line)
+        resolution_s = max(resolution_s, units.resolution_s)
+        # A quick look for a good cycle, a bound, and the rest of the way between the two.
+        steps = (units.coarse, False), (units.coarse, True), (units.fine, units.rounded)
+        for step, (unit, loose) in enumerate(steps):
+            best_s = inf if best is None else best.period_s
+            left_s = time_limit_s - (time.perf_counter() - began)
+            if least_s >= best_s - units.resolution_s or left_s <= 0:
+                break
+            answer = CycleModel(line, away, least_s, best_s, unit, loose).solve(left_s, seed)
+            least_s = max(least_s, answer.above_s) if step else least_s
+            timed = shortest_period(line, answer.order, answer.wraps) if answer.order else None
+            if timed is not None and timed.period_s < best_s:
+                best = Cycle(line, timed.period_s, timed.begin_s, answer.order, answer.wraps, timed.recurs)
+        above_s = min(above_s, least_s)
+    if best is None:
+        why = "it is proven that there is none" if above_s == inf else f"none was found in {time_limit_s:g} s"
+        raise WorkFailed(f"no order of {counted(len(mix), 'part')} a cycle can be repeated for ever: {why}")
+    proven = best.period_s - above_s <= resolution_s
+    wall_s = time.perf_counter() - began
+    return replace(best, bound_s=best.period_s if proven else above_s, proven=proven, wall_s=wall_s)
+
+
+def check_cyclic(cell: Cell, mix: Sequence[str]) -> None:
+    """BadInput, in words, for a cell that no cyclic order is looked for in, and for a mix of products it does not make."""
+    if cell.arrivals is not None:
+        raise BadInput(
+            "--cyclic: parts arrive one by one in this cell; a cycle takes each when it wants: leave [arrivals] away"
+        )
+    if len(cell.robots) != 1:
+        raise BadInput(f"--cyclic: the cell has {counted(len(cell.robots), 'robot')}; a cycle is looked for with 1")
+    for station in cell.stations:
+        if station.servers is not None:
+            raise BadInput(
+                f"--cyclic: station '{station.name}' has servers and a queue; in a cycle each part is worked on where and "
+                "when it is put down: leave servers away"
+            )
+    if cell.begins is not None or cell.closed:
+        raise BadInput("--cyclic: the work is in its middle, or a station is closed; a cycle needs the whole cell")
+    for name in mix:
+        if name not in cell.order:
+            raise BadInput(f"--cyclic: the cell's order has no '{name}'; it has {', '.join(dict.fromkeys(cell.order))}")
+    if not mix:
+        raise BadInput("--cyclic: no part enters in a cycle; allowed is 1 or more")

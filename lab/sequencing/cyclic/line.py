@@ -1,0 +1,194 @@
+"""The moves of one cycle of a cell: the ways of the parts that enter in it, and what their times have to keep to."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations_with_replacement, islice, product
+from math import comb, inf, prod
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from lab.errors import BadInput, counted
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import Option, Position, from_the_ends
+from lab.sequencing.cell.ways import distances
+
+MOST_LINES = 2000  # ways that the parts of a cycle can be given to
+MOST_MOVES = 120  # in a cycle; the model grows with the square
+Path = tuple[tuple[int, Option], ...]  # the positions that a part leaves, and how
+
+
+@dataclass(frozen=True)
+class CycleMove:
+    """One move of a cycle: the part `slot` of the cycle (from 0) leaves `place` by `option`; work_s: service and carrying."""
+
+    slot: int
+    place: int
+    option: Option
+    work_s: float
+
+
+@dataclass(frozen=True)
+class Span:
+    """What lies between the drop of a move and the begin of a later one of the same part, by their numbers.
+
+    least_s, most_s: how long that may take, its periods in full counted.
+    """
+
+    drop: int
+    pick: int
+    least_s: float = 0.0
+    most_s: float = inf
+
+
+@dataclass(frozen=True)
+class Line:
+    """A cycle without its times: which parts enter in it, and by which way each goes; all that repeats with the period.
+
+    moves: slot by slot, each along its way. stays: every consecutive two of a part's moves. needs: how long processing
+    takes, and until when a part is to be picked. holds: the stays that take room at each station.
+    """
+
+    cell: Cell
+    paths: tuple[Path, ...]
+
+    @cached_property
+    def moves(self) -> tuple[CycleMove, ...]:
+        """The moves, slot by slot."""
+        carried_s = self.cell.loaded_s
+        return tuple(
+            CycleMove(slot, place, way, way.service_s + float(carried_s[way.origin, way.target]))
+            for slot, path in enumerate(self.paths)
+            for place, way in path
+        )
+
+    @cached_property
+    def stays(self) -> tuple[Span, ...]:
+        """Where parts are between two moves, which they never leave before they came."""
+        ends = zip(self.moves[:-1], self.moves[1:], strict=True)
+        return tuple(Span(n, n + 1) for n, (one, then) in enumerate(ends) if one.slot == then.slot)
+
+    @cached_property
+    def needs(self) -> tuple[Span, ...]:
+        """Processing that ends before a pick, and how long after it the pick may begin."""
+        found = list[Span]()
+        begun: tuple[int, float] | None = None
+        for number, move in enumerate(self.moves):
+            at = self.cell.positions[move.place]
+            if number and self.moves[number - 1].slot == move.slot:
+                if at.processing_s is not None:
+                    begun = number - 1, at.processing_s
+            else:
+                begun = None
+            if begun is not None and move.option.waits:
+                drop, least_s = begun
+                most_s = inf if at.at_most_s is None else least_s + at.at_most_s - move.option.service_s
+                found.append(Span(drop, number, least_s, most_s))
+        return tuple(found)
+
+    @cached_property
+    def holds(self) -> dict[int, tuple[int, ...]]:
+        """The stays (by number) that take room at each station (by index)."""
+        found: dict[int, list[int]] = {}
+        for number, stay in enumerate(self.stays):
+            for station in self.cell.positions[self.moves[stay.pick].place].holds:
+                found.setdefault(station, []).append(number)
+        return {station: tuple(numbers) for station, numbers in found.items()}
+
+    def after_s(self, one: int, then: int) -> float:
+        """From where a move drops to where another begins, empty [s]; NaN: never one after the other."""
+        left, begun = self.moves[one].option.target, self.moves[then].option.origin
+        return 0.0 if left == begun else float(self.cell.empty_s[left, begun])
+
+    @cached_property
+    def longest_s(self) -> float:
+        """A period that is long enough for every order that can be repeated at all [s].
+
+        What a shortest period has to be comes from a circle of demands, which leaves no move twice.
+        """
+        numbers = range(len(self.moves))
+        least_s = {span.drop: span.least_s for span in self.needs}
+        empty_s = [max((s for to in numbers if (s := self.after_s(one, to)) < inf), default=0.0) for one in numbers]
+        return sum(self.moves[one].work_s + max(least_s.get(one, 0.0), empty_s[one]) for one in numbers)
+
+    def bound_s(self, away_s: Sequence[Sequence[float]]) -> float:
+        """No period is shorter: the robot's moves and its cheapest ways between them, and what each station needs.
+
+        away_s: the least time from a station to another, by any way.
+        """
+        gaps = np.array(
+            [[away_s[m.option.target][other.option.origin] for other in self.moves] for m in self.moves], float
+        )
+        if len(gaps) > 1:
+            np.fill_diagonal(gaps, 1e12)
+        rows, columns = linear_sum_assignment(gaps)
+        least_s = float(gaps[rows, columns].sum()) + sum(move.work_s for move in self.moves)
+        ready_s = {(span.drop, span.pick): span.least_s for span in self.needs}
+        for station, numbers in self.holds.items():
+            spans = [self.stays[number] for number in numbers]
+            picks = {span.pick for span in spans}
+            drops = {span.drop for span in spans}
+            into, out = drops - picks, picks - drops  # a pallet that goes on may keep the same room
+            inside_s = sum(ready_s.get((span.drop, span.pick), 0.0) for span in spans)
+            between_s = sum(
+                min(
+                    away_s[self.moves[pick].option.target][self.moves[drop].option.origin] + self.moves[drop].work_s
+                    for drop in into
+                )
+                + self.moves[pick].work_s
+                for pick in out
+            )
+            least_s = max(least_s, (inside_s + between_s) / self.cell.capacities[station])
+        return least_s
+
+
+def lines(cell: Cell, mix: Sequence[str]) -> Iterator[Line]:
+    """Every way to give the parts of a cycle their ways; parts of one product are alike. BadInput for too many."""
+    counts = {name: mix.count(name) for name in dict.fromkeys(mix)}
+    ways = {name: _paths(cell, name, counts[name], len(mix)) for name in counts}
+    many = prod(comb(len(ways[name]) + count - 1, count) for name, count in counts.items())
+    most = sum(count * max(len(path) for path in ways[name]) for name, count in counts.items())
+    if many > MOST_LINES:
+        allowed = f"allowed are {MOST_LINES}; fewer parts a cycle have fewer"
+        raise BadInput(f"--cyclic: the {counted(len(mix), 'part')} of a cycle can take {many} ways; {allowed}")
+    if most > MOST_MOVES:
+        raise BadInput(f"--cyclic: a cycle of {counted(len(mix), 'part')} has {most} moves; allowed are {MOST_MOVES}")
+    choices = [combinations_with_replacement(ways[name], count) for name, count in counts.items()]
+    for chosen in product(*choices):
+        given = {name: iter(own) for name, own in zip(counts, chosen, strict=True)}
+        yield Line(cell, tuple(next(given[name]) for name in mix))
+
+
+def _paths(cell: Cell, name: str, count: int, parts: int) -> list[Path]:
+    """All ways of a product from its start to an end."""
+    start = cell.starts[cell.order.index(name)]
+
+    def longer(path: Path, at: Position, place: int) -> Iterator[Path]:
+        if not at.options:
+            yield path
+        for way in at.options:
+            yield from longer((*path, (place, way)), cell.positions[way.to], way.to)
+
+    numbers = from_the_ends(cell.positions, lambda place, ahead: sum(ahead) or 1)
+    if comb(numbers[start] + count - 1, count) > MOST_LINES:
+        told = f"product '{name}' has {numbers[start]} ways through its routes and buffers"
+        raise BadInput(f"--cyclic: {told}: too many for a cycle of {counted(parts, 'part')}")
+    return list(islice(longer((), cell.positions[start], start), numbers[start]))
+
+
+def at_speed(cell: Cell) -> Cell:
+    """The cell with the times of its one robot, whatever its speed."""
+    robot, *_ = cell.robots
+    if robot.speed == 1.0:
+        return cell
+    empty_s, loaded_s = cell.empty_s / robot.speed, cell.loaded_s / robot.speed
+    return replace(cell, empty_s=empty_s, loaded_s=loaded_s, robots=(replace(robot, speed=1.0),))
+
+
+def away_s(cell: Cell) -> list[list[float]]:
+    """The least time in which the robot gets from a station (row) to another, empty or loaded, by any way [s].
+
+    Rounded down to nanoseconds; what cannot be reached is very far away.
+    """
+    return [[ticks / 1e9 for ticks in row] for row in distances(cell)]

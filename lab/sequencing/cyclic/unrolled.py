@@ -1,0 +1,163 @@
+"""A cycle carried out for so many parts: the line is filled, the cycle repeats, the line is emptied."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from statistics import median
+from typing import NamedTuple
+
+from lab.errors import BadInput, WorkFailed
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import Option, entry, reached_from
+from lab.sequencing.cell.schedule import Move, Schedule
+from lab.sequencing.cell.stations import Product
+from lab.sequencing.cyclic.cycle import Cycle
+from lab.sequencing.cyclic.line import at_speed
+from lab.sequencing.cyclic.times import Arc, earliest
+from lab.sequencing.simulate.run import Run, simulate
+
+
+@dataclass(frozen=True)
+class Unrolled:
+    """A finite order that repeats a cycle: its cell, the decisions (see `Run`) and the schedule.
+
+    waits: the robot waits on purpose, so that no part is picked too late at the station it is brought to; else all is done as
+    early as it can be, and `simulate` gives the same schedule.
+    """
+
+    cell: Cell
+    sequence: tuple[int, ...]
+    schedule: Schedule
+    waits: bool
+
+
+class _Turn(NamedTuple):
+    """One move of the finite order: the part, the position that it leaves, and how."""
+
+    part: int
+    place: int
+    option: Option
+
+
+def of_parts(cell: Cell, mix: Sequence[str], parts: int) -> Cell:
+    """The cell for so many parts, the products as they come in the cycles. BadInput as any cell of so many."""
+    order = tuple(mix[number % len(mix)] for number in range(parts))
+    return replace(cell, order=order, due_s=None)
+
+
+def period_of(schedule: Schedule, cycle: Cycle) -> float | None:
+    """The period of a schedule that repeats a cycle: the median time between the end of a part and that of the part so many
+    cycles later as come in the same intervals again, without those at the beginning and the end where there are enough.
+
+    While the line is filled and emptied parts end in other intervals. None: there are too few parts.
+    """
+    ends_s = sorted({a.part: a.end_s for a in schedule.parts if a.kind == "carry"}.values())
+    apart_s = [
+        (later - end) / cycle.recurs for end, later in zip(ends_s, ends_s[cycle.parts * cycle.recurs :], strict=False)
+    ]
+    if len(apart_s) > 2 * cycle.parts:
+        apart_s = apart_s[cycle.parts : -cycle.parts]
+    return median(apart_s) if apart_s else None
+
+
+def unrolled(cycle: Cycle, cell: Cell) -> Unrolled:
+    """The order of a cell's parts in which each does what the cycle has it do, in the cycle's order.
+
+    The moves of parts before the first and after the last are left out. Where a buffer is used only when the machine ahead is
+    full, the first parts go straight on. WorkFailed when the line cannot be filled so, which buffers can lead to.
+    """
+    free = _without_windows(cell)  # the order alone counts here
+    run, sequence, made = Run(free), list[int](), list[_Turn]()
+    for turn in _turns(cycle, cell):
+        here = run.locations[turn.part - 1]
+        if here != turn.place and here in reached_from(cell.positions, {turn.place}):
+            continue  # it did not need the buffer
+        decision = entry(turn.part, turn.option.choice, cell.parts)
+        way = run.option(decision) if here == turn.place else None
+        if way is None:
+            name, where = cell.part_name(turn.part), cell.names[cell.positions[here].station]
+            raise WorkFailed(
+                f"the cycle cannot be begun with an empty line: {name} at '{where}' cannot do what it does in the cycle"
+            )
+        sequence.append(decision)
+        made.append(_Turn(turn.part, here, way))
+        run.move(decision)
+    try:
+        return Unrolled(cell, tuple(sequence), simulate(cell, sequence), False)
+    except BadInput:
+        if not cell.has_windows:
+            raise
+    return Unrolled(cell, tuple(sequence), Schedule.from_moves(cell, _waiting(cell, made), sequence), True)
+
+
+def _turns(cycle: Cycle, cell: Cell) -> Iterator[_Turn]:
+    """The moves of all parts, in the order in which the cycles have them."""
+    waiting = {product.name: iter(_numbers(cell, product)) for product in cell.products}
+    moves, first = cycle.line.moves, {move.slot: number for number, move in reversed([*enumerate(cycle.line.moves)])}
+    rank = {move: number for number, move in enumerate(cycle.order)}
+    slots = sorted(first, key=lambda slot: rank[first[slot]])
+    found, left = list[tuple[int, int, _Turn]](), cell.parts
+    for number in count():
+        for slot in slots:
+            part = next(waiting[cycle.product(moves[first[slot]])], None)
+            if part is None:
+                continue
+            left -= 1
+            for n, move in enumerate(moves):
+                if move.slot == slot:
+                    found.append((number + cycle.passed[n], rank[n], _Turn(part, move.place, move.option)))
+        if not left:
+            break
+    return (turn for _, _, turn in sorted(found, key=lambda one: one[:2]))
+
+
+def _numbers(cell: Cell, product: Product) -> list[int]:
+    return [number for number, name in enumerate(cell.order, 1) if name == product.name]
+
+
+def _without_windows(cell: Cell) -> Cell:
+    products = [
+        replace(one, routes=tuple(tuple(replace(stage, at_most_s=None) for stage in route) for route in one.routes))
+        for one in cell.products
+    ]
+    return replace(
+        cell, stations=tuple(replace(one, at_most_s=None) for one in cell.stations), products=tuple(products)
+    )
+
+
+def _waiting(cell: Cell, made: Sequence[_Turn]) -> list[Move]:
+    """The moves, each as early as all windows allow; WorkFailed when they cannot all be kept."""
+    cell = at_speed(cell)
+    arcs, at = list[Arc](), cell.index(cell.robot_start)
+    work_s, empty_s = [0.0], list[float]()
+    ready = dict[int, tuple[int, float]]()  # by part: the move after which it was last processed, and how long
+    for number, (part, place, option) in enumerate(made, 1):
+        here, there = cell.positions[place], cell.positions[option.to]
+        empty_s.append(0.0 if at == option.origin else float(cell.empty_s[at, option.origin]))
+        arcs.append(Arc(number - 1, number, work_s[-1] + empty_s[-1], 0))
+        work_s.append(option.service_s + float(cell.loaded_s[option.origin, option.target]))
+        if part in ready and option.waits:
+            brought, least_s = ready[part]
+            arcs.append(Arc(brought, number, work_s[brought] + least_s, 0))
+            if here.at_most_s is not None:
+                most_s = work_s[brought] + least_s + here.at_most_s - option.service_s
+                arcs.append(Arc(number, brought, -most_s, 0))
+        if there.processing_s is not None:
+            ready[part] = number, there.processing_s
+        at = option.target
+    begin_s, broken = earliest(arcs, len(made) + 1, 0, 0.0)
+    if broken:
+        raise WorkFailed("the line cannot be filled and emptied by this cycle: a part would be picked too late")
+    moves, start, leave_s = list[Move](), cell.robot_start, 0.0
+    for number, (part, _, option) in enumerate(made, 1):
+        origin, target, pick_s = (
+            cell.names[option.origin],
+            cell.names[option.target],
+            begin_s[number] + option.service_s,
+        )
+        reach_s, drop_s = leave_s + empty_s[number - 1], begin_s[number] + work_s[number]
+        process_s = cell.positions[option.to].processing_s or 0.0
+        times_s = leave_s, reach_s, pick_s, drop_s, process_s
+        moves.append(Move(part, start, origin, target, *times_s, option.service_s, option.carries))
+        start, leave_s = target, drop_s
+    return moves

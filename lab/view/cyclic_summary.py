@@ -1,0 +1,54 @@
+"""What `lab sequence --cyclic` shows when it is done, and the line on it of `lab run`, from plain data."""
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from lab.errors import counted
+
+
+def cyclic_summary(found: Mapping[str, Any]) -> RenderableType:
+    """The end of `lab sequence --cyclic`, from its JSON document."""
+    mix = ", ".join(counted(count, name) for name, count in Counter(found["mix"]).items())
+    proven = "proven: no order repeats faster" if found["proven"] else f"proven bound {found['bound_s']:.2f} s"
+    each = "" if found["parts_a_cycle"] == 1 else f", {found['per_part_s']:.2f} s a part"
+    lines = [
+        f"every {found['period_s']:.2f} s: {mix}{each}, {found['parts_per_hour']:.1f} parts an hour (seed {found['seed']})",
+        f"{proven}; {counted(found['most_in_work'], 'part')} in work at once at the most",
+        *(_move(move, found["parts_a_cycle"]) for move in found["moves"]),
+        *_finite(found["finite"]),
+    ]
+    return Group(*map(Text, [*lines, *found["files"].values()]))
+
+
+def period_in_words(cyclic: Mapping[str, Any]) -> str:
+    """The measured period of a run beside the planned one."""
+    planned_s, measured_s = cyclic["period_s"], cyclic["measured_period_s"]
+    if measured_s is None:
+        return f"{planned_s:.2f} s planned; too few parts were delivered to measure it"
+    return f"{planned_s:.2f} s planned, {measured_s:.2f} s measured ({cyclic['period_deviation']:+.2%})"
+
+
+def _move(move: Mapping[str, Any], parts: int) -> str:
+    """One line of the cycle."""
+    number = f" {move['part']}" if parts > 1 else ""
+    pallet = "'s pallet" if move["carries"] == "pallet" else ""
+    entered = "" if not move["periods"] else f"  (entered {counted(move['periods'], 'period')} before)"
+    return f"  {move['pick_s']:9.2f} s  {move['product']}{number}{pallet}: {move['origin']} > {move['target']}{entered}"
+
+
+def _finite(finite: Mapping[str, Any]) -> list[str]:
+    """The order of a number of parts beside it."""
+    parts, lines = finite["parts"], list[str]()
+    if finite["cyclic_makespan_s"] is not None:
+        waits = ", with waits on purpose" if finite["waits_on_purpose"] else ""
+        lines.append(f"carried out for {counted(parts, 'part')}: {finite['cyclic_makespan_s']:.2f} s{waits}")
+    if finite["best_s"] is not None:
+        best = "the best order of as many" if finite["best_proven"] else "the best order found of as many"
+        lines.append(f"{best}: {finite['best_s']:.2f} s, {finite['best_per_part_s']:.2f} s a part")
+    if finite["why_not"] is not None:
+        lines.append(f"of {counted(parts, 'part')}: {finite['why_not']}")
+    return lines
