@@ -39,7 +39,7 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "PIL": set(),
     "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
     "ortools": {
-        *(f"lab.sequencing.methods.{name}" for name in ("cp_sat", "cp_sat_model")),
+        *(f"lab.sequencing.methods.cp_sat{part}" for part in ("", "_model", "_tasks", "_rooms", "_transport")),
         "lab.sequencing.cyclic.model",
     },
     "pymoo": {"lab.sequencing.methods.genetic"},

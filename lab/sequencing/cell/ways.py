@@ -1,4 +1,7 @@
-"""The moves of a cell in whole ticks: what each takes, which may follow which, and how far stations are apart."""
+"""The moves of a cell in whole ticks: what each takes, which may follow which, and how far stations are apart.
+
+Times are those of the first robot, at its speed: what works with them is for cells of one.
+"""
 
 from collections.abc import Sequence
 from math import isnan
@@ -29,7 +32,7 @@ def ticks(row: Sequence[float]) -> list[int]:
 
 def ways_of(cell: Cell) -> list[Way]:
     """Every option of every position, in their order."""
-    loaded = [ticks(row) for row in cell.loaded_s.tolist()]
+    loaded = loaded_ticks(cell)
     return [
         Way(place, option, round(option.service_s * TICKS_PER_S) + loaded[option.origin][option.target])
         for place, at in enumerate(cell.positions)
@@ -37,9 +40,14 @@ def ways_of(cell: Cell) -> list[Way]:
     ]
 
 
+def loaded_ticks(cell: Cell) -> list[list[int]]:
+    """Ticks of the way with a part from a station (row) to another; -1 for a move that is never made."""
+    return [ticks(row) for row in (cell.loaded_s / _speed(cell)).tolist()]
+
+
 def empty_ticks(cell: Cell) -> list[list[int]]:
     """Ticks of the empty way from a station (row) to another; 0 to itself, -1 for a move that is never made."""
-    empty = [ticks(row) for row in cell.empty_s.tolist()]
+    empty = [ticks(row) for row in (cell.empty_s / _speed(cell)).tolist()]
     for place in range(len(empty)):
         empty[place][place] = 0
     return empty
@@ -63,10 +71,14 @@ def distances(cell: Cell, per_s: float = TICKS_PER_S) -> list[list[int]]:
 
     In units, of which a second has `per_s`; FAR where it never gets.
     """
-    seconds = np.fmin(cell.empty_s, cell.loaded_s)
+    seconds = np.fmin(cell.empty_s, cell.loaded_s) / _speed(cell)
     table = np.where(np.isnan(seconds), FAR, np.rint(seconds * per_s)).astype(np.int64)
     np.fill_diagonal(table, 0)
     for via in range(len(table)):
         table = np.minimum(table, np.minimum(table[:, via : via + 1] + table[via], FAR))
     found: list[list[int]] = table.tolist()
     return found
+
+
+def _speed(cell: Cell) -> float:
+    return cell.robots[0].speed if cell.robots else 1.0

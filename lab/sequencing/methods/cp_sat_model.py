@@ -48,7 +48,7 @@ class Model:
 
     def __init__(self, cell: Cell, objective: str, hint: Sequence[int]) -> None:
         self.cell, self.model, self._ways = cell, cp_model.CpModel(), ways_of(cell)
-        self.times = Times(cell, self._ways)
+        self.times = Times(cell)
         known = timed(cell, self.times, self._ways, hint) if hint else []
         most = longest(cell, self.times, self._ways)
         self._longest = known[-1].drop if objective == MAKESPAN and known else most
@@ -138,7 +138,7 @@ class Model:
         if at_most_s is not None and ready is not None:
             latest = ready + self.times.whole(at_most_s) - self.times.whole(way.option.service_s)
             self.model.add(begin <= latest).only_enforce_if(done)
-        return Task(part, way, done, begin, begin + self.times.work(way), waits)
+        return Task(part, way, done, begin, begin + self.times.work(way.option), waits)
 
     def _ready(self, part: int, way: Way) -> cp_model.LinearExprT | None:
         """When the part is finished, or has come; None: it always is, when the robot is there."""
@@ -237,8 +237,8 @@ class Model:
         """How long a visit lasts at least: the moves that begin and end it, and the processing."""
         waits = all(task.way.option.waits for task in takes)
         process = [self.times.processing(task.way.option.to) if waits else 0 for task in brings]
-        begins = [(self.times.work(t.way) + more) * t.done for t, more in zip(brings, process, strict=True)]
-        ends = [self.times.work(task.way) * task.done for task in takes]
+        begins = [(self.times.work(t.way.option) + more) * t.done for t, more in zip(brings, process, strict=True)]
+        ends = [self.times.work(task.way.option) * task.done for task in takes]
         return cp_model.LinearExpr.sum([*begins, *ends])
 
     def _add_full(self, visits: Sequence[Visit]) -> None:
@@ -274,7 +274,7 @@ class Model:
     def _add_objective(self, objective: str) -> float:
         """What is to be as low as possible; the worth of its unit in the cell's."""
         model, positions = self.model, self.cell.positions
-        busy = sum(self._travels) + sum(self.times.work(task.way) * task.done for task in self._tasks)
+        busy = sum(self._travels) + sum(self.times.work(task.way.option) * task.done for task in self._tasks)
         model.add(self._end >= busy + sum(self._waits))
         ends = [task for task in self._tasks if not positions[task.way.option.to].options]
         for task in ends:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.routes import from_the_ends, part_of
+from lab.sequencing.cell.routes import SERVER, Option, from_the_ends, part_of
 from lab.sequencing.cell.ways import Way
 from lab.sequencing.simulate.run import Run
 
@@ -21,17 +21,23 @@ _SAME = 1e-12  # of the longest time: what two floats that are equal may differ 
 class Times:
     """The cell's times in whole units: the largest unit in which they all are whole, else the smallest.
 
-    rounded_s: by how much a time is changed at the most [s]; 0 when all are whole.
+    shortest: what a carried move takes at the least. rounded_s: by how much a time is changed at the most [s]; 0 when all are
+    whole.
     """
 
-    def __init__(self, cell: Cell, ways: Sequence[Way]) -> None:
-        carries = [float(cell.loaded_s[way.option.origin, way.option.target]) for way in ways]
-        tables = np.concatenate([cell.empty_s.ravel(), cell.loaded_s.ravel()])
+    def __init__(self, cell: Cell, shortest: int = 1) -> None:
+        self._cell, self._shortest = cell, shortest
+        ways = [way for place in cell.positions for way in place.options if way.robot != SERVER]
+        carries = [self._carry_s(way) for way in ways]
+        least_s = min(carries, default=1.0) if shortest else 1.0
+        both = np.concatenate([cell.empty_s.ravel(), cell.loaded_s.ravel()])
+        tables = np.concatenate([both, *(both / robot.speed for robot in cell.robots if robot.speed != 1.0)])
         given = np.array(
             [
                 *tables[~np.isnan(tables)],
                 *(place.processing_s or 0.0 for place in cell.positions),
-                *(way.option.service_s for way in ways),
+                *(way.service_s for way in ways),
+                *(seconds for station in cell.stations for *_, seconds in station.setups),
                 *(cell.arrivals.interval_s if cell.arrivals else ()),
                 *(cell.due_s or ()),
                 *cell.begin_s,
@@ -40,29 +46,31 @@ class Times:
         )
         longest_s = cell.longest_s + max(cell.due_s or (0.0,))
         fine = [per_s for per_s in UNITS_PER_S if longest_s * per_s <= MOST_UNITS] or [MOST_UNITS / longest_s]
-        fit = [per_s for per_s in fine if _off_s(given, per_s) <= _SAME * longest_s and min(carries) * per_s > 0.5]
+        fit = [per_s for per_s in fine if _off_s(given, per_s) <= _SAME * longest_s and least_s * per_s > 0.5]
         self.per_s = fit[0] if fit else fine[-1]
         # A carried move that takes no time is given a unit, see `work`.
-        added_s = 1.0 / self.per_s if min(carries) == 0 else 0.0
+        added_s = 1.0 / self.per_s if least_s == 0 else 0.0
         self.rounded_s = 0.0 if fit else max(_off_s(given, self.per_s), added_s)
-        self._cell = cell
 
     def whole(self, seconds: float) -> int:
         """A time in units."""
         return round(seconds * self.per_s)
 
-    def travel(self, origin: int, target: int) -> int:
-        """The robot's empty way between two stations."""
-        return 0 if origin == target else self.whole(float(self._cell.empty_s[origin, target]))
+    def travel(self, origin: int, target: int, robot: int = 0) -> int:
+        """A robot's empty way between two stations."""
+        speed = self._cell.robots[robot].speed
+        return 0 if origin == target else self.whole(float(self._cell.empty_s[origin, target]) / speed)
 
     def known(self, origin: int, target: int) -> bool:
-        """Whether there is an empty way; there is one wherever the robot may have to go."""
+        """Whether there is an empty way; there is one wherever a robot may have to go."""
         return origin == target or not np.isnan(self._cell.empty_s[origin, target])
 
-    def work(self, way: Way) -> int:
-        """Service and carrying; at least a unit, so that the order of moves is the order of their times."""
-        carry_s = float(self._cell.loaded_s[way.option.origin, way.option.target])
-        return self.whole(way.option.service_s) + max(1, self.whole(carry_s))
+    def work(self, option: Option) -> int:
+        """Service and carrying; where the order of moves is the order of their times, at least a unit."""
+        return self.whole(option.service_s) + max(self._shortest, self.whole(self._carry_s(option)))
+
+    def _carry_s(self, option: Option) -> float:
+        return float(self._cell.loaded_s[option.origin, option.target]) / self._cell.robots[option.robot].speed
 
     def processing(self, place: int) -> int:
         """What begins in a position."""
@@ -97,7 +105,7 @@ def timed(cell: Cell, times: Times, ways: Sequence[Way], sequence: Sequence[int]
         begin = max(begin, ready[part]) if option.waits else begin
         if place in cell.starts and not clock and part != coming[-1]:
             ready[coming[coming.index(part) + 1]] += begin
-        now = begin + times.work(way)
+        now = begin + times.work(way.option)
         if cell.positions[option.to].processing_s is not None:
             ready[part] = now + times.processing(option.to)
         run.move(decision)
@@ -112,7 +120,7 @@ def longest(cell: Cell, times: Times, ways: Sequence[Way]) -> int:
     travel = max((times.travel(a, b) for a, b in np.argwhere(~np.isnan(cell.empty_s)).tolist()), default=0)
 
     def longest_from(place: int, ahead: list[int]) -> int:
-        own = [travel + times.work(way) for way in ways if way.place == place]
+        own = [travel + times.work(way.option) for way in ways if way.place == place]
         return times.processing(place) + max((here + then for here, then in zip(own, ahead, strict=True)), default=0)
 
     most = from_the_ends(cell.positions, longest_from)

@@ -13,6 +13,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.ways import FAR, TICKS_PER_S
 from lab.sequencing.methods.lower_bound import LowerBound
+from lab.sequencing.methods.one_robot import OneRobot, one_robot, why_not
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.search import Search, SequenceResult, gap, only_one
 from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
@@ -155,11 +156,13 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
 def exact(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
     """The proven best sequence by the mean times; it draws nothing from `rng`.
 
-    The makespan is minimised by `optimum`; when that gives up, and for other objectives, by CP-SAT within its time limit,
-    which may not prove its sequence. Raises BadInput as these do.
+    The makespan is minimised by `optimum`, of a job shop with one transport robot by `one_robot`; when these give up, and for all
+    else, by CP-SAT within its time limit, which may not prove its sequence. Raises BadInput as these do.
     """
     search.check(cell)
-    found = optimum(cell) if search.objective == MAKESPAN else None
+    found: Optimum | OneRobot | None = None
+    if search.objective == MAKESPAN:
+        found = optimum(cell) if cell.serial else one_robot(cell) if not why_not(cell) else None
     sequence, cost = (found.sequence, found.cost) if found else ((), inf)
     if found is None or not found.proven:
         from lab.sequencing.methods.cp_sat import cp_sat, fits  # only where it is needed: OR-Tools takes its time

@@ -5,9 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate, chain
 from typing import NamedTuple
 
+from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import entry
-from lab.sequencing.cell.ways import TICKS_PER_S, Way, distances, empty_ticks, ticks, ways_of
+from lab.sequencing.cell.ways import TICKS_PER_S, Way, distances, empty_ticks, loaded_ticks, ticks, ways_of
 from lab.sequencing.simulate.run import SLACK_S, Run
 
 _BITS = 8  # a count in the code of all counts; MAX_PARTS fits
@@ -47,8 +48,12 @@ class MergedCell:
     """
 
     def __init__(self, cell: Cell) -> None:
+        if not cell.serial:
+            raise BadInput(
+                "the search of states is for cells of one robot, and machines without servers; CP-SAT is for all"
+            )
         self.cell, self._empty = cell, empty_ticks(cell)
-        self._loaded = [ticks(row) for row in cell.loaded_s.tolist()]
+        self._loaded = loaded_ticks(cell)
         process = [place.processing_s for place in cell.positions]
         self.process = [None if seconds is None else round(seconds * TICKS_PER_S) for seconds in process]
         later = {cell.begin_at[part - 1] for part in cell.unfinished if cell.begin_s[part - 1] > 0}

@@ -205,7 +205,7 @@ def test_objectives_that_need_due_times(oven_cell: CellMaker, objective: str) ->
 def test_times_are_whole_in_their_unit(oven_cell: CellMaker, seconds: float, per_s: float, rounded: bool) -> None:
     cell = oven_cell(1)
     oven = replace(cell.stations[1], processing_s=seconds)
-    times = Times(replace(cell, stations=(cell.stations[0], oven, cell.stations[2])), ways_of(cell))
+    times = Times(replace(cell, stations=(cell.stations[0], oven, cell.stations[2])))
     assert times.per_s == per_s
     assert (times.rounded_s > 0) == rounded
     assert times.rounded_s <= 0.5 / per_s
@@ -225,7 +225,7 @@ def test_model_times_are_those_of_the_simulation(
 ) -> None:
     cell = data.draw(cells(max_parts=4, many=True))
     ways = ways_of(cell)
-    times = Times(cell, ways)
+    times = Times(cell)
     moves = timed(cell, times, ways, first_come(cell))
     makespan_s = simulate(cell, first_come(cell)).makespan_s
     assert moves[-1].drop / times.per_s == pytest.approx(makespan_s, abs=1e-3)

@@ -13,9 +13,10 @@ from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import cost
 from lab.sequencing.cell.routes import part_of
-from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
+from lab.sequencing.cell.stations import UNLIMITED, Arrivals, Product, Robot, Stage, Station, one_robot
 from lab.sequencing.cell.ways import TICKS_PER_S
 from lab.sequencing.methods.branch_and_bound import branch_and_bound
+from lab.sequencing.methods.cp_sat import cp_sat
 from lab.sequencing.methods.exact import Optimum, exact, optimum
 from lab.sequencing.search import Reference, Search
 from lab.sequencing.simulate.merged import MergedCell
@@ -222,3 +223,25 @@ def test_what_is_not_proven_is_improved_by_cp_sat(toast_cell: CellMaker, monkeyp
 def test_the_sequencer_checks_the_objective(toast_cell: CellMaker) -> None:
     with pytest.raises(BadInput, match="no due times"):
         exact(toast_cell("I", 2), Search(objective="tardy-parts"), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("case", ["I", "II"])
+def test_a_faster_robot_is_as_tables_that_are_shorter(toast_cell: CellMaker, case: str) -> None:
+    cell = toast_cell(case, 3)
+    fast = replace(cell, robots=(replace(cell.robots[0], speed=2.0),))
+    short = replace(cell, empty_s=cell.empty_s / 2.0, loaded_s=cell.loaded_s / 2.0)
+    assert optimum(fast).cost == optimum(short).cost < optimum(cell).cost
+    assert cp_sat(fast).cost == cp_sat(short).cost == optimum(short).cost
+
+
+def test_states_are_for_one_robot_and_cp_sat_for_all(oven_cell: CellMaker) -> None:
+    """Each of two robots brings a part: 2 s, the oven's time, which has room for both, and 2 s."""
+    cell = oven_cell(2)
+    oven = replace(cell.stations[1], capacity=UNLIMITED)
+    cell = replace(
+        cell, stations=(cell.stations[0], oven, cell.stations[2]), robots=(Robot("a", "in"), Robot("b", "in"))
+    )
+    with pytest.raises(BadInput, match="one robot"):
+        optimum(cell)
+    found = exact(cell, Search(), np.random.default_rng(0))
+    assert found.cost == 2.0 + oven.processing_s + 2.0

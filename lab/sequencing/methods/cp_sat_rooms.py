@@ -1,0 +1,90 @@
+"""Room at the stations of a constraint model: each place has one part after the other; buffers are for full stations."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ortools.sat.python import cp_model
+
+from lab.sequencing.methods.cp_sat_tasks import Task, Tasks
+
+Nodes = Sequence[tuple[int, int, cp_model.LiteralT]]
+
+
+class Visit(NamedTuple):
+    """A part's room at a station: who brings it there (None: it begins there), and who may take it away."""
+
+    part: int
+    bring: Task | None
+    takes: tuple[Task, ...]
+
+
+def add_chains(model: cp_model.CpModel, nodes: Nodes, most: int, chains: int) -> None:
+    """Nodes 1 to `most` stand in chains from 0 to 0, so many at the most; a node with an arc to itself may be left out."""
+    if not most:
+        return
+    sure = model.new_constant(1)
+    # A chain through nothing: all others may be empty then.
+    nodes = [*nodes, (0, most + 1, sure), (most + 1, 0, sure)]
+    model.add_multiple_circuit(nodes)
+    model.add(sum(arc for left, _, arc in nodes if not left) <= chains + 1)
+
+
+def add_rooms(tasks: Tasks) -> None:
+    """No station ever holds more than it can, in the list of decisions and in time; buffers are used where they may be."""
+    for station in tasks.blocking:
+        _add_room(tasks, station, _visits(tasks, station))
+    for task in tasks.all:
+        if task.option.if_full is not None:
+            _add_full(tasks, task, task.option.if_full)
+
+
+def _visits(tasks: Tasks, station: int) -> list[Visit]:
+    holds, found = [station in place.holds for place in tasks.cell.positions], list[Visit]()
+    for part, begin in enumerate(tasks.cell.begin_at):
+        own = tasks.of(part)
+        takes = tuple(task for task in own if holds[task.place] and not holds[task.option.to])
+        if holds[begin]:
+            found.append(Visit(part, None, takes))
+        found += [Visit(part, t, takes) for t in own if holds[t.option.to] and not holds[t.place]]
+    return found
+
+
+def _add_room(tasks: Tasks, station: int, visits: Sequence[Visit]) -> None:
+    """Each place has one part after the other: the next is dropped when the one before was taken out."""
+    model, nodes = tasks.model, list[tuple[int, int, cp_model.LiteralT]]()
+    late = {n: model.new_bool_var("late") for n, visit in enumerate(visits, 1) if visit.bring is not None}
+    for number, visit in enumerate(visits, 1):
+        nodes += [(0, number, model.new_bool_var("first")), (number, 0, model.new_bool_var("last"))]
+        if visit.bring is not None:
+            nodes.append((number, number, ~visit.bring.done))
+            if tasks.tight:
+                drop = visit.bring.begin + tasks.least.takes(visit.bring.option)
+                model.add(visit.bring.end <= drop).only_enforce_if(visit.bring.done, ~late[number])
+                model.add_implication(nodes[-3][2], ~late[number])
+        for other, after in enumerate(visits, 1):
+            if visit.part == after.part or after.bring is None or not visit.takes:
+                continue
+            arc = model.new_bool_var("room")
+            nodes.append((number, other, arc))
+            for take in visit.takes:
+                model.add(after.bring.end >= take.left).only_enforce_if(arc, take.done)
+                tasks.after(after.bring, take, arc, take.done)
+                if tasks.tight:
+                    model.add(after.bring.end <= take.left).only_enforce_if(arc, take.done, late[other])
+    add_chains(model, nodes, len(visits), tasks.cell.capacities[station])
+
+
+def _add_full(tasks: Tasks, task: Task, station: int) -> None:
+    """A buffer is used only when the station ahead is full at that point of the list, where the cell says so."""
+    model, inside = tasks.model, list[cp_model.IntVar]()
+    for visit in _visits(tasks, station):
+        if visit.part == task.part:
+            continue
+        then = model.new_bool_var("inside")
+        inside.append(then)
+        if visit.bring is not None:
+            model.add_implication(then, visit.bring.done)
+            tasks.after(task, visit.bring, then, task.done)
+        for take in visit.takes:
+            tasks.after(take, task, then, take.done, task.done)
+    model.add(sum(inside) >= tasks.cell.capacities[station]).only_enforce_if(task.done)

@@ -1,0 +1,253 @@
+"""What robots and servers do with each part, as tasks of a constraint model: when each may happen, and when a part is ready."""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ortools.sat.python import cp_model
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import SERVER, Option, from_the_ends, reached_from
+from lab.sequencing.methods.cp_sat_times import Times
+
+
+class Team(NamedTuple):
+    """Robots, by index, that are alike in where they start, how fast they are and what they serve."""
+
+    robots: tuple[int, ...]
+
+    def able(self, option: Option) -> bool:
+        """Whether it is the way of one of them."""
+        return option.robot in self.robots
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What is done with a part at a position: a team's robot carries it on, or a server of a station works on it.
+
+    options: one for each robot of the team. begin: the service before the pick, or the server's work. left: when the part
+    leaves its place. end: when it is dropped, or finished. rank: its number in the list of decisions; None: any that fits times.
+    """
+
+    part: int
+    place: int
+    options: tuple[Option, ...]
+    done: cp_model.IntVar
+    begin: cp_model.IntVar
+    left: cp_model.LinearExprT
+    end: cp_model.LinearExprT
+    rank: cp_model.IntVar | None
+    waits: cp_model.IntVar | None
+
+    @property
+    def option(self) -> Option:
+        """The way of the team's first robot."""
+        return self.options[0]
+
+
+class Least:
+    """The least times of a cell's positions, in units.
+
+    stay: from when a part comes until it may go on. head: from the start of its routes until it comes; tail: from when it
+    comes until it is finished.
+    """
+
+    def __init__(self, cell: Cell, times: Times) -> None:
+        self._cell, self._times = cell, times
+        served = {way.to for at in cell.positions for way in at.options if way.robot == SERVER}
+        self.stay = [
+            0 if place in served or not all(way.waits for way in at.options) else times.processing(place)
+            for place, at in enumerate(cell.positions)
+        ]
+        self.tail = from_the_ends(cell.positions, self._tail)
+        self._ahead = from_the_ends(cell.positions, self._from)
+
+    def takes(self, option: Option) -> int:
+        """What a way takes: service and carrying, or the server's work."""
+        return self._times.processing(option.to) if option.robot == SERVER else self._times.work(option)
+
+    def between(self, place: int, later: int) -> int | None:
+        """From when a part comes to a place until it comes to a later one; None: it never does."""
+        return self._ahead[place].get(later)
+
+    def by_servers(self, place: int) -> set[int]:
+        """Where a part in a place may come to without a robot, the place among them."""
+        found = [place]
+        for at in found:
+            found += [way.to for way in self._cell.positions[at].options if way.robot == SERVER]
+        return set(found)
+
+    def _tail(self, place: int, ahead: list[int]) -> int:
+        ways = self._cell.positions[place].options
+        least = min([self.takes(way) + then for way, then in zip(ways, ahead, strict=True)], default=0)
+        return self.stay[place] + least
+
+    def _from(self, place: int, ahead: list[dict[int, int]]) -> dict[int, int]:
+        found = {place: 0}
+        for way, then in zip(self._cell.positions[place].options, ahead, strict=True):
+            for later, after in then.items():
+                reached = self.stay[place] + self.takes(way) + after
+                found[later] = min(found.get(later, reached), reached)
+        return found
+
+
+def teams_of(cell: Cell) -> list[Team]:
+    """The robots, alike ones together."""
+    alike = defaultdict[object, list[int]](list)
+    for number, robot in enumerate(cell.robots):
+        alike[robot.start, robot.speed, robot.serves].append(number)
+    return [Team(tuple(robots)) for robots in alike.values()]
+
+
+def possible_tasks(cell: Cell) -> int:
+    """How many tasks all parts may have: `Cell.possible_moves`, those of alike robots counted once."""
+    team = {robot: number for number, own in enumerate(teams_of(cell)) for robot in own.robots} | {SERVER: SERVER}
+    tasks = [len({(team[way.robot], *_same(way)) for way in place.options}) for place in cell.positions]
+    ahead = {at: reached_from(cell.positions, {at}) for at in set(cell.begin_at)}
+    return sum(tasks[place] for at in cell.begin_at for place in ahead[at])
+
+
+class Tasks:
+    """The tasks of all parts: each part takes one way from its begin to an end, and each task begins when it may.
+
+    Parts are numbered from 0 here. ranked: whether the list of decisions has to be known, not only times. tight: whether nobody
+    may wait without need, since something may be spoilt then. blocking: stations that may be full. follows: see `after`.
+    """
+
+    def __init__(self, cell: Cell, model: cp_model.CpModel, times: Times, horizon: int) -> None:
+        self.cell, self.model, self.times, self.horizon = cell, model, times, horizon
+        self.least, self.teams = Least(cell, times), teams_of(cell)
+        self.tight = cell.has_windows
+        self.blocking = [s for s in range(len(cell.stations)) if self._may_be_full(s)]
+        options = [way for at in cell.positions for way in at.options]
+        self.ranked = bool(self.blocking) or cell.arrivals is not None or any(o.if_full is not None for o in options)
+        self.all: list[Task] = []
+        self.follows: list[tuple[Task, Task, tuple[cp_model.LiteralT, ...]]] = []
+        self._ready: dict[tuple[int, int], cp_model.LinearExprT] = {}
+        self._certain: set[tuple[int, int]] = set()  # (part, place): wherever it may go, it comes there
+        for part in cell.unfinished:
+            self._add(part - 1)
+
+    def of(self, part: int) -> list[Task]:
+        """The tasks of one part."""
+        return [task for task in self.all if task.part == part]
+
+    def moment(self, name: str) -> cp_model.IntVar:
+        """A time of the model."""
+        return self.model.new_int_var(0, self.horizon, name)
+
+    def after(self, task: Task, before: Task, *when: cp_model.LiteralT) -> None:
+        """A task stands after another one in the list of decisions, if all of these hold."""
+        self.follows.append((before, task, when))
+        if task.rank is not None and before.rank is not None:
+            self.model.add(task.rank >= before.rank + 1).only_enforce_if(*when)
+
+    def _may_be_full(self, station: int) -> bool:
+        cell = self.cell
+        holding = {place for place, at in enumerate(cell.positions) if station in at.holds}
+        ahead = {at: reached_from(cell.positions, {at}) for at in set(cell.begin_at)}
+        return sum(bool(ahead[at] & holding) for at in cell.begin_at) > cell.capacities[station]
+
+    def _add(self, part: int) -> None:
+        cell, start = self.cell, self.cell.begin_at[part]
+        reached, into = [start], defaultdict[int, list[Task]](list)
+        self._ready[part, start] = self._first_ready(part)
+        left = defaultdict[int, int](int)  # ways into a place that are not tasks yet
+        for place in reached_from(cell.positions, {start}):
+            for way in cell.positions[place].options:
+                left[way.to] += 1
+        for place in reached:
+            own = self._leaving(part, place)
+            self.all += own
+            if own:
+                arrived: list[cp_model.LiteralT] = [task.done for task in into[place]]
+                self.model.add(sum(task.done for task in own) == (sum(arrived) if arrived else 1))
+            for task in own:
+                for before in into[place]:
+                    self.after(task, before, task.done, before.done)
+                into[task.option.to].append(task)
+                left[task.option.to] -= len(task.options)
+                if left[task.option.to] == 0:
+                    self._ready[part, task.option.to] = self._ready_at(part, task.option.to, into[task.option.to])
+                    reached.append(task.option.to)
+
+    def _ready_at(self, part: int, place: int, into: Sequence[Task]) -> cp_model.LinearExprT:
+        """When a part may go on from a place that these bring it to."""
+
+        def ready(task: Task) -> cp_model.LinearExprT:
+            if self.cell.positions[place].processing_s is None:
+                return self._ready[part, task.place]
+            return task.end if task.option.robot == SERVER else task.end + self.times.processing(place)
+
+        if len(into) == 1:
+            return ready(into[0])
+        common = self.moment("ready")
+        for task in into:
+            self.model.add(common == ready(task)).only_enforce_if(task.done)
+        return common
+
+    def _leaving(self, part: int, place: int) -> list[Task]:
+        at, found = self.cell.positions[place], list[tuple[Option, ...]]()
+        for way in at.options:
+            alike = [team for team in self.teams if team.able(way)]
+            same = way.target, way.to
+            known = [n for n, own in enumerate(found) if alike and alike[0].able(own[0]) and same == _same(own[0])]
+            if known:
+                found[known[0]] += (way,)
+            else:
+                found.append((way,))
+        return [self._task(part, place, options, len(found) == 1) for options in found]
+
+    def _task(self, part: int, place: int, options: tuple[Option, ...], only: bool) -> Task:
+        model, option, at = self.model, options[0], self.cell.positions[place]
+        start, takes = self.cell.begin_at[part], self.least.takes(option)
+        certain = only and (place == start or (part, place) in self._certain)
+        done = model.new_constant(1) if certain else model.new_bool_var("does")
+        if certain:
+            self._certain.add((part, option.to))
+        head = 0
+        if self.cell.begins is None:
+            head = (self.least.between(start, place) or 0) + (self.least.stay[place] if option.waits else 0)
+        begin = model.new_int_var(min(head, self.horizon), self.horizon, "begin")
+        model.add(begin + takes + self.least.tail[option.to] <= self.horizon).only_enforce_if(done)
+        ready = self._ready[part, place]
+        waits = model.new_bool_var("waits") if self.tight else None
+        if option.waits:
+            model.add(begin >= ready).only_enforce_if(done)
+            if waits is not None:
+                model.add(begin <= ready).only_enforce_if(done, waits)
+            if at.at_most_s is not None:
+                latest = ready + self.times.whole(at.at_most_s) - self.times.whole(option.service_s)
+                model.add(begin <= latest).only_enforce_if(done)
+        elif waits is not None:
+            model.add(waits == 0)
+        left, end = begin + self.times.whole(option.service_s), begin + takes
+        if option.robot == SERVER:
+            left = end
+        elif any(station in self.blocking for station in option.needs):
+            end = self.moment("drop")
+            model.add(end >= begin + takes)
+        rank = model.new_int_var(0, self.cell.possible_moves, "rank") if self.ranked else None
+        return Task(part, place, options, done, begin, left, end, rank, waits)
+
+    def _first_ready(self, part: int) -> cp_model.LinearExprT:
+        """When a part may leave the place where it begins."""
+        cell, arrivals = self.cell, self.cell.arrivals
+        if arrivals is None or cell.begin_at[part] != cell.starts[part]:
+            return self.times.whole(cell.begin_s[part])
+        before = [other - 1 for other in cell.coming if other <= part]
+        intervals = [self.times.whole(arrivals.interval_s[other]) for other in (*before, part)]
+        if not before or arrivals.after == "clock":
+            return sum(intervals)
+        picked = self.moment("picked")
+        for task in self.of(before[-1]):
+            if task.place == cell.starts[before[-1]]:
+                self.model.add(picked == (task.begin if task.option.robot == SERVER else task.left)).only_enforce_if(
+                    task.done
+                )
+        return picked + intervals[-1]
+
+
+def _same(option: Option) -> tuple[int, int]:
+    return option.target, option.to

@@ -1,0 +1,287 @@
+"""A cell with several robots, or machines with servers, as a constraint model: a tour for each team, a chain for each server.
+
+It shares the cell's positions with the simulation, and nothing else. The old model of one robot (`cp_sat_model`) proves more of
+the cells that it knows.
+"""
+
+from collections.abc import Sequence
+from graphlib import TopologicalSorter
+from heapq import heappop, heappush
+from itertools import pairwise
+
+from ortools.sat.python import cp_model
+
+from lab.errors import BadInput, counted
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, machine_places
+from lab.sequencing.cell.routes import SERVER, choice_of, entry, part_of
+from lab.sequencing.methods.cp_sat_rooms import add_chains, add_rooms
+from lab.sequencing.methods.cp_sat_tasks import Task, Tasks, Team
+from lab.sequencing.methods.cp_sat_times import Times
+from lab.sequencing.simulate.run import Run
+
+Arcs = dict[tuple[int, int], cp_model.IntVar]
+
+
+class TransportModel:
+    """The variables and constraints. worth: what a unit of the model's objective is in the cell's.
+
+    below: only makespans shorter than the hint's are looked for. blur: by how many units rounding may change a sequence's cost;
+    0 when no time is rounded. Where a station has room for several parts, or several servers, the model lets any of them be
+    taken; a `Run` takes the first: what is proven is a bound.
+    """
+
+    def __init__(self, cell: Cell, objective: str, hint: Sequence[int], below: bool = False) -> None:
+        self.cell, self.model, self.times = cell, cp_model.CpModel(), Times(cell, shortest=0)
+        known = _known(cell, self.times, hint) if hint else {}
+        rounding = 2 * cell.possible_moves if self.times.rounded_s else 0
+        horizon = self.times.whole(cell.longest_s) + cell.possible_moves
+        if objective == MAKESPAN and known:
+            horizon = max(drop for _, drop in known.values()) + (-1 if below else rounding)
+        self.tasks = Tasks(cell, self.model, self.times, horizon)
+        self._end = self.tasks.moment("makespan")
+        self._tours: list[tuple[Team, list[Task], Arcs]] = []
+        self._idle: list[cp_model.LinearExprT] = []
+        for team in self.tasks.teams:
+            self._add_team(team, objective)
+        for station in range(len(cell.stations)):
+            self._add_servers(station)
+        add_rooms(self.tasks)
+        self._add_order(objective)
+        for task in self.tasks.all:
+            rest = self.tasks.least.tail[task.option.to]
+            self.model.add(self._end >= task.end + rest).only_enforce_if(task.done)
+        self.worth = self._add_objective(objective)
+        each = {"machine-idle": machine_places(cell), "mean-tardiness": cell.parts, "tardy-parts": 0}.get(objective, 1)
+        self.blur = each * rounding
+        self._suggest(known)
+
+    def sequence(self, solver: cp_model.CpSolver) -> tuple[int, ...]:
+        """The decisions of the solution: each after all that it waits for, else in the order of their times."""
+        number = {task: n for n, task in enumerate(self.tasks.all) if solver.boolean_value(task.done)}
+        robot = dict[Task, int]()
+        for team, tasks, arcs in self._tours:
+            for index, tour in enumerate(_routes(solver, arcs)):
+                robot |= {tasks[node - 1]: team.robots[index] for node in tour}
+        order = TopologicalSorter[Task](dict.fromkeys(number, ()))
+        for before, task, when in self.tasks.follows:
+            if all(solver.boolean_value(literal) for literal in when):
+                order.add(task, before)
+        order.prepare()
+        ready, found = list[tuple[int, int, int, Task]](), list[int]()
+        while order.is_active():
+            for task in order.get_ready():
+                heappush(ready, (solver.value(task.begin), solver.value(task.end), number[task], task))
+            task = heappop(ready)[-1]
+            option = next(way for way in task.options if way.robot == robot.get(task, SERVER))
+            found.append(entry(task.part + 1, option.choice, self.cell.parts))
+            order.done(task)
+        return tuple(found)
+
+    def _suggest(self, known: dict[tuple[int, int, int], tuple[int, int]]) -> None:
+        """Give the solver a sequence to begin with."""
+        hints, last = dict[int, tuple[cp_model.IntVar, int]](), dict[int, Task]()
+        follows = set[tuple[Task | None, Task | None]]()
+        for rank, ((part, place, choice), (begin, _)) in enumerate(known.items()):
+            for task in self.tasks.all:
+                if (task.part, task.place) != (part, place):
+                    continue
+                robot = next((way.robot for way in task.options if way.choice == choice), None)
+                hints[task.done.index] = task.done, robot is not None
+                if robot is None:
+                    continue
+                hints[task.begin.index] = task.begin, begin
+                if task.rank is not None:
+                    hints[task.rank.index] = task.rank, rank
+                if robot != SERVER:
+                    follows.add((last.get(robot), task))
+                    last[robot] = task
+        follows |= {(task, None) for task in last.values()}
+        for _, tasks, arcs in self._tours:
+            nodes = [None, *tasks]
+            for (left, then), arc in arcs.items():
+                hints[arc.index] = arc, (nodes[left], nodes[then]) in follows
+        for variable, value in hints.values():
+            self.model.add_hint(variable, value)
+
+    def _add_team(self, team: Team, objective: str) -> None:
+        """The tours of alike robots: as many at the most as there are, through all that one of them does."""
+        tasks = [task for task in self.tasks.all if task.option.robot in team.robots]
+        least, robots, start = self.tasks.least, len(team.robots), self.cell.robots[team.robots[0]].start
+        at, alone = self.cell.index(start), len(self.cell.robots) == 1
+        arcs, spent = Arcs(), [least.takes(task.option) * task.done for task in tasks]
+        travels, rests = list(spent), list[cp_model.LinearExpr]()
+        for number, task in enumerate(tasks, 1):
+            place, option = task.place, task.option
+            before = least.by_servers(self.cell.begin_at[task.part])
+            if not alone or place in before:
+                gap = self.times.travel(at, option.origin, team.robots[0])
+                arc = self._arc(arcs, 0, number, None, task, gap)
+                head = least.between(self.cell.begin_at[task.part], place) or 0
+                spent.append((max(gap, head) if self.cell.begins is None else gap) * arc)
+                travels.append(gap * arc)
+            reached = least.by_servers(option.to)
+            if not alone or any(not self.cell.positions[to].options for to in reached):
+                arc = arcs[number, 0] = self.model.new_bool_var("last")
+                rests.append(least.tail[option.to] * arc)
+            for other, then in enumerate(tasks, 1):
+                between = self._gap(task, then, alone) if other != number else None
+                if between is not None:
+                    travel = self.times.travel(option.target, then.option.origin, team.robots[0])
+                    arc = self._arc(arcs, number, other, task, then, travel)
+                    spent.append(max(between, travel) * arc)
+                    travels.append(travel * arc)
+        self._chain(tasks, arcs, robots)
+        self._tours.append((team, tasks, arcs))
+        self.model.add(robots * self._end >= sum(spent) + sum(rests))
+        if len(tasks) > robots:
+            spans = [self._span(task) for task in tasks]
+            self.model.add_cumulative(spans, [1] * len(spans), robots)
+        if objective == "robot-idle":
+            ends = self._last(tasks, arcs)
+            self.model.add(sum(ends) >= sum(spent))
+            self._idle += [*ends, -sum(travels)]
+
+    def _gap(self, task: Task, then: Task, alone: bool) -> int | None:
+        """What passes at least between two tasks of a robot because of the part itself; None: they cannot follow each other."""
+        if task.part != then.part:
+            return 0
+        least, to = self.tasks.least, task.option.to
+        gap = least.between(to, then.place)
+        if gap is None or (alone and then.place not in least.by_servers(to)):
+            return None
+        return gap + (least.stay[then.place] if then.option.waits else 0)
+
+    def _last(self, tasks: Sequence[Task], arcs: Arcs) -> list[cp_model.LinearExprT]:
+        """When each robot has done all: the end of its last task, 0 where it has none."""
+        ends = list[cp_model.LinearExprT]()
+        for number, task in enumerate(tasks, 1):
+            if (number, 0) in arcs:
+                end = self.tasks.moment("last")
+                self.model.add(end >= task.end).only_enforce_if(arcs[number, 0])
+                ends.append(end)
+        return ends
+
+    def _arc(self, arcs: Arcs, left: int, then: int, before: Task | None, task: Task, gap: int) -> cp_model.IntVar:
+        """One task after another one, or after the begin, of the same robot or server."""
+        done = arcs[left, then] = self.model.new_bool_var("follows")
+        free = gap if before is None else before.end + gap
+        self.model.add(task.begin >= free).only_enforce_if(done)
+        if task.waits is not None:
+            self.model.add(task.begin <= free).only_enforce_if(done, ~task.waits)
+        if before is not None:
+            self.tasks.after(task, before, done)
+        return done
+
+    def _chain(self, tasks: Sequence[Task], arcs: Arcs, chains: int) -> None:
+        """Every task that is done is in one chain of these arcs; there are so many chains at the most."""
+        nodes: list[tuple[int, int, cp_model.LiteralT]] = [(left, then, arc) for (left, then), arc in arcs.items()]
+        nodes += [(number, number, ~task.done) for number, task in enumerate(tasks, 1)]
+        add_chains(self.model, nodes, len(tasks), chains)
+
+    def _span(self, task: Task) -> cp_model.IntervalVar:
+        size = self.tasks.least.takes(task.option)
+        return self.model.new_optional_interval_var(task.begin, size, task.begin + size, task.done, "works")
+
+    def _add_servers(self, station: int) -> None:
+        """A server works on one part after the other."""
+        own = [t for t in self.tasks.all if t.option.robot == SERVER and t.option.target == station]
+        servers, setups = self.cell.stations[station].servers or 1, self.cell.setups[station]
+        if not own:
+            return
+        spans = [self._span(task) for task in own]
+        if servers == 1:
+            self.model.add_no_overlap(spans)
+        elif len(own) > servers:
+            self.model.add_cumulative(spans, [1] * len(spans), servers)
+        if not (setups or self.tasks.ranked or self.tasks.tight):
+            return
+        arcs = Arcs()
+        for number, task in enumerate(own, 1):
+            self._arc(arcs, 0, number, None, task, 0)
+            arcs[number, 0] = self.model.new_bool_var("last")
+            for other, then in enumerate(own, 1):
+                if task.part != then.part:
+                    change_s = setups.get((self.cell.order[task.part], self.cell.order[then.part]), 0.0)
+                    self._arc(arcs, number, other, task, then, self.times.whole(change_s))
+        self._chain(own, arcs, servers)
+
+    def _add_order(self, objective: str) -> None:
+        """Parts that arrive are taken in their order; of parts that are alike in all, the first in number goes first."""
+        cell = self.cell
+        first = {
+            part - 1: [t for t in self.tasks.of(part - 1) if t.place == cell.begin_at[part - 1]]
+            for part in cell.unfinished
+        }
+        coming = [part - 1 for part in cell.coming] if cell.arrivals is not None else []
+        for part, then in pairwise(coming):
+            for before in first[part]:
+                for task in first[then]:
+                    self.tasks.after(task, before, before.done, task.done)
+        due_s = cell.due_s if cell.due_s and objective in WITH_DUE_TIMES else (0.0,) * cell.parts
+        latest: dict[object, int] = {}
+        for part, own in first.items():
+            kind = cell.order[part], due_s[part], cell.begin_at[part], cell.begin_s[part]
+            if part in coming:
+                continue
+            for before in first[latest[kind]] if kind in latest else ():
+                for task in own:
+                    self.model.add(task.begin >= before.begin).only_enforce_if(task.done, before.done)
+            latest[kind] = part
+
+    def _add_objective(self, objective: str) -> float:
+        """What is to be as low as possible; the worth of its unit in the cell's."""
+        if objective == MAKESPAN:
+            self.model.minimize(self._end)
+        elif objective == "robot-idle":
+            self.model.minimize(sum(self._idle))
+        elif objective == "machine-idle":
+            processed = [self.times.processing(t.option.to) * t.done for t in self.tasks.all]
+            self.model.minimize(machine_places(self.cell) * self._end - sum(processed))
+        else:
+            return self._add_late(objective)
+        return 1.0 / self.times.per_s
+
+    def _add_late(self, objective: str) -> float:
+        due = [self.times.whole(due_s) for due_s in self.cell.due_s or ()]
+        ends = [task for task in self.tasks.all if not self.cell.positions[task.option.to].options]
+        if objective == "tardy-parts":
+            late = [self.model.new_bool_var("late") for _ in due]
+            for task in ends:
+                self.model.add(task.end <= due[task.part]).only_enforce_if(task.done, ~late[task.part])
+            self.model.minimize(sum(late))
+            return 1.0
+        lateness = [self.tasks.moment("late") for _ in due]
+        for task in ends:
+            self.model.add(lateness[task.part] >= task.end - due[task.part]).only_enforce_if(task.done)
+        self.model.minimize(sum(lateness))
+        return 1.0 / self.times.per_s / self.cell.parts
+
+
+def _routes(solver: cp_model.CpSolver, arcs: Arcs) -> list[list[int]]:
+    """The nodes of each tour, the begin left out."""
+    taken = [pair for pair, arc in arcs.items() if solver.boolean_value(arc)]
+    after, found = {left: then for left, then in taken if left}, list[list[int]]()
+    for _, node in (pair for pair in taken if not pair[0]):
+        tour = [node]
+        while after[tour[-1]]:
+            tour.append(after[tour[-1]])
+        found.append(tour)
+    return found
+
+
+def _known(cell: Cell, times: Times, sequence: Sequence[int]) -> dict[tuple[int, int, int], tuple[int, int]]:
+    """When each task of a sequence begins and ends, by part, place and choice, in units; BadInput where it cannot be."""
+    run, found = Run(cell), dict[tuple[int, int, int], tuple[int, int]]()
+    for decision in sequence:
+        part, option = part_of(decision, cell.parts) - 1, run.option(decision)
+        place = run.locations[part]
+        if option is None:
+            raise BadInput(f"hint: {run.refusal(decision)}")
+        begin = times.whole(run.pick_s(part + 1, option) - option.service_s)
+        run.move(decision)
+        end_s = run.ready_s[part] if option.robot == SERVER else run.robots_s[option.robot]
+        found[part, place, choice_of(decision, cell.parts)] = begin, times.whole(end_s)
+    if not run.done:
+        raise BadInput(f"hint: the sequence ends after {counted(len(found), 'move')}, but not all parts are finished")
+    return found

@@ -1,0 +1,236 @@
+"""The proven shortest makespan of a job shop with one transport robot: states layer by layer, a move each, as many as it takes.
+
+For cells of one robot whose parts have one route each, through machines with one server each and room for all (the instances of
+Bilge and Ulusoy with one vehicle); `why_not` says what else a cell has.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import SERVER, Option, entry
+from lab.sequencing.cell.ways import FAR, distances
+from lab.sequencing.methods.cp_sat_times import Times
+from lab.sequencing.simulate.run import Run, simulate
+
+if TYPE_CHECKING:
+    from lab.sequencing.methods.one_robot_kernels import Work
+
+TIME_LIMIT_S = 60.0
+FIRST_WIDTH = 1000  # states kept of a layer, the most promising; ten times as many whenever that was no proof
+MOST_WIDTH = 3_000_000  # a gigabyte for ten parts
+MOST_RESTS = 20_000_000  # entries of the table of bounds, 8 bytes each
+
+
+@dataclass(frozen=True)
+class OneRobot:
+    """The best sequence found and the bound of all: equal when `proven`. rounded_s: as of `cp_sat`. states: that were kept."""
+
+    cost: float
+    sequence: tuple[int, ...]
+    bound: float
+    states: int
+    wall_s: float
+    rounded_s: float
+
+    @property
+    def proven(self) -> bool:
+        """Whether no sequence is shorter."""
+        return self.cost <= self.bound
+
+
+def why_not(cell: Cell) -> str:
+    """What the cell has that this search does not know, in words; empty when it fits."""
+    reasons = {
+        "it needs one robot": len(cell.robots) != 1,
+        "parts that arrive": cell.arrivals is not None,
+        "parts that begin in the middle": cell.begins is not None,
+        "time windows": cell.has_windows,
+        "setups": any(station.setups for station in cell.stations),
+        "machines with several servers": any((station.servers or 1) > 1 for station in cell.stations),
+        "alternatives": cell.most_choices > 1 or any(len(place.options) > 1 for place in cell.positions),
+        "pallets": any(way.carries == "pallet" for place in cell.positions for way in place.options),
+        "room that may be full": _may_be_full(cell),
+    }
+    found = next((reason for reason, holds in reasons.items() if holds), "")
+    if found or _sizes(cell) <= MOST_RESTS:
+        return found
+    return (
+        f"too many states: the order has {_sizes(cell)} combinations of how far each part is, allowed are {MOST_RESTS}"
+    )
+
+
+def one_robot(cell: Cell, time_limit_s: float = TIME_LIMIT_S) -> OneRobot:
+    """The shortest makespan, proven, unless the time limit [s] or memory ends it: then the best found and the bound.
+
+    The first pass, of a second, is always made; the first use of all compiles, which takes half a minute.
+    Raises BadInput for a cell that it does not know (`why_not`). Source: dynamic programming of job shops with bounding, Gromicho
+    et al. 2012, as a beam search that is widened until what it left out cannot be better; bounds by `one_robot_kernels`.
+    """
+    reason = why_not(cell)
+    if reason:
+        raise BadInput(f"search of one robot's tours: not for {reason}")
+    begin, times = perf_counter(), Times(cell, shortest=0)
+    search = _Search(cell, times)
+    width, states = FIRST_WIDTH, 0
+    while True:
+        passed, kept = search.widen(width, begin + time_limit_s)
+        states += kept
+        if search.low >= search.best or not passed or width >= MOST_WIDTH:
+            break
+        width *= 10
+    cost = simulate(cell, search.sequence).makespan_s
+    bound = cost if search.low >= search.best else search.low / times.per_s
+    return OneRobot(cost, search.sequence, min(bound, cost), states, perf_counter() - begin, times.rounded_s)
+
+
+class _Search:
+    """The best value and sequence so far, and the bound, in the units of `times`."""
+
+    def __init__(self, cell: Cell, times: Times) -> None:
+        from lab.sequencing.methods import one_robot_kernels as kernels  # numba takes its time
+
+        self._kernels, self._cell = kernels, cell
+        self._work = _work_of(cell, times)
+        self._rest = kernels.least_rest(self._work)
+        self._start = cell.index(cell.robot_start)
+        self.best, self.low, self.sequence = kernels.FAR, 0, tuple[int, ...]()
+
+    def widen(self, width: int, until_s: float) -> tuple[bool, int]:
+        """One pass with so many states a layer; whether it came to its end, and how many states it kept."""
+        kernels, work, parts = self._kernels, self._work, len(self._work.counts)
+        none, zero = np.full(1, -1, np.int64), np.zeros(1, np.int64)
+        layer = kernels.Layer(zero, none, zero, work.ready.reshape(1, parts), zero, np.zeros((1, 3), np.int64))
+        made, cut, states = list[NDArray[np.int64]](), kernels.FAR, 0
+        for _ in range(int(work.counts.sum())):
+            if self.sequence and perf_counter() > until_s:
+                return False, states
+            layer = kernels.expand(work, self._rest, layer, self._start, self.best)
+            order = np.lexsort((layer.ready.sum(1), layer.now, layer.last, layer.code))
+            kept = order[kernels.needed(work, layer, order)]
+            if len(kept) > width:
+                rank = np.lexsort((layer.now[kept], layer.bound[kept]))
+                cut = min(cut, int(layer.bound[kept[rank[width]]]))
+                kept = kept[rank[:width]]
+            layer = kernels.Layer(*(array[kept] for array in layer))
+            made.append(layer.made)
+            states += len(kept)
+        if len(layer.code):
+            ends = np.maximum(layer.ready.max(1), layer.now)
+            self.best = int(ends.min())
+            self.sequence = self._decisions(made, int(ends.argmin()))
+        self.low = max(self.low, min(cut, self.best))
+        return True, states
+
+    def _decisions(self, made: Sequence[NDArray[np.int64]], number: int) -> tuple[int, ...]:
+        """The list of decisions that leads to a state of the last layer: moves in their order, servers as their queues say."""
+        moves = list[tuple[int, int]]()
+        for layer in reversed(made):
+            before, part, place = (int(value) for value in layer[number])
+            moves.append((part, place))
+            number = before
+        kernels, work = self._kernels, self._work
+        c, ready, last, now = np.zeros(len(work.counts), np.int64), work.ready.copy(), -1, 0
+        ends = dict[tuple[int, int], int]()
+        for part, place in reversed(moves):
+            here = work.at[last, c[last]] if last >= 0 else self._start
+            ends |= {(j, int(c[j])): int(ready[j]) for j in range(len(c))}
+            drop = int(max(now + work.empty[here, work.at[part, c[part]]], ready[part]) + work.carry[part, c[part]])
+            queue = kernels.queue_at(work, c, ready, part, drop)
+            c[part] += 1
+            kernels.put(work, c, ready, part, drop, queue, place)
+            last, now = part, drop
+        ends |= {(j, int(c[j])): int(ready[j]) for j in range(len(c))}
+        return self._listed([part for part, _ in reversed(moves)], ends)
+
+    def _listed(self, tour: Sequence[int], ends: dict[tuple[int, int], int]) -> tuple[int, ...]:
+        """A robot's tour through parts, with the decisions of the servers in the order of their ends."""
+        run, work, parts, found = Run(self._cell), self._work, self._cell.parts, list[int]()
+        at = [0] * parts
+        served = set[tuple[int, int]]()
+
+        def decide(part: int) -> None:
+            found.append(entry(part + 1, 0, parts))
+            run.move(found[-1])
+
+        def when(part: int) -> tuple[int, int]:
+            end = ends[part, at[part]]
+            return end, end - int(work.process[part, at[part]])
+
+        def serve(part: int) -> None:
+            """The machine of a part does all that it has to do before, and the part."""
+            machine, own_s = work.at[part, at[part]], when(part)
+            own = [j for j in range(parts) if at[j] and work.at[j, at[j]] == machine and when(j) <= own_s]
+            for j in sorted(own, key=when):
+                if _is_served(self._cell, run.locations[j]) and (j, at[j]) not in served:
+                    served.add((j, at[j]))
+                    decide(j)
+
+        for part in tour:
+            serve(part)
+            decide(part)
+            at[part] += 1
+        for part in range(parts):
+            serve(part)
+        return tuple(found)
+
+
+def _is_served(cell: Cell, place: int) -> bool:
+    options = cell.positions[place].options
+    return bool(options) and options[0].robot == SERVER
+
+
+def _may_be_full(cell: Cell) -> bool:
+    holding = [station for place in cell.positions for station in place.holds]
+    return any(cell.capacities[station] < cell.parts for station in set(holding))
+
+
+def _ways(cell: Cell, part: int) -> list[Option]:
+    """A part's route, way by way."""
+    place, found = cell.begin_at[part], list[Option]()
+    while cell.positions[place].options:
+        found.append(cell.positions[place].options[0])
+        place = found[-1].to
+    return found
+
+
+def _sizes(cell: Cell) -> int:
+    """How many entries the table of bounds has."""
+    size = cell.parts
+    for part in range(cell.parts):
+        size *= 1 + sum(way.robot != SERVER for way in _ways(cell, part))
+    return size
+
+
+def _work_of(cell: Cell, times: Times) -> "Work":
+    from lab.sequencing.methods.one_robot_kernels import Work
+
+    routes = [_ways(cell, part) for part in range(cell.parts)]
+    counts = np.array([sum(way.robot != SERVER for way in route) for route in routes], np.int64)
+    shape = cell.parts, int(counts.max()) + 1
+    at, process, carry, tail = (np.zeros(shape, np.int64) for _ in range(4))
+    stations, queues = range(len(cell.stations)), np.zeros(len(cell.stations), np.bool_)
+    for part, route in enumerate(routes):
+        n = 0
+        at[part, 0] = cell.positions[cell.begin_at[part]].station
+        for way in route:
+            if way.robot == SERVER:
+                queues[way.target] = True
+            else:
+                carry[part, n] = times.work(way)
+                n += 1
+                at[part, n] = way.target
+            process[part, n] += times.processing(way.to)
+        for k in range(n - 1, -1, -1):
+            tail[part, k] = carry[part, k] + process[part, k + 1] + tail[part, k + 1]
+    empty = np.array([[times.travel(a, b) if times.known(a, b) else FAR for b in stations] for a in stations], np.int64)
+    least = np.array(distances(cell, times.per_s), np.int64)
+    ready = np.array([times.whole(seconds) for seconds in cell.begin_s], np.int64)
+    weight = np.cumprod(np.concatenate([[1], counts[:-1] + 1])).astype(np.int64)
+    return Work(counts, at, process, carry, empty, least, queues, ready, tail, weight)

@@ -1,0 +1,251 @@
+"""The states of a cell of one robot and machines with queues, compiled with numba: what follows them, and which are needless.
+
+A state: how far each part is (`code`, a mixed radix of `weight`), which part the robot dropped last, and when, and when each
+part is ready (its machine done with it). A part that is dropped is put at once into the order of its machine's queue, before any
+that are not done yet; those behind it are put off. Parts, operations and stations are numbered from 0, times whole.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.learning.compiled import compiled
+
+FAR = 1 << 40
+Whole = NDArray[np.int64]
+
+
+class Work(NamedTuple):
+    """What is to be done: counts (part) of moves; at (part, n), where a part is after n moves; process and carry beside it.
+
+    carry: the move that leaves it, service included. empty, least (station, station): the empty way, and the shortest way at
+    all. queues (station): whether one part after the other is worked on there. ready (part): when a part may be taken first.
+    tail: from when a part is ready until it is finished. weight (part): of its moves in a state's code.
+    """
+
+    counts: Whole
+    at: Whole
+    process: Whole
+    carry: Whole
+    empty: Whole
+    least: Whole
+    queues: NDArray[np.bool_]
+    ready: Whole
+    tail: Whole
+    weight: Whole
+
+
+@compiled
+def machine_bound(work: Work, c: Whole, ready: Whole, now: int, here: int) -> int:
+    """No end is before this, for what each machine still has to do: heads, work, the least tail (Carlier 1982)."""
+    counts, at, process, carry = work.counts, work.at, work.process, work.carry
+    worst, most = 0, int(counts.sum())
+    heads, times, tails = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.int64)
+    for machine in range(len(work.queues)):
+        if not work.queues[machine]:
+            continue
+        n = 0
+        for j in range(len(counts)):
+            k = c[j]
+            if k > 0 and at[j, k] == machine and ready[j] > now:
+                heads[n] = max(now, ready[j] - process[j, k])
+                times[n] = ready[j] - heads[n]
+                tails[n] = work.tail[j, k]
+                n += 1
+            if k < counts[j]:
+                t = max(ready[j], now + work.least[here, at[j, k]])
+                for i in range(k + 1, counts[j] + 1):
+                    t += carry[j, i - 1]
+                    if at[j, i] == machine:
+                        heads[n], times[n], tails[n] = t, process[j, i], work.tail[j, i]
+                        n += 1
+                    t += process[j, i]
+        total, tail = 0, FAR
+        for i in np.argsort(-heads[:n]):
+            total += times[i]
+            tail = min(tail, tails[i])
+            worst = max(worst, heads[i] + total + tail)
+    return worst
+
+
+@compiled
+def least_rest(work: Work) -> Whole:
+    """(code, part): from when the robot dropped that part until the end at least, if nothing else were being worked on.
+
+    The best tour through all moves that are left, by dynamic programming (Held and Karp 1962, here with an order of each part's
+    moves); a part that is fetched right after it was dropped is waited for; parts and machines need their time.
+    """
+    counts, at, carry = work.counts, work.at, work.carry
+    parts, size = len(counts), 1
+    for count in counts:
+        size *= count + 1
+    rest = np.full((size, parts), FAR, np.int64)
+    c, ready = np.empty(parts, np.int64), np.zeros(parts, np.int64)
+    for code in range(size - 1, -1, -1):
+        for j in range(parts):
+            c[j] = code // work.weight[j] % (counts[j] + 1)
+        for last in range(parts):
+            if c[last] == 0:
+                continue
+            here, own = at[last, c[last]], work.process[last, c[last]]
+            least = own if code == size - 1 else FAR
+            for j in range(parts):
+                if c[j] < counts[j]:
+                    reach = max(work.empty[here, at[j, c[j]]], own if j == last else 0)
+                    least = min(least, reach + carry[j, c[j]] + rest[code + work.weight[j], j])
+            ready[:] = 0
+            ready[last] = own
+            for j in range(parts):
+                least = max(least, ready[j] + work.tail[j, c[j]])
+            rest[code, last] = max(least, machine_bound(work, c, ready, 0, here))
+    return rest
+
+
+@compiled
+def queue_at(work: Work, c: Whole, ready: Whole, part: int, now: int) -> Whole:
+    """The parts that a machine is not done with at a time, in their order: where a part goes with its next move."""
+    queue, n = np.empty(len(c), np.int64), 0
+    machine = work.at[part, c[part] + 1]
+    if work.queues[machine]:
+        for i in range(len(c)):
+            if i != part and c[i] > 0 and work.at[i, c[i]] == machine and ready[i] > now:
+                b = n
+                while b > 0 and ready[queue[b - 1]] > ready[i]:
+                    queue[b] = queue[b - 1]
+                    b -= 1
+                queue[b] = i
+                n += 1
+    return queue[:n]
+
+
+@compiled
+def put(work: Work, c: Whole, ready: Whole, part: int, now: int, queue: Whole, place: int) -> None:
+    """`part`, dropped now at its position c, is worked on after so many of the queue: `ready` becomes so."""
+    end = now if place == 0 else ready[queue[place - 1]]
+    end += work.process[part, c[part]]
+    ready[part] = end
+    for i in queue[place:]:
+        end = max(ready[i] - work.process[i, c[i]], end) + work.process[i, c[i]]
+        ready[i] = end
+
+
+@compiled
+def bound(work: Work, rest: Whole, code: int, last: int, now: int, c: Whole, ready: Whole) -> int:
+    """No end of this state is before."""
+    here, least, all_done, most = work.at[last, c[last]], FAR, True, now + rest[code, last]
+    for i in range(len(c)):
+        most = max(most, ready[i] + work.tail[i, c[i]])
+        if c[i] < work.counts[i]:
+            all_done = False
+            pick = max(now + work.empty[here, work.at[i, c[i]]], ready[i])
+            least = min(least, pick + work.carry[i, c[i]] + rest[code + work.weight[i], i])
+    if not all_done:
+        most = max(most, least)
+    return int(max(most, machine_bound(work, c, ready, now, here)))
+
+
+class Layer(NamedTuple):
+    """States with as many moves made: code, last, now and bound (n,), ready (n, parts), and what made them of the layer before.
+
+    made (n, 3): the state's number there, the part, and its place in the queue.
+    """
+
+    code: Whole
+    last: Whole
+    now: Whole
+    ready: Whole
+    bound: Whole
+    made: Whole
+
+
+@compiled
+def expand(work: Work, rest: Whole, layer: Layer, start: int, below: int) -> Layer:
+    """All states after these whose bound is below a value; `start`: where the robot stands in the first state."""
+    parts, n, cap = len(work.counts), 0, max(64, 2 * len(layer.code))
+    out, times, made = np.empty((cap, 4), np.int64), np.empty((cap, parts), np.int64), np.empty((cap, 3), np.int64)
+    c, ready = np.empty(parts, np.int64), np.empty(parts, np.int64)
+    for a in range(len(layer.code)):
+        for j in range(parts):
+            c[j] = layer.code[a] // work.weight[j] % (work.counts[j] + 1)
+        last, now = layer.last[a], layer.now[a]
+        here = work.at[last, c[last]] if last >= 0 else start
+        for j in range(parts):
+            if c[j] == work.counts[j]:
+                continue
+            code = layer.code[a] + work.weight[j]
+            drop = max(now + work.empty[here, work.at[j, c[j]]], layer.ready[a, j]) + work.carry[j, c[j]]
+            if drop + rest[code, j] >= below:
+                continue
+            queue = queue_at(work, c, layer.ready[a], j, drop)
+            c[j] += 1
+            for place in range(len(queue) + 1):
+                ready[:] = layer.ready[a]
+                put(work, c, ready, j, drop, queue, place)
+                least = bound(work, rest, code, j, drop, c, ready)
+                if least >= below:
+                    continue
+                if n == cap:
+                    cap *= 2
+                    out, times, made = _longer(out, cap), _longer(times, cap), _longer(made, cap)
+                for i in range(parts):
+                    # Earlier than the robot can be there is no better.
+                    reach = drop + (work.least[work.at[j, c[j]], work.at[i, c[i]]] if c[i] < work.counts[i] else 0)
+                    times[n, i] = max(ready[i], reach)
+                out[n, 0], out[n, 1], out[n, 2], out[n, 3] = code, j, drop, least
+                made[n, 0], made[n, 1], made[n, 2] = a, j, place
+                n += 1
+            c[j] -= 1
+    return Layer(
+        out[:n, 0].copy(), out[:n, 1].copy(), out[:n, 2].copy(), times[:n].copy(), out[:n, 3].copy(), made[:n].copy()
+    )
+
+
+@compiled
+def _longer(array: Whole, rows: int) -> Whole:
+    longer = np.empty((rows, array.shape[1]), np.int64)
+    longer[: len(array)] = array
+    return longer
+
+
+@compiled
+def needed(work: Work, layer: Layer, order: Whole) -> NDArray[np.bool_]:
+    """Which states, in an order with equal codes and last parts together, none before is at least as good as.
+
+    As good: no time is later, and the parts that both machines still have to do stand in the same order.
+    """
+    n, parts, low = len(order), len(work.counts), 0
+    keep, c = np.ones(n, np.bool_), np.empty(parts, np.int64)
+    while low < n:
+        first, high = order[low], low
+        while (
+            high < n and layer.code[order[high]] == layer.code[first] and layer.last[order[high]] == layer.last[first]
+        ):
+            high += 1
+        for j in range(parts):
+            c[j] = layer.code[first] // work.weight[j] % (work.counts[j] + 1)
+        for y in range(low, high):
+            for x in range(low, y):
+                if keep[x] and _as_good(work, layer, c, order[x], order[y]):
+                    keep[y] = False
+                    break
+        low = high
+    return keep
+
+
+@compiled
+def _as_good(work: Work, layer: Layer, c: Whole, x: int, y: int) -> bool:
+    one, other, now = layer.ready[x], layer.ready[y], layer.now[y]
+    if layer.now[x] > now:
+        return False
+    for j in range(len(c)):
+        if one[j] > other[j]:
+            return False
+    for j in range(len(c)):
+        if c[j] == 0 or not work.queues[work.at[j, c[j]]] or one[j] <= now:
+            continue
+        for i in range(j):
+            both = c[i] > 0 and work.at[i, c[i]] == work.at[j, c[j]] and one[i] > now
+            if both and (one[i] < one[j]) != (other[i] < other[j]):
+                return False
+    return True
