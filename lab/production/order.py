@@ -24,7 +24,7 @@ from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move
 from lab.sequencing.cyclic.cycle import Cycle
 from lab.sequencing.methods.exact import Optimum, optimum
-from lab.sequencing.methods.fewer_moves import fewer_moves
+from lab.sequencing.methods.portfolio import best_known
 from lab.sequencing.search import SAME, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import Run, branch, follow
 from lab.tasks.sequencing import Sequencing, search_for
@@ -155,23 +155,13 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
     return Ordered(orders[used], proven, used, costs, worth | said, cycle)
 
 
-def reference(cell: Cell, objective: str) -> Reference:
-    """The proven optimum, or the best bound: by A* for the makespan, by CP-SAT for the other objectives."""
-    if objective == MAKESPAN:
-        from lab.sequencing.methods.exact import optimum
-
-        best = optimum(cell)
-        return Reference(best.bound_s, best.proven, "A*", sequence=fewer_moves(cell, best.sequence))
-    from lab.sequencing.methods.cp_sat import cp_sat, fits
-
+def reference(cell: Cell, objective: str, time_limit_s: float = SECOND_OPINION_S, workers: int = 1) -> Reference:
+    """The proven optimum, or the best bound, and the best order that it took to find it (see `best_known`)."""
     unit = "" if objective == "tardy-parts" else " s"
     if objective not in BUILT_IN:
         return Reference(0.0, False, "nothing: CP-SAT has no rule for this objective", unit)
-    if not fits(cell):
-        return Reference(0.0, False, "nothing: too many moves for CP-SAT", unit)
-    opinion = cp_sat(cell, objective, time_limit_s=SECOND_OPINION_S)
-    sequence = fewer_moves(cell, opinion.sequence, objective) if opinion.sequence else ()
-    return Reference(opinion.bound, opinion.status == "optimal", "CP-SAT", unit, sequence)
+    found = best_known(cell, objective, time_limit_s, workers=workers)
+    return Reference(found.bound, found.proven, found.bound_by, unit, found.sequence, found.found_by)
 
 
 def _cheapest(orders: Mapping[str, SequenceResult]) -> str:

@@ -64,6 +64,18 @@ def _genetic() -> Find:
     return genetic
 
 
+def _anneal() -> Find:
+    from lab.sequencing.methods.anneal import anneal
+
+    return anneal
+
+
+def _portfolio() -> Find:
+    from lab.sequencing.methods.portfolio import portfolio
+
+    return portfolio
+
+
 def _exact() -> Find:
     from lab.sequencing.methods.exact import exact
 
@@ -137,8 +149,10 @@ SEQUENCERS: dict[str, Sequencer] = {
     "random": Sequencer(_random, "the best of so many sequences drawn evenly", drawn=True),
     "fifo": Sequencer(_fifo, "first in, first out: a queue of tasks", react=_queued),
     "ga": Sequencer(_genetic, "a genetic algorithm with random keys"),
+    "anneal": Sequencer(_anneal, "simulated annealing of a list of priorities, begun with the best rule's"),
     "exact": Sequencer(_exact, "best-first search (A*) to the proven optimum"),
     "cp-sat": Sequencer(_cp_sat, "constraint programming, for every objective"),
+    "portfolio": Sequencer(_portfolio, "annealing, then the exact search that proves most, begun with what it found"),
     "shortest-move": _rule("shortest-move", "the shortest move"),
     "longest-remaining-work": _rule("longest-remaining-work", "the part with the most work left"),
     "most-urgent-machine": _rule("most-urgent-machine", "what feeds or empties the machine most behind"),

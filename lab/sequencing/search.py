@@ -112,7 +112,7 @@ def gap(cost: float, bound: float) -> float:
 class Reference:
     """What no sequence can beat: `bound`, in the objective's unit; `proven`: some sequence reaches it.
 
-    sequence: the best one that the method found, without pointless hops; empty: none.
+    sequence: the best one that was found, without pointless hops, and by which method; empty: none.
     """
 
     bound: float
@@ -120,6 +120,7 @@ class Reference:
     method: str
     unit: str = " s"
     sequence: tuple[int, ...] = ()
+    found_by: str = ""
 
     def gap(self, cost: float) -> float | None:
         """`gap` to the bound; None where the bound is 0 and the cost is not."""

@@ -159,8 +159,23 @@ def _sort(run: Any, count: int) -> None:
 @lean
 def move(cell: Any, run: Any, i: int, seed: Any) -> None:
     """`Run.move`: carries out the i-th of the allowed decisions, with the times of an episode's seed."""
-    parts, o = len(run.locations), run.options[i]
-    part, robot = (run.allowed[i] - 1) % parts, cell.robot[o]
+    take(cell, run, (run.allowed[i] - 1) % len(run.locations), run.options[i], seed)
+
+
+@lean
+def may(cell: Any, run: Any, part: int, o: int) -> bool:
+    """Whether a part (from 0) may take a way of its position now."""
+    place = run.locations[part]
+    if cell.arrivals != NO_ARRIVALS and place == cell.starts[part] and part != cell.coming[run.whole[0]]:
+        return False
+    room = run.room[cell.needs[o, 0]] > 0 and run.room[cell.needs[o, 1]] > 0
+    return bool(room and run.room[cell.if_full[o]] <= 0 and not (cell.windows and _too_late(cell, run, part, o)))
+
+
+@lean
+def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
+    """A part (from 0) takes a way that it may take, with the times of an episode's seed."""
+    robot = cell.robot[o]
     here, there, server, reach_s = run.locations[part], cell.to[o], 0, 0.0
     if robot == SERVER:
         pick_s, server = _server(cell, run, part, o)
