@@ -25,6 +25,7 @@ from lab.teaching.events import RunHeld, RunWentOn, Tell, unheard
 AT_REST_STEPS = 60  # physics steps at the end of a wait that are simulated in any case
 SKIPPED_STEPS = 240  # at the most without a look at what else goes on
 FORCE_EVERY = 4  # physics steps between two looks at what presses on the arm
+BRAKE_ITERATIONS = 300  # of the solver: with 60 the joints of an arm that has seven creep on at a tenth of their speed
 BACK_STEPS = 120  # physics steps of its way that the arm goes back when it was stopped by a force
 DISTURBED_S = 2.0  # after a hand has reached into the scene, all of it is simulated for so long
 
@@ -161,11 +162,15 @@ class Floor:
         assert held is not None
         why = f"{held.kind} stop: {held.why}"
         self.scene.robot.brake()
-        while self._stopped():
-            self._tell_held()
-            self.tick()
-            if not self.stops.folding:
-                self.controls.wait(TIME_STEP)
+        before = self.world.iterations(BRAKE_ITERATIONS)
+        try:
+            while self._stopped():
+                self._tell_held()
+                self.tick()
+                if not self.stops.folding:
+                    self.controls.wait(TIME_STEP)
+        finally:
+            self.world.iterations(before)
         self.between_moves()
         return why
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from lab.errors import LabError
+from lab.errors import BadInput, LabError
 from lab.production.composer import carry_out
 from lab.production.conditions import Conditions
 from lab.production.durations import RECORDS, Durations, cell_of, durations_key, kept_durations, measure
@@ -14,6 +14,7 @@ from lab.production.order import OrderAdvice, ordered
 from lab.production.recorder import show_scene
 from lab.production.relearning import Relearner
 from lab.production.report import Report, write_files
+from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import DurationsKept, RunEnded, RunJournal
 from lab.production.taught import Taught, skill_row
 from lab.sequencing.simulate.run import simulate
@@ -24,8 +25,13 @@ from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.teaching.teacher import Teacher
 
 
-def teach_all(prepared: Prepared, teacher: Teacher, journal: RunJournal | None = None) -> Taught:
-    """Find or learn every skill, then find or measure the durations of every move; what the journal holds is taken from it."""
+def teach_all(
+    prepared: Prepared, teacher: Teacher, journal: RunJournal | None = None, advice: RunAdvice | None = None
+) -> Taught:
+    """Find or learn every skill, then find or measure the durations of every move; what the journal holds is taken from it.
+
+    advice: of a run that is gone on with, what was said in the lessons that are over counts in its receipts.
+    """
     task, skillset, journal = prepared.task, prepared.skillset, journal or RunJournal()
     teacher = replace(teacher, trial=trial_of(prepared))
     known, damaged = teacher.toolbox.index()
@@ -41,11 +47,17 @@ def teach_all(prepared: Prepared, teacher: Teacher, journal: RunJournal | None =
     )  # by signature, the skill that it was first found or learned for
     for name, problem in prepared.problems.items():
         kept, same = journal.skill(name), first.setdefault(f"{problem.subtask} {problem.mdp.signature}", name)
+        settings = task.subtask(problem.subtask)
+        plan = LessonPlan(problem, settings.learner, settings.gate, task.name)
         if kept is not None:
+            if advice is not None and kept.row["source"] != "reused":
+                try:
+                    advice.again(plan)
+                except BadInput as error:  # the policy is there: only what it was worth is not known
+                    teacher.tell(RecordSkipped(f"what was said about '{name}': {error}"))
             lesson, row = Lesson(kept.policy, "reused", reason="it was there before this run was stopped"), kept.row
         else:
-            settings = task.subtask(problem.subtask)
-            lesson = teacher.find_or_teach(LessonPlan(problem, settings.learner, settings.gate, task.name), known)
+            lesson = teacher.find_or_teach(plan, known)
             if same != name and lesson.source == "reused":  # it would have been learned only once
                 lesson = replace(lesson, reason=f"it is the same problem as '{same}'", saved=(0, 0))
             row = skill_row(name, lesson)
@@ -92,7 +104,7 @@ def run(prepared: Prepared, teacher: Teacher, out: Path, conditions: Conditions 
     began = time.perf_counter() - prepared.wall_s
     if conditions.viewer is not None:
         show_scene(prepared.task, prepared.order, prepared.layout, conditions.viewer)
-    taught = teach_all(prepared, teacher, conditions.journal)
+    taught = teach_all(prepared, teacher, conditions.journal, conditions.advice)
     teacher.tell(PhaseBegan("sequence", 1))
     advice, people = conditions.advice, teacher.advising.people
     whose = OrderAdvice() if advice is None else advice.order(people, taught.durations.to_json())

@@ -48,17 +48,29 @@ class RunAdvice:
         name = plan.problem.name
         if not self.asks_people:
             return Journal()
-        begun = self.journal.session(name)
-        if begun is not None:
-            kept = KeptSession(begun, "--resume")
-            again = kept if kept.read.closed is None else KeptSession(begun, "--resume", read_only=True)
-            self.sessions[name] = again
-            return again.keep(plan)
+        made = self.again(plan)
+        if made is not None:
+            return made
         new = NewSession(None, self.toolbox, replace(self.options, subtask=name, sessions=MAX_SESSIONS))
         self.sessions[name] = new
         made = new.keep(plan)
         self.journal.write(SessionKept(name, str(new.folder)))
         return made
+
+    def again(self, plan: LessonPlan) -> Journal | None:
+        """The journal of a lesson that the run which is gone on with has begun, None of no such one.
+
+        A scene that changed is another problem of the same name, with a session of its own.
+        """
+        name, signature = plan.problem.name, plan.problem.mdp.signature
+        begun = [KeptSession(folder, "--resume") for folder in self.journal.sessions(name)]
+        kept = next((one for one in begun if one.read.session.signature == signature), None)
+        if kept is None:
+            return None
+        if kept.read.closed is not None:
+            kept = KeptSession(kept.folder, "--resume", read_only=True)
+        self.sessions[name] = kept
+        return kept.keep(plan)
 
     # ---- the order
 
@@ -66,7 +78,7 @@ class RunAdvice:
         """Whose word counts on the order; durations: those it is planned with, which its session keeps (`to_json`)."""
 
         def keep(cell: Cell, objective: str) -> Journal:
-            begun = self.journal.session(ORDER)
+            begun = next(iter(self.journal.sessions(ORDER)), None)
             session = self._new_order(durations) if begun is None else self._order_again(begun)
             self.sessions[ORDER] = session
             made = session.keep(cell, objective)

@@ -222,10 +222,9 @@ class RunJournal:
             FolderPlace(self.path.parent / SKILLS).write(file, encode(policy))
             self.write(SkillKept(row, file))
 
-    def session(self, name: str) -> Path | None:
-        """The folder of the session of a lesson that was begun."""
-        found = [e.folder for e in self.known if isinstance(e, SessionKept) and e.name == name]
-        return Path(found[-1]) if found else None
+    def sessions(self, name: str) -> list[Path]:
+        """The folders of the sessions that were begun under a name, the first one first: what changed is learned again."""
+        return [Path(e.folder) for e in self.known if isinstance(e, SessionKept) and e.name == name]
 
     def durations(self) -> DurationsKept | None:
         """The durations that it planned with."""

@@ -52,17 +52,23 @@ class World:
         self._names: dict[int, str] = {}
         self.steps = 0
         self.dark = False  # whether cameras see nothing
+        self._iterations = 60
         self._call("setGravity", 0, 0, -9.81)
         self._call(
             "setPhysicsEngineParameter",
             fixedTimeStep=TIME_STEP,
-            numSolverIterations=60,
+            numSolverIterations=self._iterations,
             deterministicOverlappingPairs=1,
         )
 
-    def iterations(self, count: int) -> None:
-        """Solve contacts and constraints in so many iterations a step: a linkage of fingers needs more than bodies do."""
+    def iterations(self, count: int) -> int:
+        """Solve contacts and constraints in so many iterations a step: a linkage of fingers needs more than bodies do.
+
+        Returns how many it were before.
+        """
+        before, self._iterations = self._iterations, count
         self._call("setPhysicsEngineParameter", numSolverIterations=count)
+        return before
 
     def _call(self, name: str, *args: Any, **kwargs: Any) -> Any:
         return getattr(self._p, name)(*args, physicsClientId=self._client, **kwargs)

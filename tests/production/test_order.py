@@ -176,7 +176,7 @@ def test_a_run_that_is_gone_on_with_asks_on_where_it_was_broken_off(tmp_path: Pa
         advised(tmp_path, leaves, broken)
     broken.close()
     again = RunJournal.resume(tmp_path / "run")
-    assert again.session(ORDER) is not None
+    assert len(again.sessions(ORDER)) == 1
     found, same = advised(tmp_path, goes_on, again)
     assert found == whole
     assert len(asked) == worth["order"]["questions"]

@@ -7,15 +7,20 @@ from typing import Any
 
 import pytest
 
+from lab.learning.requests import AdviceRequest
 from lab.production.conditions import Conditions
+from lab.production.order import Ordered
 from lab.production.report import Report
-from lab.production.run import run
+from lab.production.run import run, teach_all
+from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import RunBegan, RunJournal, read_run
+from lab.sequencing.search import SequenceResult
 from lab.skills.prepared_scene import prepare
 from lab.tasks.fault_fields import FaultFields
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
 from lab.teaching.events import Event, MoveMade, SkillReady
+from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.teacher import Teacher
 from lab.toolbox.registry import Toolbox
 
@@ -79,6 +84,47 @@ class Breaks:
         self.left -= isinstance(event, self.kind)
         if isinstance(event, self.kind) and self.left == 0:
             raise KeyboardInterrupt
+
+
+class Says:
+    """Somebody at the terminal who knows the way, and counts how often they were asked."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def __call__(self, request: AdviceRequest) -> int:
+        self.asked += 1
+        return request.own
+
+
+def taught_by(task: Task, folder: Path, person: Says, hear: Callable[[Event], None]) -> RunAdvice:
+    """The skills of a run that a person advises, its lessons begun or gone on with."""
+    again = (folder / "run.jsonl").exists()
+    journal = RunJournal.resume(folder) if again else RunJournal.begin(folder, HEAD)
+    options = LessonOptions(task="toast", advisors=("terminal",))
+    toolbox = Toolbox(folder.with_name(f"{folder.name}-toolbox"))
+    advice = RunAdvice(toolbox, options, journal)
+    teacher = Teacher(toolbox, options.advising({"terminal": person}), tell=hear, keep=advice.keep)
+    try:
+        teach_all(prepare(task, task.ordered(1), 0), teacher, journal, advice)
+    finally:
+        journal.close()
+    return advice
+
+
+def test_what_a_person_said_before_the_break_still_counts(task: Task, tmp_path: Path) -> None:
+    """Their lessons are not held again, and what each was worth is as if the run had not been broken off."""
+    whole, first, second = Says(), Says(), Says()
+    known = taught_by(task, tmp_path / "whole", whole, lambda event: None)
+    with pytest.raises(KeyboardInterrupt):
+        taught_by(task, tmp_path / "broken", first, Breaks(SkillReady, 3))
+    again = taught_by(task, tmp_path / "broken", second, lambda event: None)
+    assert first.asked > 0
+    assert first.asked + second.asked == whole.asked
+    nothing = Ordered(SequenceResult((), 0.0, ()), None, "", {})  # type: ignore[arg-type]
+    worth = {name: one["receipt"] for name, one in known.receipts(nothing)["skills"].items()}
+    assert len(worth) > 3
+    assert {name: one["receipt"] for name, one in again.receipts(nothing)["skills"].items()} == worth
 
 
 def test_broken_off_while_it_learned_and_again_while_it_moved(whole: Path, carry_on: Begin, tmp_path: Path) -> None:
