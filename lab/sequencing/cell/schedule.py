@@ -140,7 +140,7 @@ class Schedule:
 
 
 def robot_activities(move: Move) -> list[Activity]:
-    """What the robot does in one move, without what takes no time."""
+    """What the robot does in one move; what takes no time only where something is moved."""
     if move.served:
         return []
     served_s = move.pick_s - move.service_s
@@ -151,7 +151,7 @@ def robot_activities(move: Move) -> list[Activity]:
         ("service", move.part, move.origin, move.origin, served_s, move.pick_s),
         (carries, move.part, move.origin, move.target, move.pick_s, move.drop_s),
     )
-    return [Activity(move.by, *span) for span in spans if span[5] > span[4]]
+    return [Activity(move.by, *span) for span in spans if span[5] > span[4] or span[0] == carries]
 
 
 def _part_activities(
@@ -195,7 +195,9 @@ def _limits(cell: Cell, part: int, moves: Sequence[Move]) -> Iterator[FetchBy]:
 
 
 def _lasting(activities: Iterable[Activity]) -> list[Activity]:
-    return [activity for activity in activities if activity.end_s > activity.start_s]
+    """Without waiting that takes no time; what is done stays."""
+    done = ("process", "carry")
+    return [activity for activity in activities if activity.end_s > activity.start_s or activity.kind in done]
 
 
 def _by_start(activities: Iterable[Activity]) -> tuple[Activity, ...]:
