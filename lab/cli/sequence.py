@@ -15,7 +15,8 @@ from lab.errors import BadInput
 
 def sequence(
     task: Annotated[
-        str | None, typer.Argument(
+        str | None,
+        typer.Argument(
             help="A task or a cell that ships, a .toml file, or an instance file ({instances}); none: with --resume."
         ),
     ] = None,
@@ -29,11 +30,15 @@ def sequence(
     ] = None,
     layout: Annotated[
         Path | None,
-        typer.Option("--layout", help="Beside an instance file: a CSV of travel times, a matrix or rows of from,to,time."),
+        typer.Option(
+            "--layout", help="Beside an instance file: a CSV of travel times, a matrix or rows of from,to,time."
+        ),
     ] = None,
     robots: Annotated[
         int | None,
-        typer.Option("--robots", min=1, max=50, help="How many robots carry parts, all alike; default: as the file says, or 1."),
+        typer.Option(
+            "--robots", min=1, max=50, help="How many robots carry parts, all alike; default: as the file says, or 1."
+        ),
     ] = None,
     toasts: Annotated[
         int | None,

@@ -63,11 +63,11 @@ def task_convert(
     text = pyjobshop.write(found) if out is not None and out.suffix == ".json" else toml_of(found)
     if out is not None:
         write_whole(out, text)
-    document = {"file": None if out is None else str(out), "name": found.name, "parts": len(found.ordered())}
-    document |= {"robots": len(found.built_robots), "text": text}
+    parts, robots_there = len(found.ordered()), len(found.built_robots)
+    document = {"file": None if out is None else str(out), "name": found.name, "parts": parts, "robots": robots_there}
     if as_json or out is not None:
-        what = f"{counted(document['parts'], 'part')}, {counted(document['robots'], 'robot')}"
-        show(document, as_json, lambda d: f"{d['file']}: {d['name']}, {what}")
+        what = f"{counted(parts, 'part')}, {counted(robots_there, 'robot')}"
+        show(document | {"text": text}, as_json, lambda d: f"{d['file']}: {d['name']}, {what}")
     else:
         write(text)
 

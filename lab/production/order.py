@@ -156,8 +156,8 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
 
 
 def reference(cell: Cell, objective: str) -> Reference:
-    """The proven optimum, or the best bound: by A* for the makespan, by CP-SAT for the other objectives."""
-    if objective == MAKESPAN:
+    """The proven optimum, or the best bound: by A* for the makespan of one robot, by CP-SAT for all else."""
+    if objective == MAKESPAN and cell.serial:
         from lab.sequencing.methods.exact import optimum
 
         best = optimum(cell)

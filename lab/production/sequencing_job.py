@@ -18,7 +18,6 @@ from lab.production.order import NOBODY, KeepOrder, OrderAdvice, advised_session
 from lab.sequencing import SEQUENCERS, check_method, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
-from lab.sequencing.cell.schedule_rows import check_table, rows_of, write_table
 from lab.sequencing.cell.objectives import (
     MAKESPAN,
     OBJECTIVES,
@@ -27,6 +26,7 @@ from lab.sequencing.cell.objectives import (
     cost,
     stuck_cost,
 )
+from lab.sequencing.cell.schedule_rows import check_table, rows_of, write_table
 from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import follow, simulate
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case

@@ -117,7 +117,9 @@ def load_beside(word: str, asked: Asked) -> tuple[Task | CellFile | GridWorld, s
         raise BadInput(f"--layout {asked.layout} beside {word}: it is no instance file: its travel times are its own")
     if asked.robots is not None:
         if not isinstance(found, CellFile):
-            raise BadInput(f"--robots {asked.robots} beside {word}: it is no cell: the arm is the one that its file has")
+            raise BadInput(
+                f"--robots {asked.robots} beside {word}: it is no cell: the arm is the one that its file has"
+            )
         found = found.with_robots(asked.robots)
     return found, asked.case
 

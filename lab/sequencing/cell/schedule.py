@@ -160,6 +160,7 @@ def _part_activities(
     """Rows of one part, and of the machines that it passes, from its arrival to `end_s`."""
     row, since_s, process_s = cell.part_name(part), came_s, cell.begin_s[part - 1]
     place = cell.names[cell.positions[cell.begin_at[part - 1]].station]
+    works = False  # whether it is worked on there, be it for no time
     rows: list[Activity] = []
     machines: list[Activity] = []
     for move in [*moves, None]:
@@ -167,7 +168,7 @@ def _part_activities(
         # A measured run may fetch a little before the nominal end: processing then ends with the pick.
         until_s = end_s if move is None else move.pick_s
         done_s = min(since_s + process_s, until_s)
-        if station.kind == "machine":
+        if station.kind == "machine" and (works or done_s > since_s):
             for resource, log in ((row, rows), (place, machines)):
                 log.append(Activity(resource, "process", part, place, place, since_s, done_s))
         if station.kind == "machine" and station.servers is None:
@@ -180,6 +181,7 @@ def _part_activities(
             if not move.served:
                 rows.append(Activity(row, "carry", part, move.origin, move.target, move.pick_s, move.drop_s))
             since_s, place, process_s = move.drop_s, move.target, move.process_s
+            works = move.served or cell.stations[cell.index(place)].servers is None
     return _lasting(rows), _lasting(machines)
 
 

@@ -22,7 +22,9 @@ def read(source: Source, asked: Asked) -> CellFile:
         which = next(iter(sets))
     if which not in sets:
         known = ", ".join([*sets][:20]) or "none"
-        said = "say which with --case SET:LAYOUT, such as 7:1" if which is None else f"there is no set '{which}' (--case)"
+        said = (
+            "say which with --case SET:LAYOUT, such as 7:1" if which is None else f"there is no set '{which}' (--case)"
+        )
         raise source.refusal(None, f"one set of jobs; the file has {known}: {said}")
     name = f"EX{which}{place or ''}" if len(sets) > 1 else source.name
     own = replace(source, path=source.path.with_name(source.path.name))

@@ -1,4 +1,4 @@
-"""MiniZinc data (.dzn), as far as instances need it: numbers, sets, lists and matrices, each with its line; and hoist lines in it.
+"""MiniZinc data (.dzn), as far as instances need it: numbers, lists and matrices, each with its line; and hoist lines in it.
 
 The names are those of public hoist models: Ninner, tmin, tmax, f, e (Wallace and Yorke-Smith 2020; MiniZinc challenge 2020), or
 numTanks, minTime, maxTime, full, empty (Rodosek and Wallace 1998; the older MiniZinc and AMPL examples).

@@ -1,4 +1,4 @@
-"""Cyclic hoist lines as the lab's cells: one hoist carries parts through tanks in their order, each for a least and a most time."""
+"""Cyclic hoist lines as cells: one hoist carries parts through tanks in order, each for a least and a most time."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -34,10 +34,8 @@ class HoistLine:
 def cell_of_line(source: Source, line: HoistLine, asked: Asked) -> CellFile:
     """The cell of a hoist line; BadInput for several hoists, which share a track and would meet."""
     if asked.robots not in (None, 1):
-        raise BadInput(
-            f"--robots {asked.robots} beside {source.path}: hoists share one track, the lab's robots do not hinder each other; "
-            "wanted 1"
-        )
+        wanted = "wanted 1: hoists share a track, and the lab's robots do not hinder each other"
+        raise BadInput(f"--robots {asked.robots} beside {source.path}: {wanted}")
     stations: list[dict[str, Any]] = [{"name": LOAD, "kind": "storage", "capacity": _STORE}]
     for name, least, most in zip(line.tanks, line.least, line.most, strict=True):
         tank: dict[str, Any] = {"name": name, "kind": "machine", "capacity": line.capacity, "processing_s": least}

@@ -109,7 +109,13 @@ def _cell(
         products.append({"name": name, "routes": routes})
     kept = {station["name"] for station in stations}
     times = {a: {b: t for b, t in row.items() if b in kept and b != a} for a, row in travel.items() if a in kept}
-    raw = {"kind": "cell", "name": source.name, "order": names, "stations": stations, "products": products}
+    raw: dict[str, Any] = {
+        "kind": "cell",
+        "name": source.name,
+        "order": names,
+        "stations": stations,
+        "products": products,
+    }
     raw |= {"robots": robots} if len(robots) != 1 else {"robot": robots[0]}
     raw |= {"travel": times} if times else {}
     for field_name, given in (("release_s", shop.release), ("due_s", shop.due)):

@@ -7,7 +7,6 @@ machines have room for all before and after them. Source: github.com/proto-lab-r
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import yaml
 
@@ -70,27 +69,19 @@ class _Yaml:
         return self.source.whole(word, self.line, f"'{self.where}'", 1, most)
 
 
-class _NoAliases(yaml.SafeLoader):
-    """Reads no aliases, with which a short file could mean an endless one."""
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        if self.check_event(yaml.AliasEvent):
-            event = self.peek_event()
-            raise yaml.MarkedYAMLError(problem="an alias (*), which is not read", problem_mark=event.start_mark)
-        return super().compose_node(parent, index)
-
-
 def _parsed(source: Source) -> _Yaml:
     if len(source.text) > MAX_YAML:
         raise source.refusal(None, f"up to {MAX_YAML} characters of YAML", f"{len(source.text)}")
     try:
-        node = yaml.compose(source.text, Loader=_NoAliases)
+        node = yaml.compose(source.text, Loader=yaml.SafeLoader)  # nodes, which aliases cannot multiply
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = None if mark is None else mark.line + 1
         raise source.refusal(line, f"YAML: {error.problem or error.context}") from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise source.refusal(None, f"YAML: {str(error).splitlines()[0] if str(error) else 'it nests too deep'}") from None
+        raise source.refusal(
+            None, f"YAML: {str(error).splitlines()[0] if str(error) else 'it nests too deep'}"
+        ) from None
     if node is None:
         raise source.refusal(1, "'instance_config': the file is empty")
     return _Yaml(source, node)
@@ -122,9 +113,9 @@ def read(source: Source, asked: Asked) -> CellFile:
         if robot is not None
     ]
     update = {"robots": tuple(moved)} if file.robots is not None else {"robot": moved[0]}
-    found = file.model_copy(update=update)
-    found.cell()
-    return found
+    placed = file.model_copy(update=update)
+    placed.cell()
+    return placed
 
 
 def _jobs(source: Source, spec: _Yaml) -> tuple[int, list[list[Operation]], list[int | None]]:

@@ -19,7 +19,9 @@ def read(source: Source, asked: Asked) -> CellFile:
     ended = False
     for line, row in rows:
         if len(row) != len(HEADER) or ended or len(tanks) > MOST_MACHINES:
-            wanted = f"a tank's {len(HEADER)} values ({','.join(HEADER)}), at most {MOST_MACHINES} tanks, and unload last"
+            wanted = (
+                f"a tank's {len(HEADER)} values ({','.join(HEADER)}), at most {MOST_MACHINES} tanks, and unload last"
+            )
             raise source.refusal(line, wanted, ",".join(row))
         full.append(source.time(row[3], line, f"the move to '{row[0]}'"))
         if row[0] == UNLOAD:
@@ -31,7 +33,9 @@ def read(source: Source, asked: Asked) -> CellFile:
         if most[-1] is not None and most[-1] < least[-1]:
             raise source.refusal(line, f"a most time of at least {row[1]}", row[2])
     if not ended:
-        raise source.refusal(line, f"a last row '{UNLOAD}', with the move out of the last tank: the file ends before it")
+        raise source.refusal(
+            line, f"a last row '{UNLOAD}', with the move out of the last tank: the file ends before it"
+        )
     if asked.layout is None:
         raise source.refusal(None, "the hoist's empty moves beside it: give --layout FILE")
 

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import prod
 from typing import Any
 
@@ -18,7 +19,7 @@ from lab.tasks.instances.source import MOST_MACHINES, MOST_OPERATIONS, MOST_TIME
 NEVER = 2**25  # how PyJobShop writes that a deadline never comes; larger ones are taken for it, too
 LISTS = {"jobs": MAX_PARTS, "resources": MOST_MACHINES, "tasks": 20_000, "modes": 200_000}
 READ = ("end_before_start", "setup_times")  # the constraints that the lab has an equal of
-PLAIN = {  # fields that must be as they are by default, for each list
+PLAIN: Mapping[str, Mapping[str, Any]] = {  # fields that must be as they are by default, for each list
     "jobs": {"weight": 1},
     "resources": {"breaks": [], "no_idle": False},
     "tasks": {"earliest_start": 0, "earliest_end": 0, "allow_idle": False, "allow_breaks": False, "optional": False},
@@ -114,7 +115,9 @@ def _check_plain(document: _Json, lists: Mapping[str, Sequence[_Json]]) -> None:
         for one in lists[name]:
             for key, value in plain.items():
                 if (found := one.get(key, value)).value != value:
-                    raise found.refusal(f"{json.dumps(value)}, all that the lab's cells can have,", json.dumps(found.value))
+                    raise found.refusal(
+                        f"{json.dumps(value)}, all that the lab's cells can have,", json.dumps(found.value)
+                    )
     late = [one.get("deadline", NEVER) for one in lists["jobs"]]
     late += [one.get(key, NEVER) for one in lists["tasks"] for key in ("latest_start", "latest_end")]
     for found in late:
@@ -151,9 +154,9 @@ def _ways(tasks: Sequence[_Json], modes: Sequence[_Json], resources: int) -> lis
         task = mode.get("task").whole(len(tasks) - 1)
         machine = used.each(1)[0].whole(resources - 1)
         found[task].append((machine, float(mode.get("duration").whole(int(MOST_TIME)))))
-    for task, one in zip(tasks, found, strict=True):
+    for place, one in zip(tasks, found, strict=True):
         if not one:
-            raise task.refusal("a mode of this task: there is none")
+            raise place.refusal("a mode of this task: there is none")
     return [tuple(one) for one in found]
 
 
@@ -174,7 +177,7 @@ def _orders(document: _Json, jobs: Sequence[_Json], tasks: Sequence[_Json]) -> l
         seen |= {*own}
         reach = {task: _reached(after, task) & {*own} for task in own}
         orders.append(sorted(own, key=lambda task: -len(reach[task])))
-        for first, then in zip(orders[-1], orders[-1][1:], strict=False):
+        for first, then in pairwise(orders[-1]):
             if then not in reach[first]:
                 raise job.refusal(f"tasks one after the other (end_before_start): {first} and {then} have no order")
         if any(first in reach[first] for first in own):
@@ -183,7 +186,9 @@ def _orders(document: _Json, jobs: Sequence[_Json], tasks: Sequence[_Json]) -> l
     for first, thens in after.items():
         for then in thens:
             if where.get(first) != where.get(then):
-                raise document.get("constraints").refusal(f"no order between tasks {first} and {then} of different jobs")
+                raise document.get("constraints").refusal(
+                    f"no order between tasks {first} and {then} of different jobs"
+                )
     if len(seen) != len(tasks):
         raise document.get("tasks").refusal("tasks that all belong to jobs", f"{len(tasks) - len(seen)} that do not")
     return orders
@@ -206,11 +211,12 @@ def _setups(document: _Json, orders: Sequence[Sequence[int]], machines: int) -> 
     found: dict[int, dict[tuple[int, int], float]] = {}
     for one in document.get("constraints", {}).get("setup_times", []).each(LISTS["modes"]):
         machine = one.get("machine").whole(machines - 1)
-        before, after = (job_of[one.get(name).whole(len(job_of) - 1)] for name in ("task1", "task2"))
+        first, then = (one.get(name).whole(len(job_of) - 1) for name in ("task1", "task2"))
+        before, after = job_of[first], job_of[then]
         seconds = float(one.get("duration").whole(int(MOST_TIME)))
         if found.setdefault(machine, {}).get((before, after), seconds) != seconds:
             raise one.refusal(f"one setup time from job {before} to job {after} on a machine", f"{seconds:g}, too")
-        if before != after:
+        if first != then:
             found[machine][before, after] = seconds
     return {machine: times for machine, times in found.items() if any(times.values())}
 
@@ -241,11 +247,11 @@ def _document(file: CellFile) -> dict[str, Any]:
                 on_machine.setdefault(machine, []).append((name, len(tasks)))
             tasks.append({"job": number})
         numbers = [*range(first, len(tasks))]
-        job = {"tasks": numbers, "name": f"{name} {number + 1}"}
+        job: dict[str, Any] = {"tasks": numbers, "name": f"{name} {number + 1}"}
         job |= {} if file.release_s is None else {"release_date": _whole(file.release_s[number])}
         job |= {} if file.due_s is None else {"due_date": _whole(file.due_s[number])}
         jobs.append(job)
-        follow += [{"task1": a, "task2": b, "delay": 0} for a, b in zip(numbers, numbers[1:], strict=False)]
+        follow += [{"task1": a, "task2": b, "delay": 0} for a, b in pairwise(numbers)]
     resources: list[dict[str, Any]] = []
     for station in machines:
         kind = {"type": "machine"} if station.servers == 1 else {"type": "renewable", "capacity": station.servers}
@@ -282,11 +288,16 @@ def _check_written(file: CellFile) -> None:
 def _operations(product: CellProduct, index: Mapping[str, int], own: Mapping[str, float]) -> list[Operation]:
     """The machines that can do each step of a product, and their times. BadInput where its routes are no choice step by step."""
     stages = [
-        [(stage.station, own[stage.station] if stage.processing_s is None else stage.processing_s) for stage in route[1:]]
+        [
+            (stage.station, own[stage.station] if stage.processing_s is None else stage.processing_s)
+            for stage in route[1:]
+        ]
         for route in product.routes
     ]
     steps = [[*dict.fromkeys(way)] for way in zip(*stages, strict=False)]
-    alike = len({len(route) for route in stages}) == 1 and prod(len(step) for step in steps) == len({*map(tuple, stages)})
+    alike = len({len(route) for route in stages}) == 1 and prod(len(step) for step in steps) == len(
+        {*map(tuple, stages)}
+    )
     if not alike or len(stages) > MOST_WAYS:
         raise BadInput(
             f"product '{product.name}' as PyJobShop's JSON: its routes are no choice of machines step by step, which is wanted"
