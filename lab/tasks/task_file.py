@@ -2,6 +2,7 @@
 
 import re
 from functools import partial
+from os.path import isfile
 from pathlib import Path
 from typing import Any, Literal, TypeVar, cast, get_args
 
@@ -53,8 +54,9 @@ def is_path(task: str) -> bool:
 def find(task: str) -> Path:
     """The file of a task, cell or world given by name or path; BadInput when there is none."""
     files = _files()
-    if is_path(task) or (task not in files and Path(task).is_file()):  # many instances have no ending
-        if Path(task).is_file():
+    there = isfile(task)  # False, too, for a name that is too long for any file
+    if is_path(task) or (task not in files and there):  # many instances have no ending
+        if there:
             return Path(task)
         known = ", ".join(files)
         raise BadInput(f"no task file '{task}': give a file that exists, .toml or a .txt grid, or what ships: {known}")

@@ -9,7 +9,8 @@ from lab.tasks.cell_file import CellFile
 from lab.tasks.instances import Asked
 
 TANKS = "tank,soak_min,soak_max,move_from_previous\n1,150,200,31\n2,90,,22\nunload,,,30\n"
-EMPTY = "after_move_into,to_remove_from,time\n1,load,11\n1,1,0\n1,2,2\n2,load,14\n2,1,2\n2,2,0\nunload,load,19\nunload,1,3\nunload,2,4\n"
+ROWS = "1,load,11 1,1,0 1,2,2 2,load,14 2,1,2 2,2,0 unload,load,19 unload,1,3 unload,2,4"
+EMPTY = "\n".join(["after_move_into,to_remove_from,time", *ROWS.split()])
 
 
 @pytest.fixture
