@@ -12,6 +12,7 @@ MOST_MACHINES = 98  # of a cell's 100 stations two are left for where parts come
 MOST_TIME = 1e6  # as in cell files
 MOST_OPERATIONS = 99  # of a job: a route has up to 100 stages
 _SHOWN = 60  # characters of a bad value
+_LONGEST = 300  # characters of what is wanted
 _WHOLE = re.compile(r"[0-9]{1,9}")
 _TIME = re.compile(r"[0-9]{1,9}(\.[0-9]{0,9})?")
 
@@ -50,6 +51,7 @@ class Source:
         """The error for what is not as it is expected to be; got None: nothing stands there that could be shown."""
         found = str(got) if got is not None else ""
         found = found if len(found) <= _SHOWN else f"{found[:_SHOWN]} ..."
+        wanted = wanted if len(wanted) <= _LONGEST else f"{wanted[:_LONGEST]} ..."  # it may name what the file names
         where = f"{self.path}: " + ("" if line is None else f"line {line}: ")
         return BadInput(f"{where}wanted {wanted}" + (f", not '{found}'" if got is not None else ""))
 

@@ -51,3 +51,7 @@ def test_what_stands_beside_it(refused: Callable[..., str], empty: Asked) -> Non
     assert refused(TANKS, "tanks.csv").endswith("give --layout FILE")
     assert "hoists share a track" in refused(TANKS, "tanks.csv", Asked(empty.layout, robots=2))
     assert refused(EMPTY, "empty.csv").startswith("empty.csv: line 1: wanted jobs or tanks: these are travel times")
+
+
+def test_a_long_name_makes_no_long_line(refused: Callable[..., str], empty: Asked) -> None:
+    assert len(refused(TANKS.replace("2,90,,22", f"{'x' * 5000},,,22"), "tanks.csv", empty)) < 400
