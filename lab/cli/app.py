@@ -79,6 +79,11 @@ COMMANDS = {  # what is typed after `lab` -> the command
     "toolbox restore": Command(toolbox.toolbox_restore, "lab toolbox restore 'insert at toaster 1a2b3c4d'"),
     "task list": Command(task.task_list, "lab task list"),
     "task show": Command(task.task_show, "lab task show toast"),
+    "task convert": Command(
+        task.task_convert,
+        "lab task convert bilge-ulusoy-jobs.csv --layout bilge-ulusoy-layouts.csv --case 7:1 --robots 2 --out ex71.toml",
+        "{words of instances}",
+    ),
     "task random": Command(task.task_random, "lab task random 10x10x10 --density 0.06 --seed 7 --out my-world.toml"),
     "task reconstruct": Command(task.task_reconstruct, "lab task reconstruct --seed 0 --out world-2.toml"),
     "task check": Command(task.task_check, "lab task check my-toast.toml"),

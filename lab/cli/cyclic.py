@@ -9,7 +9,7 @@ from lab.errors import BadInput
 if TYPE_CHECKING:
     from lab.teaching.kept_order import OrderOptions
 
-OF_A_CYCLE = ("task", "case", "toasts", "parts", "seed")
+OF_A_CYCLE = ("task", "case", "toasts", "parts", "seed", "layout", "robots")
 
 
 def cyclic_found(given: "OrderOptions", toolbox: str | None, files: dict[str, Path]) -> dict[str, Any]:
@@ -29,8 +29,11 @@ def cyclic_found(given: "OrderOptions", toolbox: str | None, files: dict[str, Pa
             )
     if "plot" in files:
         raise BadInput(f"--cyclic beside --plot {files['plot']}: a cycle has no episodes; --gantt draws it")
+    if "schedule" in files:
+        raise BadInput(f"--cyclic beside --schedule {files['schedule']}: a cycle has no end: --gantt draws it")
     options = LessonOptions(advisors=DEFAULT_ADVISORS, seed=given.seed)
     with lesson_seat(()) as seat, seat.progress:
         teacher = teacher_of(toolbox, options, seat)
-        wanted = CyclicWanted(given.case, given.toasts, given.parts, given.seed)
+        beside = given.beside
+        wanted = CyclicWanted(given.case, given.toasts, given.parts, given.seed, beside.layout, beside.robots)
         return cyclic_named(given.task, wanted, teacher, files)

@@ -48,9 +48,10 @@ def _of_studies() -> Tables:
 
 
 def _of_tasks() -> Tables:
+    from lab.tasks.instances import INSTANCES
     from lab.tasks.robot_fields import MODELS
 
-    return {"arms": MODELS}
+    return {"arms": MODELS, "instances": INSTANCES}
 
 
 def _of_export() -> Tables:

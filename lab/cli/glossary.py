@@ -15,6 +15,7 @@ TERMS = {
 }
 TEXTS = {  # what stands below a command's options -> its headings, each with a family of `lab.cli.families`
     "words of teaching": {"Learners": "learners", "Gates": "gates", "Words": "terms"},
-    "words of sequencing": {"Methods": "methods"},
+    "words of sequencing": {"Methods": "methods", "Instance files": "instances"},
+    "words of instances": {"Instance files": "instances"},
     "words of exporting": {"Formats": "export formats"},
 }

@@ -116,6 +116,8 @@ def sequenced(
         kept.keep,
         options.parts,
         kept.durations(),
+        options.beside.layout,
+        options.robots,
     )
     teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
     return sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)

@@ -15,11 +15,30 @@ from lab.errors import BadInput
 
 def sequence(
     task: Annotated[
-        str | None, typer.Argument(help="A task or a cell that ships, or a .toml file; none: with --resume.")
+        str | None,
+        typer.Argument(
+            help="A task or a cell that ships, a .toml file, or an instance file ({instances}); none: with --resume."
+        ),
     ] = None,
     case: Annotated[
         str | None,
-        typer.Option("--case", help="toast: I, II or III of the thesis. A cell: its order by initials, such as RSR."),
+        typer.Option(
+            "--case",
+            help="toast: I, II or III of the thesis. A cell: its order by initials, such as RSR. Job sets and layouts as CSV: "
+            "SET:LAYOUT, such as 7:1, or EX71.",
+        ),
+    ] = None,
+    layout: Annotated[
+        Path | None,
+        typer.Option(
+            "--layout", help="Beside an instance file: a CSV of travel times, a matrix or rows of from,to,time."
+        ),
+    ] = None,
+    robots: Annotated[
+        int | None,
+        typer.Option(
+            "--robots", min=1, max=50, help="How many robots carry parts, all alike; default: as the file says, or 1."
+        ),
     ] = None,
     toasts: Annotated[
         int | None,
@@ -65,6 +84,9 @@ def sequence(
         Path | None, typer.Option("--plot", help="A .png or .svg file for the costs of the episodes.")
     ] = None,
     gantt: Annotated[Path | None, typer.Option("--gantt", help="A .png or .svg file for the Gantt chart.")] = None,
+    schedule: Annotated[
+        Path | None, typer.Option("--schedule", help="A .csv or .json file for the best order known, as a timed table.")
+    ] = None,
     page: ShowPage = False,
     port: Port = 0,
     wait: Wait = None,
@@ -83,9 +105,12 @@ def sequence(
     from lab.view.summary import sequence_summary
 
     given = OrderOptions(
-        task or "", case, toasts, method, objective, episodes, sessions, stochastic, advisor, gate, seed, parts
+        *(task or "", case, toasts, method, objective, episodes, sessions, stochastic, advisor, gate, seed, parts),
+        layout=None if layout is None else str(layout),
+        robots=robots,
     )
-    files = {name: path for name, path in (("plot", plot), ("gantt", gantt)) if path is not None}
+    asked = {"plot": plot, "gantt": gantt, "schedule": schedule}
+    files = {name: path for name, path in asked.items() if path is not None}
     if cyclic:
         if resume is not None:
             raise BadInput(f"--cyclic beside --resume {resume}: nobody is asked about a cycle: leave one of them away")

@@ -34,6 +34,44 @@ def task_show(task: str, as_json: Json = False) -> None:
         write(text)
 
 
+def task_convert(
+    file: Annotated[str, typer.Argument(help="An instance file ({instances}), or a cell.")],
+    layout: Annotated[
+        Path | None, typer.Option("--layout", help="A CSV of travel times, a matrix or rows of from,to,time.")
+    ] = None,
+    robots: Annotated[
+        int | None, typer.Option("--robots", min=1, max=50, help="How many robots carry parts, all alike; default: 1.")
+    ] = None,
+    case: Annotated[
+        str | None, typer.Option("--case", help="Of job sets and layouts as CSV: SET:LAYOUT, such as 7:1, or EX71.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="The .toml file to write, or, without a robot, PyJobShop's .json; default: shown."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Read an instance as the field writes it, and write it as the lab's own cell file (TOML), or as PyJobShop's JSON."""
+    from lab.tasks.cell_toml import toml_of
+    from lab.tasks.instances import Asked, pyjobshop
+    from lab.tasks.record import write_whole
+    from lab.tasks.task_file import load_cell_beside
+
+    found = load_cell_beside(file, Asked(layout, robots, case))
+    if out is not None and out.suffix not in (".toml", ".json"):
+        raise BadInput(f"file '{out}' (--out): wanted one that ends with .toml or .json")
+    text = pyjobshop.write(found) if out is not None and out.suffix == ".json" else toml_of(found)
+    if out is not None:
+        write_whole(out, text)
+    parts, robots_there = len(found.ordered()), len(found.built_robots)
+    document = {"file": None if out is None else str(out), "name": found.name, "parts": parts, "robots": robots_there}
+    if as_json or out is not None:
+        what = f"{counted(parts, 'part')}, {counted(robots_there, 'robot')}"
+        show(document | {"text": text}, as_json, lambda d: f"{d['file']}: {d['name']}, {what}")
+    else:
+        write(text)
+
+
 def task_random(
     shape: Annotated[str, typer.Argument(help="Cells along 2 or 3 axes, each 1 to 100: 12x12, 10x10x10.")],
     out: Annotated[Path, typer.Option("--out", help="The .toml file to write.")],

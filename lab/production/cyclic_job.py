@@ -18,8 +18,9 @@ from lab.sequencing.methods.exact import optimum
 from lab.skills.prepared_scene import prepare
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
+from lab.tasks.instances import Asked
 from lab.tasks.task import Task
-from lab.tasks.task_file import load_any
+from lab.tasks.task_file import load_beside
 from lab.teaching.events import PhaseBegan
 from lab.teaching.teacher import Teacher
 
@@ -30,12 +31,14 @@ MAX_EXPANDED = 50_000  # states, for the best finite order
 
 @dataclass(frozen=True)
 class CyclicWanted:
-    """What is asked for: which parts enter in a cycle, as `lab sequence` names an order; the seed."""
+    """What is asked for: which parts enter in a cycle, as `lab sequence` names an order; the seed; see `Asked`."""
 
     case: str | None = None
     toasts: int | None = None
     parts: str | None = None
     seed: int = 0
+    layout: Path | None = None
+    robots: int | None = None
 
 
 def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[str, Path]) -> dict[str, Any]:
@@ -51,7 +54,7 @@ def cyclic_named(name: str, wanted: CyclicWanted, teacher: Teacher, files: dict[
     case = wanted.case
     if case is not None and name == "toast":
         name, case = toast_case(case), None
-    loaded = load_any(name)
+    loaded, case = load_beside(name, Asked(wanted.layout, wanted.robots, case))
     if isinstance(loaded, GridWorld):
         raise BadInput(f"{name}: it is a world, there is nothing to sequence: learn it with lab teach {name}")
     mix, own = _mix(loaded, case, wanted)

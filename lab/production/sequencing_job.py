@@ -26,14 +26,16 @@ from lab.sequencing.cell.objectives import (
     cost,
     stuck_cost,
 )
+from lab.sequencing.cell.schedule_rows import check_table, rows_of, write_table
 from lab.sequencing.methods.portfolio import TIME_LIMIT_S, WORKERS
 from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import follow, simulate
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
+from lab.tasks.instances import Asked
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.tasks.task import Task
-from lab.tasks.task_file import load_any
+from lab.tasks.task_file import load_beside
 from lab.teaching.events import PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.teacher import Teacher
 
@@ -43,7 +45,7 @@ class Wanted:
     """What `lab sequence` is asked for; None: as the file says. advisor: who may be asked which part to move next.
 
     keep: gives the journal of what people say, by default one that is not written. durations: those of a task's moves
-    (`Durations.to_json`), None: they are measured.
+    (`Durations.to_json`), None: they are measured. layout, robots: beside an instance file (see `Asked`).
     """
 
     method: str | None = None
@@ -58,6 +60,8 @@ class Wanted:
     keep: KeepOrder = lambda cell, objective: Journal()
     parts: str | None = None
     durations: Mapping[str, Any] | None = None
+    layout: Path | None = None
+    robots: int | None = None
 
 
 def sequence_named(
@@ -69,11 +73,11 @@ def sequence_named(
     """
     from lab.view.canvas import check_picture
 
-    for path in files.values():
-        check_picture(path)
+    for kind, path in files.items():
+        check_table(path) if kind == "schedule" else check_picture(path)
     if case is not None and name == "toast":
         name, case = toast_case(case), None
-    loaded = load_any(name)
+    loaded, case = load_beside(name, Asked(wanted.layout, wanted.robots, case))
     if isinstance(loaded, GridWorld):
         raise BadInput(f"{name}: it is a world, there is nothing to sequence: learn it with lab teach {name}")
     _check_names(wanted, loaded.sequencing)
@@ -275,12 +279,14 @@ def _best_known(
         theirs = cost(follow(cell, known.sequence), objective)
         if theirs < value - SAME or (theirs <= value + SAME and len(known.sequence) < len(sequence)):
             value, sequence, by = theirs, known.sequence, known.found_by
+    schedule = simulate(cell, sequence)
     return {
-        "best_s": simulate(cell, sequence).makespan_s,
+        "best_s": schedule.makespan_s,
         "best_cost": value,
         "best_by": by,
         "best_sequence": list(sequence),
         "best_moves": _in_words(cell, sequence),
+        "schedule": rows_of(schedule, cell, "planned"),
     }
 
 
@@ -313,7 +319,7 @@ def _in_words(cell: Cell, sequence: Sequence[int]) -> list[str]:
 
 
 def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], files: dict[str, Path]) -> None:
-    """The pictures that are asked for by name: "plot", the costs of the episodes, "gantt", the best order known."""
+    """What is asked for by name: "plot", the costs of the episodes, "gantt" and "schedule", of the best order known."""
     from lab.view.gantt import gantt
     from lab.view.sequencing_plots import sequence_plot
 
@@ -324,4 +330,6 @@ def draw(cell: Cell, document: dict[str, Any], found: Sequence[SequenceResult], 
         sequence_plot(costs, document["optimal_cost"], files["plot"], ylabel=label, deadlock=stuck)
     if "gantt" in files:
         gantt(simulate(cell, document["best_sequence"]), files["gantt"], due_s=cell.due_s)
+    if "schedule" in files:
+        write_table(document["schedule"], files["schedule"])
     document["files"] = {name: str(path) for name, path in files.items()}

@@ -11,7 +11,8 @@ from lab.sequencing.cell.stations import check_layout
 from lab.tasks.cell_fields import CellFields, CellRobot
 from lab.tasks.toml_text import Loc
 
-MAX_STAGES = 400  # of all routes together: the time to find the moves they need grows with the square
+MAX_STAGES = 400  # of all routes together: the time to find the moves that one robot needs grows with the square
+MAX_SERVED = 5000  # where machines have servers, or robots are several
 SHOWN = 3  # missing moves in one message
 
 
@@ -62,8 +63,10 @@ def _order_faults(cell: CellFields) -> Iterator[Fault]:
 def layout_faults(cell: CellFields) -> Iterator[Fault]:
     """Stations and routes that cannot be, machines without a time, stations that no route leads to."""
     stages = list(cell.stages())
-    if len(stages) > MAX_STAGES:
-        yield Fault(("products",), f"{len(stages)} stages on all routes together: allowed are up to {MAX_STAGES}")
+    served = len(cell.built_robots) != 1 or any(station.servers is not None for station in cell.stations)
+    most = MAX_SERVED if served else MAX_STAGES
+    if len(stages) > most:
+        yield Fault(("products",), f"{len(stages)} stages on all routes together: allowed are up to {most}")
     try:
         check_layout(cell.built_stations, cell.built_products)
     except BadInput as error:

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field, WrapValidator
 
 from lab.errors import unknown
+from lab.sequencing.cell.cell import MAX_PARTS
 from lab.sequencing.cell.chance import LAWS, Chance
 from lab.sequencing.cell.stations import ROBOT, STATION_KINDS, UNLIMITED, Product, Robot, Stage, Station
 from lab.tasks.record import Name, Record, as_tuple
@@ -151,7 +152,7 @@ class CellFields(Record):
     robot: CellRobot | None = None
     robots: Annotated[tuple[CellRobot, ...], BeforeValidator(as_tuple), Field(max_length=50)] | None = None
     stations: Annotated[tuple[CellStation, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=100)]
-    products: Annotated[tuple[CellProduct, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=50)]
+    products: Annotated[tuple[CellProduct, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=MAX_PARTS)]
     travel: Times = Field(default={})
     loaded: Times = Field(default={})
     arrivals: CellArrivals | None = None

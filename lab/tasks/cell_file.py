@@ -13,7 +13,7 @@ from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import MAX_PARTS, Cell
 from lab.sequencing.cell.chance import Chance
 from lab.sequencing.cell.routes import positions_of
-from lab.sequencing.cell.stations import Arrivals, Begins
+from lab.sequencing.cell.stations import ROBOT, Arrivals, Begins
 from lab.tasks.cell_faults import Fault, file_faults, layout_faults, loc_of, missing_times, travel_faults
 from lab.tasks.cell_fields import CellFields, CellStage, Times
 from lab.tasks.task_faults import fields_at
@@ -76,6 +76,17 @@ class CellFile(CellFields):
             if name not in self.names:
                 raise unknown("product", name, self.names, f"order for cell '{self.name}'")
         return parts
+
+    def with_robots(self, count: int) -> Self:
+        """The same with so many robots like its first one; BadInput for a cell without a robot, and for missing times."""
+        first = self.robot or next(iter(self.robots or ()), None)
+        if first is None:
+            raise BadInput(f"--robots {count}: cell '{self.name}' has none: its parts go on by themselves")
+        named = tuple(first.model_copy(update={"name": f"{ROBOT} {n}"}) for n in range(1, count + 1))
+        several = {"robot": None, "robots": named}
+        found = self.model_copy(update=several if count > 1 else {"robot": first, "robots": None})
+        found.cell()
+        return found
 
     def _cell_or_fault(self, order: Sequence[str] | int | None) -> Cell | Fault:
         """The cell, or the first fault; each kind of fault is looked for once there are none of those before it."""

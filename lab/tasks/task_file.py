@@ -2,6 +2,7 @@
 
 import re
 from functools import partial
+from os.path import isfile
 from pathlib import Path
 from typing import Any, Literal, TypeVar, cast, get_args
 
@@ -12,6 +13,7 @@ from lab.files import tasks_folder
 from lab.tasks.cell_file import CellFile
 from lab.tasks.first_form import own_loc, renewed
 from lab.tasks.grid_world import RANDOM, GridWorld, from_text, from_words
+from lab.tasks.instances import SUFFIXES, Asked, is_instance, read_instance, takes_case
 from lab.tasks.record import MAX_SHORT_BYTES, Record, read_text
 from lab.tasks.task import Task
 from lab.tasks.task_faults import fields_at, loc_of, refusal, within
@@ -46,17 +48,18 @@ def names_file(word: str) -> bool:
 
 def is_path(task: str) -> bool:
     """Whether a word for a task, a cell or a world is the path of a file, which may not be there."""
-    return Path(task).suffix in (".toml", ".txt") or "/" in task
+    return Path(task).suffix in (".toml", ".txt", *SUFFIXES) or "/" in task
 
 
 def find(task: str) -> Path:
     """The file of a task, cell or world given by name or path; BadInput when there is none."""
-    if is_path(task):
-        if Path(task).is_file():
-            return Path(task)
-        known = ", ".join(_files())
-        raise BadInput(f"no task file '{task}': give a file that exists, .toml or a .txt grid, or what ships: {known}")
     files = _files()
+    there = isfile(task)  # False, too, for a name that is too long for any file
+    if is_path(task) or (task not in files and there):  # many instances have no ending
+        if there:
+            return Path(task)
+        known = ", ".join(files)
+        raise BadInput(f"no task file '{task}': give a file that exists, .toml or a .txt grid, or what ships: {known}")
     if task not in files:
         raise unknown("task", task, files, "TASK")
     return files[task]
@@ -86,6 +89,9 @@ def load_any(word: str, wanted: FileKind | None = None) -> Task | CellFile | Gri
     """A task, a cell or a world, as `load`, `load_cell` and `load_world` read it; BadInput also when another is wanted."""
     drawn = word.startswith(RANDOM)
     path = Path(word) if drawn else find(word)
+    if not drawn and is_instance(path):
+        _check_wanted(word, "cell", wanted)
+        return read_instance(path)
     if drawn or path.suffix == ".txt":
         _check_wanted(word, "world", wanted)
         return from_words(word) if drawn else from_text(path)
@@ -98,6 +104,36 @@ def load_any(word: str, wanted: FileKind | None = None) -> Task | CellFile | Gri
     if kind == "cell":
         return CellFile.checked(toml)
     return _task(toml) if kind == "task" else _checked(GridWorld, toml, toml.raw)
+
+
+def load_beside(word: str, asked: Asked) -> tuple[Task | CellFile | GridWorld, str | None]:
+    """As `load_any`, with what is asked for beside the file; and the --case that is left to name an order, None: none.
+
+    A layout is for instance files, robots for these and for cells. BadInput for anything else.
+    """
+    path = None if word.startswith(RANDOM) else find(word)
+    if path is not None and is_instance(path):
+        return read_instance(path, asked), None if takes_case(path, asked) else asked.case
+    found = load_any(word)
+    if asked.layout is not None:
+        raise BadInput(f"--layout {asked.layout} beside {word}: it is no instance file: its travel times are its own")
+    if asked.robots is not None:
+        if not isinstance(found, CellFile):
+            raise BadInput(
+                f"--robots {asked.robots} beside {word}: it is no cell: the arm is the one that its file has"
+            )
+        found = found.with_robots(asked.robots)
+    return found, asked.case
+
+
+def load_cell_beside(word: str, asked: Asked) -> CellFile:
+    """As `load_beside`: a cell; BadInput for anything else, and for a --case that names no instance."""
+    found, case = load_beside(word, asked)
+    if not isinstance(found, CellFile):
+        raise BadInput(f"{word}: wanted an instance file or a cell")
+    if case is not None:
+        raise BadInput(f"--case {case} beside {word}: it holds one instance only")
+    return found
 
 
 def describe(word: str) -> tuple[str, dict[str, Any]]:

@@ -15,6 +15,7 @@ from lab.advice.journal import Journal
 from lab.advice.order_level import signature_of
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
+from lab.tasks.instances import Asked
 from lab.tasks.record import write_whole
 from lab.teaching.kept_session import SessionInFolder, check_same, claimed, kept_journal, read_session
 from lab.teaching.lesson_options import SessionOptions, whole_path
@@ -43,6 +44,8 @@ class OrderOptions(SessionOptions):
     gate: str = "ccrl"
     seed: Annotated[int, Ge(0)] = 0
     parts: str | None = None
+    layout: str | None = None
+    robots: Annotated[int, Ge(1)] | None = None
 
     def complete(self) -> "OrderOptions":
         """Themselves; BadInput when nothing is named to sequence."""
@@ -62,7 +65,13 @@ class OrderOptions(SessionOptions):
 
     def to_json(self) -> dict[str, Any]:
         """A plain dict, files by their whole paths, so that they are found from another folder."""
-        return asdict(self) | {"task": whole_path(self.task)}
+        layout = None if self.layout is None else str(Path(self.layout).absolute())
+        return asdict(self) | {"task": whole_path(self.task), "layout": layout}
+
+    @property
+    def beside(self) -> Asked:
+        """What is asked for beside a file."""
+        return Asked(None if self.layout is None else Path(self.layout), self.robots, self.case)
 
 
 class OrderSession(SessionInFolder):

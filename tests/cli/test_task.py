@@ -131,3 +131,13 @@ def test_what_cannot_be_drawn_is_refused_or_left_out(lab: Lab, folder: Path, tre
     ran = lab("task", "check", "toast", "--plot", "no/t.png")
     assert (ran.code, ran.err) == (2, "lab: picture 'no/t.png': there is no folder 'no'\n")
     assert tree(folder) == ["t.toml"]
+
+
+def test_convert_writes_an_instance_as_toml_and_says_what_is_wrong(lab: Callable[..., Any], tmp_path: Path) -> None:
+    instance, out = tmp_path / "two", tmp_path / "two.toml"
+    instance.write_text("2 2\n0 3 1 2\n1 4 0 1\n")
+    assert lab("task", "convert", str(instance), "--out", str(out), "--json").json["parts"] == 2
+    assert lab("task", "check", str(out)).code == 0
+    instance.write_text("2 2\n0 3 1 2\n1 4 7 1\n")
+    ran = lab("task", "convert", str(instance))
+    assert (ran.code, ran.out, ran.err.count("\n"), "line 3" in ran.err) == (2, "", 1, True)

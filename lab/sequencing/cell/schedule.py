@@ -140,7 +140,7 @@ class Schedule:
 
 
 def robot_activities(move: Move) -> list[Activity]:
-    """What the robot does in one move, without what takes no time."""
+    """What the robot does in one move; what takes no time only where something is moved."""
     if move.served:
         return []
     served_s = move.pick_s - move.service_s
@@ -151,7 +151,7 @@ def robot_activities(move: Move) -> list[Activity]:
         ("service", move.part, move.origin, move.origin, served_s, move.pick_s),
         (carries, move.part, move.origin, move.target, move.pick_s, move.drop_s),
     )
-    return [Activity(move.by, *span) for span in spans if span[5] > span[4]]
+    return [Activity(move.by, *span) for span in spans if span[5] > span[4] or span[0] == carries]
 
 
 def _part_activities(
@@ -160,6 +160,7 @@ def _part_activities(
     """Rows of one part, and of the machines that it passes, from its arrival to `end_s`."""
     row, since_s, process_s = cell.part_name(part), came_s, cell.begin_s[part - 1]
     place = cell.names[cell.positions[cell.begin_at[part - 1]].station]
+    works = False  # whether it is worked on there, be it for no time
     rows: list[Activity] = []
     machines: list[Activity] = []
     for move in [*moves, None]:
@@ -167,7 +168,7 @@ def _part_activities(
         # A measured run may fetch a little before the nominal end: processing then ends with the pick.
         until_s = end_s if move is None else move.pick_s
         done_s = min(since_s + process_s, until_s)
-        if station.kind == "machine":
+        if station.kind == "machine" and (works or done_s > since_s):
             for resource, log in ((row, rows), (place, machines)):
                 log.append(Activity(resource, "process", part, place, place, since_s, done_s))
         if station.kind == "machine" and station.servers is None:
@@ -180,6 +181,7 @@ def _part_activities(
             if not move.served:
                 rows.append(Activity(row, "carry", part, move.origin, move.target, move.pick_s, move.drop_s))
             since_s, place, process_s = move.drop_s, move.target, move.process_s
+            works = move.served or cell.stations[cell.index(place)].servers is None
     return _lasting(rows), _lasting(machines)
 
 
@@ -195,7 +197,9 @@ def _limits(cell: Cell, part: int, moves: Sequence[Move]) -> Iterator[FetchBy]:
 
 
 def _lasting(activities: Iterable[Activity]) -> list[Activity]:
-    return [activity for activity in activities if activity.end_s > activity.start_s]
+    """Without waiting that takes no time; what is done stays."""
+    done = ("process", "carry")
+    return [activity for activity in activities if activity.end_s > activity.start_s or activity.kind in done]
 
 
 def _by_start(activities: Iterable[Activity]) -> tuple[Activity, ...]:

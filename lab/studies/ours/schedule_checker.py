@@ -1,0 +1,129 @@
+"""Whether a schedule keeps to its cell, from first principles: plain data in, faults in words out, nothing of the simulators.
+
+cell: what a cell file says, as TOML's values (`tomllib.load`, `CellFile.model_dump`). rows: what `--schedule` writes as JSON.
+Not looked at: whether a buffer for when the machine ahead is full (buffers = "busy") was used only then.
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import maximum_bipartite_matching
+
+Row = Mapping[str, Any]
+EPS, NEVER, NONE = 1e-6, float("inf"), dict[str, Any](robot=None, start_s=float("inf"), end_s=float("inf"))
+Rooms = list[tuple[str, float, float]]  # station, from, to [s]
+
+
+def faults(cell: Row, rows: Sequence[Row], makespan_s: float) -> list[str]:
+    """What is wrong with a schedule that claims this makespan [s], a line each; none: it is right."""
+    robots = {one.get("name") or "robot": one for one in cell.get("robots") or [cell.get("robot")] if one}
+    order = cell.get("order") or [cell["products"][0]["name"]] * cell["parts"]
+    parts, arrivals = [f"{name} {n}" for n, name in enumerate(order, 1)], cell.get("arrivals") or {}
+    for row in rows:
+        known = row["part"] in (*parts, None) and (row["robot"] in robots or row["operation"] in ("process", "blocked"))
+        if not (known and 0 <= row["start_s"] <= row["end_s"] < NEVER):
+            return [f"a row that cannot be: {row}"]
+    found, taken, end_s, came_s = list[str](), Rooms(), 0.0, 0.0
+    rows = [row for row in rows if row["operation"] != "service" or row["end_s"] > row["start_s"] + EPS]
+    rows.sort(key=lambda row: (row["start_s"], row["end_s"]))
+    for part, name, free_s in zip(parts, order, cell.get("release_s") or [0.0] * len(order), strict=True):
+        came_s += arrivals.get("interval_s", 0.0)  # the parts come in their order
+        own = [row for row in rows if row["part"] == part and row["operation"] not in ("wait", "blocked")]
+        routes = next(one["routes"] for one in cell["products"] if one["name"] == name)
+        tried = [_way(cell, robots, route, own, max(free_s, came_s)) for route in routes]
+        wrong, rooms, done_s, first_s = min(tried, key=lambda way: len(way[0]))
+        found, taken, end_s = found + [f"{part}: {one}" for one in wrong], taken + rooms, max(end_s, done_s)
+        came_s = first_s if arrivals.get("after") == "pick" else came_s
+    for one in cell["stations"]:
+        work = [row for row in rows if row["operation"] == "process" and row["station"] == one["name"]]
+        found += _crowd(one, [(a, b) for at, a, b in taken if at == one["name"]]) + _overload(one, work)
+    for name, robot in robots.items():
+        found += _trips(cell, robot, [row for row in rows if row["robot"] == name])
+    return found + ([] if abs(end_s - makespan_s) <= EPS else [f"the makespan is {end_s:g}, not {makespan_s:g}"])
+
+
+def _travel_s(cell: Row, robot: Row, ends: Sequence[str], tables: Sequence[str] = ("travel",)) -> float:
+    times = [row[ends[-1]] for table in tables if ends[-1] in (row := (cell.get(table) or {}).get(ends[0], {}))]
+    return float([*times, 0.0 if ends[0] == ends[-1] else NEVER][0]) / float(robot.get("speed") or 1.0)
+
+
+def _way(
+    cell: Row, robots: Row, route: Any, rows: Sequence[Row], free_s: float
+) -> tuple[list[str], Rooms, float, float]:
+    """A part on a route: what does not fit, the rooms it takes, when it is finished, and when it was first taken [s]."""
+    wrong, rooms, left, stations = list[str](), Rooms(), [*rows], {one["name"]: one for one in cell["stations"]}
+
+    def within(what: str, least_s: float, at_s: float, most_s: float = NEVER) -> None:
+        wrong.extend([f"{what}: {at_s:g}, not {least_s:g} to {most_s:g}"] * (not least_s - EPS <= at_s <= most_s + EPS))
+
+    def take(kind: str, *ends: str) -> tuple[float, float]:
+        fits = [row for row in left if (row["operation"], row["station"], row["target"]) == (kind, ends[0], ends[-1])]
+        row = (*fits, NONE)[0]
+        least_s = _travel_s(cell, robots.get(row["robot"], {}), ends, ("loaded", "travel"))
+        within(f"{kind} {' > '.join(ends)}", least_s, row["end_s"] - row["start_s"] if fits else -1.0)
+        left.remove(row) if fits else None
+        return row["start_s"], row["end_s"]
+
+    stages: list[Row] = [{"station": one} if isinstance(one, str) else one for one in route]
+    at, since_s, ready_s, first_s, most_s, service_s = stages[0]["station"], NEVER, free_s, NEVER, NEVER, 0.0
+    pallet: list[tuple[str, float]] = []  # where the part's own one stands, and since when, if it waits for it
+    for stage in stages[1:]:
+        place, own_s, buffer = stations[stage["station"]], stage.get("processing_s"), stage.get("buffer")
+        through = [buffer] if any(row["operation"] == "carry" and row["target"] == buffer for row in left) else []
+        for target in [*through, place["name"]] if robots else []:
+            pick_s, came_s = take("carry", at, target)
+            within(f"picked in '{at}'", ready_s + service_s, pick_s, ready_s + most_s)
+            served_s = take("service", at) if service_s > EPS else (ready_s, pick_s)
+            within(f"service in '{at}'", service_s, min(served_s[1], pick_s) - max(served_s[0], ready_s))
+            rooms, since_s, ready_s, kept = [*rooms, (at, since_s, pick_s)], came_s, came_s, (at, since_s)
+            for before, stood_s in pallet:  # it goes ahead of the part, from the station before to the one after
+                left_s, since_s = take("pallet", before, target)
+                within("pallet picked", kept[1], left_s, pick_s)
+                within("pallet dropped", left_s, since_s, pick_s)
+                rooms.append((before, stood_s, left_s))
+            at, first_s, most_s, service_s = target, min(first_s, pick_s), NEVER, 0.0
+            pallet, rooms = ([kept], rooms[:-1]) if stage.get("pallet") else ([], rooms)
+        if place["kind"] == "machine":
+            begin_s, end_s = take("process", place["name"])
+            latest_s = most_s if not robots else 0.0 if place.get("servers") is None else NEVER
+            within(f"begun in '{place['name']}'", ready_s, begin_s, ready_s + latest_s)
+            work_s = (place.get("processing_s") or 0.0) if own_s is None else own_s
+            within(f"worked on in '{place['name']}'", work_s, end_s - begin_s, work_s)
+            limits = [one["at_most_s"] for one in (stage, place) if one.get("at_most_s") is not None]
+            ready_s, most_s, first_s = end_s, [*limits, NEVER][0], min(first_s, begin_s)
+            service_s = stage.get("service_s") or 0.0
+    rooms += [(at, since_s, ready_s)] if stations[at]["kind"] == "machine" else []
+    return wrong + [f"not on its route: {row}" for row in left[:1]], rooms, ready_s, first_s
+
+
+def _crowd(station: Row, spans: Sequence[tuple[float, float]]) -> list[str]:
+    """Whether there are ever more parts in a station than it has room for."""
+    most = max((sum(a <= begin < b - EPS for a, b in spans) for begin, _ in spans), default=0)
+    return [f"'{station['name']}' holds {most}"] * (station["capacity"] != "unlimited" and most > station["capacity"])
+
+
+def _overload(station: Row, work: Sequence[Row]) -> list[str]:
+    """Whether more servers are at work than a machine has, setups counted: the fewest chains that cover all its work."""
+    follows, setups = np.zeros((len(work), len(work)), dtype=bool), station.get("setup_s") or {}
+    for (i, one), (j, then) in combinations(enumerate(work), 2):
+        setup_s = setups.get(one["product"], {}).get(then["product"], 0.0)
+        follows[i, j] = one["end_s"] + setup_s <= then["start_s"] + EPS
+    chains = len(work) - int((maximum_bipartite_matching(csr_array(follows)) >= 0).sum()) if work else 0
+    return [f"'{station['name']}' needs {chains} servers"] if chains > (station.get("servers") or NEVER) else []
+
+
+def _trips(cell: Row, robot: Row, rows: Sequence[Row]) -> list[str]:
+    """Where a robot would have to be at two places, drive too fast, leave its service, or work where it does not serve."""
+    at, free_s, found, serves, busy = robot["start"], 0.0, list[str](), robot.get("serves"), None
+    for row in rows:
+        ends, carries = (row["station"], row["target"]), row["operation"] in ("carry", "pallet")
+        short = row["operation"] == "empty" and row["end_s"] - row["start_s"] + EPS < _travel_s(cell, robot, ends)
+        wrong = {"late": row["start_s"] + EPS < free_s + _travel_s(cell, robot, (at, ends[0])), "short": short}
+        wrong["barred"] = serves is not None and carries and not {*ends} <= {*serves}
+        wrong["gone from its service"] = busy is not None and (busy != row["part"] or not carries)
+        found += [f"robot {word}: {row}" for word, is_so in wrong.items() if is_so]
+        at, free_s, busy = row["target"], row["end_s"], row["part"] if row["operation"] == "service" else None
+    return found

@@ -1,0 +1,117 @@
+"""Instances as the field writes them, read as the lab's cell files: a file a format, and how a format is told by its content."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from lab.errors import BadInput
+from lab.tasks.cell_file import CellFile
+from lab.tasks.instances import bilge_ulusoy, dzn, fjsplib, jobshoplab, jsplib, phillips_unger, pyjobshop, taillard
+from lab.tasks.instances.source import Asked, Source
+from lab.tasks.record import MAX_SHORT_BYTES, read_text
+
+__all__ = ["INSTANCES", "SUFFIXES", "Asked", "Format", "format_of", "is_instance", "read_instance", "takes_case"]
+
+SUFFIXES = (".csv", ".dzn", ".yaml", ".yml", ".json", ".jsp", ".jssp", ".fjs")  # of files that are instances
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format: what it is, how it is read, the endings that mean it where the content says nothing."""
+
+    help: str
+    read: Callable[[Source, Asked], CellFile]
+    suffixes: tuple[str, ...] = ()
+
+
+INSTANCES = {
+    "jsplib": Format("job shops of JSPLIB and the OR-Library, text", jsplib.read, (".jsp", ".jssp")),
+    "taillard": Format("Taillard's job shops, text: times, then machines", taillard.read),
+    "fjsplib": Format("flexible job shops of FJSPLIB, text", fjsplib.read, (".fjs",)),
+    "bilge-ulusoy": Format("job sets of Bilge and Ulusoy, CSV; --case SET:LAYOUT, such as 7:1", bilge_ulusoy.read),
+    "phillips-unger": Format("tanks of a hoist line, CSV; --layout: its empty moves", phillips_unger.read),
+    "hoist": Format("hoist lines as MiniZinc data", dzn.read, (".dzn",)),
+    "jobshoplab": Format("JobShopLab's job shops with vehicles, YAML", jobshoplab.read, (".yaml", ".yml")),
+    "pyjobshop": Format("PyJobShop's JSON, without breaks and deadlines", pyjobshop.read, (".json",)),
+}
+
+
+def is_instance(path: Path) -> bool:
+    """Whether a file that is there is read as an instance: all but .toml, and .txt files that begin as text grids do."""
+    if path.suffix != ".txt":
+        return path.suffix != ".toml"
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            start = file.read(400)
+    except OSError:  # which reading it as a grid says
+        return False
+    return re.match(r"\s*(#[^\n]*[^\n.#SG][^\n]*\n\s*)*([0-9]|[Nn]b\b)", start) is not None
+
+
+def takes_case(path: Path, asked: Asked) -> bool:
+    """Whether --case names one of the instances that a file and its layouts hold, and no order of parts."""
+    return asked.layout is not None or format_of(_source(path)) == "bilge-ulusoy"
+
+
+def read_instance(path: Path, asked: Asked | None = None) -> CellFile:
+    """The cell of an instance file of any of these formats; BadInput, with file and line, for a damaged one."""
+    source = _source(path)
+    return INSTANCES[format_of(source)].read(source, asked or Asked())
+
+
+def _source(path: Path) -> Source:
+    text = read_text(path)
+    if len(text) > MAX_SHORT_BYTES:
+        raise BadInput(f"{path}: {len(text)} characters: an instance has up to {MAX_SHORT_BYTES}")
+    return Source(path, text.removeprefix("\ufeff"))
+
+
+def format_of(source: Source) -> str:
+    """Which format a file has, by its content; by its ending where that says nothing. BadInput for none of them."""
+    rows = [*source.rows()]
+    found = None if not rows else _of_text(source) or _of_numbers(source)
+    if found is None:
+        suffix = source.path.suffix.lower()
+        found = next((name for name, one in INSTANCES.items() if suffix in one.suffixes), None)
+    if found is None or not rows:
+        line, got = (rows[0][0], " ".join(rows[0][1])) if rows else (1, None)
+        raise source.refusal(line, f"an instance ({', '.join(INSTANCES)})" + ("" if rows else ": it is empty"), got)
+    return found
+
+
+def _of_text(source: Source) -> str | None:
+    start = source.text.lstrip()
+    if start.startswith("{"):
+        return "pyjobshop"
+    if re.search(r"^instance_config[ \t]*:", source.text, re.MULTILINE):
+        return "jobshoplab"
+    header = [word.strip().lower() for word in start.partition("\n")[0].split(",")]
+    if header[:3] == ["set", "job", "operation"]:
+        return "bilge-ulusoy"
+    if header[:2] == ["tank", "soak_min"]:
+        return "phillips-unger"
+    if len(header) > 2 and ("from" in header or "after_move_into" in header):
+        raise source.refusal(1, "jobs or tanks: these are travel times: give them with --layout", ",".join(header))
+    if re.search(r"^[ \t]*(Ninner|numTanks|tmin|minTime)[ \t]*=", source.text, re.MULTILINE):
+        return "hoist"
+    return None
+
+
+def _of_numbers(source: Source) -> str | None:
+    """Of a text of numbers: two blocks are Taillard's, rows of pairs JSPLIB's, three numbers in the head FJSPLIB's."""
+    rows = [*source.rows()]
+    words = {row[0].lower() for _, row in rows}
+    numbers = [row for _, row in rows if row[0][0].isdigit()]
+    if not numbers:
+        return None
+    if words & {*taillard.BLOCKS} or {"nb"} & words:
+        return "taillard"
+    if not rows[0][1][0][0].isdigit():
+        return None
+    head = numbers[0]
+    if source.path.suffix.lower() == ".fjs" or len(head) == 3:
+        return "fjsplib"
+    if len(head) == 2 and len(numbers) > 1 and head[1] == str(len(numbers[1])) and int(head[1]) > 1:
+        return "taillard"
+    return "jsplib"

@@ -1,0 +1,43 @@
+"""Flexible job shops as text, as FJSPLIB has them and PyJobShop reads them: each operation lists the machines that can do it."""
+
+from collections.abc import Sequence
+
+from lab.tasks.cell_file import CellFile
+from lab.tasks.instances.job_shop import JobShop, Operation, cell_of_shop
+from lab.tasks.instances.source import MOST_OPERATIONS, Asked, Source
+
+
+def read(source: Source, asked: Asked) -> CellFile:
+    """The cell of such a text; machines are numbered from 1. BadInput, with file and line, for any other."""
+    rows = [*source.rows()]
+    jobs, machines = source.shape(rows[0])
+    if len(rows) != 1 + jobs:
+        line = rows[-1][0] if len(rows) <= jobs else rows[1 + jobs][0]
+        raise source.refusal(line, f"{jobs} rows, one for each job", f"{len(rows) - 1} rows")
+    found = [_job(source, number, line, words, machines) for number, (line, words) in enumerate(rows[1:], 1)]
+    return cell_of_shop(source, JobShop(machines, found, [line for line, _ in rows[1:]]), asked)
+
+
+def _job(source: Source, job: int, line: int, words: Sequence[str], machines: int) -> list[Operation]:
+    """The operations of a row: their number; for each of them how many machines can do it, and each with its time."""
+    rest = iter(words)
+
+    def word(what: str) -> str:
+        found = next(rest, None)
+        if found is None:
+            raise source.refusal(line, f"{what}: the row ends before it")
+        return found
+
+    what = f"how many operations job {job} has"
+    operations = list[Operation]()
+    for number in range(1, 1 + source.whole(word(what), line, what, 1, MOST_OPERATIONS)):
+        which = f"operation {number} of job {job}"
+        what = f"how many machines can do {which}"
+        ways = list[tuple[int, float]]()
+        for _ in range(source.whole(word(what), line, what, 1, machines)):
+            at = source.whole(word(f"a machine for {which}"), line, f"a machine for {which}", 1, machines) - 1
+            ways.append((at, source.time(word(f"a time of {which}"), line, f"a time of {which}")))
+        operations.append(tuple(ways))
+    if (more := next(rest, None)) is not None:
+        raise source.refusal(line, f"the end of the row after {len(operations)} operations", more)
+    return operations

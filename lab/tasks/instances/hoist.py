@@ -1,0 +1,56 @@
+"""Cyclic hoist lines as cells: one hoist carries parts through tanks in order, each for a least and a most time."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from lab.errors import BadInput
+from lab.tasks.cell_file import CellFile
+from lab.tasks.instances.job_shop import built
+from lab.tasks.instances.source import Asked, Source
+
+LOAD, UNLOAD = "load", "unload"
+PARTS = 4  # of a finite order, if -n does not say
+_STORE = 200
+
+
+@dataclass(frozen=True)
+class HoistLine:
+    """A line of tanks, all times in the file's unit.
+
+    least, most: soak times (None: no most). full: the loaded move into each tank and, last, to the end. empty: from tank -> to
+    tank -> the hoist's time, tanks by name, beside LOAD and UNLOAD. capacity: parts that a tank holds.
+    """
+
+    tanks: Sequence[str]
+    least: Sequence[float]
+    most: Sequence[float | None]
+    full: Sequence[float]
+    empty: Mapping[str, Mapping[str, float]]
+    capacity: int = 1
+    parts: int = PARTS
+
+
+def cell_of_line(source: Source, line: HoistLine, asked: Asked) -> CellFile:
+    """The cell of a hoist line; BadInput for several hoists, which share a track and would meet."""
+    if asked.robots not in (None, 1):
+        wanted = "wanted 1: hoists share a track, and the lab's robots do not hinder each other"
+        raise BadInput(f"--robots {asked.robots} beside {source.path}: {wanted}")
+    stations: list[dict[str, Any]] = [{"name": LOAD, "kind": "storage", "capacity": _STORE}]
+    for name, least, most in zip(line.tanks, line.least, line.most, strict=True):
+        tank: dict[str, Any] = {"name": name, "kind": "machine", "capacity": line.capacity, "processing_s": least}
+        stations.append(tank | ({} if most is None else {"at_most_s": most - least}))
+    stations.append({"name": UNLOAD, "kind": "storage", "capacity": _STORE})
+    way = [LOAD, *line.tanks, UNLOAD]
+    raw = {
+        "kind": "cell",
+        "name": source.name,
+        "parts": line.parts,
+        "robot": {"start": UNLOAD},
+        "stations": stations,
+        "products": [{"name": "carrier", "routes": [way]}],
+        "travel": {a: {b: time for b, time in row.items() if a != b} for a, row in line.empty.items()},
+        "loaded": {a: {b: time} for a, b, time in zip(way, way[1:], line.full, strict=False)},
+        "sequencing": {"method": "exact", "episodes": 100},
+    }
+    return built(source, raw)

@@ -1,0 +1,254 @@
+"""The checker of schedules: right ones of the simulation pass, whatever the cell; each kind of wrong one is caught."""
+
+from collections.abc import Callable
+from copy import deepcopy
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lab.sequencing.cell.schedule_rows import rows_of
+from lab.sequencing.simulate.run import Run, simulate
+from lab.studies.ours.schedule_checker import faults
+from lab.tasks.cell_file import CellFile
+from lab.tasks.task_file import load_cell
+
+Rows = list[dict[str, Any]]
+Plain = dict[str, Any]
+
+
+def decided(file: CellFile, choose: Callable[[tuple[int, ...]], int]) -> tuple[Rows, float] | None:
+    """The rows and the makespan of a run whose decisions are chosen one by one; None when it ends in a deadlock."""
+    cell, sequence = file.cell(), list[int]()
+    run = Run(cell)
+    while allowed := run.allowed():
+        sequence.append(choose(allowed))
+        run.move(sequence[-1])
+    if not run.done:
+        return None
+    schedule = simulate(cell, sequence)
+    return rows_of(schedule, cell, "planned"), schedule.makespan_s
+
+
+@st.composite
+def plain_cells(draw: st.DrawFn) -> Plain:
+    """A cell as a file has it: robots (none, too), machines with room for one or a queue, setups, releases, buffers, windows."""
+    seconds = st.integers(0, 9).map(float)
+    machines = [f"m{n}" for n in range(draw(st.integers(1, 3)))]
+    robots = [
+        {"name": f"r{n}", "start": "in", "speed": draw(st.sampled_from([1.0, 2.0]))}
+        for n in range(draw(st.integers(0, 3)))
+    ]
+    jobs = [f"job{n}" for n in range(draw(st.integers(1, 3)))]
+    stations: list[Plain] = [{"name": name, "kind": "storage", "capacity": "unlimited"} for name in ("in", "out")]
+    stations.append({"name": "buffer", "kind": "buffer", "capacity": 1})
+    for name in machines:
+        room = draw(st.sampled_from(["unlimited", 1, 2]))
+        one: Plain = {"name": name, "kind": "machine", "capacity": room, "processing_s": 1.0}
+        if not robots or draw(st.booleans()):
+            one["servers"] = 1 if room == 1 else draw(st.integers(1, 2))
+            one["setup_s"] = {a: {b: draw(seconds) for b in jobs} for a in jobs} if draw(st.booleans()) else {}
+        elif room == "unlimited":
+            one["capacity"] = 2
+        if draw(st.integers(0, 4)) == 0:
+            one["at_most_s"] = 20.0
+        stations.append(one)
+    served = {one["name"] for one in stations if "servers" in one}
+    products, through = list[Plain](), False
+    for name in jobs:
+        visited = draw(st.permutations(machines))
+        stages: list[Plain] = [{"station": machine, "processing_s": draw(seconds)} for machine in visited]
+        if robots and visited[0] not in served and draw(st.booleans()):
+            stages[0]["buffer"] = "buffer"
+            through = True
+        out = [{"station": "out"}] if robots and (visited[-1] not in served or draw(st.booleans())) else []
+        products.append({"name": name, "routes": [[{"station": "in"}, *stages, *out]]})
+    if not any(stage["station"] == "out" for product in products for stage in product["routes"][0]):
+        stations.pop(1)
+    if not through:
+        stations = [one for one in stations if one["name"] != "buffer"]
+    names = [one["name"] for one in stations]
+    order = [draw(st.sampled_from(jobs)) for _ in range(draw(st.integers(1, 4)))]
+    cell: Plain = {"name": "drawn", "order": order, "stations": stations, "products": products, "robots": robots}
+    if draw(st.booleans()):
+        cell["release_s"] = [draw(seconds) for _ in order]
+    for table in ("travel", "loaded"):
+        cell[table] = {a: {b: draw(seconds) for b in names if b != a} for a in names}
+    return cell
+
+
+def as_file(cell: Plain) -> CellFile:
+    return CellFile.model_validate(cell)
+
+
+@settings(max_examples=150)
+@given(cell=plain_cells(), data=st.data())
+def test_what_the_simulation_does_is_right_and_its_damage_is_caught(cell: Plain, data: st.DataObject) -> None:
+    found = decided(as_file(cell), lambda allowed: data.draw(st.sampled_from(allowed)))
+    if found is None:
+        return
+    rows, makespan_s = found
+    assert faults(cell, rows, makespan_s) == faults(as_file(cell).model_dump(), rows, makespan_s) == []
+    assert faults(cell, rows, makespan_s + 0.5)
+    works = [n for n, row in enumerate(rows) if row["operation"] in ("carry", "process")]
+    number = data.draw(st.sampled_from(works))
+    assert faults(cell, rows[:number] + rows[number + 1 :], makespan_s), "a row left out"
+    assert faults(cell, [*rows, rows[number]], makespan_s), "a row twice"
+    processes = [n for n in works if rows[n]["operation"] == "process"]
+    longer = deepcopy(rows)
+    longer[data.draw(st.sampled_from(processes))]["end_s"] += 0.5
+    assert faults(cell, longer, makespan_s), "work that takes longer than it does"
+
+
+@pytest.mark.parametrize("name", ["fms", "toast-case-1", "toast-case-2", "toast-case-1-window", "hoist-pu"])
+@settings(max_examples=10)
+@given(data=st.data())
+def test_the_cells_that_ship_pass(name: str, data: st.DataObject) -> None:
+    """Pallets, services, arrivals, buffers and windows among them."""
+    file = load_cell(name)
+    found = decided(file, lambda allowed: data.draw(st.sampled_from(allowed)))
+    if found is not None:
+        assert faults(file.model_dump(), *found) == []
+
+
+# ---- each kind of fault, by hand: two jobs, two robots, a machine with a queue and one that holds one part ----------
+
+SHOP: Plain = {
+    "name": "shop",
+    "order": ["a", "b"],
+    "stations": [
+        {"name": "in", "kind": "storage", "capacity": "unlimited"},
+        {"name": "saw", "kind": "machine", "capacity": 2, "servers": 1},
+        {"name": "oven", "kind": "machine", "capacity": 1},
+        {"name": "out", "kind": "storage", "capacity": "unlimited"},
+    ],
+    "products": [
+        {"name": name, "routes": [["in", *({"station": m, "processing_s": 4.0} for m in ("saw", "oven")), "out"]]}
+        for name in "ab"
+    ],
+    "robots": [{"name": "r1", "start": "in"}, {"name": "r2", "start": "in"}],
+    "travel": {a: {b: 2.0 for b in ("in", "saw", "oven", "out") if b != a} for a in ("in", "saw", "oven", "out")},
+}
+
+
+def row(part: str, what: str, way: str, start_s: float, end_s: float, robot: str | None = None) -> Plain:
+    origin, _, target = way.partition(" > ")
+    return {
+        "part": part,
+        "product": part[0],
+        "operation": what,
+        "station": origin,
+        "target": target or origin,
+        "robot": robot,
+        "start_s": start_s,
+        "end_s": end_s,
+    }
+
+
+RIGHT = [  # in > saw 2 s, saw 4 s, saw > oven 2 s, oven 4 s, oven > out 2 s; b waits for the saw, then for the oven
+    row("a 1", "carry", "in > saw", 0, 2, "r1"),
+    row("a 1", "process", "saw", 2, 6),
+    row("a 1", "carry", "saw > oven", 6, 8, "r1"),
+    row("a 1", "process", "oven", 8, 12),
+    row("a 1", "carry", "oven > out", 12, 14, "r1"),
+    row("b 2", "carry", "in > saw", 0, 2, "r2"),
+    row("b 2", "process", "saw", 6, 10),
+    row("b 2", "carry", "saw > oven", 10, 12, "r2"),
+    row("b 2", "process", "oven", 12, 16),
+    row("b 2", "carry", "oven > out", 16, 18, "r2"),
+]
+B_OUT = 9
+
+
+def changed(*changes: tuple[int, Plain]) -> Rows:
+    rows = deepcopy(RIGHT)
+    for number, change in changes:
+        rows[number] |= change
+    return rows
+
+
+def shop(**change: Any) -> Plain:
+    return deepcopy(SHOP) | change
+
+
+def saw(**change: Any) -> Plain:
+    stations = deepcopy(SHOP["stations"])
+    stations[1] |= change
+    return shop(stations=stations)
+
+
+def oven(**change: Any) -> Plain:
+    stations = deepcopy(SHOP["stations"])
+    stations[2] |= change
+    return shop(stations=stations)
+
+
+def test_the_right_one_by_hand_passes() -> None:
+    as_file(SHOP).cell()
+    assert faults(SHOP, RIGHT, 18.0) == []
+
+
+@pytest.mark.parametrize(
+    ("cell", "rows", "said"),
+    [
+        (SHOP, changed((9, {"end_s": 17.0})), "carry oven > out: 1, not 2 to inf"),
+        (SHOP, changed((2, {"start_s": 5.0, "end_s": 7.0})), "picked in 'saw': 5, not 6 to inf"),
+        (SHOP, changed((1, {"end_s": 5.0})), "worked on in 'saw': 3, not 4 to 4"),
+        (SHOP, changed((3, {"start_s": 9.0, "end_s": 13.0})), "begun in 'oven': 9, not 8 to 8"),
+        (SHOP, changed((6, {"start_s": 4.0, "end_s": 8.0})), "'saw' needs 2 servers"),
+        (SHOP, RIGHT[:3] + RIGHT[4:], "process oven: -1, not 0 to inf"),
+        (SHOP, [*RIGHT, row("a 1", "carry", "out > in", 14, 16, "r1")], "not on its route"),
+        (SHOP, [*RIGHT, row("c 3", "carry", "in > saw", 0, 2, "r1")], "a row that cannot be"),
+        (SHOP, changed((0, {"start_s": float("nan")})), "a row that cannot be"),
+        (SHOP, changed((0, {"robot": "r3"})), "a row that cannot be"),
+        (SHOP, changed((5, {"robot": "r1"})), "robot late"),
+        (SHOP, [*RIGHT, row("a 1", "empty", "out > in", 14, 15, "r1") | {"part": None}], "robot short"),
+        (shop(robots=[{"name": "r1", "start": "oven"}, {"name": "r2", "start": "in"}]), RIGHT, "robot late"),
+        (
+            shop(robots=[{"name": "r1", "start": "in", "speed": 0.5}, {"name": "r2", "start": "in"}]),
+            RIGHT,
+            "not 4 to inf",
+        ),
+        (
+            shop(robots=[{"name": "r1", "start": "in", "serves": ["in", "saw"]}, {"name": "r2", "start": "in"}]),
+            RIGHT,
+            "barred",
+        ),
+        (saw(capacity=1), RIGHT, "'saw' holds 2"),
+        (oven(), changed((4, {"start_s": 13.0, "end_s": 15.0})), "'oven' holds 2"),
+        (saw(setup_s={"a": {"b": 1.0}}), RIGHT, "'saw' needs 2 servers"),
+        (oven(at_most_s=0.5), changed((9, {"start_s": 17.0, "end_s": 19.0})), "picked in 'oven': 17, not 16 to 16.5"),
+        (shop(release_s=[0.0, 1.0]), RIGHT, "picked in 'in': 0, not 1 to inf"),
+        (shop(arrivals={"interval_s": 1.0}), RIGHT, "picked in 'in': 0, not 1 to inf"),
+        (SHOP, changed((B_OUT, {"start_s": 16.5, "end_s": 18.5})), "the makespan is 18.5, not 18"),
+    ],
+)
+def test_each_kind_of_fault_is_caught(cell: Plain, rows: Rows, said: str) -> None:
+    assert any(said in fault for fault in faults(cell, rows, 18.0)), faults(cell, rows, 18.0)
+
+
+def test_service_is_by_who_picks_and_as_long_as_it_takes() -> None:
+    served = deepcopy(SHOP)
+    for product in served["products"]:
+        product["routes"][0][2]["service_s"] = 1.0
+    rows = changed((4, {"start_s": 13.0, "end_s": 15.0}), (7, {"end_s": 13.0}), (8, {"start_s": 13.0, "end_s": 17.0}))
+    rows[9] |= {"start_s": 18.0, "end_s": 20.0}
+    services = [row("a 1", "service", "oven", 12, 13, "r1"), row("b 2", "service", "oven", 17, 18, "r2")]
+    assert faults(served, [*rows, *services], 20.0) == []
+    assert any("service in 'oven'" in one for one in faults(served, rows, 20.0))
+    services[1] |= {"start_s": 17.5}
+    assert any("service in 'oven': 0.5, not 1" in one for one in faults(served, [*rows, *services], 20.0))
+
+
+def test_a_pallet_goes_ahead_of_its_part() -> None:
+    file = load_cell("fms")
+    found = decided(file, lambda allowed: allowed[0])
+    assert found is not None
+    rows, makespan_s = found
+    late = deepcopy(rows)
+    pallet = next(one for one in late if one["operation"] == "pallet")
+    pallet["start_s"], pallet["end_s"] = pallet["start_s"] + 500.0, pallet["end_s"] + 500.0
+    assert any("pallet" in one for one in faults(file.model_dump(), late, makespan_s))
+    without = [one for one in rows if one["operation"] != "pallet"]
+    assert any("pallet" in one for one in faults(file.model_dump(), without, makespan_s))
