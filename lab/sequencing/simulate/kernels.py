@@ -73,7 +73,7 @@ def reset(cell: Any, run: Any, seed: Any) -> None:
 
 
 @inner
-def _reach(cell: Any, run: Any, o: int) -> float:
+def reached_s(cell: Any, run: Any, o: int) -> float:
     """`Run.reach_s`."""
     robot = cell.robot[o]
     return float(run.robots_s[robot] + cell.empty_s[robot, run.robots_at[robot], cell.origin[o]])
@@ -85,12 +85,12 @@ def _too_late(cell: Any, run: Any, part: int, o: int) -> bool:
     at_most_s = cell.at_most_s[run.locations[part]]
     if at_most_s == np.inf or not cell.waits[o]:
         return False
-    begin_s = _server(cell, run, part, o)[0] if cell.robot[o] == SERVER else _reach(cell, run, o)
+    begin_s = server_for(cell, run, part, o)[0] if cell.robot[o] == SERVER else reached_s(cell, run, o)
     return bool(max(begin_s, run.ready_s[part]) + cell.service_s[o] > run.ready_s[part] + at_most_s + SLACK_S)
 
 
 @inner
-def _server(cell: Any, run: Any, part: int, o: int) -> Any:
+def server_for(cell: Any, run: Any, part: int, o: int) -> Any:
     """`Run._server`."""
     station, best_s, best = cell.target[o], np.inf, -1
     for server in range(cell.first_server[station], cell.first_server[station + 1]):
@@ -178,10 +178,10 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
     robot = cell.robot[o]
     here, there, server, reach_s = run.locations[part], cell.to[o], 0, 0.0
     if robot == SERVER:
-        pick_s, server = _server(cell, run, part, o)
+        pick_s, server = server_for(cell, run, part, o)
         drop_s = pick_s
     else:
-        reach_s = _reach(cell, run, o)
+        reach_s = reached_s(cell, run, o)
         ready_s = max(reach_s, run.ready_s[part]) if cell.waits[o] else reach_s
         pick_s = ready_s + cell.service_s[o]
         drop_s = pick_s + cell.loaded_s[robot, cell.origin[o], cell.target[o]]
