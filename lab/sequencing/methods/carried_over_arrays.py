@@ -29,8 +29,10 @@ FEATURES = (
     "other robot sooner",
     "enters",
     "load after",
-    "part is next",
+    "tail behind the queue",
 )
+
+CONTEXTS = 3
 
 
 class FeatureArrays(NamedTuple):
@@ -42,7 +44,9 @@ class FeatureArrays(NamedTuple):
     """
 
     scale_s: float
+    whole_s: float
     left_s: Floats
+    carried_s: Floats
     moves: Floats
     load_s: Floats
     machine: Ints
@@ -65,6 +69,8 @@ class WorkArrays(NamedTuple):
     free_s: Floats
     features: Floats
     most: Floats
+    contexts: Floats
+    weights: Floats
 
 
 def feature_arrays(cell: Cell) -> FeatureArrays:
@@ -83,7 +89,9 @@ def feature_arrays(cell: Cell) -> FeatureArrays:
     machine = [machine_of(cell, place) for place in range(len(cell.positions))]
     return FeatureArrays(
         scale_s=max(1e-9, float(left_s[begun].sum() / max(1.0, moves[begun].sum()))),
+        whole_s=max(1e-9, float(left_s[begun].sum())),
         left_s=left_s,
+        carried_s=np.array(carried_s(cell)),
         moves=moves,
         load_s=load_s,
         machine=np.array([size if one is None else one for one in machine], np.int64),
@@ -121,4 +129,19 @@ def work_arrays(cell: Cell) -> WorkArrays:
         free_s=np.zeros(size),
         features=np.zeros(len(FEATURES)),
         most=np.zeros(4),
+        contexts=np.ones(CONTEXTS),
+        weights=np.zeros(len(FEATURES)),
     )
+
+
+def carried_s(cell: Cell) -> list[float]:
+    least_s = cell.loaded_s / max([robot.speed for robot in cell.robots], default=1.0)
+
+    def left_s(place: int, ahead: list[float]) -> float:
+        ways = [
+            option.service_s + (0.0 if option.robot == SERVER else least_s[option.origin, option.target]) + then
+            for option, then in zip(cell.positions[place].options, ahead, strict=True)
+        ]
+        return min(ways, default=0.0)
+
+    return from_the_ends(cell.positions, left_s)

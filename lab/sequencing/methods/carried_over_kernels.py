@@ -25,7 +25,7 @@ def _survey(cell: Any, run: Any, known: Any, work: Any) -> None:
             work.free_s[station] = free_s
         elif run.room[station] <= 0:
             work.free_s[station] = np.inf
-    tail_s, left_s, unfinished = 0.0, 0.0, 0
+    tail_s, left_s, unfinished, carried_s = 0.0, 0.0, 0, 0.0
     for part in range(parts):
         place = run.locations[part]
         first = cell.first_option[place]
@@ -33,6 +33,7 @@ def _survey(cell: Any, run: Any, known: Any, work: Any) -> None:
             continue
         unfinished += 1
         left_s += known.left_s[place]
+        carried_s += known.carried_s[place]
         tail_s = max(tail_s, run.ready_s[part] + known.left_s[place])
         for station in range(none):
             work.to_come_s[station] += known.load_s[place, station]
@@ -44,11 +45,15 @@ def _survey(cell: Any, run: Any, known: Any, work: Any) -> None:
         elif machine < none and cell.first_server[machine] == cell.first_server[machine + 1]:
             if run.room[machine] <= 0:
                 work.free_s[machine] = min(work.free_s[machine], run.ready_s[part])
-    ahead_s = 0.0
+    ahead_s, load_s = 0.0, 0.0
     for station in range(none):
         if work.to_come_s[station] > 0.0:
             ahead_s = max(ahead_s, _ends(run, work, station))
+            load_s = max(load_s, work.to_come_s[station])
     work.most[0], work.most[1], work.most[2] = tail_s, left_s / max(1, unfinished), ahead_s
+    carried_s /= max(1, len(run.robots_s))
+    work.contexts[1] = left_s / known.whole_s
+    work.contexts[2] = carried_s / max(1e-9, carried_s + load_s)
 
 
 @inner
@@ -102,6 +107,7 @@ def _describe(cell: Any, run: Any, known: Any, work: Any, count: int, i: int) ->
         free_s = work.free_s[ahead] if work.free_s[ahead] < np.inf else 0.0
         f[8] = max(0.0, end_s - max(free_s, run.clock[0]))
         f[9] = max(0.0, free_s - end_s)
+    f[19] = max(end_s, end_s + f[9]) + known.left_s[there] - work.most[0]
     behind = known.machine[here]
     if behind < none and robot != SERVER and run.room[behind] <= 0:
         f[10] = _ends(run, work, behind) - work.most[2] + scale_s
@@ -133,20 +139,12 @@ def work_ready(cell: Any, run: Any, j: int, parts: int) -> float:
 
 
 @inner
-def _value(weights: Any, f: Any) -> float:
-    """Of features (F,): linear, plus rectified units; weights: F, then for each unit its F + 2."""
-    size, total = len(f), 0.0
+def _weigh(weights: Any, work: Any) -> None:
+    size = len(work.weights)
     for k in range(size):
-        total += weights[k] * f[k]
-    at = size
-    while at < len(weights):
-        unit = weights[at + size]
-        for k in range(size):
-            unit += weights[at + k] * f[k]
-        if unit > 0.0:
-            total += weights[at + size + 1] * unit
-        at += size + 2
-    return total
+        work.weights[k] = weights[k]
+        for c in range(1, len(work.contexts)):
+            work.weights[k] += weights[c * size + k] * work.contexts[c]
 
 
 @inner
@@ -165,10 +163,13 @@ def choose(cell: Any, run: Any, known: Any, work: Any, weights: Any, count: int)
         first_s = min(first_s, work.begin_s[i])
         work.least_s[part] = min(work.least_s[part], work.end_s[i])
     work.most[3] = first_s
+    _weigh(weights, work)
     best, best_value = 0, -np.inf
     for i in range(count):
         _describe(cell, run, known, work, count, i)
-        value = _value(weights, work.features)
+        value = 0.0
+        for k in range(len(work.features)):
+            value += work.weights[k] * work.features[k]
         if value > best_value:
             best, best_value = i, value
     return best
