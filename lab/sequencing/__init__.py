@@ -70,6 +70,12 @@ def _anneal() -> Find:
     return anneal
 
 
+def _carried() -> Find:
+    from lab.sequencing.methods.carried_over import carried
+
+    return carried
+
+
 def _portfolio() -> Find:
     from lab.sequencing.methods.portfolio import portfolio
 
@@ -104,6 +110,13 @@ def _queued(cell: "Cell", objective: str, seed: int) -> Reaction:
     from lab.sequencing.methods.fifo import first_in_first_out
 
     return Reaction(first_in_first_out, "a queue of tasks as they become possible", plans=False)
+
+
+def _carried_on(cell: "Cell", objective: str, seed: int) -> Reaction:
+    from lab.sequencing.methods.carried_over import DEFAULT, rule_of
+    from lab.sequencing.methods.rollout import by_rule
+
+    return Reaction(by_rule(rule_of(DEFAULT)), "the carried-over policy, asked at every decision", plans=False)
 
 
 def _asked(name: str, cell: "Cell", objective: str, seed: int) -> Reaction:
@@ -150,6 +163,7 @@ SEQUENCERS: dict[str, Sequencer] = {
     "fifo": Sequencer(_fifo, "first in, first out: a queue of tasks", react=_queued),
     "ga": Sequencer(_genetic, "a genetic algorithm with random keys"),
     "anneal": Sequencer(_anneal, "simulated annealing of a list of priorities, begun with the best rule's"),
+    "carried": Sequencer(_carried, "a policy learned on small cells, see --policy: no search", react=_carried_on),
     "exact": Sequencer(_exact, "best-first search (A*) to the proven optimum"),
     "cp-sat": Sequencer(_cp_sat, "constraint programming, for every objective"),
     "portfolio": Sequencer(_portfolio, "annealing, then the exact search that proves most, begun with what it found"),

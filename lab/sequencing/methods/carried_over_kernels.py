@@ -1,198 +1,249 @@
-"""Features of decisions compiled, and runs that always take the decision with the highest value."""
+"""Features of decisions compiled (see `carried_over_features`), and runs that always take the decision of highest value."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lab.learning.compiled import inner, lean
+from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import SERVER
+from lab.sequencing.methods.carried_over_features import FEATURES, WAITED
+from lab.sequencing.simulate.cell_arrays import Floats, Ints, most_moves
 from lab.sequencing.simulate.kernels import cost, list_allowed, reached_s, reset, server_for, take
+
+(
+    DELAY,
+    EMPTY_WAY,
+    IDLE,
+    PART_WAITED,
+    DURATION,
+    TAIL,
+    WORK_LEFT,
+    LOAD_AHEAD,
+    STARVES,
+    QUEUE,
+    LOAD_BEHIND,
+    SERVED,
+    ROOM,
+    MOVES_LEFT,
+    SLACK,
+    WAY_ON,
+    OTHER_WAY,
+    ENTERS,
+    LOAD_AFTER,
+    QUEUED_TAIL,
+) = range(len(FEATURES))
+
+
+class WorkArrays(NamedTuple):
+    """Room for the features of D decisions of K parts at S stations, and for L decisions that were made.
+
+    begin_s, end_s (D,): of each decision. least_s (K,): the soonest end of each part's decisions. free_s, load_s (S + 1,): when a
+    machine is through with what it has, and its load. compared (4,): the latest tail, the mean work left, the highest load, the
+    first begin. features (F,): of one decision. sequence (L,).
+    """
+
+    begin_s: Floats
+    end_s: Floats
+    least_s: Floats
+    free_s: Floats
+    load_s: Floats
+    compared: Floats
+    features: Floats
+    sequence: Ints
+
+
+def work_arrays(cell: Cell) -> WorkArrays:
+    """Room for a run of the cell."""
+    decisions, size = cell.parts * cell.most_choices, len(cell.stations) + 1
+    return WorkArrays(
+        begin_s=np.zeros(decisions),
+        end_s=np.zeros(decisions),
+        least_s=np.zeros(cell.parts),
+        free_s=np.zeros(size),
+        load_s=np.zeros(size),
+        compared=np.zeros(4),
+        features=np.zeros(len(FEATURES)),
+        sequence=np.zeros(most_moves(cell), np.int64),
+    )
 
 
 @inner
 def _survey(cell: Any, run: Any, known: Any, work: Any) -> None:
-    """What is to come at each machine, and when each is through with what it has."""
-    parts, none = len(run.locations), len(known.places) - 1
-    for station in range(none + 1):
-        work.to_come_s[station], work.free_s[station] = 0.0, 0.0
-        first, last = 0, 0
-        if station < none:
-            first, last = cell.first_server[station], cell.first_server[station + 1]
-        if last > first:
-            free_s = np.inf
-            for server in range(first, last):
-                free_s = min(free_s, run.servers_s[server])
-            work.free_s[station] = free_s
-        elif run.room[station] <= 0:
+    """What the decisions are compared with, but for the first begin."""
+    last, tail_s, left_s, going = len(known.places) - 1, 0.0, 0.0, 0
+    for station in range(last):
+        work.load_s[station] = 0.0
+        if cell.first_server[station + 1] > cell.first_server[station]:
+            work.free_s[station] = _first_free(cell, run, station)
+        else:
             work.free_s[station] = np.inf
-    tail_s, left_s, unfinished, carried_s = 0.0, 0.0, 0, 0.0
-    for part in range(parts):
+    for part in range(len(run.locations)):
         place = run.locations[part]
-        first = cell.first_option[place]
+        first, machine = cell.first_option[place], known.machine[place]
         if first == cell.first_option[place + 1]:
             continue
-        unfinished += 1
+        going += 1
         left_s += known.left_s[place]
-        carried_s += known.carried_s[place]
-        tail_s = max(tail_s, run.ready_s[part] + known.left_s[place])
-        for station in range(none):
-            work.to_come_s[station] += known.load_s[place, station]
-        machine = known.machine[place]
+        tail_s = max(tail_s, max(run.clock[0], run.ready_s[part]) + known.left_s[place])
+        for station in range(last):
+            work.load_s[station] += known.load_s[place, station]
         if cell.robot[first] == SERVER:
-            machine = cell.target[first]
-            work.free_s[machine] = max(work.free_s[machine], run.ready_s[part]) if False else work.free_s[machine]
-            work.free_s[machine] += cell.processing_s[cell.to[first]] / known.places[machine]
-        elif machine < none and cell.first_server[machine] == cell.first_server[machine + 1]:
-            if run.room[machine] <= 0:
-                work.free_s[machine] = min(work.free_s[machine], run.ready_s[part])
-    ahead_s, load_s = 0.0, 0.0
-    for station in range(none):
-        if work.to_come_s[station] > 0.0:
-            ahead_s = max(ahead_s, _ends(run, work, station))
-            load_s = max(load_s, work.to_come_s[station])
-    work.most[0], work.most[1], work.most[2] = tail_s, left_s / max(1, unfinished), ahead_s
-    carried_s /= max(1, len(run.robots_s))
-    work.contexts[1] = left_s / known.whole_s
-    work.contexts[2] = carried_s / max(1e-9, carried_s + load_s)
+            station = cell.target[first]
+            work.free_s[station] += cell.processing_s[cell.to[first]] / known.places[station]
+        elif machine < last and cell.first_server[machine + 1] == cell.first_server[machine]:
+            work.free_s[machine] = min(work.free_s[machine], run.ready_s[part])
+    highest_s = 0.0
+    for station in range(last):
+        if cell.first_server[station + 1] == cell.first_server[station]:
+            if run.room[station] > 0 or work.free_s[station] == np.inf:
+                work.free_s[station] = 0.0  # there is room, or what takes it stays for ever
+        if work.load_s[station] > 0.0:
+            work.load_s[station] += max(0.0, work.free_s[station] - run.clock[0])
+            highest_s = max(highest_s, work.load_s[station])
+    work.compared[0], work.compared[1] = tail_s, left_s / going
+    work.compared[2] = highest_s if highest_s > 0.0 else 1.0
 
 
 @inner
-def _ends(run: Any, work: Any, station: int) -> float:
-    """When a machine would end if it never stood still from now on."""
-    if work.to_come_s[station] <= 0.0:
-        return 0.0
-    free_s = work.free_s[station]
-    return float(max(run.clock[0], free_s if free_s < np.inf else 0.0) + work.to_come_s[station])
+def _first_free(cell: Any, run: Any, station: int) -> float:
+    """`Run.free_s`."""
+    free_s = np.inf
+    for server in range(cell.first_server[station], cell.first_server[station + 1]):
+        free_s = min(free_s, run.servers_s[server])
+    return free_s
 
 
 @inner
-def _times(cell: Any, run: Any, part: int, o: int) -> Any:
-    """When a decision begins and ends, as long as there is room."""
-    if cell.robot[o] == SERVER:
-        begin_s = server_for(cell, run, part, o)[0]
-        return begin_s, begin_s + cell.processing_s[cell.to[o]]
-    at_s = reached_s(cell, run, o)
-    begin_s = max(at_s, run.ready_s[part]) if cell.waits[o] else at_s
-    return begin_s, begin_s + cell.service_s[o] + cell.loaded_s[cell.robot[o], cell.origin[o], cell.target[o]]
+def _times(cell: Any, run: Any, work: Any, count: int) -> None:
+    """When each decision begins and ends as far as there is room, the first begin, and the soonest end of each part."""
+    parts, first_s = len(run.locations), np.inf
+    for i in range(count):
+        work.least_s[(run.allowed[i] - 1) % parts] = np.inf
+    for i in range(count):
+        part, o = (run.allowed[i] - 1) % parts, run.options[i]
+        if cell.robot[o] == SERVER:
+            begin_s = server_for(cell, run, part, o)[0]
+            end_s = begin_s + cell.processing_s[cell.to[o]]
+        else:
+            begin_s = reached_s(cell, run, o)
+            if cell.waits[o]:
+                begin_s = max(begin_s, run.ready_s[part])
+            end_s = begin_s + cell.service_s[o] + cell.loaded_s[cell.robot[o], cell.origin[o], cell.target[o]]
+        work.begin_s[i], work.end_s[i] = begin_s, end_s
+        first_s = min(first_s, begin_s)
+        work.least_s[part] = min(work.least_s[part], end_s)
+    work.compared[3] = first_s
+
+
+@inner
+def _way_on(cell: Any, run: Any, work: Any, count: int, i: int) -> float:
+    """How long after the drop of the i-th decision its robot can pick another part, at the soonest."""
+    parts, robot, at = len(run.locations), cell.robot[run.options[i]], cell.target[run.options[i]]
+    part, soonest_s = (run.allowed[i] - 1) % parts, np.inf
+    for j in range(count):
+        o, other = run.options[j], (run.allowed[j] - 1) % parts
+        if cell.robot[o] == robot and other != part:
+            on_s = cell.empty_s[robot, at, cell.origin[o]]
+            if cell.waits[o]:
+                on_s = max(on_s, run.ready_s[other] - work.end_s[i])
+            soonest_s = min(soonest_s, on_s)
+    return soonest_s if soonest_s < np.inf else 0.0
 
 
 @inner
 def _describe(cell: Any, run: Any, known: Any, work: Any, count: int, i: int) -> None:
     """The features of the i-th allowed decision."""
-    parts, none, f = len(run.locations), len(known.places) - 1, work.features
-    part, o = (run.allowed[i] - 1) % parts, run.options[i]
-    robot, here, there = cell.robot[o], run.locations[part], cell.to[o]
-    begin_s, end_s, scale_s = work.begin_s[i], work.end_s[i], known.scale_s
+    f, scale_s, last = work.features, known.scale_s, len(known.places) - 1
+    part, o = (run.allowed[i] - 1) % len(run.locations), run.options[i]
+    here, there, robot = run.locations[part], cell.to[o], cell.robot[o]
+    begin_s, end_s, left_s = work.begin_s[i], work.end_s[i], known.left_s[here]
+    ahead, behind, after = known.following[here], known.machine[here], known.following[there]
     f[:] = 0.0
-    f[0] = begin_s - work.most[3]
     if robot == SERVER:
-        f[2] = 0.0
-        free_s = np.inf
-        for server in range(cell.first_server[cell.target[o]], cell.first_server[cell.target[o] + 1]):
-            free_s = min(free_s, run.servers_s[server])
-        f[2] = begin_s - free_s
-        f[11] = scale_s
+        f[IDLE] = (begin_s - _first_free(cell, run, cell.target[o])) / scale_s
+        f[SERVED] = 1.0
     else:
         at_s = reached_s(cell, run, o)
-        f[1] = at_s - run.robots_s[robot]
-        f[2] = begin_s - at_s
-    f[3] = max(0.0, begin_s - run.ready_s[part])
-    f[4] = end_s - begin_s
-    f[5] = begin_s + known.left_s[here] - work.most[0]
-    f[6] = known.left_s[here] - work.most[1]
-    ahead = known.next_machine[here]
-    if ahead < none:
-        f[7] = _ends(run, work, ahead) - work.most[2]
-    if robot != SERVER and known.machine[there] == ahead and ahead < none:
-        free_s = work.free_s[ahead] if work.free_s[ahead] < np.inf else 0.0
-        f[8] = max(0.0, end_s - max(free_s, run.clock[0]))
-        f[9] = max(0.0, free_s - end_s)
-    f[19] = max(end_s, end_s + f[9]) + known.left_s[there] - work.most[0]
-    behind = known.machine[here]
-    if behind < none and robot != SERVER and run.room[behind] <= 0:
-        f[10] = _ends(run, work, behind) - work.most[2] + scale_s
-    need = cell.needs[o, 0]
-    if need < none:
-        f[12] = scale_s / run.room[need]
-    f[13] = known.moves[here] * scale_s
-    if known.has_due:
-        f[14] = cell.due_s[part] - begin_s - known.left_s[here]
-    if robot != SERVER:
-        nearest_s = np.inf
-        for j in range(count):
-            if cell.robot[run.options[j]] == robot and (run.allowed[j] - 1) % parts != part:
-                nearest_s = min(nearest_s, max(work_ready(cell, run, j, parts) - end_s, cell.empty_s[robot, cell.target[o], cell.origin[run.options[j]]]))
-        f[15] = nearest_s if nearest_s < np.inf else 0.0
-    f[16] = end_s - work.least_s[part]
+        f[EMPTY_WAY] = (at_s - run.robots_s[robot]) / scale_s
+        f[IDLE] = (begin_s - at_s) / scale_s
+        f[WAY_ON] = _way_on(cell, run, work, count, i) / scale_s
+        if ahead < last and known.machine[there] == ahead:
+            f[STARVES] = max(0.0, end_s - max(work.free_s[ahead], run.clock[0])) / scale_s
+            f[QUEUE] = max(0.0, work.free_s[ahead] - end_s) / scale_s
+        if behind < last and run.room[behind] <= 0:
+            f[LOAD_BEHIND] = work.load_s[behind] / work.compared[2]
     if here == cell.starts[part]:
-        f[17] = scale_s
-    after = known.next_machine[there]
-    if after < none:
-        f[18] = _ends(run, work, after) - work.most[2]
-    for k in range(len(f)):
-        f[k] /= scale_s
+        f[ENTERS] = 1.0
+    else:
+        f[PART_WAITED] = min(WAITED, max(0.0, begin_s - run.ready_s[part]) / scale_s)
+    f[DELAY] = (begin_s - work.compared[3]) / scale_s
+    f[DURATION] = (end_s - begin_s) / scale_s
+    f[TAIL] = (begin_s + left_s - work.compared[0]) / scale_s
+    f[WORK_LEFT] = (left_s - work.compared[1]) / scale_s
+    if ahead < last:
+        f[LOAD_AHEAD] = work.load_s[ahead] / work.compared[2] - 1.0
+    if cell.needs[o, 0] < last:
+        f[ROOM] = 1.0 / run.room[cell.needs[o, 0]]
+    f[MOVES_LEFT] = known.moves[here]
+    if known.due:
+        f[SLACK] = (cell.due_s[part] - begin_s - left_s) / scale_s
+    f[OTHER_WAY] = (end_s - work.least_s[part]) / scale_s
+    if after < last:
+        f[LOAD_AFTER] = work.load_s[after] / work.compared[2] - 1.0
+    f[QUEUED_TAIL] = f[QUEUE] + (end_s + known.left_s[there] - work.compared[0]) / scale_s
+
+
+@lean
+def describe_all(cell: Any, run: Any, known: Any, work: Any, found: Any) -> int:
+    """`features` of a run as it stands, for all its allowed decisions, into the rows of found; how many there are."""
+    count = list_allowed(cell, run)
+    if count > 0:
+        _survey(cell, run, known, work)
+        _times(cell, run, work, count)
+    for i in range(count):
+        _describe(cell, run, known, work, count, i)
+        for k in range(len(work.features)):
+            found[i, k] = work.features[k]
+    return count
 
 
 @inner
-def work_ready(cell: Any, run: Any, j: int, parts: int) -> float:
-    return run.ready_s[(run.allowed[j] - 1) % parts] if cell.waits[run.options[j]] else 0.0
-
-
-@inner
-def _weigh(weights: Any, work: Any) -> None:
-    size = len(work.weights)
-    for k in range(size):
-        work.weights[k] = weights[k]
-        for c in range(1, len(work.contexts)):
-            work.weights[k] += weights[c * size + k] * work.contexts[c]
-
-
-@inner
-def choose(cell: Any, run: Any, known: Any, work: Any, weights: Any, count: int) -> int:
+def _best(cell: Any, run: Any, known: Any, work: Any, weights: Any, count: int) -> int:
     """Which of the allowed decisions has the highest value; of several the first."""
-    parts = len(run.locations)
     if count == 1:
         return 0
     _survey(cell, run, known, work)
-    first_s = np.inf
-    for i in range(count):
-        work.least_s[(run.allowed[i] - 1) % parts] = np.inf
-    for i in range(count):
-        part = (run.allowed[i] - 1) % parts
-        work.begin_s[i], work.end_s[i] = _times(cell, run, part, run.options[i])
-        first_s = min(first_s, work.begin_s[i])
-        work.least_s[part] = min(work.least_s[part], work.end_s[i])
-    work.most[3] = first_s
-    _weigh(weights, work)
-    best, best_value = 0, -np.inf
+    _times(cell, run, work, count)
+    best, highest = 0, -np.inf
     for i in range(count):
         _describe(cell, run, known, work, count, i)
         value = 0.0
-        for k in range(len(work.features)):
-            value += work.weights[k] * work.features[k]
-        if value > best_value:
-            best, best_value = i, value
+        for k in range(len(weights)):
+            value += weights[k] * work.features[k]
+        if value > highest:
+            best, highest = i, value
     return best
 
 
 @lean
-def decide(cell: Any, run: Any, known: Any, work: Any, weights: Any, sequence: Any) -> int:
-    """A whole run; how many decisions, which stand in the sequence."""
+def decide(cell: Any, run: Any, known: Any, work: Any, weights: Any) -> int:
+    """A whole run with the weights (F,); how many decisions it took, which stand in work.sequence."""
     reset(cell, run, np.uint64(0))
     parts, made = len(run.locations), 0
     while True:
         count = list_allowed(cell, run)
         if count == 0:
             return made
-        i = choose(cell, run, known, work, weights, count)
-        sequence[made] = run.allowed[i]
+        i = _best(cell, run, known, work, weights, count)
+        work.sequence[made] = run.allowed[i]
         made += 1
         take(cell, run, (run.allowed[i] - 1) % parts, run.options[i], np.uint64(0))
 
 
 @lean
-def costs_of(cell: Any, run: Any, known: Any, work: Any, candidates: Any, sequence: Any, costs: Any) -> None:
-    """What the runs of N candidates cost."""
+def costs_of(cell: Any, run: Any, known: Any, work: Any, candidates: Any, costs: Any) -> None:
+    """What the runs with N weights (N, F) cost (N,)."""
     for n in range(len(candidates)):
-        decide(cell, run, known, work, candidates[n], sequence)
+        decide(cell, run, known, work, candidates[n])
         costs[n] = cost(cell, run)
