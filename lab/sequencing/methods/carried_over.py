@@ -12,7 +12,7 @@ from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
 from lab.sequencing.methods.carried_over_features import FEATURES, FeatureArrays, feature_arrays, features
 from lab.sequencing.methods.carried_over_weights import SHIPPED
 from lab.sequencing.methods.rules import Rule
-from lab.sequencing.search import Search, SequenceResult, only_one
+from lab.sequencing.search import SAME, Search, SequenceResult, only_one
 from lab.sequencing.simulate.cell_arrays import Floats, cell_arrays, run_arrays
 from lab.sequencing.simulate.run import Run, follow
 
@@ -54,7 +54,11 @@ def rule_of(policy: CarriedPolicy) -> Rule:
         if not last or last[0][0] is not run.cell:
             last[:] = [(run.cell, feature_arrays(run.cell, policy.objective))]
         values = features(run, allowed, last[0][1]) @ policy.vector
-        return allowed[int(np.argmax(values))]
+        best = 0
+        for i, value in enumerate(values):
+            if value > values[best] + SAME:
+                best = i
+        return allowed[best]
 
     return choose
 

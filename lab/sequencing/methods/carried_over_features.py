@@ -5,7 +5,7 @@ parts. `features` is the readable form; `carried_over_kernels` holds the compile
 """
 
 from collections.abc import Mapping
-from math import inf
+from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -119,9 +119,9 @@ def features(run: Run, allowed: tuple[int, ...], known: FeatureArrays) -> Floats
         queue_s = max(0.0, free_s - end_s) if brought else 0.0
         full = not served and behind != last and run.occupied[behind] >= cell.capacities[behind]
         others = [
-            max(run.ready_s[p - 1] - end_s if o.waits else -inf, _empty_s(cell, o, way.target))
+            max(_empty_s(cell, o, way.target), run.ready_s[p - 1] - end_s if o.waits else 0.0)
             for p, o in zip(parts, options, strict=True)
-            if not served and o.robot == way.robot and p != part
+            if not served and o.robot == way.robot and p != part and not isnan(_empty_s(cell, o, way.target))
         ]
         began_s = run.free_s(way.target) if served else run.reach_s(way)
         seconds = {

@@ -8,6 +8,7 @@ from lab.learning.compiled import inner, lean
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import SERVER
 from lab.sequencing.methods.carried_over_features import FEATURES, WAITED
+from lab.sequencing.search import SAME
 from lab.sequencing.simulate.cell_arrays import Floats, Ints, most_moves
 from lab.sequencing.simulate.kernels import cost, list_allowed, reached_s, reset, server_for, take
 
@@ -145,9 +146,10 @@ def _way_on(cell: Any, run: Any, work: Any, count: int, i: int) -> float:
         o, other = run.options[j], (run.allowed[j] - 1) % parts
         if cell.robot[o] == robot and other != part:
             on_s = cell.empty_s[robot, at, cell.origin[o]]
-            if cell.waits[o]:
-                on_s = max(on_s, run.ready_s[other] - work.end_s[i])
-            soonest_s = min(soonest_s, on_s)
+            if cell.waits[o] and run.ready_s[other] - work.end_s[i] > on_s:
+                on_s = run.ready_s[other] - work.end_s[i]
+            if on_s < soonest_s:  # not where there is no such way (NaN)
+                soonest_s = on_s
     return soonest_s if soonest_s < np.inf else 0.0
 
 
@@ -221,7 +223,7 @@ def _best(cell: Any, run: Any, known: Any, work: Any, weights: Any, count: int) 
         value = 0.0
         for k in range(len(weights)):
             value += weights[k] * work.features[k]
-        if value > highest:
+        if value > highest + SAME:
             best, highest = i, value
     return best
 
