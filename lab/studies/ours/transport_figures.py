@@ -26,7 +26,7 @@ def profile(gaps: Mapping[str, Sequence[float]]) -> bytes:
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
-        for number, (method, values) in enumerate(_best_first(gaps)):
+        for number, (method, values) in _ranked(gaps):
             ordered = np.sort(np.maximum(values, 0.0))
             x, y = [0.0, *ordered, WIDEST], 100.0 * np.arange(len(ordered) + 1) / len(ordered)
             axes.step(x, [*y, y[-1]], where="post", label=method, **_look(number))
@@ -50,8 +50,7 @@ def by_seconds(found: "Mapping[Entry, Found]", least: "Mapping[Instance, float]"
 
     def draw(figure: "Figure") -> None:
         axes = figure.add_subplot()
-        ranked = _best_first({method: [float(line[-1]) for line in of] for method, of in lines.items()})
-        for number, (method, _) in enumerate(ranked):
+        for number, (method, _) in _ranked({name: [float(line[-1]) for line in of] for name, of in lines.items()}):
             axes.plot(seconds, np.mean(lines[method], axis=0), label=method, **_look(number))
         axes.set_xscale("log")
         axes.set_yscale("symlog", linthresh=1.0)
@@ -71,8 +70,11 @@ def _gaps_at(seconds: np.ndarray, trace: Sequence[tuple[float, float]], least: f
     return gaps
 
 
-def _best_first(gaps: Mapping[str, Sequence[float]]) -> list[tuple[str, Sequence[float]]]:
-    return sorted(gaps.items(), key=lambda one: float(np.mean(one[1])))
+def _ranked(gaps: Mapping[str, Sequence[float]]) -> list[tuple[int, tuple[str, Sequence[float]]]]:
+    """The methods, least mean gap first, each with the number of its look, which is the same in both pictures."""
+    looks = {method: number for number, method in enumerate(sorted(gaps))}
+    ranked = sorted(gaps.items(), key=lambda one: float(np.mean(one[1])))
+    return [(looks[method], (method, values)) for method, values in ranked]
 
 
 def _look(number: int) -> dict[str, Any]:

@@ -129,8 +129,10 @@ def test_what_is_told_of_all(tiny: Instance) -> None:
     reading = {"instances": [Path(tiny.file)], "methods": ["fifo", "portfolio"], "seconds": 0.1}
     told = transport(Job(1), reading)
     assert told.summary == {"instances": 1, "entries": 2, "optima proven here": 1}
-    assert [one["value"] for one in those(told.rows, measure="mean_gap_percent")] == [0.0, 0.0]
-    assert [one["value"] for one in those(told.rows, measure="proven_alone")] == [0.0, 1.0]
+    means = those(told.rows, measure="mean gap_percent")
+    assert [one["value"] for one in means] == [0.0, 0.0]
+    assert [one["best known found"] for one in means] == ["1 of 1", "1 of 1"]
+    assert [one["proven alone"] for one in means] == ["0 of 1", "1 of 1"]
     assert len(told.figures) == 2
 
 
