@@ -101,8 +101,6 @@ class Production:
             raise RunStopped(f"{why}: {error}") from None
         recovery.lose(dict(found.stuck))
         work.plan, self.sequence = found.run, [*found.sequence]
-        if first is not None and first not in self.sequence:
-            raise RunStopped(f"{why}: {self.floor.bench.held} is in the gripper and cannot be brought on: take it out")
         if found.schedule is not None and found.proven is not None:
             gap = found.proven.gap(found.schedule.makespan_s)
             plan = found.schedule.later(now_s)

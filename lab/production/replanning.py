@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lab.errors import WorkFailed
 from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.methods.exact import Optimum, optimum
 from lab.sequencing.simulate.rest import NOTHING, Mishaps, Rest, rest_of
@@ -29,14 +31,17 @@ class NewPlan:
 def plan_again(run: Run, mishaps: Mishaps, under_way: int | None = None) -> NewPlan:
     """The best order from where a run is; under_way: the decision that must come first, its part is in the gripper.
 
-    Raises WorkFailed where no order comes to its end.
+    Raises WorkFailed where no order comes to its end, and where that part cannot be brought on.
     """
     fallback_s = float(np.nanmax(run.cell.empty_s, initial=0.0))
     rest = rest_of(run, mishaps, fallback_s)
+    if under_way is not None and (rest.cell is None or Run(rest.cell).option(under_way) is None):
+        name = run.cell.part_name(part_of(under_way, run.cell.parts))
+        raise WorkFailed(f"{name} is in the gripper and cannot be brought on: take it out")
     if rest.cell is None:
         return NewPlan(run, (), None, None, rest.stuck)
     now = Run(rest.cell)
-    if under_way is None or now.option(under_way) is None:
+    if under_way is None:
         return _ordered(rest, now, ())
     ahead = branch(now)
     ahead.move(under_way)

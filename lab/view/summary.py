@@ -11,7 +11,7 @@ from rich.text import Text
 
 from lab.errors import counted
 from lab.view.cyclic_summary import period_in_words
-from lab.view.figures import beside, gap_of
+from lab.view.figures import SAME, beside, gap_of
 
 _STUDY_ROWS = 30
 SHOWN_MOVES = 60
@@ -198,20 +198,11 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     proven = "proven optimum" if found["optimum_proven"] else "proven bound"
     best, bound = beside(found["best_cost"], found["bound_cost"], unit, 2)
     alone = beside(found["cost"], found["bound_cost"], unit, 2)[0]
-    by = (
-        found["bound_by"]
-        if found["best_by"] == found["bound_by"]
-        else f"{found['best_by']}, bound by {found['bound_by']}"
-    )
-    gap = (
-        ""
-        if found["proven"] or found["bound_cost"] <= 0
-        else f", gap {gap_of(found['best_cost'] / found['bound_cost'] - 1, 2)}"
-    )
     lines = [
-        f"best order known: {what}{best} for {_ordered(found['order'])} (by {by}; seed {found['seed']})",
-        f"{proven} {bound}{gap}",
-        f"{found['method']} alone: {what}{alone}, in episode {found['found_at_episode']} of {found['episodes']}",
+        f"best order known: {what}{best} for {_ordered(found['order'])} (by {found['best_by']}; seed {found['seed']})",
+        f"{proven} {bound}{_gap(found['best_cost'], found)} ({found['bound_by']})",
+        f"{found['method']} alone: {what}{alone}{_gap(found['cost'], found)}, "
+        f"in episode {found['found_at_episode']} of {found['episodes']}",
         *_order_of_transfers(found),
     ]
     if found["luckiest_cost"] is not None:
@@ -229,6 +220,13 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     if found["stochastic"] is not None:
         lines += _drawn(found["stochastic"], unit)
     return Group(*map(Text, [*lines, *found["files"].values()]))
+
+
+def _gap(value: float, found: Mapping[str, Any]) -> str:
+    """How much more a cost is than the bound, in words; nothing where it is as much, or the bound is 0."""
+    bound = found["bound_cost"]
+    share = value / bound - 1 if bound > 0 else 0.0
+    return f", gap {gap_of(share, 2)}" if share > SAME else ""
 
 
 def _order_of_transfers(found: Mapping[str, Any]) -> list[str]:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from lab.errors import WorkFailed
 from lab.production.replanning import in_another, plan_again
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import Product, Stage, Station, one_robot
@@ -45,6 +46,11 @@ def test_a_lost_part_is_left_out(run: Run) -> None:
 def test_what_is_in_the_gripper_comes_first() -> None:
     found = plan_again(Run(oven()), Mishaps(), under_way=2)
     assert (found.sequence, found.proven) == ((2, 2, 1, 1), None)
+
+
+def test_what_is_in_the_gripper_and_has_nowhere_to_go_stops_the_work(run: Run) -> None:
+    with pytest.raises(WorkFailed, match="toast 2 is in the gripper and cannot be brought on: take it out"):
+        plan_again(run, Mishaps(), under_way=2)  # toast 1 is in the oven
 
 
 def test_what_is_in_an_oven_that_is_out_of_order_is_stuck(run: Run) -> None:

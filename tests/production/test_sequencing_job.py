@@ -19,6 +19,7 @@ from lab.production.sequencing_job import (
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES
+from lab.sequencing.cell.schedule_rows import rows_of
 from lab.sequencing.search import Reference
 from lab.sequencing.simulate.run import simulate
 from lab.tasks.sequencing import search_for
@@ -38,10 +39,20 @@ FIELDS = (
     *("found_at_episode", "luckiest_cost"),
     *("sequence", "moves", "episode_costs", "episode_makespans_s", "optimal_s", "optimal_cost", "optimum_proven"),
     *("bound_s", "bound_cost", "bound_by", "gap", "success_percent", "final_success_percent", "mean_best_s"),
-    *("mean_best_cost", "advisor", "advice", "stochastic", "files", "interrupted"),
+    *("mean_best_cost", "best_s", "best_cost", "best_by", "best_sequence", "best_moves", "schedule", "srl_s", "proven"),
+    *("robots", "advisor", "advice", "stochastic", "files", "interrupted"),
 )
 LEARNERS = ("srl", "srl-time", "mc")
-AT_ONCE = ("fifo", "exact", "cp-sat", "shortest-move", "longest-remaining-work", "most-urgent-machine", "nearest-ready")
+AT_ONCE = (
+    "fifo",
+    "exact",
+    "cp-sat",
+    "portfolio",
+    "shortest-move",
+    "longest-remaining-work",
+    "most-urgent-machine",
+    "nearest-ready",
+)
 UNDUE = sorted(set(SEQUENCERS) - {"earliest-due"})  # those that need no due times
 
 
@@ -74,6 +85,7 @@ def test_one_document_and_nothing_else_on_stdout(lab: Lab, folder: Path) -> None
 
 
 def test_a_cell_by_hand(lab: Lab) -> None:
+    oven = load_cell("oven.toml").cell()
     assert asked(lab, "oven.toml --method fifo --seed 5") == {
         "task": "oven",
         "toasts": 2,
@@ -102,6 +114,15 @@ def test_a_cell_by_hand(lab: Lab) -> None:
         "final_success_percent": None,
         "mean_best_s": 29.0,
         "mean_best_cost": 29.0,
+        "best_s": 29.0,
+        "best_cost": 29.0,
+        "best_by": "fifo",
+        "best_sequence": [1, 1, 2, 2],
+        "best_moves": ["toast 1: in > hot", "toast 1: hot > out", "toast 2: in > hot", "toast 2: hot > out"],
+        "schedule": rows_of(simulate(oven, (1, 1, 2, 2)), oven, "planned"),
+        "srl_s": None,
+        "proven": True,
+        "robots": 1,
         "advisor": "none",
         "advice": None,
         "stochastic": None,
@@ -179,9 +200,10 @@ def test_what_a_person_is_shown(lab: Lab) -> None:
     ran = lab("sequence", "toast", "--case", "I", "--method", "fifo", "--sessions", "2")
     assert ran.code == 0
     assert ran.out.splitlines() == [
-        "fifo: 544.00 s for 3 toasts (seed 0)",
-        "order of the transfers: 1 2 3 1 2 1 2 3 2 3 3",
-        "proven optimum 513.00 s, gap 6.04% (A*)",
+        "best order known: 513.00 s for 3 toasts (by A*; seed 0)",
+        "proven optimum 513.00 s (A*)",
+        "fifo alone: 544.00 s, gap 6.04%, in episode 1 of 1",
+        "order of the transfers: 1 2 1 2 1 2 3 2 3 3",
         "2 sessions: optimum found in 0 %, mean best 544.00 s",
     ]
 
@@ -246,14 +268,14 @@ def test_objectives_by_hand(lab: Lab, objective: str, cost: float, method: str) 
 
 def test_the_objective_is_told_in_words(lab: Lab) -> None:
     ran = lab("sequence", "late.toml", "--objective", "mean-tardiness", "--method", "earliest-due")
-    assert ran.out.splitlines()[0] == "earliest-due: mean tardiness 4.50 s for 2 toasts (seed 0)"
+    assert ran.out.splitlines()[0] == "best order known: mean tardiness 4.50 s for 2 toasts (by earliest-due; seed 0)"
     ran = lab("sequence", "late.toml", "--objective", "tardy-parts", "--method", "earliest-due")
-    assert ran.out.splitlines()[0] == "earliest-due: tardy parts 1.00 for 2 toasts (seed 0)"
+    assert ran.out.splitlines()[0] == "best order known: tardy parts 1.00 for 2 toasts (by earliest-due; seed 0)"
 
 
 def test_what_cannot_be_beaten_comes_from_whom_it_can() -> None:
     cell = load_cell("late.toml").cell()
-    assert reference(cell, "makespan") == Reference(29.0, True, "A*")
+    assert reference(cell, "makespan") == Reference(29.0, True, "A*", sequence=(1, 1, 2, 2), found_by="A*")
     for objective in set(OBJECTIVES) - {"makespan"}:
         assert reference(cell, objective).method == "CP-SAT"
 
@@ -375,7 +397,7 @@ def test_who_listens_hears_every_session(teacher: Teacher) -> None:
     assert document["sessions"] == 3
     assert heard[0] == PhaseBegan("sequence", 3)
     found = [(event.result.cost, event.reference) for event in heard if isinstance(event, SequenceFound)]
-    assert found == [(29.0, Reference(29.0, True, "A*"))] * 3
+    assert found == [(29.0, Reference(29.0, True, "A*", sequence=(1, 1, 2, 2), found_by="A*"))] * 3
 
 
 @pytest.mark.parametrize(

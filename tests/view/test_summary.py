@@ -219,6 +219,12 @@ FOUND: dict[str, Any] = {
     "bound_cost": 100.0,
     "bound_by": "A*",
     "gap": 0.1,
+    "found_at_episode": 7,
+    "episodes": 20,
+    "best_cost": 100.0,
+    "best_by": "annealing",
+    "best_sequence": [1, 2, 1, 2],
+    "best_moves": ["toast 1: in > hot", "toast 2: in > side", "toast 1: hot > out", "toast 2: side > out"],
     "sessions": 1,
     "success_percent": 0.0,
     "mean_best_cost": 110.0,
@@ -230,9 +236,10 @@ FOUND: dict[str, Any] = {
 
 def test_a_sequence() -> None:
     first = [
-        "srl: 110.00 s for 2 toasts (seed 3)",
-        "order of the transfers: 2 1 2 1",
-        "proven optimum 100.00 s, gap 10.00% (A*)",
+        "best order known: 100.00 s for 2 toasts (by annealing; seed 3)",
+        "proven optimum 100.00 s (A*)",
+        "srl alone: 110.00 s, gap 10.00%, in episode 7 of 20",
+        "order of the transfers: 1 2 1 2",
     ]
     assert shown(sequence_summary(FOUND)) == first
     several = {"sessions": 4, "success_percent": 75.0, "mean_best_cost": 102.5, "files": {"plot": "[e].png"}}
@@ -246,15 +253,24 @@ def test_a_sequence() -> None:
 @pytest.mark.parametrize(
     ("change", "line"),
     [
-        ({"optimum_proven": False, "bound_cost": 90.0}, "proven bound 90.00 s, gap 10.00% (A*)"),
-        ({"gap": None}, "proven optimum 100.00 s (A*)"),
-        ({"order": ["rook", "sign", "rook"]}, "srl: 110.00 s for 2 rooks, 1 sign (seed 3)"),
-        ({"objective": "mean-tardiness"}, "srl: mean tardiness 110.00 s for 2 toasts (seed 3)"),
-        ({"objective": "tardy-parts", "cost": 2.0}, "srl: tardy parts 2.00 for 2 toasts (seed 3)"),
+        ({"optimum_proven": False, "bound_cost": 80.0}, "proven bound 80.00 s, gap 25.00% (A*)"),
+        ({"best_by": "A*"}, "best order known: 100.00 s for 2 toasts (by A*; seed 3)"),
+        ({"order": ["rook", "sign", "rook"]}, "best order known: 100.00 s for 2 rooks, 1 sign (by annealing; seed 3)"),
         (
-            {"objective": "tardy-parts", "bound_cost": 1.0, "gap": 1.0, "bound_by": "CP-SAT"},
-            "proven optimum 1.00, gap 100.00% (CP-SAT)",
+            {"objective": "mean-tardiness"},
+            "best order known: mean tardiness 100.00 s for 2 toasts (by annealing; seed 3)",
         ),
+        ({"cost": 100.0}, "srl alone: 100.00 s, in episode 7 of 20"),
+        ({"bound_cost": 0.0, "optimum_proven": False}, "proven bound 0.00 s (A*)"),  # no share of nothing
+        (
+            {"objective": "tardy-parts", "cost": 2.0, "best_cost": 1.0, "bound_cost": 1.0, "bound_by": "CP-SAT"},
+            "srl alone: tardy parts 2.00, gap 100.00%, in episode 7 of 20",
+        ),
+        (
+            {"objective": "tardy-parts", "best_cost": 1.0, "bound_cost": 1.0, "bound_by": "CP-SAT"},
+            "proven optimum 1.00 (CP-SAT)",
+        ),
+        ({"best_sequence": [1, 4, 1, 2]}, "  toast 2: in > side"),  # 4: its second way
         ({"sessions": 2, "success_percent": None}, "2 sessions: mean best 110.00 s"),
     ],
 )
@@ -265,7 +281,7 @@ def test_sequences_that_went_otherwise(change: dict[str, Any], line: str) -> Non
 def test_a_sequence_with_advice() -> None:
     advice = {"requests": 12, "helped_steps": 40, "misleads": 1, "rejected_at_episode": None}
     lines = shown(sequence_summary(FOUND | {"advice": [advice, advice | {"rejected_at_episode": 95}]}))
-    assert lines[3:] == [
+    assert lines[4:] == [
         "session 1: asked in 12 episodes, 40 moves advised",
         "session 2: asked in 12 episodes, 40 moves advised; rejected its advisor in episode 95",
     ]
@@ -279,7 +295,7 @@ def test_a_sequence_in_drawn_times() -> None:
         "saved_by_reacting": {"mean": 3.0, "ci95": [2.25, 3.75]},
     }
     lines = shown(sequence_summary(FOUND | {"stochastic": drawn}))
-    assert lines[3:] == [
+    assert lines[4:] == [
         "200 drawn episodes: the list as it is 112.00 s (110.50 to 113.50)",
         "reacting 109.00 s (108.00 to 110.00): planned anew at every decision",
         "saved by reacting 3.00 s (2.25 to 3.75)",
