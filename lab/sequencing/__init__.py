@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from lab.sequencing.cell.cell import Cell
+    from lab.sequencing.methods.carried_over import CarriedPolicy
     from lab.sequencing.search import Search, SequenceResult
     from lab.sequencing.simulate.execution import Policy
 
@@ -113,10 +114,17 @@ def _queued(cell: "Cell", objective: str, seed: int) -> Reaction:
 
 
 def _carried_on(cell: "Cell", objective: str, seed: int) -> Reaction:
-    from lab.sequencing.methods.carried_over import DEFAULT, rule_of
+    from lab.sequencing.methods.carried_over import DEFAULT
+
+    return carried_reaction(DEFAULT)
+
+
+def carried_reaction(policy: "CarriedPolicy") -> Reaction:
+    """A carried-over policy, asked at every decision."""
+    from lab.sequencing.methods.carried_over import rule_of
     from lab.sequencing.methods.rollout import by_rule
 
-    return Reaction(by_rule(rule_of(DEFAULT)), "the carried-over policy, asked at every decision", plans=False)
+    return Reaction(by_rule(rule_of(policy)), "the carried-over policy, asked at every decision", plans=False)
 
 
 def _asked(name: str, cell: "Cell", objective: str, seed: int) -> Reaction:

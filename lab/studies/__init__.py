@@ -93,6 +93,12 @@ def _flat(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return flat(job, reading)
 
 
+def _carried_over(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.carried_over import carried_over
+
+    return carried_over(job, reading)
+
+
 def _changed_scenes(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.changed_scenes_study import changed_scenes
 
@@ -181,6 +187,9 @@ STUDIES: dict[str, Study] = {
         _reuse,
         sessions=10,
         least=1,
+    ),
+    "carried-over": Study(
+        "A policy learned on small cells orders larger ones, beside every dispatching rule", _carried_over, sessions=240
     ),
     "sequencing-speed": Study("Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed),
     "transport": Study(
