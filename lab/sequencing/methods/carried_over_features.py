@@ -117,6 +117,7 @@ def features(run: Run, allowed: tuple[int, ...], known: FeatureArrays) -> Floats
         free_s = survey.free_s.get(ahead, 0.0)
         brought = not served and known.machine[there] == ahead != last
         queue_s = max(0.0, free_s - end_s) if brought else 0.0
+        work_s = 0.0 if served else cell.positions[there].processing_s or 0.0
         full = not served and behind != last and run.occupied[behind] >= cell.capacities[behind]
         others = [
             max(_empty_s(cell, o, way.target), run.ready_s[p - 1] - end_s if o.waits else 0.0)
@@ -137,7 +138,7 @@ def features(run: Run, allowed: tuple[int, ...], known: FeatureArrays) -> Floats
             "slack": (cell.due_s or ())[index] - begins[i] - left_s if known.due else 0.0,
             "way-on": min(others, default=0.0),
             "other-way": end_s - min(e for e, p in zip(ends, parts, strict=True) if p == part),
-            "queued-tail": end_s + queue_s + known.left_s[there] - survey.tail_s,
+            "queued-tail": end_s + queue_s + work_s + known.left_s[there] - survey.tail_s,
         }
         plain = {
             "load-ahead": survey.share(ahead) - 1.0 if ahead != last else 0.0,
@@ -179,8 +180,8 @@ class _Survey:
                 self.free_s[station] = min((run.ready_s[part] for part in inside), default=0.0)
             to_come_s = sum(known.load_s[run.locations[part], station] for part in going)
             if to_come_s > 0.0:
-                wait_s = max(0.0, self.free_s.get(station, 0.0) - run.now_s)
-                self.loads_s[station] = wait_s + to_come_s
+                free_s = run.free_s(station) if cell.stations[station].servers else self.free_s.get(station, 0.0)
+                self.loads_s[station] = max(0.0, free_s - run.now_s) + to_come_s  # what waits there is to come
 
     def share(self, station: int) -> float:
         """The load of a machine as a share of the highest one."""

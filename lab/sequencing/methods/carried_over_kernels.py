@@ -96,11 +96,14 @@ def _survey(cell: Any, run: Any, known: Any, work: Any) -> None:
             work.free_s[machine] = min(work.free_s[machine], run.ready_s[part])
     highest_s = 0.0
     for station in range(last):
-        if cell.first_server[station + 1] == cell.first_server[station]:
+        if cell.first_server[station + 1] > cell.first_server[station]:
+            free_s = _first_free(cell, run, station)  # without what waits there, which is to come
+        else:
             if run.room[station] > 0 or work.free_s[station] == np.inf:
                 work.free_s[station] = 0.0  # there is room, or what takes it stays for ever
+            free_s = work.free_s[station]
         if work.load_s[station] > 0.0:
-            work.load_s[station] += max(0.0, work.free_s[station] - run.clock[0])
+            work.load_s[station] += max(0.0, free_s - run.clock[0])
             highest_s = max(highest_s, work.load_s[station])
     work.compared[0], work.compared[1] = tail_s, left_s / going
     work.compared[2] = highest_s if highest_s > 0.0 else 1.0
@@ -193,7 +196,8 @@ def _describe(cell: Any, run: Any, known: Any, work: Any, count: int, i: int) ->
     f[OTHER_WAY] = (end_s - work.least_s[part]) / scale_s
     if after < last:
         f[LOAD_AFTER] = work.load_s[after] / work.compared[2] - 1.0
-    f[QUEUED_TAIL] = f[QUEUE] + (end_s + known.left_s[there] - work.compared[0]) / scale_s
+    work_s = cell.processing_s[there] if robot != SERVER and cell.begins[there] else 0.0
+    f[QUEUED_TAIL] = f[QUEUE] + (end_s + work_s + known.left_s[there] - work.compared[0]) / scale_s
 
 
 @lean

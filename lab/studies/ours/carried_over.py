@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lab.errors import BadInput
 from lab.sequencing.cell.objectives import MAKESPAN, cost
 from lab.sequencing.methods.carried_over import CarriedPolicy, Decider
 from lab.sequencing.methods.carried_over_learning import CarriedLearning, learn_policy
@@ -83,7 +84,7 @@ def _kept(job: Job, kind: str, items: Sequence[Any], work: Any, read: Any) -> di
         try:
             if entry["key"] in names:
                 done[names[entry["key"]]] = read(entry["found"])
-        except (KeyError, TypeError):
+        except (KeyError, TypeError, AttributeError, BadInput):
             continue  # not ours: made anew
     left = [one for one in items if one not in done]
     job.progress(len(done), len(items))

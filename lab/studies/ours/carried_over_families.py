@@ -37,6 +37,7 @@ def shop(rng: np.random.Generator, least: int, most: int) -> Cell:
     at = rng.uniform(0.0, 1.0, (machines + 1, 2))
     ways = np.abs(at[:, None] - at[None]).sum(axis=-1) * rng.uniform(0.7, 1.3, (machines + 1, machines + 1))
     times = np.maximum(2.0, np.round(12.0 * rng.uniform(0.3, 1.5) * ways))
+    np.fill_diagonal(times, 0.0)
     names = [f"M{number}" for number in range(1, machines + 1)]
     stations = Station("LU", "storage", UNLIMITED), *(Station(n, "machine", UNLIMITED, servers=1) for n in names)
     products = []
