@@ -23,9 +23,9 @@ WORST = 3.0  # times the best rule's cost: more than that, as a deadlock costs, 
 class CarriedLearning:
     """How long it learns: generations of so many candidates, each tried on so many of the cells, drawn; step: the first."""
 
-    generations: int = 120
-    population: int = 24
-    batch: int = 80
+    generations: int = 200
+    population: int = 32
+    batch: int = 120
     step: float = 0.3
 
     def __post_init__(self) -> None:
