@@ -25,9 +25,7 @@ class _Held(Record):
 
 def write_policy(path: Path, policy: CarriedPolicy) -> None:
     """Writes a policy whole or not at all: the same one always gives the same bytes. BadInput when it cannot be written."""
-    held = _Held(
-        format=FORMAT, weights=dict(policy.weights), objective=policy.objective, learned_on=policy.learned_on
-    )
+    held = _Held(format=FORMAT, weights=dict(policy.weights), objective=policy.objective, learned_on=policy.learned_on)
     write_whole(path, json.dumps(held.model_dump(), indent=1) + "\n")
 
 

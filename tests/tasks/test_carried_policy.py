@@ -21,7 +21,9 @@ HELD = {"format": FORMAT, "weights": {"delay": -1.5, "tail": 0.25}, "objective":
     weights=st.dictionaries(st.sampled_from([*FEATURES]), st.floats(-1e6, 1e6)),
     said=st.text(st.characters(exclude_categories=["Cs"])),
 )
-def test_it_is_read_as_it_was_written(tmp_path_factory: pytest.TempPathFactory, weights: dict[str, float], said: str) -> None:
+def test_it_is_read_as_it_was_written(
+    tmp_path_factory: pytest.TempPathFactory, weights: dict[str, float], said: str
+) -> None:
     path = tmp_path_factory.mktemp("policies") / "policy.json"
     policy = CarriedPolicy(weights, learned_on=said)
     write_policy(path, policy)

@@ -49,7 +49,7 @@ def learn_policy(
 
     It begins with what `nearest_ready` does. The weights are the mean of those in the last quarter of the generations;
     one without which no run of these cells costs more is 0. The same seed gives the same policy. Raises BadInput for an
-    objective that a cell has no data for. Source: CMA-ES, Hansen 2016; direct policy search, Moriarty, Schultz and Grefenstette 1999.
+    objective that a cell has no data for. Source: CMA-ES, Hansen 2016; Moriarty et al. 1999, policies by evolution.
     """
     settings = settings or CarriedLearning()
     if not cells:

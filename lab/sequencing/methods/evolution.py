@@ -48,7 +48,9 @@ class Evolution:
         self.mean = self.mean + self._step * move
         whitened = self._axes @ ((self._axes.T @ move) / self._lengths)
         keep = 1.0 - self._step_rate
-        self._step_path = keep * self._step_path + sqrt(self._step_rate * (2.0 - self._step_rate) * self._mass) * whitened
+        self._step_path = (
+            keep * self._step_path + sqrt(self._step_rate * (2.0 - self._step_rate) * self._mass) * whitened
+        )
         length = float(np.linalg.norm(self._step_path))
         usual = self._usual * sqrt(1.0 - keep ** (2 * self._generation))
         steady = length / usual < 1.4 + 2.0 / (len(self.mean) + 1.0)

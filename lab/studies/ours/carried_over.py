@@ -29,7 +29,7 @@ TIME_LIMIT_S = 20.0  # of CP-SAT, for each of the larger cells that A* does not 
 REPEATS = 20  # of each run whose time is measured
 ABOUT = (
     "Policies are linear: {features} features of a decision, learned by CMA-ES from the costs of greedy runs alone, on {cells} "
-    "drawn small cells of a family ({generations} generations). The cells that they are tried on are larger, and none of them was "
+    "drawn small cells of a family ({generations} generations). They are tried on larger cells, none of which was "
     "learned on. No search: one decision after the other, the one of highest value. The best rule is the one with the "
     "lowest mean gap in the very cells of a row's group."
 )

@@ -55,7 +55,9 @@ def toasts(rng: np.random.Generator, least: int, most: int) -> Cell:
     factor = rng.uniform(0.7, 1.4)
     return replace(
         cell,
-        stations=tuple(replace(s, processing_s=round(s.processing_s * rng.uniform(0.5, 2.0), 1)) for s in cell.stations),
+        stations=tuple(
+            replace(s, processing_s=round(s.processing_s * rng.uniform(0.5, 2.0), 1)) for s in cell.stations
+        ),
         empty_s=np.round(cell.empty_s * factor, 2),
         loaded_s=np.round(cell.loaded_s * factor, 2),
     )
@@ -89,7 +91,11 @@ SMALL: Mapping[str, Callable[[np.random.Generator], Cell]] = {
     FMS: lambda rng: manufactured(rng, *PARTS),
 }
 BILGE_ULUSOY, MORE_JOBS = "Bilge and Ulusoy, two vehicles", "drawn, 10 to 20 jobs"
-THESIS_TOASTS, DRAWN_TOASTS, ORDERS = "cases I to III, 20 to 60 toasts", "drawn, 20 to 60 toasts", "orders of 12 to 30 parts"
+THESIS_TOASTS, DRAWN_TOASTS, ORDERS = (
+    "cases I to III, 20 to 60 toasts",
+    "drawn, 20 to 60 toasts",
+    "orders of 12 to 30 parts",
+)
 
 
 def unseen() -> tuple[Unseen, ...]:

@@ -12,6 +12,7 @@ from lab.sequencing.methods.carried_over import DEFAULT, CarriedPolicy, rule_of
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.rules import dispatch, nearest_ready
 from lab.sequencing.search import Search
+from lab.sequencing.simulate.execution import Observed
 from lab.sequencing.simulate.run import Run
 
 CellMaker = Callable[..., Cell]
@@ -36,7 +37,7 @@ def test_it_reacts_as_it_plans(toast_cell: CellMaker) -> None:
     run = Run(cell)
     choose = reaction.policy(cell)
     while allowed := run.allowed():
-        run.move(choose(run, allowed))
+        run.move(choose(Observed(run), allowed))
     assert run.end_s == find_sequence(cell, "carried", Search(1), 0).cost
     assert (reaction.words, reaction.plans) == ("the carried-over policy, asked at every decision", False)
 

@@ -54,7 +54,9 @@ def test_robots_and_servers_too(shops: Cells, data: DataObject) -> None:
 
 @settings(max_examples=60)
 @given(data=st.data(), weights=WEIGHTS)
-def test_the_run_is_that_of_the_readable_rule(shops: Cells, cells: Cells, data: DataObject, weights: dict[str, float]) -> None:
+def test_the_run_is_that_of_the_readable_rule(
+    shops: Cells, cells: Cells, data: DataObject, weights: dict[str, float]
+) -> None:
     cell = data.draw(st.one_of(shops(), cells(many=True)))
     policy, decider, run = CarriedPolicy(weights), Decider(cell), Run(cell)
     assert decider.sequence(policy.vector) == dispatch(run, rule_of(policy))
