@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from lab.sequencing.cell.cell import Cell
-    from lab.sequencing.methods.carried_over import CarriedPolicy
+    from lab.sequencing.methods.carried_over_policy import CarriedPolicy
     from lab.sequencing.search import Search, SequenceResult
     from lab.sequencing.simulate.execution import Policy
 
@@ -114,7 +114,7 @@ def _queued(cell: "Cell", objective: str, seed: int) -> Reaction:
 
 
 def _carried_on(cell: "Cell", objective: str, seed: int) -> Reaction:
-    from lab.sequencing.methods.carried_over import DEFAULT
+    from lab.sequencing.methods.carried_over_weights import DEFAULT
 
     return carried_reaction(DEFAULT)
 

@@ -11,7 +11,7 @@ from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective
 
 if TYPE_CHECKING:
-    from lab.sequencing.methods.carried_over import CarriedPolicy
+    from lab.sequencing.methods.carried_over_policy import CarriedPolicy
 
 FACTORS = ("A", "B")
 VALUES = ("pairs", "states")

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from lab.errors import BadInput
 from lab.sequencing.cell.objectives import MAKESPAN
-from lab.sequencing.methods.carried_over import CarriedPolicy
+from lab.sequencing.methods.carried_over_policy import CarriedPolicy
 from lab.tasks.record import Record, read_text, write_whole
 
 FORMAT: Literal["carried-policy-1"] = "carried-policy-1"

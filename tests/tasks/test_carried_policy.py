@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
-from lab.sequencing.methods.carried_over import CarriedPolicy
-from lab.sequencing.methods.carried_over_features import FEATURES
+from lab.sequencing.methods.carried_over_policy import FEATURES, CarriedPolicy
 from lab.tasks.carried_policy import FORMAT, read_policy, write_policy
 
 POLICY = CarriedPolicy({"delay": -1.5, "tail": 0.25}, "mean-tardiness", "three toasts")

@@ -1,49 +1,16 @@
 """A policy learned on small cells that orders larger ones: the decision whose features are worth most, without any search."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from math import isfinite
-
 import numpy as np
 
-from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
-from lab.sequencing.methods.carried_over_features import FEATURES, FeatureArrays, feature_arrays, features
-from lab.sequencing.methods.carried_over_weights import SHIPPED
+from lab.sequencing.cell.objectives import MAKESPAN, cost
+from lab.sequencing.methods.carried_over_features import FeatureArrays, feature_arrays, features
+from lab.sequencing.methods.carried_over_policy import CarriedPolicy
+from lab.sequencing.methods.carried_over_weights import DEFAULT
 from lab.sequencing.methods.rules import Rule
 from lab.sequencing.search import SAME, Search, SequenceResult, only_one
 from lab.sequencing.simulate.cell_arrays import Floats, cell_arrays, run_arrays
 from lab.sequencing.simulate.run import Run, follow
-
-MOST = 1e6  # of a weight
-
-
-@dataclass(frozen=True)
-class CarriedPolicy:
-    """What a feature of a decision is worth, by its name in FEATURES; one that is left out is worth 0.
-
-    objective: what it was learned for. learned_on: in words. BadInput for weights that cannot be, and names that nobody has.
-    """
-
-    weights: Mapping[str, float]
-    objective: str = MAKESPAN
-    learned_on: str = ""
-    vector: Floats = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        for name, weight in self.weights.items():
-            if name not in FEATURES:
-                raise unknown("feature", name, FEATURES, "policy")
-            if not (isfinite(weight) and abs(weight) <= MOST):
-                raise BadInput(f"weight of '{name}' = {weight}: allowed are finite numbers from -{MOST:g} to {MOST:g}")
-        if self.objective not in BUILT_IN:
-            raise unknown("objective", self.objective, BUILT_IN, "policy")
-        vector = np.array([self.weights.get(name, 0.0) for name in FEATURES])
-        object.__setattr__(self, "vector", vector)
-
-
-DEFAULT = CarriedPolicy(SHIPPED, learned_on="small cells of all families of the study carried-over, seed 0")
 
 
 def rule_of(policy: CarriedPolicy) -> Rule:

@@ -4,7 +4,6 @@ Times are counted in a cell's mean work of a move, loads as shares of the highes
 parts. `features` is the readable form; `carried_over_kernels` holds the compiled one.
 """
 
-from collections.abc import Mapping
 from math import isnan
 from typing import NamedTuple
 
@@ -13,32 +12,11 @@ import numpy as np
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES
 from lab.sequencing.cell.routes import SERVER, Option, from_the_ends, part_of
+from lab.sequencing.methods.carried_over_policy import FEATURES
 from lab.sequencing.methods.rules import loads_s, machine_of, work_left_s
 from lab.sequencing.simulate.cell_arrays import Floats, Ints
 from lab.sequencing.simulate.run import Run
 
-FEATURES: Mapping[str, str] = {
-    "delay": "how much later it begins than the decision that may begin first",
-    "empty-way": "how long the robot drives to the pick",
-    "idle": "how long the robot waits at the pick, or the machine's server for the part",
-    "part-waited": "how long the part is ready by then, at most ten moves; 0 at the start of its route",
-    "duration": "how long robot or server then work",
-    "tail": "the part's end if nothing stops it any more, less the latest of such ends",
-    "work-left": "work left of the part, less the mean of the parts that are not finished",
-    "load-ahead": "load of the machine that works on the part next, as a share of the highest, less 1",
-    "starves": "how long that machine is through with all it has before the part is brought",
-    "queue": "how long the part waits there until the machine is through with what it has",
-    "load-behind": "load of the full machine that the part leaves, as a share of the highest",
-    "server": "1 where a machine's server takes the part, 0 where a robot does",
-    "room": "1 over the room that is left where it goes",
-    "moves-left": "the part's moves to its end",
-    "slack": "due time less the part's end if nothing stops it any more; 0 where no due times count",
-    "way-on": "how long until the robot can pick another part after the drop",
-    "other-way": "how much later it ends than the same part by the best of its ways",
-    "enters": "1 where the part is at the start of its route",
-    "load-after": "load of the machine after the next, as a share of the highest, less 1",
-    "queued-tail": "tail, with the wait in the queue",
-}
 WAITED = 10.0  # moves: what was ready longer ago counts no more
 
 

@@ -7,7 +7,8 @@ import numpy as np
 from lab.learning.compiled import inner, lean
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import SERVER
-from lab.sequencing.methods.carried_over_features import FEATURES, WAITED
+from lab.sequencing.methods.carried_over_features import WAITED
+from lab.sequencing.methods.carried_over_policy import FEATURES
 from lab.sequencing.search import SAME
 from lab.sequencing.simulate.cell_arrays import Floats, Ints, most_moves
 from lab.sequencing.simulate.kernels import cost, list_allowed, reached_s, reset, server_for, take

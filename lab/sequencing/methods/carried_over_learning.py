@@ -8,8 +8,8 @@ import numpy as np
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, check_built_in, check_objective, cost
-from lab.sequencing.methods.carried_over import CarriedPolicy, Decider
-from lab.sequencing.methods.carried_over_features import FEATURES
+from lab.sequencing.methods.carried_over import Decider
+from lab.sequencing.methods.carried_over_policy import FEATURES, CarriedPolicy
 from lab.sequencing.methods.evolution import Evolution
 from lab.sequencing.methods.rules import dispatch, usable
 from lab.sequencing.search import SAME

@@ -10,8 +10,9 @@ import numpy as np
 
 from lab.errors import BadInput
 from lab.sequencing.cell.objectives import MAKESPAN, cost
-from lab.sequencing.methods.carried_over import CarriedPolicy, Decider
+from lab.sequencing.methods.carried_over import Decider
 from lab.sequencing.methods.carried_over_learning import CarriedLearning, learn_policy
+from lab.sequencing.methods.carried_over_policy import CarriedPolicy
 from lab.sequencing.methods.portfolio import best_known
 from lab.sequencing.methods.rules import dispatch, usable
 from lab.sequencing.search import gap

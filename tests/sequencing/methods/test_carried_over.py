@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 
-import numpy as np
 import pytest
 
-from lab.errors import BadInput, WorkFailed
+from lab.errors import WorkFailed
 from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.methods.carried_over import DEFAULT, CarriedPolicy, rule_of
+from lab.sequencing.methods.carried_over import rule_of
+from lab.sequencing.methods.carried_over_policy import CarriedPolicy
+from lab.sequencing.methods.carried_over_weights import DEFAULT
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.rules import dispatch, nearest_ready
 from lab.sequencing.search import Search
@@ -55,13 +56,3 @@ def test_a_deadlock_is_told(crossing_cell: CellMaker) -> None:
     search = Search(1, policy=CarriedPolicy({"enters": 1.0}))
     with pytest.raises(WorkFailed, match="no sequence for 2 parts came to its end in 1 episode: deadlocks"):
         find_sequence(crossing_cell(), "carried", search, 0)
-
-
-def test_what_is_no_policy() -> None:
-    with pytest.raises(BadInput, match=r"^unknown feature 'dely' \(policy\): did you mean 'delay'\?"):
-        CarriedPolicy({"dely": 1.0})
-    with pytest.raises(BadInput, match=r"^weight of 'delay' = nan: allowed are finite numbers"):
-        CarriedPolicy({"delay": float("nan")})
-    with pytest.raises(BadInput, match=r"^unknown objective 'makespam' \(policy\): did you mean 'makespan'\?"):
-        CarriedPolicy({}, "makespam")
-    assert not np.any(CarriedPolicy({}).vector)

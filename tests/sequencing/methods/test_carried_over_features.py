@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.methods.carried_over_features import FEATURES, feature_arrays, features
+from lab.sequencing.methods.carried_over_features import feature_arrays, features
+from lab.sequencing.methods.carried_over_policy import FEATURES
 from lab.sequencing.simulate.run import Run, follow
 
 CellMaker = Callable[..., Cell]

@@ -11,8 +11,9 @@ from hypothesis.strategies import DataObject, SearchStrategy
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import cost
 from lab.sequencing.methods import carried_over_kernels
-from lab.sequencing.methods.carried_over import CarriedPolicy, Decider, rule_of
-from lab.sequencing.methods.carried_over_features import FEATURES, feature_arrays, features
+from lab.sequencing.methods.carried_over import Decider, rule_of
+from lab.sequencing.methods.carried_over_features import feature_arrays, features
+from lab.sequencing.methods.carried_over_policy import FEATURES, CarriedPolicy
 from lab.sequencing.methods.rules import dispatch
 from lab.sequencing.simulate import kernels
 from lab.sequencing.simulate.cell_arrays import cell_arrays, run_arrays

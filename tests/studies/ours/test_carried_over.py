@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from lab.sequencing.methods.carried_over import CarriedPolicy, Decider
+from lab.sequencing.methods.carried_over import Decider
 from lab.sequencing.methods.carried_over_learning import CarriedLearning
+from lab.sequencing.methods.carried_over_policy import CarriedPolicy
 from lab.studies.findings import those
 from lab.studies.ours import carried_over as study
 from lab.studies.ours.carried_over import ALL, CARRIED, Surveyed, carried_over, decisions_per_s, rows_of, surveyed
