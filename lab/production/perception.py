@@ -61,7 +61,8 @@ def perceive(
 ) -> list[Deviation]:
     """All that is not as believed: fixed things as task and layout have them, parts on their spots, by body.
 
-    delivered: those that have to stay within DELIVERED_M of them. What is in the gripper is left out. The order is that of `Sort` for parts, then strange parts, obstacles and stations.
+    delivered: those that have to stay within DELIVERED_M of them. What is in the gripper is left out. The order is that of
+    `Sort` for parts, then strange parts, obstacles and stations.
     """
     if floor.world.dark:
         return [Deviation("camera blind", "", "the camera sees nothing")]
@@ -69,9 +70,7 @@ def perceive(
     return [*found, *_obstacles(floor, task, layout), *_stations(floor, task)]
 
 
-def _parts(
-    floor: Floor, task: Task, spot_of: Mapping[str, Spot], delivered: Container[str]
-) -> Iterator[Deviation]:
+def _parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot], delivered: Container[str]) -> Iterator[Deviation]:
     held = _held(floor)
     for body, spot in spot_of.items():
         if body in held:
