@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.learning.compiled import inner, lean
-from lab.sequencing.methods.priority_kernels import OrderArrays, below, carried_out, changed, copied, drawn
+from lab.sequencing.methods.priority_kernels import OrderArrays, carried_out, changed, copied, drawn
 from lab.sequencing.simulate.cell_arrays import Floats, Ints
 
 
@@ -14,7 +14,7 @@ class LearnedOrders(NamedTuple):
     """What is learned of the L entries of a list, and the episode under way.
 
     An entry is a part and which of its moves; first (K + 1,): where the entries of each part begin. place, spread (L,): where
-    in the list it should stand, from 0 to 1, and how sure that is. ways (L, C): how good each way is for it. drawn (L,):
+    in the list it should stand, from 0 to 1, and how unsure that is. ways (L, C): the probability of each way. drawn (L,):
     the places of an episode; by (L,): the entries in their order. tried: the neighbour of parts, choices (L,), which cost
     cost (2,): of these, and the least so far. nth (K,): how many entries of a part were met. best (L,): the best decisions,
     then zeros. stream (1,): the state of the random numbers.
@@ -37,16 +37,14 @@ class LearnedOrders(NamedTuple):
 
 @inner
 def _way_of(learned: Any, entry: int, explores: bool) -> int:
-    """A way for an entry: drawn by how good they are, or the best one."""
-    count, total = learned.ways.shape[1], 0.0
-    best = 0
+    """A way for an entry: drawn by their probabilities, or the likeliest one."""
+    count, best = learned.ways.shape[1], 0
     for way in range(count):
-        total += learned.ways[entry, way]
         if learned.ways[entry, way] > learned.ways[entry, best]:
             best = way
     if not explores or count == 1:
         return best
-    left = drawn(learned.stream) * total
+    left = drawn(learned.stream)
     for way in range(count):
         left -= learned.ways[entry, way]
         if left < 0.0:
@@ -61,7 +59,7 @@ def _listed(learned: Any, explores: bool) -> None:
     for part in range(len(learned.nth)):
         learned.nth[part] = 0
         for entry in range(learned.first[part], learned.first[part + 1]):
-            learned.parts[entry] = part
+            learned.parts[entry] = part  # only until the list is kept
     for entry in range(size):
         at = learned.place[entry]
         if explores:
@@ -100,6 +98,7 @@ def _learn(learned: Any, alpha: float) -> None:
 
 @inner
 def _try(cell: Any, run: Any, learned: Any, limit: float) -> float:
+    """What the list in `tried` costs; up to the limit it is kept."""
     value = carried_out(cell, run, learned.tried, limit)
     if value <= limit:
         learned.cost[0] = value
@@ -112,8 +111,8 @@ def _try(cell: Any, run: Any, learned: Any, limit: float) -> float:
 
 
 @lean
-def session(cell: Any, run: Any, learned: Any, costs: Any, alpha: float, temperature: float) -> None:
-    """One episode of as many sequences as there are costs (N,), which are filled: one drawn, the others to improve it."""
+def lesson(cell: Any, run: Any, learned: Any, costs: Any, alpha: float, temperature: float) -> None:
+    """As many sequences as there are costs (N,), which are filled: one is drawn, the others improve it; then it is learned from."""
     _listed(learned, True)
     learned.cost[0] = np.inf
     costs[0] = _try(cell, run, learned, np.inf)
@@ -122,7 +121,8 @@ def session(cell: Any, run: Any, learned: Any, costs: Any, alpha: float, tempera
         changed(learned.tried, learned.stream, learned.ways.shape[1])
         warm = temperature * (1.0 - n / len(costs))
         costs[n] = _try(cell, run, learned, learned.cost[0] - warm * np.log(1.0 - drawn(learned.stream)))
-    _learn(learned, alpha * np.exp((learned.cost[1] - learned.cost[0]) / max(1e-9, temperature)))
+    if learned.cost[1] < np.inf:  # else nothing has come to its end yet
+        _learn(learned, alpha * np.exp((learned.cost[1] - learned.cost[0]) / max(1e-9, temperature)))
 
 
 @lean
