@@ -151,7 +151,9 @@ def _rule(name: str, words: str) -> Sequencer:
 SEQUENCERS: dict[str, Sequencer] = {
     "srl": Sequencer(_srl, "the thesis's: learns from the reward of whole episodes, as printed", drawn=True),
     "srl-time": Sequencer(
-        _srl_time, "our own: learns step by step what time still to come costs, from a bound on", react=_learned_on
+        _srl_time,
+        "our own: learns step by step what time still to come costs, from a bound of the whole model on",
+        react=_learned_on,
     ),
     "srl-improved": Sequencer(
         _srl_improved, "our own: learns where in the order moves belong, from episodes that it improves"
@@ -160,7 +162,9 @@ SEQUENCERS: dict[str, Sequencer] = {
     "random": Sequencer(_random, "the best of so many sequences drawn evenly", drawn=True),
     "fifo": Sequencer(_fifo, "first in, first out: a queue of tasks", react=_queued),
     "ga": Sequencer(_genetic, "a genetic algorithm begun with the rules', each child improved"),
-    "anneal": Sequencer(_anneal, "simulated annealing of a list of priorities, begun with the best rule's"),
+    "anneal": Sequencer(
+        _anneal, "simulated annealing of a list of priorities, begun with the best rule's: a search, it learns nothing"
+    ),
     "exact": Sequencer(_exact, "best-first search (A*) to the proven optimum"),
     "cp-sat": Sequencer(_cp_sat, "constraint programming, for every objective"),
     "portfolio": Sequencer(_portfolio, "annealing, then the exact search that proves most, begun with what it found"),

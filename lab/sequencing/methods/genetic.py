@@ -1,4 +1,4 @@
-"""A genetic algorithm as a rival: lists of priorities begun with the dispatching rules', crossed part by part, each child improved."""
+"""A genetic algorithm as a rival: it begins with the dispatching rules, crosses lists of priorities and improves each child."""
 
 import numpy as np
 
@@ -17,10 +17,11 @@ ROUND = 500  # sequences between two looks at the clock, the listener and Ctrl-C
 def genetic(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
     """The best sequence that a genetic algorithm with local improvement finds by the mean times; every one tried is an episode.
 
-    A population holds the lists of all dispatching rules and others that are drawn. Again and again two parents, each the better
-    of two drawn ones, have a child, which a short descent improves (a memetic algorithm); it takes the place of the worse
-    of two drawn ones if it is no worse, so that the best one always stays. Of makespans, a neighbour that has become too long is given
-    up, and its episode costs what it would have cost at the least. Raises BadInput and WorkFailed as the other methods do.
+    A population holds the lists of all dispatching rules and others that are drawn. Again and again two parents, each the
+    better of two drawn ones, have a child, which a short descent improves (a memetic algorithm); it takes the place of the
+    worse of two drawn ones if it is no worse, so that the best one always stays. Of makespans, a neighbour that has become
+    too long is given up, and its episode costs what it would have cost at the least. It is a search and learns nothing.
+    Raises BadInput and WorkFailed as the other methods do.
     Source: Moscato 1989; steady state, Whitley 1989; job-based order crossover, Ono, Yamamura and Kobayashi 1996;
     lists of operations as chromosomes, Bierwirth 1995.
     """
@@ -42,7 +43,7 @@ def genetic(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceRes
 
 
 def _population(orders: Orders, size: int, seed: int) -> Population:
-    """The lists of the rules that come to their ends, the best first, as far as there is room for half of all; others are drawn."""
+    """The lists of the rules that come to their ends, the best first, at most half of all; others are drawn."""
     ruled = sorted((one for one in orders.begun if one.done), key=lambda one: one.cost)[: max(1, size // 2)]
     first, stream = orders.first, np.array([seed], np.uint64)
     parts, choices = np.tile(first.parts, (size, 1)), np.tile(first.choices, (size, 1))

@@ -45,9 +45,9 @@ METHODS = (
 )
 WALLS = (
     "Seconds are those of one session on one core, other processes of the study beside it; compiling is not counted. srl, mc "
-    "and random are compiled and run many sessions at once; ga is compiled, one session after the other; srl-time, the rules and exact are plain Python. srl-time "
-    "takes its lower bound's table into the count. exact proves the optimum of all these jobs in less "
-    "time than 200 episodes of srl-time take: a learner is of use where there is no such proof."
+    "and random are compiled and run many sessions at once; ga is compiled, one session after the other; srl-time, the rules "
+    "and exact are plain Python. srl-time takes its lower bound's table into the count. exact proves the optimum of all these "
+    "jobs in less time than 200 episodes of srl-time take: a learner is of use where there is no such proof."
 )
 LIMITS = (
     f"Sessions at most: {CAPS['few']['srl-time']} of srl-time, with and without the bound, with few toasts; with 10 and more "

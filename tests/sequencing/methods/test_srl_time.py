@@ -132,8 +132,8 @@ def test_without_the_bound_values_begin_at_0_and_still_only_rise(cells: Cells, d
 
 
 def test_what_the_bound_is_worth(toast_cell: CellMaker) -> None:
-    """Four toasts: ten episodes are enough with the bound, and not without it; in the end both come to the optimum."""
+    """Four toasts: fifty episodes are enough with the bound and not without it, for which it takes some hundred."""
     cell = toast_cell("II", 4)
-    first = [srl_time(cell, Search(10), np.random.default_rng(seed), bounded=False).final_cost for seed in range(5)]
-    assert min(first) > optimum(cell).cost == learned(cell, 10).final_cost
-    assert srl_time(cell, Search(1500), np.random.default_rng(0), bounded=False).cost == optimum(cell).cost
+    for seed in range(3):
+        few, many = (srl_time(cell, Search(n), np.random.default_rng(seed), bounded=False) for n in (50, 500))
+        assert few.final_cost > optimum(cell).cost == many.final_cost == learned(cell, 50, seed).final_cost
