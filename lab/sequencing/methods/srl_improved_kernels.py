@@ -112,7 +112,7 @@ def _try(cell: Any, run: Any, learned: Any, limit: float) -> float:
 
 @lean
 def lesson(cell: Any, run: Any, learned: Any, costs: Any, alpha: float, temperature: float) -> None:
-    """As many sequences as there are costs (N,), which are filled: one drawn, the others to improve it; then it is learned from."""
+    """As many sequences as there are costs (N,), which are filled: one drawn, the others to improve it; then it is learned."""
     _listed(learned, True)
     learned.cost[0] = np.inf
     costs[0] = _try(cell, run, learned, np.inf)

@@ -16,7 +16,7 @@ Cells = Callable[..., st.SearchStrategy[Cell]]
 
 
 def test_crossing_by_hand(oven_cell: Callable[..., Cell]) -> None:
-    """Parents 1 1 2 2 3 3 and 3 2 1 3 2 1: what is inherited stays in the first one's places, the rest is in the other's order."""
+    """Parents 1 1 2 2 3 3 and 3 2 1 3 2 1: what is inherited stays in the first one's places, the rest in the other's order."""
     population = _population(Orders(oven_cell(3), "makespan", "a test"), 2, 0)
     population.parts[0], population.parts[1] = [0, 0, 1, 1, 2, 2], [2, 1, 0, 2, 1, 0]
     seen = dict[tuple[bool, ...], list[int]]()
