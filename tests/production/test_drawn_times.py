@@ -120,7 +120,7 @@ def test_the_file_says_what_is_drawn(lab: Lab, monkeypatch: pytest.MonkeyPatch, 
     drawn = asked(lab, "come.toml --method fifo --stochastic")["stochastic"]
     assert (drawn["processing"], drawn["arrivals"], drawn["spread"]) == ("constant", "exponential", 0.2)
     ran = lab("sequence", "come.toml", "--method", "fifo", "--stochastic")
-    assert ran.out.splitlines()[3].startswith("3 drawn episodes: the list as it is ")
+    assert ran.out.splitlines()[4].startswith("3 drawn episodes: the list as it is ")
 
 
 @pytest.mark.usefixtures("measured")
