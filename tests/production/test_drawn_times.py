@@ -94,7 +94,7 @@ def test_who_plans_at_every_decision_is_given_fewer_episodes(
 def test_the_best_list_is_the_one_that_is_carried_out(monkeypatch: pytest.MonkeyPatch) -> None:
     few(monkeypatch, 2)
     file = load_cell("toast-case-1")
-    wanted = Wanted("ga", 8, sessions=4, stochastic=True)
+    wanted = Wanted("ga", 100, sessions=4, stochastic=True)
     document, found = sequence_cell(file.cell(3), file.sequencing, wanted, file.chance())
     best = min(found, key=lambda result: result.cost)
     assert best.cost < found[-1].cost
