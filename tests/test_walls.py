@@ -42,7 +42,6 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
         *(f"lab.sequencing.methods.cp_sat{part}" for part in ("", "_model", "_tasks", "_rooms", "_transport")),
         "lab.sequencing.cyclic.model",
     },
-    "pymoo": {"lab.sequencing.methods.genetic"},
     "starlette": {"lab.view.server", "lab.view.server_page"},
     "uvicorn": {"lab.view.server"},
     "websockets": set(),  # uvicorn's
@@ -59,7 +58,7 @@ NEVER = {  # room -> rooms that it never imports, whatever the layers say
 }
 HEAVY = (
     *("numpy", "pydantic", "scipy", "trimesh", "matplotlib", "numba", "meshcat", "cv2", "pybullet", "safetensors"),
-    *("ortools", "pymoo", "starlette", "uvicorn", "gymnasium", "jinja2", "fsspec"),
+    *("ortools", "starlette", "uvicorn", "gymnasium", "jinja2", "fsspec"),
 )
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 
@@ -261,7 +260,7 @@ def faults(module: str, source: str) -> list[str]:
             "from ortools.sat.python import cp_model",
             "allowed in ['lab.sequencing.cyclic.model', ",
         ),
-        ("lab.sequencing.methods.fifo", "def f():\n    import pymoo", "allowed in ['lab.sequencing.methods.genetic']"),
+        ("lab.sequencing.methods.fifo", "def f():\n    import jinja2", "allowed in ['lab.studies.report']"),
         ("lab.mdp", "import random", "allowed in no module"),
         ("lab.toolbox.registry", "import pickle", "allowed in no module"),
         ("lab.mdp", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import lab.sim.world", "never does"),

@@ -129,7 +129,6 @@ def test_help_loads_nothing_heavy(root: Path) -> None:
         "pybullet",
         "safetensors",
         "ortools",
-        "pymoo",
     )
     code = f"""
 import sys

@@ -31,8 +31,21 @@ def found(
 
 def test_the_table() -> None:
     rules = ("shortest-move", "nearest-ready", "longest-remaining-work", "most-urgent-machine", "earliest-due")
-    methods = {"srl", "srl-time", "mc", "random", "fifo", "ga", "anneal", "exact", "cp-sat", "portfolio", "carried"}
-    assert set(NAMES) == {*methods, *rules}
+    assert set(NAMES) == {
+        "srl",
+        "srl-time",
+        "srl-improved",
+        "mc",
+        "random",
+        "fifo",
+        "ga",
+        "anneal",
+        "exact",
+        "cp-sat",
+        "portfolio",
+        "carried",
+        *rules,
+    }
 
 
 @pytest.mark.parametrize("name", NAMES)

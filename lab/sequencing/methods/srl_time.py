@@ -33,14 +33,16 @@ class SrlTimeResult(LearnedSequence):
     q: Table
 
 
-def srl_time(cell: Cell, search: Search, rng: np.random.Generator) -> SrlTimeResult:
+def srl_time(cell: Cell, search: Search, rng: np.random.Generator, bounded: bool = True) -> SrlTimeResult:
     """Learn in simulated episodes which position to serve next; the best sequence found is the result.
 
     Where alike parts are more than in SMALL_JOBS, these are learned first, each in a fifth of the episodes, and what was
     learned is tried on the job in a twentieth: with many parts waiting and many done, it does not matter how many. In
     what is left the job itself is learned. `episode_costs` are those of the job.
     Q(s,a) begins at what the step costs and what has to come at least after it (`lower_bound`), never above the
-    truth, so that greedy choices explore by themselves; ties are drawn by `rng`. After an episode, from its last step to
+    truth, so that greedy choices explore by themselves; ties are drawn by `rng`. That bound knows the whole model, its
+    times and all that is still to come, which a learner that only sees episodes does not: with `bounded` False values begin
+    at 0. After an episode, from its last step to
     its first, Q(s,a) = cost of the step + min Q(s',.): Q-learning with alpha 1, exact where nothing is left to chance. It
     learns with the mean times; `srl_time_reacting` goes on learning where times are drawn. Raises BadInput for an
     objective that the cell has no times for.
@@ -48,10 +50,10 @@ def srl_time(cell: Cell, search: Search, rng: np.random.Generator) -> SrlTimeRes
     """
     search.check(cell)
     log, final = Log(search), inf
-    learner, left = TimeLearner(cell, search.objective, rng), search.episodes
+    learner, left = TimeLearner(cell, search.objective, rng, bounded), search.episodes
     for parts in SMALL_JOBS if _many_alike(cell) else ():
         practice, tries = search.episodes // PRACTICE, search.episodes // TRIES
-        small = TimeLearner(replace(cell, order=cell.order[:parts]), search.objective, rng)
+        small = TimeLearner(replace(cell, order=cell.order[:parts]), search.objective, rng, bounded)
         for _ in range(practice):
             small.episode()
         for _ in range(tries):
@@ -71,15 +73,18 @@ def _many_alike(cell: Cell) -> bool:
 
 
 class TimeLearner:
-    """The table, and how an episode goes. distinct: alike parts are told apart, which due times make necessary."""
+    """The table, and how an episode goes. distinct: alike parts are told apart, which due times make necessary.
 
-    def __init__(self, cell: Cell, objective: str, rng: np.random.Generator) -> None:
+    bounded: values begin at what has to come at least; else at 0.
+    """
+
+    def __init__(self, cell: Cell, objective: str, rng: np.random.Generator, bounded: bool = True) -> None:
         check_built_in(objective, "srl-time")
         self.q: Table = {}
         self.merged = MergedCell(cell)
         self.distinct = objective in WITH_DUE_TIMES
-        self._cell, self._objective, self._rng = cell, objective, rng
-        self._bound = LowerBound(self.merged) if objective in (MAKESPAN, "machine-idle") else None
+        self._cell, self._objective, self._rng, self._bounded = cell, objective, rng, bounded
+        self._bound = LowerBound(self.merged) if bounded and objective in (MAKESPAN, "machine-idle") else None
         self.stuck_cost, self._machines = stuck_cost(cell, objective), machine_places(cell)
         self._all_work_s = sum(place.processing_s or 0.0 for place in cell.positions)
 
@@ -166,7 +171,9 @@ class TimeLearner:
         return self.q[key]
 
     def _at_least(self, state: MergedState, action: Action) -> float:
-        """What an action costs, and what has to come at least after it."""
+        """What an action costs, and what has to come at least after it; 0 where nobody is to know."""
+        if not self._bounded:
+            return 0.0
         ahead, cost = self.step(state, action)
         if self._bound is None:
             return cost

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 LOOKS: dict[tuple[str, str | None], Look] = {  # by method and reward factor
     ("srl-time", None): (BLUE, "o", "srl-time"),
+    ("srl-time without the bound", None): (BLUE, "x", "srl-time without the bound"),
     ("srl", "B"): (ORANGE, "s", "SRL, type B"),
     ("srl", "A"): (RED, "D", "SRL, type A"),
     ("mc", None): (GREEN, "^", "Monte Carlo"),

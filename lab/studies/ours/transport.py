@@ -30,7 +30,8 @@ TIMES = (
 )
 LEARNERS = (
     "srl and mc learn from the costs of whole sequences alone; srl-time is given a lower bound of the whole cell besides, and "
-    "takes cells with one robot only. anneal, ga and random search learn nothing; exact, cp-sat and portfolio know the "
+    "takes cells with one robot only. srl-improved learns from sequences that a short annealing has improved, so that much of "
+    "what it finds is that search's. anneal, ga and random search learn nothing; exact, cp-sat and portfolio know the "
     "cell's model."
 )
 CHECKED = (

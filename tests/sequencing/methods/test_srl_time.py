@@ -116,3 +116,24 @@ def test_many_parts_that_may_block_one_another(oven_cell: CellMaker) -> None:
     stuck = [cost for cost in result.episode_costs if cost == stuck_cost(cell, "makespan")]
     assert stuck
     assert result.cost == simulate(cell, result.sequence).makespan_s
+
+
+@settings(max_examples=25, deadline=None)
+@given(data=st.data(), seed=st.integers(0, 2**32 - 1))
+def test_without_the_bound_values_begin_at_0_and_still_only_rise(cells: Cells, data: st.DataObject, seed: int) -> None:
+    """What is not known of the model is found out: never above the truth, in more episodes."""
+    cell = data.draw(cells(max_machines=2, max_parts=2, many=True))
+    found = [srl_time(cell, Search(n), np.random.default_rng(seed), bounded=False) for n in (1, 4, 16)]
+    start = next(iter(found[0].q))
+    assert all(min(one.q[start].values()) <= optimum(cell).cost + 1e-6 for one in found)
+    for fewer, more in pairwise(found):
+        for state, row in fewer.q.items():
+            assert all(0.0 <= value <= more.q[state][action] + 1e-6 for action, value in row.items())
+
+
+def test_what_the_bound_is_worth(toast_cell: CellMaker) -> None:
+    """Four toasts: fifty episodes are enough with the bound and not without it, for which it takes some hundred."""
+    cell = toast_cell("II", 4)
+    for seed in range(3):
+        few, many = (srl_time(cell, Search(n), np.random.default_rng(seed), bounded=False) for n in (50, 500))
+        assert few.final_cost > optimum(cell).cost == many.final_cost == learned(cell, 50, seed).final_cost

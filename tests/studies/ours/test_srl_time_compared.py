@@ -12,7 +12,16 @@ from lab.sequencing.methods.exact import optimum
 from lab.studies.findings import Findings
 from lab.studies.ours import srl_time_compared, srl_time_sessions
 from lab.studies.ours.srl_time_compared import rows_of, settings_of, srl_time_study, works_of
-from lab.studies.ours.srl_time_sessions import CAPS, Instance, MethodOutcome, MethodSetting, sessions_for, single, tried
+from lab.studies.ours.srl_time_sessions import (
+    CAPS,
+    UNBOUNDED,
+    Instance,
+    MethodOutcome,
+    MethodSetting,
+    sessions_for,
+    single,
+    tried,
+)
 from lab.studies.runner import Job
 
 THREE = Instance("II", 3)
@@ -32,7 +41,7 @@ def test_every_rival_is_asked() -> None:
     assert sorted(single(THREE)) == sorted(("fifo", *RULES, "exact", "cp-sat"))
     assert "cp-sat" not in single(RSR)  # it does not prove all of them in seconds
     asked = {(one.method, one.reward_factor) for one in settings_of(THREE) if one.episodes is not None}
-    learners = {("srl", "B"), ("srl-time", None), ("random", None), ("ga", None)}
+    learners = {("srl", "B"), ("srl-time", None), (UNBOUNDED, None), ("random", None), ("ga", None)}
     assert asked == learners | {("srl", "A"), ("mc", None)}
     assert {one.episodes for one in settings_of(THREE)} == {None, 5, 15, 30, 60, 200}
     many = settings_of(Instance("I", 30))
@@ -51,7 +60,8 @@ def test_every_rival_is_asked() -> None:
         (MethodSetting(Instance("I", 30), "srl", 200, "B"), CAPS["many"]["readable"]),
         (MethodSetting(Instance("I", 30), "random", 200), CAPS["many"]["compiled"]),
         (MethodSetting(RSR, "srl", 200, "B"), CAPS["order"]["compiled"]),
-        (MethodSetting(RSR, "ga", 200), CAPS["order"]["ga"]),
+        (MethodSetting(RSR, "ga", 200), 500),
+        (MethodSetting(RSR, UNBOUNDED, 200), CAPS["order"][UNBOUNDED]),
     ],
 )
 def test_what_takes_long_is_tried_less_often(setting: MethodSetting, sessions: int) -> None:
@@ -60,7 +70,7 @@ def test_what_takes_long_is_tried_less_often(setting: MethodSetting, sessions: i
 
 
 @pytest.mark.parametrize(
-    "method", ["srl", "mc", "random", "srl-time", "ga", "fifo", "nearest-ready", "exact", "cp-sat"]
+    "method", ["srl", "mc", "random", "srl-time", UNBOUNDED, "ga", "fifo", "nearest-ready", "exact", "cp-sat"]
 )
 def test_what_sessions_come_to(method: str) -> None:
     learns = method in srl_time_sessions.LEARNING
@@ -69,7 +79,7 @@ def test_what_sessions_come_to(method: str) -> None:
     assert len(found.gap) == len(found.wall_s) == (3 if learns else 1)
     assert (found.gap >= 0).all()
     assert (found.wall_s > 0).all()
-    assert np.isfinite(found.final_gap).all() == (method in ("srl", "mc", "srl-time"))
+    assert np.isfinite(found.final_gap).all() == (method in ("srl", "mc", "srl-time", UNBOUNDED))
     if method in ("exact", "cp-sat"):
         assert found.gap.tolist() == [0.0]
     again = tried(setting, sessions=3, seed=1)
