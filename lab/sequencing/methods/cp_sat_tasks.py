@@ -13,7 +13,7 @@ from lab.sequencing.methods.cp_sat_times import Times
 
 
 class Team(NamedTuple):
-    """Robots, by index, that are alike in where they start, how fast they are and what they serve."""
+    """Robots, by index, that are alike in how fast they are and what they serve; they may start in different places."""
 
     robots: tuple[int, ...]
 
@@ -96,7 +96,7 @@ def teams_of(cell: Cell) -> list[Team]:
     """The robots, alike ones together."""
     alike = defaultdict[object, list[int]](list)
     for number, robot in enumerate(cell.robots):
-        alike[robot.start, robot.speed, robot.serves].append(number)
+        alike[robot.speed, robot.serves].append(number)
     return [Team(tuple(robots)) for robots in alike.values()]
 
 
