@@ -1,12 +1,10 @@
 """A second opinion on the best sequence, for every objective: the cell as a constraint model, solved by CP-SAT."""
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from time import perf_counter
 from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 from ortools.sat.python import cp_model
@@ -14,7 +12,9 @@ from ortools.sat.python import cp_model
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, check_built_in, check_objective, cost
+from lab.sequencing.methods.cp_sat_free import free_robots
 from lab.sequencing.methods.cp_sat_model import Model
+from lab.sequencing.methods.cp_sat_solver import Status, solved
 from lab.sequencing.methods.cp_sat_tasks import possible_tasks
 from lab.sequencing.methods.cp_sat_transport import TransportModel
 from lab.sequencing.methods.rules import first_come
@@ -27,16 +27,6 @@ MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory gro
 
 FIRST_LOOK = 3.0  # about so many seconds of a thread, counted in what the solver does
 GROWS = 2.0
-PATIENCE_S = 5.0  # so long it looks at least before it begins again with another method's better order
-WAIT_S = 0.05
-
-Status = Literal["optimal", "feasible", "unknown", "impossible"]
-_STATUS: dict[object, Status] = {
-    cp_model.OPTIMAL: "optimal",
-    cp_model.FEASIBLE: "feasible",
-    cp_model.UNKNOWN: "unknown",
-    cp_model.INFEASIBLE: "impossible",
-}
 
 
 @dataclass(frozen=True)
@@ -86,12 +76,22 @@ def cp_sat(
     return _searched(_Asked(Shared(cell, objective), seed, workers, time_limit_s), tuple(known))
 
 
-def beside(shared: Shared, time_limit_s: float, seed: int, workers: int) -> CpSatResult:
+def beside(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
     """As `cp_sat`, beside other methods: it begins with the best order of all, again where another one finds a better one.
 
-    All that it finds and proves is told to the others as it comes; it ends when they are over, too.
+    All that it finds and proves is told to the others as it comes; it ends when they are over, too. Of a cell that is too large
+    for a model it gives a bound only. The time limit holds for all of it [s].
     """
-    return _searched(_Asked(shared, seed, workers, time_limit_s), shared.sequence)
+    begin_s, cell = perf_counter(), shared.cell
+    if (
+        cell.robots
+        and shared.objective != "robot-idle"
+        and not (fits(cell) and (cell.serial or shared.objective != MAKESPAN))
+    ):
+        free_robots(shared, time_limit_s, seed, workers)
+    left_s = time_limit_s - (perf_counter() - begin_s)
+    if fits(cell) and left_s > 0 and not shared.over.is_set():
+        _searched(_Asked(shared, seed, workers, left_s), shared.sequence)
 
 
 @dataclass
@@ -188,7 +188,7 @@ def _result(
     solver.parameters.absolute_gap_limit = model.blur
     for name, value in more.items():
         setattr(solver.parameters, name, value)
-    status = _STATUS[_solved(solver, model.model, asked.shared, worth)]
+    status = solved(solver, model.model, asked.shared, worth)
     sequence = model.sequence(solver) if status in ("optimal", "feasible") else ()
     if sequence and (model.times.rounded_s or not cell.serial) and _spoils(cell, sequence):
         status, sequence = "unknown", ()
@@ -197,23 +197,6 @@ def _result(
     if status == "optimal" and value > bound + model.blur * model.worth + SAME:
         status = "feasible"  # where a model lets a part have another room or server than a run does
     return CpSatResult(status, value, bound, sequence, solver.wall_time, model.times.rounded_s)
-
-
-def _solved(solver: cp_model.CpSolver, model: cp_model.CpModel, shared: Shared, worth: float) -> object:
-    """The solver's status. It is stopped by Ctrl-C, which it would not hear itself, when all is over, or for a better order."""
-    solver.parameters.catch_sigint_signal = False
-    begin_s = perf_counter()
-    with ThreadPoolExecutor(1) as pool:
-        answer = pool.submit(solver.solve, model)
-        try:
-            while not wait([answer], WAIT_S).done:
-                patient = shared.cost >= worth - SAME or perf_counter() < begin_s + PATIENCE_S
-                if shared.over.is_set() or not patient:
-                    break
-        finally:
-            while not wait([answer], WAIT_S).done:
-                solver.stop_search()
-    return answer.result()
 
 
 def cp_sat_sequencer(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:

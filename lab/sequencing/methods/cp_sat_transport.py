@@ -40,13 +40,16 @@ class Tours(NamedTuple):
 class TransportModel:
     """The variables and constraints. worth: what a unit of the model's objective is in the cell's.
 
-    below: only makespans shorter than the hint's are looked for. blur: by how many units rounding may change a sequence's cost;
-    0 when no time is rounded. Where a station has room for several parts, or several servers, the model lets any of them be
-    taken; a `Run` takes the first: what is proven is a bound.
+    below: only makespans shorter than the hint's are looked for. free: robots are wherever they are wanted, rooms are never
+    full, setups take no time: a small model, for a bound and an order to begin with. blur: by how many units rounding may
+    change a sequence's cost; 0 when no time is rounded. Where a station has room for several parts, or several servers, the
+    model lets any of them be taken; a `Run` takes the first: what is proven is a bound.
     """
 
-    def __init__(self, cell: Cell, objective: str, hint: Sequence[int], below: bool = False) -> None:
-        self.cell, self.model, self.times = cell, cp_model.CpModel(), Times(cell, shortest=0)
+    def __init__(
+        self, cell: Cell, objective: str, hint: Sequence[int], below: bool = False, free: bool = False
+    ) -> None:
+        self.cell, self.model, self.times, self._free = cell, cp_model.CpModel(), Times(cell, shortest=0), free
         known = _known(cell, self.times, hint) if hint else {}
         rounding = 2 * cell.possible_moves if self.times.rounded_s else 0
         horizon = self.times.whole(cell.longest_s) + cell.possible_moves
@@ -60,7 +63,8 @@ class TransportModel:
             self._add_team(team, objective)
         for station in range(len(cell.stations)):
             self._add_servers(station)
-        add_rooms(self.tasks)
+        if not free:
+            add_rooms(self.tasks)
         self._add_order(objective)
         for task in self.tasks.all:
             rest = self.tasks.least.tail[task.option.to]
@@ -95,6 +99,12 @@ class TransportModel:
             found.append(entry(task.part + 1, option.choice, self.cell.parts))
             order.done(task)
         return tuple(found)
+
+    def moves(self, solver: cp_model.CpSolver) -> list[tuple[int, int, int]]:
+        """The tasks that are done in the order of their times, each as its part from 0, where it is, and where to it comes."""
+        done = [task for task in self.tasks.all if solver.boolean_value(task.done)]
+        done.sort(key=lambda task: (solver.value(task.begin), solver.value(task.end), task.part))
+        return [(task.part, task.place, task.option.to) for task in done]
 
     def _suggest(self, known: dict[tuple[int, int, int], tuple[int, int]]) -> None:
         """Give the solver a sequence to begin with."""
@@ -132,7 +142,7 @@ class TransportModel:
         starts = Counter(self._start(robot) for robot in team.robots)
         arcs, firsts, spent = Arcs(), Arcs(), [least.takes(task.option) * task.done for task in tasks]
         travels, rests = list(spent), list[cp_model.LinearExpr]()
-        for number, task in enumerate(tasks, 1):
+        for number, task in enumerate(() if self._free else tasks, 1):
             place, option = task.place, task.option
             before = least.by_servers(self.cell.begin_at[task.part])
             if not alone or place in before:
@@ -157,7 +167,8 @@ class TransportModel:
                     arc = self._arc(arcs, number, other, task, then, travel)
                     spent.append(max(between, travel) * arc)
                     travels.append(travel * arc)
-        self._chain(tasks, arcs, robots)
+        if not self._free:
+            self._chain(tasks, arcs, robots)
         for at, count in starts.items() if firsts else ():
             self.model.add(sum(first for (start, _), first in firsts.items() if start == at) <= count)
         self._tours.append(Tours(team, tasks, arcs, firsts))
@@ -225,7 +236,7 @@ class TransportModel:
             self.model.add_no_overlap(spans)
         elif len(own) > servers:
             self.model.add_cumulative(spans, [1] * len(spans), servers)
-        if not (setups or self.tasks.ranked or self.tasks.tight):
+        if self._free or not (setups or self.tasks.ranked or self.tasks.tight):
             return
         arcs = Arcs()
         for number, task in enumerate(own, 1):

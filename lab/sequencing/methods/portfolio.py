@@ -53,9 +53,9 @@ def best_known(
     """The best order by the mean times, and what is proven of it; CP-SAT is looked at only where nothing faster proves it.
 
     Of a cell with one robot that does all the work the shortest makespan is searched by states (`optimum`), of a job shop with
-    one robot by its tours (`one_robot`). Else annealing and CP-SAT look: with one worker one after the other, the same seed giving
-    the same order; with more side by side, each going on from the best order of both, until it is proven. time_limit_s: of the
-    search of tours, and of CP-SAT, or of both together [s].
+    one robot by its tours (`one_robot`). Else annealing and CP-SAT look: with one worker one after the other, the same seed
+    giving the same order; with more side by side, each going on from the best order of both, until it is proven.
+    time_limit_s: of the search of tours, and of CP-SAT, or of both together [s].
     Raises BadInput as they do, WorkFailed where it is proven, or seems, that no order comes to its end.
     """
     if objective == MAKESPAN and cell.serial:
@@ -99,15 +99,15 @@ def _side_by_side(shared: Shared, until_s: float, seed: int, workers: int) -> No
 
 def _prove(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
     """What CP-SAT makes of it, told to all."""
-    from lab.sequencing.methods.cp_sat import beside, fits  # only where it is needed: OR-Tools takes its time
+    from lab.sequencing.methods.cp_sat import beside  # only where it is needed: OR-Tools takes its time
 
-    if fits(shared.cell):
-        beside(shared, time_limit_s, seed, workers)
+    beside(shared, time_limit_s, seed, workers)
 
 
 def _anneal(shared: Shared, seed: int, again: int, stops: Callable[[], bool] = lambda: False) -> bool:
     """Annealing once, each time longer; every other time it goes on from the best order of all. Whether it came to its end."""
-    annealing = Annealing(shared.cell, shared.objective, seed + again)
+    known = shared.sequence if again % 2 else ()
+    annealing = Annealing(shared.cell, shared.objective, seed + again, known)
     steps = max(ROUND, (MOVES << again) // most_moves(shared.cell))
     for done in range(0, steps, ROUND):
         if stops() or shared.over.is_set():

@@ -30,7 +30,7 @@ class Shared:
         return self.cost <= self.bound + SAME
 
     def tell(self, by: str, sequence: Sequence[int] = (), bound: float = 0.0) -> None:
-        """A complete order that is carried out in the simulation, and a cost that none is below; either is kept if it is better."""
+        """A complete order, which is carried out here, and a cost that none is below; either is kept if it is better."""
         value = cost(follow(self.cell, sequence), self.objective) if sequence else inf
         with self._lock:
             if value < self.cost - SAME:
