@@ -31,7 +31,7 @@ def found(
 
 def test_the_table() -> None:
     rules = ("shortest-move", "nearest-ready", "longest-remaining-work", "most-urgent-machine", "earliest-due")
-    assert set(NAMES) == {"srl", "srl-time", "mc", "random", "fifo", "ga", "exact", "cp-sat", *rules}
+    assert set(NAMES) == {"srl", "srl-time", "mc", "random", "fifo", "ga", "anneal", "exact", "cp-sat", "portfolio", *rules}
 
 
 @pytest.mark.parametrize("name", NAMES)
