@@ -82,15 +82,12 @@ def beside(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None
     All that it finds and proves is told to the others as it comes; it ends when they are over, too. Of a cell that is too large
     for a model it gives a bound only. The time limit holds for all of it [s].
     """
-    begin_s, cell = perf_counter(), shared.cell
-    if (
-        cell.robots
-        and shared.objective != "robot-idle"
-        and not (fits(cell) and (cell.serial or shared.objective != MAKESPAN))
-    ):
+    begin_s, cell, large = perf_counter(), shared.cell, not fits(shared.cell)
+    of_use = large or (shared.objective == MAKESPAN and not cell.serial)
+    if cell.robots and shared.objective != "robot-idle" and of_use:
         free_robots(shared, time_limit_s, seed, workers)
     left_s = time_limit_s - (perf_counter() - begin_s)
-    if fits(cell) and left_s > 0 and not shared.over.is_set():
+    if not large and left_s > 0 and not shared.over.is_set():
         _searched(_Asked(shared, seed, workers, left_s), shared.sequence)
 
 

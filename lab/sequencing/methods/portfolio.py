@@ -1,10 +1,8 @@
 """The methods together: rules, annealing, and the exact search that proves most, each going on from the best order so far."""
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import count
 from math import inf
 from time import perf_counter
 
@@ -24,7 +22,11 @@ from lab.sequencing.simulate.run import follow
 MOVES, ROUND = 12_000_000, 3_000  # of all sequences that annealing tries; how many it tries between two looks at Ctrl-C
 TIME_LIMIT_S = 60.0
 WORKERS = 6  # threads of CP-SAT, also on two cores: they look in different ways
-SHORTEST_S = 0.1  # what CP-SAT is left at least
+ANNEALERS, ANNEALINGS = (
+    2,
+    40,
+)  # threads beside CP-SAT, each with seeds of its own; how often each begins again at the most
+SHORTEST_S, WAIT_S = 0.1, 0.05  # what CP-SAT is left at least; between two looks at the clock
 
 
 @dataclass(frozen=True)
@@ -85,16 +87,19 @@ def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceR
 
 
 def _side_by_side(shared: Shared, until_s: float, seed: int, workers: int) -> None:
-    """Annealing, again and again, beside CP-SAT in a thread of its own, until it is proven or the time is over."""
-    with ThreadPoolExecutor(1) as pool:
-        proof = pool.submit(_prove, shared, max(SHORTEST_S, until_s - perf_counter()), seed, workers)
+    """Annealing, again and again, beside CP-SAT, in threads of their own, until it is proven or the time is over."""
+    with ThreadPoolExecutor() as pool:
+        left_s = max(SHORTEST_S, until_s - perf_counter())
+        working = [pool.submit(_prove, shared, left_s, seed, workers)]
+        working += [pool.submit(_anneal_on, shared, seed + ANNEALINGS * number) for number in range(ANNEALERS)]
         try:
-            for again in count(1):
-                if not _anneal(shared, seed, again, lambda: proof.done() or perf_counter() > until_s):
+            while perf_counter() < until_s and not shared.over.wait(WAIT_S):
+                if any(one.done() and one.exception() for one in working):
                     break
         finally:  # Ctrl-C, too
             shared.over.set()
-    proof.result()
+    for one in working:
+        one.result()
 
 
 def _prove(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
@@ -104,15 +109,21 @@ def _prove(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None
     beside(shared, time_limit_s, seed, workers)
 
 
-def _anneal(shared: Shared, seed: int, again: int, stops: Callable[[], bool] = lambda: False) -> bool:
-    """Annealing once, each time longer; every other time it goes on from the best order of all. Whether it came to its end."""
-    known = shared.sequence if again % 2 else ()
-    annealing = Annealing(shared.cell, shared.objective, seed + again, known)
-    steps = max(ROUND, (MOVES << again) // most_moves(shared.cell))
+def _anneal_on(shared: Shared, seed: int) -> None:
+    """Annealing again and again, longer and longer."""
+    for again in range(1, ANNEALINGS):
+        _anneal(shared, seed + again, again)
+
+
+def _anneal(shared: Shared, seed: int, again: int) -> None:
+    """Annealing once, the longer the oftener it was done before; each third time it goes on from the best order of all."""
+    if shared.over.is_set():
+        return
+    annealing = Annealing(shared.cell, shared.objective, seed, shared.sequence if again % 3 == 1 else ())
+    steps = max(ROUND, (MOVES << (again + 3) // 4) // most_moves(shared.cell))
     for done in range(0, steps, ROUND):
-        if stops() or shared.over.is_set():
-            return False
         annealing.advance(ROUND, done / steps)
         if annealing.best and annealing.best_cost < shared.cost - SAME:
             shared.tell("annealing", annealing.best)
-    return True
+        if shared.over.is_set():
+            return
