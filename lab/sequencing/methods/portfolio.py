@@ -14,6 +14,7 @@ from lab.sequencing.methods.anneal import Annealing
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.fewer_moves import fewer_moves
 from lab.sequencing.methods.one_robot import one_robot, why_not
+from lab.sequencing.methods.rules import work_left_s
 from lab.sequencing.methods.shared import Shared
 from lab.sequencing.search import SAME, Search, SequenceResult, only_one
 from lab.sequencing.simulate.cell_arrays import most_moves
@@ -64,6 +65,7 @@ def best_known(
         found = optimum(cell)
         return BestKnown(fewer_moves(cell, found.sequence), found.cost, "A*", found.bound_s, "A*")
     shared = Shared(cell, objective)
+    shared.tell("each part alone", bound=_alone(cell, objective))
     if objective == MAKESPAN and not why_not(cell):
         tour = one_robot(cell, time_limit_s)
         shared.tell("search of tours", tour.sequence, tour.bound)
@@ -84,6 +86,17 @@ def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceR
     search.check(cell)
     found = best_known(cell, search.objective, TIME_LIMIT_S, workers=WORKERS)
     return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))
+
+
+def _alone(cell: Cell, objective: str) -> float:
+    """What it costs at least if no part ever waits for another one; 0 where that says nothing."""
+    left_s = work_left_s(cell)
+    ends = {part: cell.begin_s[part - 1] + left_s[cell.begin_at[part - 1]] for part in cell.unfinished}
+    late = [max(0.0, ends.get(part, 0.0) - due) for part, due in enumerate(cell.due_s or (), 1)]
+    known = {MAKESPAN: max(ends.values(), default=0.0)}
+    if late:
+        known |= {"mean-tardiness": sum(late) / cell.parts, "tardy-parts": float(sum(one > SAME for one in late))}
+    return known.get(objective, 0.0)
 
 
 def _side_by_side(shared: Shared, until_s: float, seed: int, workers: int) -> None:
