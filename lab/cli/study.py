@@ -35,19 +35,38 @@ def study_run(
     advisor_table: Annotated[
         str | None, typer.Option("--advisor-table", help="What advisors know: learned (default) or exact values.")
     ] = None,
+    seconds: Annotated[
+        float | None,
+        typer.Option("--seconds", min=0.1, help="transport: for each method on each instance; default: 10."),
+    ] = None,
+    methods: Annotated[str | None, typer.Option("--methods", help="transport: some only, with commas between.")] = None,
+    instances: Annotated[
+        list[Path] | None, typer.Option("--instances", help="transport: files or folders of your own instead.")
+    ] = None,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="transport: hold every schedule against its instance, by a checker apart.")
+    ] = False,
     seed: Seed = 0,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for report, rows and sessions; default: NAME-study.")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Run a study and write its report; sessions of chapter 9 that a folder already holds are not run again."""
+    """Run a study and write its report; what its folder already holds (chapter 9, faults, transport) is not run again."""
     from lab.studies import run_study, study_of
     from lab.studies.runner import Job
     from lab.view.progress import counting
     from lab.view.summary import study_summary
 
+    asked = {
+        "advisor_table": advisor_table,
+        "seconds": seconds,
+        "methods": None if methods is None else [name.strip() for name in methods.split(",")],
+        "instances": instances or None,
+        "verify": verify or None,
+    }
+    reading = {name: value for name, value in asked.items() if value is not None}
     with counting(console(), f"cells of {name}") as progress:
         job = Job(sessions or study_of(name).sessions, seed, workers, dask, progress=progress)
-        document = run_study(name, job, out or Path(f"{name}-study"), advisor_table)
+        document = run_study(name, job, out or Path(f"{name}-study"), reading)
     show(document, as_json, study_summary)

@@ -3,12 +3,13 @@
 Bodies' poses stand in for a camera that looks at the whole table: with the camera covered nothing is seen.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from math import atan2, cos, hypot, pi, sin
 from typing import Literal
 
 from lab.production.floor import Floor
+from lab.production.standing import DELIVERED_M
 from lab.sim.arms.robot import NAME
 from lab.sim.parts.kinds import Spot
 from lab.sim.scene import station_bodies
@@ -55,18 +56,21 @@ class Deviation:
     obstacle: Obstacle | None = None
 
 
-def perceive(floor: Floor, task: Task, layout: Layout, spot_of: Mapping[str, Spot]) -> list[Deviation]:
+def perceive(
+    floor: Floor, task: Task, layout: Layout, spot_of: Mapping[str, Spot], delivered: Container[str] = ()
+) -> list[Deviation]:
     """All that is not as believed: fixed things as task and layout have them, parts on their spots, by body.
 
-    What is in the gripper is left out. The order is that of `Sort` for parts, then strange parts, obstacles and stations.
+    delivered: those that have to stay within DELIVERED_M of them. What is in the gripper is left out. The order is that of
+    `Sort` for parts, then strange parts, obstacles and stations.
     """
     if floor.world.dark:
         return [Deviation("camera blind", "", "the camera sees nothing")]
-    found = [*_parts(floor, task, spot_of), *_strange_parts(floor, task, spot_of)]
+    found = [*_parts(floor, task, spot_of, delivered), *_strange_parts(floor, task, spot_of)]
     return [*found, *_obstacles(floor, task, layout), *_stations(floor, task)]
 
 
-def _parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot]) -> Iterator[Deviation]:
+def _parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot], delivered: Container[str]) -> Iterator[Deviation]:
     held = _held(floor)
     for body, spot in spot_of.items():
         if body in held:
@@ -79,7 +83,7 @@ def _parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot]) -> Iterator[De
             yield Deviation("part gone", body, f"{body} is nowhere on the table", where)
         elif floor.bench.upright(body) < UPRIGHT:
             yield Deviation("part fallen", body, f"{body} lies on its side at {seen}", where, at, far)
-        elif far > PART_M or at.z < spot.z - FELL_M:
+        elif far > (DELIVERED_M if body in delivered else PART_M) or at.z < spot.z - FELL_M:
             words = f"{body} is not at {station}: seen {far:.2f} m away at {seen}"
             if floor.scene.robot.arm.inverse(floor.bench.part_pose(body)) is None:
                 yield Deviation("part out of reach", body, f"{words}, out of reach", where, at, far)

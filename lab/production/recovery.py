@@ -267,7 +267,8 @@ class Recovery:
     def _deviations(self) -> list[Deviation]:
         """What is not as believed; of parts that were given up, and things that belong to nobody, nothing new."""
         floor = self.work.floor
-        found = perceive(floor, floor.scene.task, floor.scene.layout, self.work.spot_of)
+        delivered = {self.work.name(part) for part in self.work.finished}
+        found = perceive(floor, floor.scene.task, floor.scene.layout, self.work.spot_of, delivered)
         return [one for one in found if one.sort != "camera blind" and not self._is_known(one)]
 
     def _is_known(self, one: Deviation) -> bool:

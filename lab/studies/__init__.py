@@ -17,18 +17,19 @@ if TYPE_CHECKING:
     from lab.studies.runner import Job
 
 TABLES = ("learned", "exact")  # what advisors know: see `thesis.chapter_9_sessions`
+ADVISED = ("advisor_table",)
 
 
 @dataclass(frozen=True)
 class Study:
-    """A study: its title, what runs it with a job and a reading, and whether it has advisors who know one of TABLES.
+    """A study: its title, what runs it with a job and a reading, and what it reads: options that only some studies have.
 
     sessions: as many as it has unless --sessions says otherwise; least: fewer are refused.
     """
 
     title: str
     run: "Run"
-    has_advisors: bool = False
+    reads: tuple[str, ...] = ()
     sessions: int = 500
     least: int = 10
 
@@ -116,6 +117,12 @@ def _reuse(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return reuse(job, reading)
 
 
+def _transport(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.transport import transport
+
+    return transport(job, reading)
+
+
 def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.sequencing_speed import sequencing_speed
 
@@ -130,28 +137,28 @@ def _speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
 
 STUDIES: dict[str, Study] = {
     "table-9.2": Study(
-        "Table 9.2: best scores in world I with full view", _chapter_9("best_scores", "table-9.2"), True
+        "Table 9.2: best scores in world I with full view", _chapter_9("best_scores", "table-9.2"), ADVISED
     ),
     "table-9.3": Study(
-        "Table 9.3: best scores in world I with limited view", _chapter_9("best_scores", "table-9.3"), True
+        "Table 9.3: best scores in world I with limited view", _chapter_9("best_scores", "table-9.3"), ADVISED
     ),
     "table-9.4": Study(
-        "Table 9.4: best scores in world II with full view", _chapter_9("best_scores", "table-9.4"), True
+        "Table 9.4: best scores in world II with full view", _chapter_9("best_scores", "table-9.4"), ADVISED
     ),
     "table-9.5": Study(
-        "Table 9.5: best scores in world II with limited view", _chapter_9("best_scores", "table-9.5"), True
+        "Table 9.5: best scores in world II with limited view", _chapter_9("best_scores", "table-9.5"), ADVISED
     ),
     "appendix-v": Study(
-        "Appendix V: all methods, parameters and advisors in both worlds and views", _chapter_9("appendix_v"), True
+        "Appendix V: all methods, parameters and advisors in both worlds and views", _chapter_9("appendix_v"), ADVISED
     ),
     "figure-9.4": Study("Figure 9.4: learning alone with several decay factors", _chapter_9("figure_9_4")),
-    "chapter-9": Study("Chapter 9: its tables, Appendix V and figures", _chapter_9("chapter_9"), True),
+    "chapter-9": Study("Chapter 9: its tables, Appendix V and figures", _chapter_9("chapter_9"), ADVISED),
     "readings": Study(
         "Readings of chapter 9: what the thesis leaves open, and what comes nearest", _chapter_9("readings")
     ),
-    "advice-budget": Study("Success against helped steps: every gate with and without memory", _advice_budget, True),
+    "advice-budget": Study("Success against helped steps: every gate with and without memory", _advice_budget, ADVISED),
     "advice-worth": Study("What an advisor's help is worth over nobody's, for every skill of toast", _advice_worth),
-    "advisors": Study("Several advisors at once, beside the best and the worst of them alone", _advisors, True),
+    "advisors": Study("Several advisors at once, beside the best and the worst of them alone", _advisors, ADVISED),
     "table-7.4": Study("Table 7.4: sequencing case I by session length", _chapter_7("best_results", "I")),
     "table-7.5": Study("Table 7.5: sequencing case II by session length", _chapter_7("best_results", "II")),
     "table-7.6": Study("Table 7.6: sequencing case III by session length", _chapter_7("best_results", "III")),
@@ -176,6 +183,13 @@ STUDIES: dict[str, Study] = {
         least=1,
     ),
     "sequencing-speed": Study("Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed),
+    "transport": Study(
+        "Orders of work: every method on the field's own instances, beside the best known and the printed",
+        _transport,
+        ("seconds", "methods", "instances", "verify"),
+        sessions=1,
+        least=1,
+    ),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }
 
@@ -187,25 +201,28 @@ def study_of(name: str) -> Study:
     return STUDIES[name]
 
 
-def run_study(name: str, job: "Job", out: Path, advisor_table: str | None = None) -> dict[str, Any]:
+def run_study(name: str, job: "Job", out: Path, reading: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Run a study and write its report, rows and sessions to `out`; the document of `lab study run --json`.
 
-    advisor_table: one of TABLES. BadInput for an unknown study or advisor table, too few sessions and a folder that cannot
-    be; WorkFailed when it cannot be written.
+    reading: the values of such options; "advisor_table" is one of TABLES. BadInput for an unknown study or
+    advisor table, a reading that the study has not got, too few sessions and a folder that cannot be; WorkFailed when it cannot
+    be written.
     """
     from lab.files import check_out
     from lab.studies.runner import STORE
 
-    study = study_of(name)
+    study, reading = study_of(name), reading or {}
     if job.sessions < study.least:
         raise BadInput(f"{counted(job.sessions, 'session')} (--sessions): '{name}' takes {study.least} at the least")
-    if advisor_table is not None and advisor_table not in TABLES:
-        raise unknown("advisor table", advisor_table, TABLES, "--advisor-table")
-    if advisor_table is not None and not study.has_advisors:
-        raise BadInput(f"advisor table '{advisor_table}' (--advisor-table): the study '{name}' has none to choose")
+    if (table := reading.get("advisor_table", TABLES[0])) not in TABLES:
+        raise unknown("advisor table", table, TABLES, "--advisor-table")
+    for option in reading:
+        if option not in study.reads:
+            takes = ", ".join(one for one, other in STUDIES.items() if option in other.reads)
+            raise BadInput(f"--{option.replace('_', '-')}: the study '{name}' has none to choose; it is for {takes}")
     check_out(out)
     try:
-        found = study.run(replace(job, folder=out), {} if advisor_table is None else {"advisor_table": advisor_table})
+        found = study.run(replace(job, folder=out), reading)
     except KeyboardInterrupt:
         goes_on = f"'{out}' keeps what is done, and the same command goes on"
         kept = goes_on if (out / STORE).is_file() else "nothing is kept"

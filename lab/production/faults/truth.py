@@ -68,9 +68,19 @@ def _wrong(
             yield f"{one.part} was delivered, and '{one.station}' had not finished it"
     if failure is None and lacking:
         yield f"nothing was said of {', '.join(lacking)}"
-    for piece in pieces(failure or ""):
-        if happened and not explained(piece, happened):
+    told = [*pieces(failure or "")] if happened else []
+    true = [piece for piece in told if explained(piece, happened)]
+    while following := [piece for piece in told if piece not in true and _follows(piece, true)]:
+        true += following
+    for piece in told:
+        if piece not in true:
             yield f"no fault explains: {piece}"
+
+
+def _follows(piece: str, true: Sequence[str]) -> bool:
+    """Whether a part has no room because of another one, of which a true reason tells why it is still there."""
+    stands = re.search(r"no spot of .* is free: (.+) is there$", piece)
+    return stands is not None and any(one.startswith(f"{stands[1]} ") for one in true)
 
 
 def _begun_again(one: Happened, heard: Sequence[Event]) -> bool:

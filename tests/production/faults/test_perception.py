@@ -68,6 +68,13 @@ def test_what_is_seen_is_what_was_done(after: Any, two_toasts: Any, spots: Any, 
     assert words is None or words in found[0]
 
 
+def test_a_delivered_part_has_to_stand_nearer_to_its_spot(after: Any, two_toasts: Any, spots: Any) -> None:
+    floor, prepared = after({"what": "part moved", "part": "slice 1", "by_m": [0.0, 0.03]}), two_toasts[0]
+    assert seen(floor, prepared, spots) == []
+    (one,) = perceive(floor, prepared.task, prepared.layout, spots(floor), {"slice 1"})
+    assert (one.name, one.sort) == ("slice 1", "part moved")
+
+
 def test_in_a_covered_cameras_dark_nothing_else_is_seen(after: Any, two_toasts: Any, spots: Any) -> None:
     floor = after({"what": "camera blind"}, {"what": "part gone"}, {"what": "obstacle gone", "obstacle": "cubes A"})
     assert seen(floor, two_toasts[0], spots) == ["the camera sees nothing"]

@@ -54,6 +54,14 @@ def test_a_run_is_delivered_or_stopped_or_wrong() -> None:
     assert (lie.came, lie.why) == ("wrong", "no fault explains: slice 2: it lies on its side")
 
 
+def test_a_part_that_another_keeps_out_is_explained_by_why_that_one_is_there() -> None:
+    fallen = Happened("part fallen", "slice 1 fell", 10.0, part="slice 1", station="out")
+    full = "slice {} at '{}': no spot of '{}' is free: slice {} is there"
+    why = f"slice 1 lies on its side; {full.format(3, 'hot', 'hot', 2)}; {full.format(2, 'out', 'out', 1)}"
+    assert verdict([fallen], [], why, ["slice 1"]).came == "stopped"
+    assert verdict([fallen], [], full.format(3, "hot", "hot", 2), ["slice 3"]).came == "wrong"  # why is slice 2 there?
+
+
 def test_a_run_in_which_nothing_struck_may_stop() -> None:
     assert (
         verdict([], [], "slice 1 at 'toaster': it is not done 60 s after it should be", ["slice 1"]).came == "stopped"

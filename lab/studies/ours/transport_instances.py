@@ -1,0 +1,84 @@
+"""The board's instances: those that come with the lab, each a row of board.csv, and files of one's own."""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+from lab.errors import BadInput
+from lab.sequencing.cell.cell import Cell
+from lab.tasks.cell_file import CellFile, order_from_word
+from lab.tasks.instances import Asked, is_instance, read_instance
+from lab.tasks.task_file import load_cell
+
+FOLDER = Path(__file__).with_name("instances")
+OWN = "your own"
+
+
+@dataclass(frozen=True)
+class Instance:
+    """An instance: its family and name, the file that holds it, and what is asked for beside it.
+
+    file: in `instances`, a cell that comes with the lab, or a path; case: which of a file's instances, of a cell the order.
+    printed: what others print, in the file's unit of time, and what that is: "optimum", "best known", "PPO".
+    """
+
+    family: str
+    name: str
+    file: str
+    layout: str = ""
+    case: str = ""
+    robots: int | None = None
+    printed: float | None = None
+    printed_is: str = ""
+
+    @property
+    def is_cyclic(self) -> bool:
+        """Whether the shortest period is asked for, of an order that repeats for ever."""
+        return self.family.endswith("cyclic")
+
+
+def board() -> tuple[Instance, ...]:
+    """The instances that come with the lab."""
+    with (FOLDER / "board.csv").open(encoding="utf-8", newline="") as file:
+        return tuple(
+            Instance(
+                **{name: one[name] for name in ("family", "name", "file", "layout", "case", "printed_is")},
+                robots=int(one["robots"]) if one["robots"] else None,
+                printed=float(one["printed"]) if one["printed"] else None,
+            )
+            for one in csv.DictReader(file)
+        )
+
+
+def own(paths: Sequence[Path]) -> tuple[Instance, ...]:
+    """An instance of each file, and of each file in a folder; BadInput for what is not there or cannot be read."""
+    found = list[Instance]()
+    for path in paths:
+        if not path.exists():
+            raise BadInput(f"instance '{path}' (--instances): there is no such file or folder")
+        files = [path] if path.is_file() else sorted(one for one in path.iterdir() if one.is_file())
+        found += [Instance(OWN, one.name, str(one)) for one in files]
+    for one in found:
+        cell_file(one)
+    return tuple(found)
+
+
+@lru_cache(maxsize=256)
+def cell_file(instance: Instance) -> CellFile:
+    """The cell file that an instance is, its order in it. BadInput as its reader."""
+    shipped = FOLDER / instance.file
+    path = shipped if shipped.is_file() else Path(instance.file)
+    if path.is_file() and is_instance(path):
+        layout = FOLDER / instance.layout if instance.layout else None
+        return read_instance(path, Asked(layout, instance.robots, instance.case or None))
+    file = load_cell(instance.file)
+    if not instance.case:
+        return file
+    return file.model_copy(update={"order": order_from_word(file, instance.case), "parts": None})
+
+
+def cell_of(instance: Instance) -> Cell:
+    """The cell of an instance. BadInput as `cell_file`."""
+    return replace(cell_file(instance).cell(), due_s=None)  # the makespan alone is asked for
