@@ -90,6 +90,8 @@ def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceR
 
 def _alone(cell: Cell, objective: str) -> float:
     """What it costs at least if no part ever waits for another one; 0 where that says nothing."""
+    if not all(way.waits for place in cell.positions for way in place.options):
+        return 0.0
     left_s = work_left_s(cell)
     ends = {part: cell.begin_s[part - 1] + left_s[cell.begin_at[part - 1]] for part in cell.unfinished}
     late = [max(0.0, ends.get(part, 0.0) - due) for part, due in enumerate(cell.due_s or (), 1)]

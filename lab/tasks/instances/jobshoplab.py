@@ -1,8 +1,8 @@
 """Job shops with vehicles as YAML, as JobShopLab has them: jobs, machines and travel times as tables within strings.
 
 As its simulator does: vehicle n begins at machine n, counted round; jobs begin in the input buffer; machines have room for all
-before and after them; the clock stops with the last operation: the way to the output buffer does not count. Its vehicles set out
-for a part that a machine works on, or that waits behind it, not earlier; here they may. Source: github.com/proto-lab-ro/jobshoplab.
+before and after them; the clock stops with the last operation: the way to the output buffer does not count. Its vehicles set
+out for a part once its machine works on it, not earlier; here they may. Source: github.com/proto-lab-ro/jobshoplab.
 """
 
 import re

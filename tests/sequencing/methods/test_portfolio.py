@@ -75,6 +75,19 @@ def test_no_list_of_decisions_is_better(
     assert not found.proven or found.cost == pytest.approx(least)
 
 
+@settings(max_examples=25, deadline=None)
+@given(data=st.data(), objective=st.sampled_from(sorted(set(OBJECTIVES) - {"makespan"})))
+def test_one_robot_that_does_all(
+    cells: Callable[..., st.SearchStrategy[Cell]], ends: Ends, data: st.DataObject, objective: str
+) -> None:
+    """Pallets, arrivals, routes to choose from, and what is not the makespan."""
+    cell = data.draw(cells(max_machines=1, max_parts=2, many=True))
+    costs = [cost(run, objective) for run in ends(Run(cell))]
+    found = best_known(cell, objective, 10.0, workers=2)
+    if costs:
+        assert found.bound - 1e-4 <= min(costs) <= found.cost + SAME  # times are rounded to a millionth
+
+
 def test_with_one_worker_the_same_seed_gives_the_same(ex11: Callable[[int], Cell]) -> None:
     one, other = (best_known.__wrapped__(ex11(2), seed=3) for _ in range(2))
     assert one == other
