@@ -10,11 +10,9 @@ import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, cost
-from lab.sequencing.methods.anneal import Annealing
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.fewer_moves import fewer_moves
-from lab.sequencing.methods.one_robot import one_robot, why_not
-from lab.sequencing.methods.rules import work_left_s
+from lab.sequencing.methods.rules import first_come, work_left_s
 from lab.sequencing.methods.shared import Shared
 from lab.sequencing.search import SAME, Search, SequenceResult, only_one
 from lab.sequencing.simulate.cell_arrays import most_moves
@@ -23,10 +21,7 @@ from lab.sequencing.simulate.run import follow
 MOVES, ROUND = 12_000_000, 3_000  # of all sequences that annealing tries; how many it tries between two looks at Ctrl-C
 TIME_LIMIT_S = 60.0
 WORKERS = 6  # threads of CP-SAT, also on two cores: they look in different ways
-ANNEALERS, ANNEALINGS = (
-    2,
-    40,
-)  # threads beside CP-SAT, each with seeds of its own; how often each begins again at the most
+ANNEALERS, ANNEALINGS = 2, 40  # threads beside CP-SAT, with seeds of their own; how often each begins at the most
 SHORTEST_S, WAIT_S = 0.1, 0.05  # what CP-SAT is left at least; between two looks at the clock
 
 
@@ -66,16 +61,13 @@ def best_known(
         return BestKnown(fewer_moves(cell, found.sequence), found.cost, "A*", found.bound_s, "A*")
     shared = Shared(cell, objective)
     shared.tell("each part alone", bound=_alone(cell, objective))
+    from lab.sequencing.methods.one_robot import one_robot, why_not  # here and below: numba takes its time
+
     if objective == MAKESPAN and not why_not(cell):
         tour = one_robot(cell, time_limit_s)
         shared.tell("search of tours", tour.sequence, tour.bound)
     if not shared.over.is_set():
-        until_s = perf_counter() + time_limit_s
-        _anneal(shared, seed, 0)
-        if workers > 1:
-            _side_by_side(shared, until_s, seed, workers)
-        else:
-            _prove(shared, time_limit_s, seed, workers)
+        _look(shared, time_limit_s, seed, workers)
     sequence = fewer_moves(cell, shared.sequence, objective) if shared.sequence else ()
     value = cost(follow(cell, sequence), objective) if sequence else inf
     return BestKnown(sequence, value, shared.found_by, min(shared.bound, value), shared.bound_by)
@@ -86,6 +78,19 @@ def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceR
     search.check(cell)
     found = best_known(cell, search.objective, TIME_LIMIT_S, workers=WORKERS)
     return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))
+
+
+def _look(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
+    """Annealing and CP-SAT: side by side, or in turn; where one robot does all the work CP-SAT needs no help to begin with."""
+    until_s = perf_counter() + time_limit_s
+    if shared.cell.serial and workers == 1:
+        shared.tell("first come, first served", first_come(shared.cell))
+        _prove(shared, time_limit_s, seed, workers)
+    _anneal(shared, seed, 0)
+    if workers > 1:
+        _side_by_side(shared, until_s, seed, workers)
+    elif not shared.cell.serial:
+        _prove(shared, time_limit_s, seed, workers)
 
 
 def _alone(cell: Cell, objective: str) -> float:
@@ -132,6 +137,8 @@ def _anneal_on(shared: Shared, seed: int) -> None:
 
 def _anneal(shared: Shared, seed: int, again: int) -> None:
     """Annealing once, the longer the oftener it was done before; each third time it goes on from the best order of all."""
+    from lab.sequencing.methods.anneal import Annealing
+
     if shared.over.is_set():
         return
     annealing = Annealing(shared.cell, shared.objective, seed, shared.sequence if again % 3 == 1 else ())

@@ -34,7 +34,7 @@ def ways(cell: Cell, sequence: tuple[int, ...]) -> list[tuple[str, str]]:
 
 def through_the_buffer(cell: Cell) -> tuple[int, ...]:
     """The decisions of a single part that stops over."""
-    run, taken = Run(cell), []
+    run, taken = Run(cell), list[int]()
     while not run.done:
         before = len(taken)
         for decision in run.allowed():
