@@ -40,6 +40,12 @@ def _srl_time() -> Find:
     return srl_time
 
 
+def _srl_improved() -> Find:
+    from lab.sequencing.methods.srl_improved import srl_improved
+
+    return srl_improved
+
+
 def _monte_carlo() -> Find:
     from lab.sequencing.methods.monte_carlo import monte_carlo
 
@@ -144,11 +150,12 @@ def _rule(name: str, words: str) -> Sequencer:
 
 SEQUENCERS: dict[str, Sequencer] = {
     "srl": Sequencer(_srl, "the thesis's: learns from the reward of whole episodes, as printed", drawn=True),
-    "srl-time": Sequencer(_srl_time, "our own: learns step by step what time still to come costs", react=_learned_on),
+    "srl-time": Sequencer(_srl_time, "our own: learns step by step what time still to come costs, from a bound on", react=_learned_on),
+    "srl-improved": Sequencer(_srl_improved, "our own: learns where in the order moves belong, from episodes that it improves"),
     "mc": Sequencer(_monte_carlo, "Monte Carlo: averages the returns of the episodes", drawn=True),
     "random": Sequencer(_random, "the best of so many sequences drawn evenly", drawn=True),
     "fifo": Sequencer(_fifo, "first in, first out: a queue of tasks", react=_queued),
-    "ga": Sequencer(_genetic, "a genetic algorithm with random keys"),
+    "ga": Sequencer(_genetic, "a genetic algorithm begun with the rules', each child improved"),
     "anneal": Sequencer(_anneal, "simulated annealing of a list of priorities, begun with the best rule's"),
     "exact": Sequencer(_exact, "best-first search (A*) to the proven optimum"),
     "cp-sat": Sequencer(_cp_sat, "constraint programming, for every objective"),

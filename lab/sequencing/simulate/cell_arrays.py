@@ -179,8 +179,13 @@ def run_arrays(cell: Cell) -> RunArrays:
 
 def most_moves(cell: Cell) -> int:
     """How many moves the longest sequence has."""
+    return sum(moves_each(cell))
+
+
+def moves_each(cell: Cell) -> list[int]:
+    """How many moves each part has at the most, part 1 first."""
     longest = from_the_ends(cell.positions, lambda _, ahead: max((1 + moves for moves in ahead), default=0))
-    return sum(longest[start] for start in cell.begin_at)
+    return [longest[start] for start in cell.begin_at]
 
 
 def _padded(stations: Sequence[Sequence[int]], spare: int) -> Ints:
