@@ -150,8 +150,12 @@ def _rule(name: str, words: str) -> Sequencer:
 
 SEQUENCERS: dict[str, Sequencer] = {
     "srl": Sequencer(_srl, "the thesis's: learns from the reward of whole episodes, as printed", drawn=True),
-    "srl-time": Sequencer(_srl_time, "our own: learns step by step what time still to come costs, from a bound on", react=_learned_on),
-    "srl-improved": Sequencer(_srl_improved, "our own: learns where in the order moves belong, from episodes that it improves"),
+    "srl-time": Sequencer(
+        _srl_time, "our own: learns step by step what time still to come costs, from a bound on", react=_learned_on
+    ),
+    "srl-improved": Sequencer(
+        _srl_improved, "our own: learns where in the order moves belong, from episodes that it improves"
+    ),
     "mc": Sequencer(_monte_carlo, "Monte Carlo: averages the returns of the episodes", drawn=True),
     "random": Sequencer(_random, "the best of so many sequences drawn evenly", drawn=True),
     "fifo": Sequencer(_fifo, "first in, first out: a queue of tasks", react=_queued),

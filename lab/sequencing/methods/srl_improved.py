@@ -14,7 +14,11 @@ from lab.sequencing.simulate.cell_arrays import Floats, moves_each
 
 EPISODE = 10_000  # sequences of an episode at the most: one that is drawn, and neighbours
 LEAST_EPISODES = 100
-ALPHA, SPREAD, WARM = 0.2, 0.1, 0.01  # step of learning; how unsure a place is at first; temperature as a share of the cost
+ALPHA, SPREAD, WARM = (
+    0.2,
+    0.1,
+    0.01,
+)  # step of learning; how unsure a place is at first; temperature as a share of the cost
 
 
 @dataclass(frozen=True)
