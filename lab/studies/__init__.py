@@ -129,6 +129,12 @@ def _transport(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return transport(job, reading)
 
 
+def _reacting(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.reacting import reacting
+
+    return reacting(job, reading)
+
+
 def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.sequencing_speed import sequencing_speed
 
@@ -190,6 +196,9 @@ STUDIES: dict[str, Study] = {
     ),
     "carried-over": Study(
         "A policy learned on small cells orders larger ones, beside every dispatching rule", _carried_over, sessions=240
+    ),
+    "reacting": Study(
+        "Drawn times, breakdowns, late parts: a list, policies that react, hindsight", _reacting, sessions=50
     ),
     "sequencing-speed": Study("Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed),
     "transport": Study(

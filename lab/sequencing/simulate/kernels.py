@@ -41,6 +41,28 @@ def _drawn(law: int, spread: float, mean_s: float, seed: Any, number: int) -> fl
 
 
 @inner
+def _apart(cell: Any, parts: int) -> int:
+    """`chance.Episode._apart`."""
+    return 2 * (parts + 1) * len(cell.begins)
+
+
+@inner
+def _worked(cell: Any, seed: Any, part: int, there: int, parts: int) -> float:
+    """`chance.Episode.processing_s` of a part (from 0)."""
+    number = (part + 1) * len(cell.begins) + there
+    work_s = _drawn(cell.processing_law, cell.spread, cell.processing_s[there], seed, number)
+    if cell.breaks_every_s == 0.0 or work_s == 0.0:
+        return work_s
+    first, worked_s, repaired_s = _apart(cell, parts) + parts + 2 * chance.MOST_BREAKS * number, 0.0, 0.0
+    for n in range(chance.MOST_BREAKS):
+        worked_s -= cell.breaks_every_s * np.log(1.0 - uniform(seed, first + 2 * n))
+        if worked_s >= work_s:
+            break
+        repaired_s -= cell.repair_s * np.log(1.0 - uniform(seed, first + 2 * n + 1))
+    return work_s + repaired_s
+
+
+@inner
 def _interval(cell: Any, seed: Any, part: int) -> float:
     """`chance.Episode.interval_s` of a part (from 0)."""
     number = (part + 1) * len(cell.begins) + cell.starts[part]
@@ -56,6 +78,9 @@ def reset(cell: Any, run: Any, seed: Any) -> None:
     for part in range(len(run.locations)):
         place = cell.begin_at[part]
         run.locations[part], run.ready_s[part], run.finished_s[part] = place, cell.begin_s[part], 0.0
+        if cell.late_s > 0.0 and place == cell.starts[part]:
+            late = _apart(cell, len(run.locations)) + part
+            run.ready_s[part] -= cell.late_s * np.log(1.0 - uniform(seed, late))
         run.room[cell.holds[place, 0]] -= 1
         run.room[cell.holds[place, 1]] -= 1
         if cell.first_option[place] < cell.first_option[place + 1]:
@@ -197,8 +222,7 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
         run.clock[1] += drop_s - carried_s
     process_s = 0.0
     if cell.begins[there]:
-        number = (part + 1) * len(cell.begins) + there
-        process_s = _drawn(cell.processing_law, cell.spread, cell.processing_s[there], seed, number)
+        process_s = _worked(cell, seed, part, there, len(run.locations))
         run.ready_s[part] = drop_s + process_s
         run.clock[2] += process_s
     end_s = drop_s + process_s if robot == SERVER else drop_s
