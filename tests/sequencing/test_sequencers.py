@@ -31,7 +31,19 @@ def found(
 
 def test_the_table() -> None:
     rules = ("shortest-move", "nearest-ready", "longest-remaining-work", "most-urgent-machine", "earliest-due")
-    assert set(NAMES) == {"srl", "srl-time", "mc", "random", "fifo", "ga", "anneal", "exact", "cp-sat", "portfolio", *rules}
+    assert set(NAMES) == {
+        "srl",
+        "srl-time",
+        "mc",
+        "random",
+        "fifo",
+        "ga",
+        "anneal",
+        "exact",
+        "cp-sat",
+        "portfolio",
+        *rules,
+    }
 
 
 @pytest.mark.parametrize("name", NAMES)
