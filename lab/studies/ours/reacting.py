@@ -32,20 +32,22 @@ TROUBLES = {
 }
 LIST, RULE, ANEW, ROLLING, HINDSIGHT = "the list as it is", "best rule", "planned anew", "rolling", "best in hindsight"
 ABOUT = (
-    "Makespans in {episodes} drawn episodes, the same ones for all; intervals are of the mean, 95 %. The list is the proven "
-    "optimum by the mean times, kept whatever comes. Best rule: of all dispatching rules, asked at every decision, the "
-    "one with the least mean here. Planned anew: by mean times at every decision. Rolling: each decision is tried in {futures} futures "
-    "drawn from what can be known, by the list and by every rule after it. Best in hindsight: the optimum with the drawn "
-    "times known (where it was not proven, a bound), which no policy can reach."
+    "Makespans in {episodes} drawn episodes, the same ones for all; intervals are of the mean, 95 %. The list is "
+    "the proven optimum by the mean times, kept whatever comes. Best rule: of all dispatching rules, asked at "
+    "every decision, the one with the least mean here. Planned anew: by mean times at every decision. Rolling: "
+    "each decision is tried in {futures} futures drawn from what can be known, by the list and by every rule "
+    "after it. Best in hindsight: the optimum with the drawn times known (where it was not proven, a bound), "
+    "which no policy can reach."
 )
 KINDS = (
     "Times 10 % off: processing times are normal, their standard deviation a tenth of the mean (thesis 7.6). "
-    "Breakdowns: besides, a machine works 300 s between two of them on average, and is repaired for 60 s. Late parts: besides, each comes 60 s late on "
-    "average. Where the FMS's parts arrive after one another, lateness is not drawn."
+    "Breakdowns: besides, a machine works 300 s between two of them on average, and is repaired for 60 s. Late "
+    "parts: besides, each comes 60 s late on average. Where the FMS's parts arrive after one another, lateness is "
+    "not drawn."
 )
 LIMITS = (
-    "Cells with one robot only: with several robots or servers decisions do not follow one another in time. Machines break down "
-    "while they work, the robot never does."
+    "Cells with one robot only: with several robots or servers decisions do not follow one another in time. "
+    "Machines break down while they work, the robot never does."
 )
 
 
