@@ -75,7 +75,7 @@ class _Rolling:
         """The least mean of all the ways to carry on after a decision."""
         index, way = part_of(decision, self.cell.parts) - 1, seen.option(decision)
         place = seen.locations[index]
-        option = int(self._arrays.first_option[place]) + self.cell.positions[place].options.index(way)  # type: ignore[arg-type]
+        option = int(self._arrays.first_option[place]) + self.cell.positions[place].options.index(way)
         tails = [self._without(decision)]
         for rule in usable(self.cell).values():
             ahead = branch(seen)
