@@ -39,7 +39,10 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "PIL": set(),
     "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
     "ortools": {
-        *(f"lab.sequencing.methods.cp_sat{part}" for part in ("", "_model", "_tasks", "_rooms", "_transport")),
+        *(
+            f"lab.sequencing.methods.cp_sat{part}"
+            for part in ("", "_free", "_model", "_tasks", "_rooms", "_solver", "_transport")
+        ),
         "lab.sequencing.cyclic.model",
     },
     "starlette": {"lab.view.server", "lab.view.server_page"},

@@ -118,6 +118,7 @@ def sequenced(
         kept.durations(),
         options.beside.layout,
         options.robots,
+        None if options.policy is None else Path(options.policy),
     )
     teacher = teacher_of(toolbox, LessonOptions(advisors=DEFAULT_ADVISORS, seed=options.seed), seat)
     return sequence_named(options.task, options.case, options.toasts, wanted, teacher=teacher, files=files)

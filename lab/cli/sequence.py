@@ -48,6 +48,10 @@ def sequence(
     method: Annotated[
         str | None, typer.Option("--method", help="{methods}; default: the file's.", autocompletion=offers("methods"))
     ] = None,
+    policy: Annotated[
+        Path | None,
+        typer.Option("--policy", help="What --method carried decides by: a file of lab study run carried-over."),
+    ] = None,
     objective: Annotated[
         str | None,
         typer.Option("--objective", help="{objectives}; default: the file's.", autocompletion=offers("objectives")),
@@ -108,6 +112,7 @@ def sequence(
         *(task or "", case, toasts, method, objective, episodes, sessions, stochastic, advisor, gate, seed, parts),
         layout=None if layout is None else str(layout),
         robots=robots,
+        policy=None if policy is None else str(policy),
     )
     asked = {"plot": plot, "gantt": gantt, "schedule": schedule}
     files = {name: path for name, path in asked.items() if path is not None}

@@ -4,18 +4,20 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import reduce
 from math import gcd
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule import Schedule
-from lab.sequencing.cyclic.cycle import Cycle, best_cycle
-from lab.sequencing.cyclic.unrolled import Unrolled, period_of, unrolled
+
+if TYPE_CHECKING:  # and below where it is needed: OR-Tools takes its time
+    from lab.sequencing.cyclic.cycle import Cycle
+    from lab.sequencing.cyclic.unrolled import Unrolled
 
 SECONDS_PER_HOUR = 3600.0
 
 
-def cycle_document(cycle: Cycle) -> dict[str, Any]:
+def cycle_document(cycle: "Cycle") -> dict[str, Any]:
     """What is told of a cycle, for JSON."""
     per_part_s = cycle.period_s / cycle.parts
     products = {move.slot: cycle.product(move) for move in cycle.line.moves}
@@ -41,8 +43,10 @@ def mix_of(order: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name, count in counts.items() for _ in range(count // cycles))
 
 
-def measured_period(cycle: Cycle, planned: Schedule, measured: Schedule) -> dict[str, Any]:
+def measured_period(cycle: "Cycle", planned: Schedule, measured: Schedule) -> dict[str, Any]:
     """The period of a run that carried a cycle out, beside the planned one; None where too few parts were delivered."""
+    from lab.sequencing.cyclic.unrolled import period_of
+
     found_s = period_of(measured, cycle)
     return cycle_document(cycle) | {
         "planned_period_s": period_of(planned, cycle),
@@ -51,11 +55,14 @@ def measured_period(cycle: Cycle, planned: Schedule, measured: Schedule) -> dict
     }
 
 
-def cyclic_order(cell: Cell, seed: int) -> tuple[Cycle, Unrolled]:
+def cyclic_order(cell: Cell, seed: int) -> "tuple[Cycle, Unrolled]":
     """The cycle of a cell's products and its order for the cell's parts, as a run carries it out: as early as can be.
 
     BadInput where the robot would have to wait on purpose, and as `best_cycle`.
     """
+    from lab.sequencing.cyclic.cycle import best_cycle
+    from lab.sequencing.cyclic.unrolled import unrolled
+
     cycle = best_cycle(cell, mix_of(cell.order), seed=seed)
     found = unrolled(cycle, cell)
     if found.waits:

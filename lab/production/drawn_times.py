@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lab.sequencing import SEQUENCERS, find_sequence
+from lab.sequencing import SEQUENCERS, carried_reaction, find_sequence
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.search import Search, SequenceResult
@@ -23,6 +23,8 @@ def stochastic(
     from lab.sequencing.simulate.execution import replicate
 
     reaction = SEQUENCERS[method].react(cell, search.objective, seed)
+    if search.policy is not None:
+        reaction = carried_reaction(search.policy)
     fixed = _planned(cell, method, search, found, seed)
     episodes = max(FEWEST, min(REPLICATIONS, PLANNED // cell.parts**2)) if reaction.plans else REPLICATIONS
     costs = [replicate(cell, how, chance, episodes, seed, search.objective) for how in (fixed, reaction.policy)]

@@ -22,7 +22,6 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN, cost
 from lab.sequencing.cell.routes import part_of
 from lab.sequencing.cell.schedule import Move
-from lab.sequencing.cyclic.cycle import Cycle
 from lab.sequencing.methods.exact import Optimum, optimum
 from lab.sequencing.methods.portfolio import best_known
 from lab.sequencing.search import SAME, Reference, Search, SequenceResult
@@ -32,6 +31,7 @@ from lab.teaching.events import ORDER, LessonEvent, OrderChosen, SequenceFound, 
 from lab.teaching.lesson_sessions import TellingAdvisor
 
 if TYPE_CHECKING:
+    from lab.sequencing.cyclic.cycle import Cycle
     from lab.sequencing.methods.srl_advised import AdvisedResult
 
 NOBODY = AdvisorName.of("none")
@@ -116,7 +116,7 @@ class Ordered:
     used: str
     costs: dict[str, float]
     receipt: dict[str, Any] | None = None
-    cycle: Cycle | None = None
+    cycle: "Cycle | None" = None
 
 
 def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, tell: Tell = unheard) -> Ordered:

@@ -5,7 +5,7 @@ import os
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lab.errors import WorkFailed
 from lab.export.program import PROGRAM, TRAJECTORY
@@ -16,7 +16,6 @@ from lab.production.run_story import story_of
 from lab.production.taught import Taught
 from lab.sequencing.cell.schedule import Schedule
 from lab.sequencing.cell.schedule_rows import csv_of, rows_of
-from lab.sequencing.cyclic.cycle import Cycle
 from lab.sequencing.methods.exact import Optimum
 from lab.sequencing.search import SequenceResult
 from lab.sequencing.simulate.run import simulate
@@ -25,6 +24,9 @@ from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared
 from lab.teaching.lesson_plan import Lesson
 from lab.toolbox.policy import Policy
+
+if TYPE_CHECKING:
+    from lab.sequencing.cyclic.cycle import Cycle
 
 FILES = {
     "gantt": "gantt.png",
@@ -55,7 +57,7 @@ class Report:
     wall_s: float = 0.0
     files: dict[str, str] = field(default_factory=dict)
     receipts: dict[str, Any] | None = None
-    cycle: Cycle | None = None
+    cycle: "Cycle | None" = None
 
     @property
     def success(self) -> bool:

@@ -30,6 +30,7 @@ from lab.sequencing.cell.schedule_rows import check_table, rows_of, write_table
 from lab.sequencing.methods.portfolio import TIME_LIMIT_S, WORKERS
 from lab.sequencing.search import SAME, EpisodeSequenced, LearnedSequence, Reference, Search, SequenceResult
 from lab.sequencing.simulate.run import follow, simulate
+from lab.tasks.carried_policy import read_policy
 from lab.tasks.cell_file import CellFile, order_from_word, toast_case
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.instances import Asked
@@ -46,6 +47,7 @@ class Wanted:
 
     keep: gives the journal of what people say, by default one that is not written. durations: those of a task's moves
     (`Durations.to_json`), None: they are measured. layout, robots: beside an instance file (see `Asked`).
+    policy: the file that the method `carried` decides by; None: what ships.
     """
 
     method: str | None = None
@@ -62,6 +64,7 @@ class Wanted:
     durations: Mapping[str, Any] | None = None
     layout: Path | None = None
     robots: int | None = None
+    policy: Path | None = None
 
 
 def sequence_named(
@@ -107,6 +110,10 @@ def _check_names(wanted: Wanted, settings: Sequencing) -> None:
     if objective not in OBJECTIVES:
         raise unknown("objective", objective, OBJECTIVES, "--objective")
     check_gate(wanted.gate)
+    if wanted.policy is not None:
+        if method != "carried":
+            raise BadInput(f"--policy {wanted.policy} with --method {method}: only carried decides by one")
+        read_policy(wanted.policy)
     if wanted.advisor.row != "none" and method != "srl":
         raise BadInput(f"--advisor {wanted.advisor} with --method {method}: only srl asks for advice")
 
@@ -166,6 +173,7 @@ def _sessions(
         objective=wanted.objective,
         chance=chance if wanted.stochastic and SEQUENCERS[method].drawn else NO_CHANCE,
     )
+    search = replace(search, policy=None if wanted.policy is None else read_policy(wanted.policy))
     check_objective(search.objective, cell)
     # The portfolio is what it is compared with: it is asked once, with its own time.
     own = (TIME_LIMIT_S, WORKERS) if method == "portfolio" else ()

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from lab.sequencing.cell.cell import Cell
+    from lab.sequencing.methods.carried_over_policy import CarriedPolicy
     from lab.sequencing.search import Search, SequenceResult
     from lab.sequencing.simulate.execution import Policy
 
@@ -76,6 +77,12 @@ def _anneal() -> Find:
     return anneal
 
 
+def _carried() -> Find:
+    from lab.sequencing.methods.carried_over import carried
+
+    return carried
+
+
 def _portfolio() -> Find:
     from lab.sequencing.methods.portfolio import portfolio
 
@@ -110,6 +117,20 @@ def _queued(cell: "Cell", objective: str, seed: int) -> Reaction:
     from lab.sequencing.methods.fifo import first_in_first_out
 
     return Reaction(first_in_first_out, "a queue of tasks as they become possible", plans=False)
+
+
+def _carried_on(cell: "Cell", objective: str, seed: int) -> Reaction:
+    from lab.sequencing.methods.carried_over_weights import DEFAULT
+
+    return carried_reaction(DEFAULT)
+
+
+def carried_reaction(policy: "CarriedPolicy") -> Reaction:
+    """A carried-over policy, asked at every decision."""
+    from lab.sequencing.methods.carried_over import rule_of
+    from lab.sequencing.methods.rollout import by_rule
+
+    return Reaction(by_rule(rule_of(policy)), "the carried-over policy, asked at every decision", plans=False)
 
 
 def _asked(name: str, cell: "Cell", objective: str, seed: int) -> Reaction:
@@ -165,6 +186,7 @@ SEQUENCERS: dict[str, Sequencer] = {
     "anneal": Sequencer(
         _anneal, "simulated annealing of a list of priorities, begun with the best rule's: a search, it learns nothing"
     ),
+    "carried": Sequencer(_carried, "a policy learned on small cells, see --policy: no search", react=_carried_on),
     "exact": Sequencer(_exact, "best-first search (A*) to the proven optimum"),
     "cp-sat": Sequencer(_cp_sat, "constraint programming, for every objective"),
     "portfolio": Sequencer(_portfolio, "annealing, then the exact search that proves most, begun with what it found"),

@@ -3,12 +3,15 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from lab.errors import BadInput, WorkFailed, counted, unknown
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import MAKESPAN, check_objective
+
+if TYPE_CHECKING:
+    from lab.sequencing.methods.carried_over_policy import CarriedPolicy
 
 FACTORS = ("A", "B")
 VALUES = ("pairs", "states")
@@ -79,7 +82,7 @@ class Search:
     """How long to look, for what, in which environment, and whom to tell. BadInput for fewer than 1 episode.
 
     chance: what the processing times and arrivals are drawn from while it learns. settings: those of SRL and Monte
-    Carlo; the others have none.
+    Carlo; the others have none. policy: of the method `carried`; None: the one that ships.
     """
 
     episodes: int = 400
@@ -87,6 +90,7 @@ class Search:
     chance: Chance = NO_CHANCE
     settings: SrlSettings = field(default_factory=SrlSettings)
     on_episode: OnEpisode | None = None
+    policy: "CarriedPolicy | None" = None
 
     def __post_init__(self) -> None:
         if self.episodes < 1:

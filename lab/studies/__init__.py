@@ -93,6 +93,12 @@ def _flat(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return flat(job, reading)
 
 
+def _carried_over(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.carried_over import carried_over
+
+    return carried_over(job, reading)
+
+
 def _changed_scenes(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.changed_scenes_study import changed_scenes
 
@@ -121,6 +127,12 @@ def _transport(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.transport import transport
 
     return transport(job, reading)
+
+
+def _reacting(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.reacting import reacting
+
+    return reacting(job, reading)
 
 
 def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
@@ -181,6 +193,12 @@ STUDIES: dict[str, Study] = {
         _reuse,
         sessions=10,
         least=1,
+    ),
+    "carried-over": Study(
+        "A policy learned on small cells orders larger ones, beside every dispatching rule", _carried_over, sessions=240
+    ),
+    "reacting": Study(
+        "Drawn times, breakdowns, late parts: a list, policies that react, hindsight", _reacting, sessions=50
     ),
     "sequencing-speed": Study("Speed of the high level: episodes a second, proofs, time to 1 %", _sequencing_speed),
     "transport": Study(

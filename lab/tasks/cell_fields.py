@@ -123,10 +123,13 @@ class Stochastic(Record):
     processing: Law = "normal"
     arrivals: Law = "constant"
     spread: Annotated[float, Field(ge=0, le=1)] = 0.1
+    breaks_every_s: Seconds = 0.0
+    repair_s: Seconds = 0.0
+    late_s: Seconds = 0.0
 
     def built(self) -> Chance:
         """As the sequencer has it."""
-        return Chance(self.processing, self.arrivals, self.spread)
+        return Chance(**self.model_dump())
 
 
 class CellFields(Record):

@@ -46,6 +46,7 @@ class OrderOptions(SessionOptions):
     parts: str | None = None
     layout: str | None = None
     robots: Annotated[int, Ge(1)] | None = None
+    policy: str | None = None
 
     def complete(self) -> "OrderOptions":
         """Themselves; BadInput when nothing is named to sequence."""
@@ -65,8 +66,9 @@ class OrderOptions(SessionOptions):
 
     def to_json(self) -> dict[str, Any]:
         """A plain dict, files by their whole paths, so that they are found from another folder."""
-        layout = None if self.layout is None else str(Path(self.layout).absolute())
-        return asdict(self) | {"task": whole_path(self.task), "layout": layout}
+        beside = {"layout": self.layout, "policy": self.policy}
+        whole = {name: None if path is None else str(Path(path).absolute()) for name, path in beside.items()}
+        return asdict(self) | {"task": whole_path(self.task)} | whole
 
     @property
     def beside(self) -> Asked:

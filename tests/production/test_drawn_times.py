@@ -12,7 +12,9 @@ from lab.production.sequencing_job import (
 )
 from lab.sequencing import SEQUENCERS
 from lab.sequencing.cell.chance import Chance
+from lab.sequencing.methods.carried_over_policy import CarriedPolicy
 from lab.sequencing.simulate.execution import replicate
+from lab.tasks.carried_policy import write_policy
 from lab.tasks.task_file import load_cell
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
@@ -32,6 +34,7 @@ REACTING = {
     "fifo": "a queue of tasks as they become possible",
     "shortest-move": "the rule shortest-move, asked at every decision",
     "exact": "planned anew at every decision",
+    "carried": "the carried-over policy, asked at every decision",
 }
 
 
@@ -89,6 +92,19 @@ def test_who_plans_at_every_decision_is_given_fewer_episodes(
         monkeypatch.setattr(f"lab.production.drawn_times.{name}", number)
     drawn = asked(lab, f"oven.toml --toasts {toasts} --method {method} --stochastic")["stochastic"]
     assert drawn["replications"] == episodes
+
+
+def test_the_policy_of_a_file_plans_and_reacts(lab: Lab, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    """What begins soonest first is nearest-ready; the policy that ships does better."""
+    few(monkeypatch, 3)
+    write_policy(folder / "soonest.json", CarriedPolicy({"delay": -1.0}))
+    words = "toast --case I --toasts 4 --stochastic --method"
+    own = asked(lab, f"{words} carried --policy soonest.json")
+    rule, shipped = asked(lab, f"{words} nearest-ready"), asked(lab, f"{words} carried")
+    assert own["sequence"] == rule["sequence"]
+    assert own["stochastic"]["reacting"]["mean"] == rule["stochastic"]["reacting"]["mean"]
+    assert shipped["makespan_s"] < own["makespan_s"]
+    assert shipped["stochastic"]["reacting"]["mean"] < own["stochastic"]["reacting"]["mean"]
 
 
 def test_the_best_list_is_the_one_that_is_carried_out(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -49,6 +49,10 @@ KNOWN = ", ".join(sorted(SEQUENCERS))
         ("oven.toml --plot p.pdf", "picture 'p.pdf': plots are written as .png or .svg"),
         ("oven.toml --gantt g", "picture 'g': plots are written as .png or .svg"),
         ("oven.toml --gantt no/g.svg", "picture 'no/g.svg': there is no folder 'no'"),
+        ("fms --method carried --policy no.json", "no.json: cannot be read: "),
+        ("fms --method carried --policy oven.toml", "policy oven.toml (--policy): Invalid JSON: "),
+        ("fms --method srl --policy no.json", "--policy no.json with --method srl: only carried decides by one"),
+        ("fms --cyclic --policy no.json", "--cyclic beside --policy no.json: "),
         ("toast --method srrl", f"unknown method 'srrl' (--method): did you mean 'srl'? known: {KNOWN}"),
     ],
 )

@@ -43,6 +43,7 @@ def test_the_table() -> None:
         "exact",
         "cp-sat",
         "portfolio",
+        "carried",
         *rules,
     }
 

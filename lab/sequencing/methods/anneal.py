@@ -1,13 +1,14 @@
 """Simulated annealing: an order of priorities is changed a little, again and again, and worse ones are kept ever more seldom."""
 
-from math import exp, log
+from collections.abc import Sequence
+from math import exp, inf, log
 
 import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.chance import drawn_seed
 from lab.sequencing.methods import anneal_kernels
-from lab.sequencing.methods.priorities import Orders
+from lab.sequencing.methods.priorities import Orders, Priorities
 from lab.sequencing.search import Log, Search, SequenceResult
 
 ROUND = 500  # sequences between two looks at the clock, the listener and Ctrl-C
@@ -36,16 +37,17 @@ def anneal(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResu
 
 
 class Annealing:
-    """An annealing under way. orders: what it begins with; costs: of the last round."""
+    """An annealing under way. orders: what it begins with, but for a `known` order; costs: of the last round."""
 
-    def __init__(self, cell: Cell, objective: str, seed: int) -> None:
+    def __init__(self, cell: Cell, objective: str, seed: int, known: Sequence[int] = ()) -> None:
         self.orders = orders = Orders(cell, objective, "annealing")
-        cost = orders.best.cost if orders.best.done else orders.stuck_cost
+        first = Priorities.of(cell, known) if known else orders.first
+        cost = inf if known else orders.best.cost if orders.best.done else orders.stuck_cost
         self._work = anneal_kernels.AnnealArrays(
             tried=orders.order(),
-            parts=orders.first.parts.copy(),
-            choices=orders.first.choices.copy(),
-            best=orders.padded(),
+            parts=first.parts.copy(),
+            choices=first.choices.copy(),
+            best=np.zeros_like(first.parts) if known else orders.padded(),
             cost=np.array([cost, cost]),
             stream=np.array([seed], np.uint64),
         )

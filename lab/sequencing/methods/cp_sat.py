@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite
 from time import perf_counter
 from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 from ortools.sat.python import cp_model
@@ -13,10 +12,13 @@ from ortools.sat.python import cp_model
 from lab.errors import BadInput
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, check_built_in, check_objective, cost
+from lab.sequencing.methods.cp_sat_free import free_robots
 from lab.sequencing.methods.cp_sat_model import Model
+from lab.sequencing.methods.cp_sat_solver import Status, solved
 from lab.sequencing.methods.cp_sat_tasks import possible_tasks
 from lab.sequencing.methods.cp_sat_transport import TransportModel
 from lab.sequencing.methods.rules import first_come
+from lab.sequencing.methods.shared import Shared
 from lab.sequencing.search import SAME, Search, SequenceResult, only_one
 from lab.sequencing.simulate.run import Run, follow
 
@@ -25,14 +27,6 @@ MOST_MOVES = 800  # that parts may make, in a model; what it takes in memory gro
 
 FIRST_LOOK = 3.0  # about so many seconds of a thread, counted in what the solver does
 GROWS = 2.0
-
-Status = Literal["optimal", "feasible", "unknown", "impossible"]
-_STATUS: dict[object, Status] = {
-    cp_model.OPTIMAL: "optimal",
-    cp_model.FEASIBLE: "feasible",
-    cp_model.UNKNOWN: "unknown",
-    cp_model.INFEASIBLE: "impossible",
-}
 
 
 @dataclass(frozen=True)
@@ -79,46 +73,86 @@ def cp_sat(
     if workers < 1:
         raise BadInput(f"workers = {workers}: allowed are whole numbers from 1")
     known = first_come(cell) if hint is None else hint
-    model = Model(cell, objective, known) if cell.serial else TransportModel(cell, objective, known)
-    asked = _Asked(cell, objective, seed, workers, perf_counter() + time_limit_s)
-    if isinstance(model, Model):
-        return _result(asked, model)
-    narrows = objective == MAKESPAN and not model.times.rounded_s
-    found = _narrowed(asked, model) if narrows else _result(asked, model)
-    if found.status == "unknown" and known:
-        return replace(found, status="feasible", cost=cost(follow(cell, known), objective), sequence=tuple(known))
-    return found
+    return _searched(_Asked(Shared(cell, objective), seed, workers, time_limit_s), tuple(known))
 
 
-@dataclass(frozen=True)
+def beside(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
+    """As `cp_sat`, beside other methods: it begins with the best order of all, again where another one finds a better one.
+
+    All that it finds and proves is told to the others as it comes; it ends when they are over, too. Of a cell that is too large
+    for a model it gives a bound only. The time limit holds for all of it [s].
+    """
+    begin_s, cell, large = perf_counter(), shared.cell, not fits(shared.cell)
+    of_use = large or (shared.objective == MAKESPAN and not cell.serial)
+    if cell.robots and shared.objective != "robot-idle" and of_use:
+        free_robots(shared, time_limit_s, seed, workers)
+    left_s = time_limit_s - (perf_counter() - begin_s)
+    if not large and left_s > 0 and not shared.over.is_set():
+        _searched(_Asked(shared, seed, workers, left_s), shared.sequence)
+
+
+@dataclass
 class _Asked:
-    """What is asked of the solver; until_s: on the clock `perf_counter`."""
+    """What is asked of the solver. until_s: on the clock `perf_counter`, which begins with the first look."""
 
-    cell: Cell
-    objective: str
+    shared: Shared
     seed: int
     workers: int
-    until_s: float
+    time_limit_s: float
+    until_s: float = inf
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether there is time, and something left to prove."""
+        return perf_counter() < self.until_s and not self.shared.over.is_set()
 
 
-def _narrowed(asked: _Asked, model: TransportModel) -> CpSatResult:
+def _searched(asked: _Asked, known: tuple[int, ...]) -> CpSatResult:
+    """What the solver makes of a cell, beginning with an order; empty: with nothing."""
+    cell, objective, shared = asked.shared.cell, asked.shared.objective, asked.shared
+    while True:
+        model = Model(cell, objective, known) if cell.serial else TransportModel(cell, objective, known)
+        asked.until_s = min(asked.until_s, perf_counter() + asked.time_limit_s)
+        worth = cost(follow(cell, known), objective) if known else inf
+        if isinstance(model, TransportModel) and objective == MAKESPAN and not model.times.rounded_s:
+            found = _narrowed(asked, model, worth)
+        else:
+            found = _result(asked, model, worth)
+        if found.status == "unknown" and known:
+            found = replace(found, status="feasible", cost=worth, sequence=known)
+        _tell(shared, found)
+        if found.status in ("optimal", "impossible") or not asked.goes_on or shared.cost >= found.cost - SAME:
+            return found
+        known = shared.sequence
+
+
+def _tell(shared: Shared, found: CpSatResult) -> None:
+    """What was found; not that there is nothing where somebody has an order, which rounded times may do."""
+    known = found.status == "impossible" and shared.sequence
+    shared.tell("CP-SAT", found.sequence, 0.0 if known else found.bound)
+
+
+def _narrowed(asked: _Asked, model: TransportModel, worth: float) -> CpSatResult:
     """The shortest makespan: a first look, then only what is shorter than the best so far, until there is nothing.
 
     Measured: that there is nothing shorter is proven in a tenth of the time without linear relaxations and with ends that are
     known; what is short is found, and bounded, better with them. So the two take turns, each time longer.
     """
-    begin_s, most = perf_counter(), FIRST_LOOK
-    best = _result(asked, model, {"max_deterministic_time": most})
-    if best.status == "unknown":
-        best = _result(asked, model)
-    while best.status == "feasible" and perf_counter() < asked.until_s:
-        below = TransportModel(asked.cell, asked.objective, best.sequence, below=True)
+    begin_s, most, shared = perf_counter(), FIRST_LOOK, asked.shared
+    best = _result(asked, model, worth, {"max_deterministic_time": most})
+    if best.status == "unknown" and asked.goes_on and shared.cost >= worth - SAME:
+        best = _result(asked, model, worth)
+    while best.status == "feasible" and asked.goes_on:
+        _tell(shared, best)
+        if shared.cost < best.cost - SAME:
+            best = replace(best, sequence=shared.sequence, cost=shared.cost)
+        below = TransportModel(shared.cell, shared.objective, best.sequence, below=True)
         for linear in (False, True):
             most *= GROWS
             more: dict[str, object] = {"max_deterministic_time": most}
             if not linear:
                 more |= {"linearization_level": 0, "stop_after_first_solution": True}
-            found = _result(asked, below, more)
+            found = _result(asked, below, best.cost, more)
             if found.cost < best.cost:
                 best = replace(found, bound=max(found.bound, best.bound))
                 best = replace(best, status="optimal" if best.cost <= best.bound + SAME else "feasible")
@@ -129,16 +163,19 @@ def _narrowed(asked: _Asked, model: TransportModel) -> CpSatResult:
             best = replace(best, bound=min(best.cost, max(best.bound, found.bound)))
             if found.status == "feasible":  # no shorter as a run: only the model lets it be
                 return replace(best, wall_s=perf_counter() - begin_s)
-            if perf_counter() >= asked.until_s:
+            if not asked.goes_on or shared.cost < best.cost - SAME:
                 break
     return replace(best, wall_s=perf_counter() - begin_s)
 
 
 def _result(
-    asked: _Asked, model: Model | TransportModel, more: Mapping[str, object] = MappingProxyType({})
+    asked: _Asked,
+    model: Model | TransportModel,
+    worth: float,
+    more: Mapping[str, object] = MappingProxyType({}),
 ) -> CpSatResult:
-    """What the solver makes of a model, with more parameters of its own."""
-    cell, solver = asked.cell, cp_model.CpSolver()
+    """What the solver makes of a model that was built with an order of this cost, with more parameters of its own."""
+    cell, solver = asked.shared.cell, cp_model.CpSolver()
     solver.parameters.max_time_in_seconds = max(0.01, asked.until_s - perf_counter())
     solver.parameters.num_workers = asked.workers
     solver.parameters.random_seed = asked.seed
@@ -148,11 +185,11 @@ def _result(
     solver.parameters.absolute_gap_limit = model.blur
     for name, value in more.items():
         setattr(solver.parameters, name, value)
-    status = _STATUS[solver.solve(model.model)]
+    status = solved(solver, model.model, asked.shared, worth)
     sequence = model.sequence(solver) if status in ("optimal", "feasible") else ()
     if sequence and (model.times.rounded_s or not cell.serial) and _spoils(cell, sequence):
         status, sequence = "unknown", ()
-    value = cost(follow(cell, sequence), asked.objective) if sequence else inf
+    value = cost(follow(cell, sequence), asked.shared.objective) if sequence else inf
     bound = inf if status == "impossible" else min(value, solver.best_objective_bound * model.worth)
     if status == "optimal" and value > bound + model.blur * model.worth + SAME:
         status = "feasible"  # where a model lets a part have another room or server than a run does

@@ -13,7 +13,7 @@ from lab.sequencing.methods.cp_sat_times import Times
 
 
 class Team(NamedTuple):
-    """Robots, by index, that are alike in where they start, how fast they are and what they serve."""
+    """Robots, by index, that are alike in how fast they are and what they serve; they may start in different places."""
 
     robots: tuple[int, ...]
 
@@ -96,7 +96,7 @@ def teams_of(cell: Cell) -> list[Team]:
     """The robots, alike ones together."""
     alike = defaultdict[object, list[int]](list)
     for number, robot in enumerate(cell.robots):
-        alike[robot.start, robot.speed, robot.serves].append(number)
+        alike[robot.speed, robot.serves].append(number)
     return [Team(tuple(robots)) for robots in alike.values()]
 
 
@@ -119,6 +119,7 @@ class Tasks:
         self.cell, self.model, self.times, self.horizon = cell, model, times, horizon
         self.least, self.teams = Least(cell, times), teams_of(cell)
         self.tight = cell.has_windows
+        self._ahead = {at: reached_from(cell.positions, {at}) for at in set(cell.begin_at)}
         self.blocking = [s for s in range(len(cell.stations)) if self._may_be_full(s)]
         options = [way for at in cell.positions for way in at.options]
         self.ranked = bool(self.blocking) or cell.arrivals is not None or any(o.if_full is not None for o in options)
@@ -146,15 +147,14 @@ class Tasks:
     def _may_be_full(self, station: int) -> bool:
         cell = self.cell
         holding = {place for place, at in enumerate(cell.positions) if station in at.holds}
-        ahead = {at: reached_from(cell.positions, {at}) for at in set(cell.begin_at)}
-        return sum(bool(ahead[at] & holding) for at in cell.begin_at) > cell.capacities[station]
+        return sum(bool(self._ahead[at] & holding) for at in cell.begin_at) > cell.capacities[station]
 
     def _add(self, part: int) -> None:
         cell, start = self.cell, self.cell.begin_at[part]
         reached, into = [start], defaultdict[int, list[Task]](list)
         self._ready[part, start] = self._first_ready(part)
         left = defaultdict[int, int](int)  # ways into a place that are not tasks yet
-        for place in reached_from(cell.positions, {start}):
+        for place in self._ahead[start]:
             for way in cell.positions[place].options:
                 left[way.to] += 1
         for place in reached:

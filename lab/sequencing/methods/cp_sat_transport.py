@@ -4,10 +4,12 @@ It shares the cell's positions with the simulation, and nothing else. The old mo
 the cells that it knows.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from graphlib import TopologicalSorter
 from heapq import heappop, heappush
 from itertools import pairwise
+from typing import NamedTuple
 
 from ortools.sat.python import cp_model
 
@@ -23,16 +25,31 @@ from lab.sequencing.simulate.run import Run
 Arcs = dict[tuple[int, int], cp_model.IntVar]
 
 
+class Tours(NamedTuple):
+    """What a team does. arcs: from task to task, numbered from 1; 0 is the begin and the end of every tour.
+
+    firsts: by where robots start, a station's index, and the first task; empty where all of the team start in one place.
+    """
+
+    team: Team
+    tasks: list[Task]
+    arcs: Arcs
+    firsts: Arcs
+
+
 class TransportModel:
     """The variables and constraints. worth: what a unit of the model's objective is in the cell's.
 
-    below: only makespans shorter than the hint's are looked for. blur: by how many units rounding may change a sequence's cost;
-    0 when no time is rounded. Where a station has room for several parts, or several servers, the model lets any of them be
-    taken; a `Run` takes the first: what is proven is a bound.
+    below: only makespans shorter than the hint's are looked for. free: robots are wherever they are wanted, rooms are never
+    full, setups take no time: a small model, for a bound and an order to begin with. blur: by how many units rounding may
+    change a sequence's cost; 0 when no time is rounded. Where a station has room for several parts, or several servers, the
+    model lets any of them be taken; a `Run` takes the first: what is proven is a bound.
     """
 
-    def __init__(self, cell: Cell, objective: str, hint: Sequence[int], below: bool = False) -> None:
-        self.cell, self.model, self.times = cell, cp_model.CpModel(), Times(cell, shortest=0)
+    def __init__(
+        self, cell: Cell, objective: str, hint: Sequence[int], below: bool = False, free: bool = False
+    ) -> None:
+        self.cell, self.model, self.times, self._free = cell, cp_model.CpModel(), Times(cell, shortest=0), free
         known = _known(cell, self.times, hint) if hint else {}
         rounding = 2 * cell.possible_moves if self.times.rounded_s else 0
         horizon = self.times.whole(cell.longest_s) + cell.possible_moves
@@ -40,13 +57,14 @@ class TransportModel:
             horizon = max(drop for _, drop in known.values()) + (-1 if below else rounding)
         self.tasks = Tasks(cell, self.model, self.times, horizon)
         self._end = self.tasks.moment("makespan")
-        self._tours: list[tuple[Team, list[Task], Arcs]] = []
+        self._tours: list[Tours] = []
         self._idle: list[cp_model.LinearExprT] = []
         for team in self.tasks.teams:
             self._add_team(team, objective)
         for station in range(len(cell.stations)):
             self._add_servers(station)
-        add_rooms(self.tasks)
+        if not free:
+            add_rooms(self.tasks)
         self._add_order(objective)
         for task in self.tasks.all:
             rest = self.tasks.least.tail[task.option.to]
@@ -60,9 +78,13 @@ class TransportModel:
         """The decisions of the solution: each after all that it waits for, else in the order of their times."""
         number = {task: n for n, task in enumerate(self.tasks.all) if solver.boolean_value(task.done)}
         robot = dict[Task, int]()
-        for team, tasks, arcs in self._tours:
-            for index, tour in enumerate(_routes(solver, arcs)):
-                robot |= {tasks[node - 1]: team.robots[index] for node in tour}
+        for team, tasks, arcs, firsts in self._tours:
+            free = list(team.robots)
+            for tour in _routes(solver, arcs):
+                starts = [at for (at, node), first in firsts.items() if node == tour[0] and solver.boolean_value(first)]
+                own = next(one for one in free if not starts or self._start(one) == starts[0])
+                free.remove(own)
+                robot |= {tasks[node - 1]: own for node in tour}
         order = TopologicalSorter[Task](dict.fromkeys(number, ()))
         for before, task, when in self.tasks.follows:
             if all(solver.boolean_value(literal) for literal in when):
@@ -78,10 +100,16 @@ class TransportModel:
             order.done(task)
         return tuple(found)
 
+    def moves(self, solver: cp_model.CpSolver) -> list[tuple[int, int, int]]:
+        """The tasks that are done in the order of their times, each as its part from 0, where it is, and where to it comes."""
+        done = [task for task in self.tasks.all if solver.boolean_value(task.done)]
+        done.sort(key=lambda task: (solver.value(task.begin), solver.value(task.end), task.part))
+        return [(task.part, task.place, task.option.to) for task in done]
+
     def _suggest(self, known: dict[tuple[int, int, int], tuple[int, int]]) -> None:
         """Give the solver a sequence to begin with."""
         hints, last = dict[int, tuple[cp_model.IntVar, int]](), dict[int, Task]()
-        follows = set[tuple[Task | None, Task | None]]()
+        follows, begins = set[tuple[Task | None, Task | None]](), set[tuple[int, Task]]()
         for rank, ((part, place, choice), (begin, _)) in enumerate(known.items()):
             for task in self.tasks.all:
                 if (task.part, task.place) != (part, place):
@@ -95,31 +123,39 @@ class TransportModel:
                     hints[task.rank.index] = task.rank, rank
                 if robot != SERVER:
                     follows.add((last.get(robot), task))
+                    begins |= {(self._start(robot), task)} if robot not in last else set()
                     last[robot] = task
         follows |= {(task, None) for task in last.values()}
-        for _, tasks, arcs in self._tours:
+        for _, tasks, arcs, firsts in self._tours:
             nodes = [None, *tasks]
             for (left, then), arc in arcs.items():
                 hints[arc.index] = arc, (nodes[left], nodes[then]) in follows
+            for (at, node), first in firsts.items():
+                hints[first.index] = first, (at, tasks[node - 1]) in begins
         for variable, value in hints.values():
             self.model.add_hint(variable, value)
 
     def _add_team(self, team: Team, objective: str) -> None:
         """The tours of alike robots: as many at the most as there are, through all that one of them does."""
         tasks = [task for task in self.tasks.all if task.option.robot in team.robots]
-        least, robots, start = self.tasks.least, len(team.robots), self.cell.robots[team.robots[0]].start
-        at, alone = self.cell.index(start), len(self.cell.robots) == 1
-        arcs, spent = Arcs(), [least.takes(task.option) * task.done for task in tasks]
+        least, robots, alone = self.tasks.least, len(team.robots), len(self.cell.robots) == 1
+        starts = Counter(self._start(robot) for robot in team.robots)
+        arcs, firsts, spent = Arcs(), Arcs(), [least.takes(task.option) * task.done for task in tasks]
         travels, rests = list(spent), list[cp_model.LinearExpr]()
-        for number, task in enumerate(tasks, 1):
+        for number, task in enumerate(() if self._free else tasks, 1):
             place, option = task.place, task.option
             before = least.by_servers(self.cell.begin_at[task.part])
             if not alone or place in before:
-                gap = self.times.travel(at, option.origin, team.robots[0])
-                arc = self._arc(arcs, 0, number, None, task, gap)
-                head = least.between(self.cell.begin_at[task.part], place) or 0
-                spent.append((max(gap, head) if self.cell.begins is None else gap) * arc)
-                travels.append(gap * arc)
+                gaps = {at: self.times.travel(at, option.origin, team.robots[0]) for at in starts}
+                head = (least.between(self.cell.begin_at[task.part], place) or 0) if self.cell.begins is None else 0
+                begun = firsts if len(starts) > 1 else arcs
+                for at, gap in gaps.items():
+                    arc = self._arc(begun, at if len(starts) > 1 else 0, number, None, task, gap)
+                    spent.append(max(gap, head) * arc)
+                    travels.append(gap * arc)
+                if len(starts) > 1:
+                    arcs[0, number] = self.model.new_bool_var("first")
+                    self.model.add(sum(firsts[at, number] for at in starts) == arcs[0, number])
             reached = least.by_servers(option.to)
             if not alone or any(not self.cell.positions[to].options for to in reached):
                 arc = arcs[number, 0] = self.model.new_bool_var("last")
@@ -131,8 +167,11 @@ class TransportModel:
                     arc = self._arc(arcs, number, other, task, then, travel)
                     spent.append(max(between, travel) * arc)
                     travels.append(travel * arc)
-        self._chain(tasks, arcs, robots)
-        self._tours.append((team, tasks, arcs))
+        if not self._free:
+            self._chain(tasks, arcs, robots)
+        for at, count in starts.items() if firsts else ():
+            self.model.add(sum(first for (start, _), first in firsts.items() if start == at) <= count)
+        self._tours.append(Tours(team, tasks, arcs, firsts))
         self.model.add(robots * self._end >= sum(spent) + sum(rests))
         if len(tasks) > robots:
             spans = [self._span(task) for task in tasks]
@@ -141,6 +180,9 @@ class TransportModel:
             ends = self._last(tasks, arcs)
             self.model.add(sum(ends) >= sum(spent))
             self._idle += [*ends, -sum(travels)]
+
+    def _start(self, robot: int) -> int:
+        return self.cell.index(self.cell.robots[robot].start)
 
     def _gap(self, task: Task, then: Task, alone: bool) -> int | None:
         """What passes at least between two tasks of a robot because of the part itself; None: they cannot follow each other."""
@@ -194,7 +236,7 @@ class TransportModel:
             self.model.add_no_overlap(spans)
         elif len(own) > servers:
             self.model.add_cumulative(spans, [1] * len(spans), servers)
-        if not (setups or self.tasks.ranked or self.tasks.tight):
+        if self._free or not (setups or self.tasks.ranked or self.tasks.tight):
             return
         arcs = Arcs()
         for number, task in enumerate(own, 1):

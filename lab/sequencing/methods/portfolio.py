@@ -1,17 +1,19 @@
-"""All methods in turn: rules, annealing, and the exact search that proves most, each beginning with the best order so far."""
+"""The methods together: rules, annealing, and the exact search that proves most, each going on from the best order so far."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf
+from time import perf_counter
 
 import numpy as np
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import MAKESPAN, cost
-from lab.sequencing.methods.anneal import Annealing
 from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.fewer_moves import fewer_moves
-from lab.sequencing.methods.one_robot import one_robot, why_not
+from lab.sequencing.methods.rules import first_come, work_left_s
+from lab.sequencing.methods.shared import Shared
 from lab.sequencing.search import SAME, Search, SequenceResult, only_one
 from lab.sequencing.simulate.cell_arrays import most_moves
 from lab.sequencing.simulate.run import follow
@@ -19,9 +21,8 @@ from lab.sequencing.simulate.run import follow
 MOVES, ROUND = 12_000_000, 3_000  # of all sequences that annealing tries; how many it tries between two looks at Ctrl-C
 TIME_LIMIT_S = 60.0
 WORKERS = 6  # threads of CP-SAT, also on two cores: they look in different ways
-
-
-Found = tuple[tuple[int, ...], float, str]  # a sequence, its cost, and by whom
+ANNEALERS, ANNEALINGS = 2, 40  # threads beside CP-SAT, with seeds of their own; how often each begins at the most
+SHORTEST_S, WAIT_S = 0.1, 0.05  # what CP-SAT is left at least; between two looks at the clock
 
 
 @dataclass(frozen=True)
@@ -50,25 +51,26 @@ def best_known(
     """The best order by the mean times, and what is proven of it; CP-SAT is looked at only where nothing faster proves it.
 
     Of a cell with one robot that does all the work the shortest makespan is searched by states (`optimum`), of a job shop with
-    one robot by its tours (`one_robot`); else CP-SAT begins with the order that annealing found. time_limit_s: of each of
-    these [s]. workers: of CP-SAT; more than one may find another of several orders that cost the same.
+    one robot by its tours (`one_robot`). Else annealing and CP-SAT look: with one worker one after the other, the same seed
+    giving the same order; with more side by side, each going on from the best order of both, until it is proven.
+    time_limit_s: of the search of tours, and of CP-SAT, or of both together [s].
     Raises BadInput as they do, WorkFailed where it is proven, or seems, that no order comes to its end.
     """
-    best: Found = ((), inf, "")
-    bound, bound_by = 0.0, "nothing"
     if objective == MAKESPAN and cell.serial:
         found = optimum(cell)
         return BestKnown(fewer_moves(cell, found.sequence), found.cost, "A*", found.bound_s, "A*")
+    shared = Shared(cell, objective)
+    shared.tell("each part alone", bound=_alone(cell, objective))
+    from lab.sequencing.methods.one_robot import one_robot, why_not  # here and below: numba takes its time
+
     if objective == MAKESPAN and not why_not(cell):
         tour = one_robot(cell, time_limit_s)
-        best, bound, bound_by = (tour.sequence, tour.cost, "search of tours"), tour.bound, "search of tours"
-    if best[1] > bound + SAME:
-        best = min(best, _annealed(cell, objective, seed), key=lambda one: one[1])
-        sequence, least, theirs = _solved(cell, objective, time_limit_s, seed, best[0], workers)
-        best = min(best, (sequence, _cost(cell, sequence, objective), "CP-SAT"), key=lambda one: one[1])
-        bound, bound_by = max((least, theirs), (bound, bound_by), key=lambda one: one[0])
-    sequence = fewer_moves(cell, best[0], objective) if best[0] else ()
-    return BestKnown(sequence, _cost(cell, sequence, objective), best[2], min(bound, best[1]), bound_by)
+        shared.tell("search of tours", tour.sequence, tour.bound)
+    if not shared.over.is_set():
+        _look(shared, time_limit_s, seed, workers)
+    sequence = fewer_moves(cell, shared.sequence, objective) if shared.sequence else ()
+    value = cost(follow(cell, sequence), objective) if sequence else inf
+    return BestKnown(sequence, value, shared.found_by, min(shared.bound, value), shared.bound_by)
 
 
 def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
@@ -78,24 +80,72 @@ def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceR
     return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))
 
 
-def _annealed(cell: Cell, objective: str, seed: int) -> Found:
-    annealing, steps = Annealing(cell, objective, seed), max(ROUND, MOVES // most_moves(cell))
+def _look(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
+    """Annealing and CP-SAT: side by side, or in turn; where one robot does all the work CP-SAT needs no help to begin with."""
+    until_s = perf_counter() + time_limit_s
+    if shared.cell.serial and workers == 1:
+        shared.tell("first come, first served", first_come(shared.cell))
+        _prove(shared, time_limit_s, seed, workers)
+    _anneal(shared, seed, 0)
+    if workers > 1:
+        _side_by_side(shared, until_s, seed, workers)
+    elif not shared.cell.serial:
+        _prove(shared, time_limit_s, seed, workers)
+
+
+def _alone(cell: Cell, objective: str) -> float:
+    """What it costs at least if no part ever waits for another one; 0 where that says nothing."""
+    if not all(way.waits for place in cell.positions for way in place.options):
+        return 0.0
+    left_s = work_left_s(cell)
+    ends = {part: cell.begin_s[part - 1] + left_s[cell.begin_at[part - 1]] for part in cell.unfinished}
+    late = [max(0.0, ends.get(part, 0.0) - due) for part, due in enumerate(cell.due_s or (), 1)]
+    known = {MAKESPAN: max(ends.values(), default=0.0)}
+    if late:
+        known |= {"mean-tardiness": sum(late) / cell.parts, "tardy-parts": float(sum(one > SAME for one in late))}
+    return known.get(objective, 0.0)
+
+
+def _side_by_side(shared: Shared, until_s: float, seed: int, workers: int) -> None:
+    """Annealing, again and again, beside CP-SAT, in threads of their own, until it is proven or the time is over."""
+    with ThreadPoolExecutor() as pool:
+        left_s = max(SHORTEST_S, until_s - perf_counter())
+        working = [pool.submit(_prove, shared, left_s, seed, workers)]
+        working += [pool.submit(_anneal_on, shared, seed + ANNEALINGS * number) for number in range(ANNEALERS)]
+        try:
+            while perf_counter() < until_s and not shared.over.wait(WAIT_S):
+                if any(one.done() and one.exception() for one in working):
+                    break
+        finally:  # Ctrl-C, too
+            shared.over.set()
+    for one in working:
+        one.result()
+
+
+def _prove(shared: Shared, time_limit_s: float, seed: int, workers: int) -> None:
+    """What CP-SAT makes of it, told to all."""
+    from lab.sequencing.methods.cp_sat import beside  # only where it is needed: OR-Tools takes its time
+
+    beside(shared, time_limit_s, seed, workers)
+
+
+def _anneal_on(shared: Shared, seed: int) -> None:
+    """Annealing again and again, longer and longer."""
+    for again in range(1, ANNEALINGS):
+        _anneal(shared, seed + again, again)
+
+
+def _anneal(shared: Shared, seed: int, again: int) -> None:
+    """Annealing once, the longer the oftener it was done before; each third time it goes on from the best order of all."""
+    from lab.sequencing.methods.anneal import Annealing
+
+    if shared.over.is_set():
+        return
+    annealing = Annealing(shared.cell, shared.objective, seed, shared.sequence if again % 3 == 1 else ())
+    steps = max(ROUND, (MOVES << (again + 3) // 4) // most_moves(shared.cell))
     for done in range(0, steps, ROUND):
         annealing.advance(ROUND, done / steps)
-    return annealing.best, annealing.best_cost if annealing.best else inf, "annealing"
-
-
-def _solved(
-    cell: Cell, objective: str, time_limit_s: float, seed: int, hint: tuple[int, ...], workers: int
-) -> tuple[tuple[int, ...], float, str]:
-    """What CP-SAT finds, the bound, and whose it is."""
-    from lab.sequencing.methods.cp_sat import cp_sat, fits  # only where it is needed: OR-Tools takes its time
-
-    if not fits(cell):
-        return (), 0.0, "nothing: too many moves for CP-SAT"
-    found = cp_sat(cell, objective, time_limit_s, seed, hint or None, workers)
-    return found.sequence, found.bound, "CP-SAT"
-
-
-def _cost(cell: Cell, sequence: tuple[int, ...], objective: str) -> float:
-    return cost(follow(cell, sequence), objective) if sequence else inf
+        if annealing.best and annealing.best_cost < shared.cost - SAME:
+            shared.tell("annealing", annealing.best)
+        if shared.over.is_set():
+            return

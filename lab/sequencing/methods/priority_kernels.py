@@ -61,9 +61,16 @@ def carried_out(cell: Any, run: Any, order: Any, limit: float) -> float:
     It is given up, parts being left unfinished, where a part cannot end before `limit` any more: then that end is returned.
     """
     reset(cell, run, np.uint64(0))
+    for i in range(len(order.parts)):
+        order.used[i] = False
+    return float(carried_on(cell, run, order, limit, np.uint64(0)))
+
+
+@inner
+def carried_on(cell: Any, run: Any, order: Any, limit: float, seed: Any) -> float:
+    """`carried_out` from where the run is, with what is not used of the list, and the times of an episode's seed."""
     size, first, moves = len(order.parts), 0, 0
     for i in range(size):
-        order.used[i] = False
         order.sequence[i] = 0
     while run.whole[1] > 0:
         i, o = first, -1
@@ -82,7 +89,7 @@ def carried_out(cell: Any, run: Any, order: Any, limit: float) -> float:
         order.used[i] = True
         order.sequence[moves] = part + 1 + cell.choice[o] * len(run.locations)
         moves += 1
-        take(cell, run, part, o, np.uint64(0))
+        take(cell, run, part, o, seed)
         end_s = run.ready_s[part] + order.left_s[run.locations[part]]
         if end_s > limit and run.whole[1] > 0:
             return float(end_s)

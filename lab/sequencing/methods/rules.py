@@ -174,14 +174,14 @@ def work_left_s(cell: Cell) -> tuple[float, ...]:
 
 
 @lru_cache(maxsize=16)
-def _loads_s(cell: Cell) -> tuple[dict[int, float], ...]:
+def loads_s(cell: Cell) -> tuple[dict[int, float], ...]:
     """For each position, station index -> processing still to come there [s], averaged over the ways on."""
 
     def loads_s(place: int, ahead: list[dict[int, float]]) -> dict[int, float]:
         total: dict[int, float] = {}
         for option, then in zip(cell.positions[place].options, ahead, strict=True):
             there, own = cell.positions[option.to], dict(then)
-            machine = option.target if option.robot == SERVER else _machine(cell, option.to)
+            machine = option.target if option.robot == SERVER else machine_of(cell, option.to)
             if there.processing_s and machine is not None:
                 own[machine] = own.get(machine, 0.0) + there.processing_s
             for station, seconds in own.items():
@@ -197,13 +197,13 @@ def _feeds(cell: Cell) -> tuple[frozenset[int], ...]:
 
     def feeds(place: int, ahead: list[frozenset[int]]) -> frozenset[int]:
         ways = cell.positions[place].options
-        machine = ways[0].target if ways and ways[0].robot == SERVER else _machine(cell, place)
+        machine = ways[0].target if ways and ways[0].robot == SERVER else machine_of(cell, place)
         return frozenset().union(*ahead) if machine is None else frozenset({machine})
 
     return tuple(from_the_ends(cell.positions, feeds))
 
 
-def _machine(cell: Cell, position: int) -> int | None:
+def machine_of(cell: Cell, position: int) -> int | None:
     """The machine, by station index, that the part takes room in; None: it is in none."""
     holds = cell.positions[position].holds
     return next((station for station in holds if cell.stations[station].kind == "machine"), None)
@@ -211,14 +211,14 @@ def _machine(cell: Cell, position: int) -> int | None:
 
 def _machine_ends_s(run: Run) -> dict[int, float]:
     """Station index -> when the machine would end without ever standing still [s]; only machines with work to come."""
-    cell, loads_s = run.cell, _loads_s(run.cell)
+    cell, by_position = run.cell, loads_s(run.cell)
     to_come_s: dict[int, float] = {}
     through_s: dict[int, list[float]] = {}
     for index, position in enumerate(run.locations):
-        for station, seconds in loads_s[position].items():
+        for station, seconds in by_position[position].items():
             places = cell.stations[station].servers or cell.capacities[station]
             to_come_s[station] = to_come_s.get(station, 0.0) + seconds / places
-        machine = _machine(cell, position)
+        machine = machine_of(cell, position)
         if machine is not None and cell.stations[machine].servers is None:
             through_s.setdefault(machine, []).append(run.ready_s[index])
     ends_s = {}

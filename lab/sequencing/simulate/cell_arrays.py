@@ -74,6 +74,9 @@ class CellArrays(NamedTuple):
     processing_law: int
     arrivals_law: int
     spread: float
+    breaks_every_s: float
+    repair_s: float
+    late_s: float
 
 
 class RunArrays(NamedTuple):
@@ -148,6 +151,9 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
         processing_law=LAW_CODES[chance.processing],
         arrivals_law=LAW_CODES[chance.arrivals],
         spread=float(chance.spread),
+        breaks_every_s=float(chance.breaks_every_s),
+        repair_s=float(chance.repair_s),
+        late_s=float(chance.late_s),
     )
 
 

@@ -24,13 +24,14 @@ class Observed(Run):
 
     ready: whether each part may be picked now, part 1 first. ready_s: when it was ready or, as long as it is not, when
     it should be: by the mean time since it began, and now when it is later than that. processed_s counts means for what
-    is not finished.
+    is not finished. began_s: when what goes on with it began, or when it was to come.
     """
 
     def __init__(self, run: Run) -> None:
         super().__init__(run.cell)
         take_over(self, run)
         self.ready: tuple[bool, ...] = ()
+        self.began_s: list[float] = []
 
 
 Choose = Callable[[Observed, tuple[int, ...]], int]  # (what is known, allowed decisions) -> one of them, or WAIT
@@ -46,17 +47,20 @@ class Execution:
         self.sequence: list[int] = []
         # For each part: when its latest process began, and how long that takes on average; when it came to its first
         # station, and when it was picked there.
-        self._began_s, self._mean_s = [0.0] * cell.parts, list(cell.begin_s)
+        self._began_s, self._mean_s = list(cell.begin_s), [0.0] * cell.parts
         self._came_s, self._left_s = [0.0] * cell.parts, [0.0] * cell.parts
 
     def observe(self) -> Observed:
         """What is known now; nothing of it changes when the run goes on."""
         run, seen = self.run, Observed(self.run)
+        seen.began_s = self._began_s.copy()
         seen.ready = tuple(
             ready_s <= run.now_s and not self._coming(index) for index, ready_s in enumerate(run.ready_s)
         )
         for index, ready in enumerate(seen.ready):
-            if not ready and not self._at_start(index):
+            if not ready and self._at_start(index):
+                seen.ready_s[index] = max(run.now_s, run.cell.begin_s[index])  # those that arrive are looked at below
+            elif not ready:
                 began_s, mean_s = self._began_s[index], self._mean_s[index]
                 seen.ready_s[index] = max(run.now_s, began_s + mean_s)
                 seen.processed_s += mean_s - (run.ready_s[index] - began_s)

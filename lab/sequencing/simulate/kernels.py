@@ -41,6 +41,28 @@ def _drawn(law: int, spread: float, mean_s: float, seed: Any, number: int) -> fl
 
 
 @inner
+def _apart(cell: Any, parts: int) -> int:
+    """`chance.Episode._apart`."""
+    return 2 * (parts + 1) * len(cell.begins)
+
+
+@inner
+def _worked(cell: Any, seed: Any, part: int, there: int, parts: int) -> float:
+    """`chance.Episode.processing_s` of a part (from 0)."""
+    number = (part + 1) * len(cell.begins) + there
+    work_s = _drawn(cell.processing_law, cell.spread, cell.processing_s[there], seed, number)
+    if cell.breaks_every_s == 0.0 or work_s == 0.0:
+        return work_s
+    first, worked_s, repaired_s = _apart(cell, parts) + parts + 2 * chance.MOST_BREAKS * number, 0.0, 0.0
+    for n in range(chance.MOST_BREAKS):
+        worked_s -= cell.breaks_every_s * np.log(1.0 - uniform(seed, first + 2 * n))
+        if worked_s >= work_s:
+            break
+        repaired_s -= cell.repair_s * np.log(1.0 - uniform(seed, first + 2 * n + 1))
+    return work_s + repaired_s
+
+
+@inner
 def _interval(cell: Any, seed: Any, part: int) -> float:
     """`chance.Episode.interval_s` of a part (from 0)."""
     number = (part + 1) * len(cell.begins) + cell.starts[part]
@@ -56,6 +78,9 @@ def reset(cell: Any, run: Any, seed: Any) -> None:
     for part in range(len(run.locations)):
         place = cell.begin_at[part]
         run.locations[part], run.ready_s[part], run.finished_s[part] = place, cell.begin_s[part], 0.0
+        if cell.late_s > 0.0 and place == cell.starts[part]:
+            late = _apart(cell, len(run.locations)) + part
+            run.ready_s[part] -= cell.late_s * np.log(1.0 - uniform(seed, late))
         run.room[cell.holds[place, 0]] -= 1
         run.room[cell.holds[place, 1]] -= 1
         if cell.first_option[place] < cell.first_option[place + 1]:
@@ -73,7 +98,7 @@ def reset(cell: Any, run: Any, seed: Any) -> None:
 
 
 @inner
-def _reach(cell: Any, run: Any, o: int) -> float:
+def reached_s(cell: Any, run: Any, o: int) -> float:
     """`Run.reach_s`."""
     robot = cell.robot[o]
     return float(run.robots_s[robot] + cell.empty_s[robot, run.robots_at[robot], cell.origin[o]])
@@ -85,12 +110,12 @@ def _too_late(cell: Any, run: Any, part: int, o: int) -> bool:
     at_most_s = cell.at_most_s[run.locations[part]]
     if at_most_s == np.inf or not cell.waits[o]:
         return False
-    begin_s = _server(cell, run, part, o)[0] if cell.robot[o] == SERVER else _reach(cell, run, o)
+    begin_s = server_for(cell, run, part, o)[0] if cell.robot[o] == SERVER else reached_s(cell, run, o)
     return bool(max(begin_s, run.ready_s[part]) + cell.service_s[o] > run.ready_s[part] + at_most_s + SLACK_S)
 
 
 @inner
-def _server(cell: Any, run: Any, part: int, o: int) -> Any:
+def server_for(cell: Any, run: Any, part: int, o: int) -> Any:
     """`Run._server`."""
     station, best_s, best = cell.target[o], np.inf, -1
     for server in range(cell.first_server[station], cell.first_server[station + 1]):
@@ -178,10 +203,10 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
     robot = cell.robot[o]
     here, there, server, reach_s = run.locations[part], cell.to[o], 0, 0.0
     if robot == SERVER:
-        pick_s, server = _server(cell, run, part, o)
+        pick_s, server = server_for(cell, run, part, o)
         drop_s = pick_s
     else:
-        reach_s = _reach(cell, run, o)
+        reach_s = reached_s(cell, run, o)
         ready_s = max(reach_s, run.ready_s[part]) if cell.waits[o] else reach_s
         pick_s = ready_s + cell.service_s[o]
         drop_s = pick_s + cell.loaded_s[robot, cell.origin[o], cell.target[o]]
@@ -197,8 +222,7 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
         run.clock[1] += drop_s - carried_s
     process_s = 0.0
     if cell.begins[there]:
-        number = (part + 1) * len(cell.begins) + there
-        process_s = _drawn(cell.processing_law, cell.spread, cell.processing_s[there], seed, number)
+        process_s = _worked(cell, seed, part, there, len(run.locations))
         run.ready_s[part] = drop_s + process_s
         run.clock[2] += process_s
     end_s = drop_s + process_s if robot == SERVER else drop_s

@@ -255,7 +255,9 @@ class Run:
         return reach_s, ready_s, ready_s + option.service_s
 
     def _first_ready_s(self) -> list[float]:
-        arrivals, all_s, came_s = self.cell.arrivals, list(self.cell.begin_s), 0.0
+        arrivals, came_s = self.cell.arrivals, 0.0
+        places = zip(self.cell.begin_s, self.locations, self.cell.starts, strict=True)
+        all_s = [s + (self.times.late_s(n) if at == start else 0.0) for n, (s, at, start) in enumerate(places, 1)]
         if arrivals is not None:
             for part in self.cell.coming[: 1 if arrivals.after == "pick" else None]:
                 came_s += self.times.interval_s(part)

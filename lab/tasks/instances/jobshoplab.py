@@ -1,7 +1,8 @@
 """Job shops with vehicles as YAML, as JobShopLab has them: jobs, machines and travel times as tables within strings.
 
-As its simulator does: vehicle n begins at machine n, counted round; jobs begin in the input buffer and end in the output buffer;
-machines have room for all before and after them. Source: github.com/proto-lab-ro/jobshoplab.
+As its simulator does: vehicle n begins at machine n, counted round; jobs begin in the input buffer; machines have room for all
+before and after them; the clock stops with the last operation: the way to the output buffer does not count. Its vehicles set
+out for a part once its machine works on it, not earlier; here they may. Source: github.com/proto-lab-ro/jobshoplab.
 """
 
 import re
@@ -148,7 +149,7 @@ def _jobs(source: Source, spec: _Yaml) -> tuple[int, list[list[Operation]], list
 
 
 def _travel(source: Source, spec: _Yaml, machines: int) -> Layout:
-    """The matrix of travel times, the buffers called in-buf and out-buf."""
+    """The matrix of travel times, but for the output buffer's; the input buffer is called in-buf."""
     rows = list(spec.table())
     head = [_station(name) for name in rows[0][1].split("|")] if rows else []
     wanted = {*(f"m-{number}" for number in range(machines)), BUFFERS["input"]}
@@ -165,7 +166,9 @@ def _travel(source: Source, spec: _Yaml, machines: int) -> Layout:
         travel[_station(name)] = {b: source.time(word, line, where) for b, word in zip(head, times, strict=True)}
     if len(travel) != len(head):
         raise source.refusal(rows[-1][0], f"{len(head)} rows of times", len(travel))
-    return Layout(source.path, _ordered(head), travel)
+    end = BUFFERS["output"]
+    used = {a: {b: time for b, time in row.items() if b != end} for a, row in travel.items() if a != end}
+    return Layout(source.path, _ordered([name for name in head if name != end]), used)
 
 
 def _ordered(names: Sequence[str]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lab.errors import BadInput
 from lab.learning.splitmix import uniform
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance, Episode
+from lab.sequencing.cell.chance import LAWS, NO_CHANCE, Chance, Episode, repairs
 
 CellMaker = Callable[..., Cell]
 SEEDS = st.integers(0, 2**64 - 1)
@@ -116,3 +116,35 @@ def test_what_takes_no_time_is_not_drawn(oven_cell: CellMaker) -> None:
 def test_chances_that_cannot_be(given_: dict[str, object], says: str) -> None:
     with pytest.raises(BadInput, match=says):
         Chance(**given_)  # type: ignore[arg-type]
+
+
+# ---- breakdowns and late parts -------------------------------------------------------------------------------------
+
+
+def test_repairs_by_hand() -> None:
+    """It breaks down after 4 s and 4 s more, is repaired for 2 s each time, and would break down again after 12 s of work."""
+    four, two = 1.0 - np.exp(-0.4), 1.0 - np.exp(-0.5)
+    numbers = [four, two] * 4
+    assert repairs(10.0, 10.0, 4.0, lambda n: numbers[n]) == pytest.approx(4.0)
+    assert repairs(3.9, 10.0, 4.0, lambda n: numbers[n]) == 0.0
+
+
+def test_breakdowns_prolong_work_by_their_share(oven_cell: CellMaker) -> None:
+    """10 s of work, a breakdown in 20 s of it, 4 s of repair: 2 s more on average."""
+    times = draws(oven_cell(1), Chance("constant", breaks_every_s=20.0, repair_s=4.0))
+    assert times.min() == 10.0
+    assert times.mean() == pytest.approx(12.0, abs=0.3)
+
+
+def test_late_parts_come_so_much_later_on_average(oven_cell: CellMaker) -> None:
+    cell = oven_cell(2)
+    late_s = np.array([Episode(cell, Chance("constant", late_s=5.0), seed).late_s(2) for seed in range(4000)])
+    assert late_s.mean() == pytest.approx(5.0, abs=0.5)
+    assert Episode(cell, NO_CHANCE, 3).late_s(2) == 0.0
+
+
+@pytest.mark.parametrize("name", ["breaks_every_s", "repair_s", "late_s"])
+@pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf")])
+def test_times_of_mishaps_that_cannot_be(name: str, value: float) -> None:
+    with pytest.raises(BadInput, match=rf"^chance, {name} = {value}: allowed are finite times from 0$"):
+        Chance(**{name: value})  # type: ignore[arg-type]

@@ -59,13 +59,16 @@ def walk_both(cell: Cell, chance: Chance, seed: int, pick: Callable[[int], int])
         kernels.move(arrays, there, i, np.uint64(seed))
 
 
+MISHAPS = st.tuples(st.sampled_from([0.0, 5.0]), st.floats(0, 10), st.sampled_from([0.0, 20.0]))
+
+
 @settings(max_examples=80, deadline=None)
 @given(data=st.data())
 def test_it_is_the_readable_run(cells: Callable[..., SearchStrategy[Cell]], data: DataObject) -> None:
     """Several products and routes, buffers of both kinds, pallets, arrivals; the times of the cell, and drawn ones."""
     cell = with_due_times(data.draw(cells(many=True, max_parts=4)), data.draw(st.floats(0, 100)))
     laws = st.sampled_from(sorted(LAWS))
-    chance = Chance(data.draw(laws), data.draw(laws), data.draw(st.floats(0, 1)))
+    chance = Chance(data.draw(laws), data.draw(laws), data.draw(st.floats(0, 1)), *data.draw(MISHAPS))
     choices = data.draw(st.randoms(use_true_random=False))
     run, _, there = walk_both(cell, chance, data.draw(SEEDS), choices.randrange)
     for name in objectives.OBJECTIVES:
@@ -77,7 +80,8 @@ def test_it_is_the_readable_run(cells: Callable[..., SearchStrategy[Cell]], data
 @given(data=st.data())
 def test_robots_and_servers_too(shops: Callable[..., SearchStrategy[Cell]], data: DataObject) -> None:
     cell = with_due_times(data.draw(shops()), data.draw(st.floats(0, 100)))
-    chance = Chance(data.draw(st.sampled_from(sorted(LAWS))), "constant", data.draw(st.floats(0, 1)))
+    law = data.draw(st.sampled_from(sorted(LAWS)))
+    chance = Chance(law, "constant", data.draw(st.floats(0, 1)), *data.draw(MISHAPS))
     choices = data.draw(st.randoms(use_true_random=False))
     run, _, there = walk_both(cell, chance, data.draw(SEEDS), choices.randrange)
     for name in objectives.OBJECTIVES:

@@ -1,15 +1,22 @@
 """The checker of schedules: right ones of the simulation pass, whatever the cell; each kind of wrong one is caught."""
 
+import os
 from collections.abc import Callable
 from copy import deepcopy
+from math import inf
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
+from lab.errors import WorkFailed
+from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.schedule_rows import rows_of
-from lab.sequencing.simulate.run import Run, simulate
+from lab.sequencing.methods.cp_sat import cp_sat
+from lab.sequencing.methods.portfolio import best_known
+from lab.sequencing.search import SAME
+from lab.sequencing.simulate.run import Run, branch, simulate
 from lab.studies.ours.schedule_checker import faults
 from lab.tasks.cell_file import CellFile
 from lab.tasks.task_file import load_cell
@@ -99,6 +106,63 @@ def test_what_the_simulation_does_is_right_and_its_damage_is_caught(cell: Plain,
     longer = deepcopy(rows)
     longer[data.draw(st.sampled_from(processes))]["end_s"] += 0.5
     assert faults(cell, longer, makespan_s), "work that takes longer than it does"
+
+
+NODES = 20_000  # of a search through all lists of decisions; a larger cell is passed over
+
+
+def least_of_all(cell: Cell) -> float | None:
+    """The least makespan of all lists of decisions: each state that was reached is gone on from once. None: too many."""
+    best, seen, open_runs = inf, set[Any](), [Run(cell)]
+    while open_runs:
+        run = open_runs.pop()
+        best = min(best, run.end_s) if run.done else best
+        for decision in run.allowed():
+            ahead = branch(run)
+            ahead.move(decision)
+            key = (
+                *ahead.locations,
+                *ahead.ready_s,
+                *ahead.robots_at,
+                *ahead.robots_s,
+                ahead.end_s,
+                repr(ahead._rooms_s),
+                repr(ahead._servers),
+            )
+            if ahead.end_s < best and key not in seen:
+                seen.add(key)
+                open_runs.append(ahead)
+        if len(seen) > NODES:
+            return None
+    return best
+
+
+@settings(max_examples=int(os.environ.get("LAB_RANDOM_CELLS", "8")), deadline=None)
+@given(cell=plain_cells())
+def test_three_solvers_and_the_checker_agree(cell: Plain) -> None:
+    """All lists of decisions, CP-SAT, and the search that fits the cell: by states, by tours, or the portfolio.
+
+    None of them proves more than the least, finds less, or has an order that the checker refuses.
+    With LAB_RANDOM_CELLS=500 in the environment it is tried on so many cells.
+    """
+    built = as_file(cell).cell()
+    if not built.unfinished:
+        return
+    least = least_of_all(built)
+    event("too many lists of decisions" if least is None else "no order" if least == inf else "compared")
+    if least is None:
+        return
+    if least == inf:
+        with pytest.raises(WorkFailed):
+            best_known(built, time_limit_s=10.0)
+        return
+    own, other = cp_sat(built, time_limit_s=3.0), best_known(built, time_limit_s=3.0)
+    event("all prove" if other.proven and own.status == "optimal" else "not all prove in their time")
+    for sequence, value, bound in ((own.sequence, own.cost, own.bound), (other.sequence, other.cost, other.bound)):
+        assert bound <= least + SAME <= value + 2 * SAME
+        schedule = simulate(built, sequence)
+        assert schedule.makespan_s == pytest.approx(value)
+        assert faults(cell, rows_of(schedule, built, "planned"), schedule.makespan_s) == []
 
 
 @pytest.mark.parametrize("name", ["fms", "toast-case-1", "toast-case-2", "toast-case-1-window", "hoist-pu"])

@@ -28,12 +28,12 @@ instance_config:
 """
 
 
-def test_vehicles_begin_at_the_machines_and_jobs_end_in_the_output(read: Callable[..., CellFile]) -> None:
+def test_vehicles_begin_at_the_machines_and_jobs_end_with_their_last_operation(read: Callable[..., CellFile]) -> None:
     cell = read(TEXT, "two.yaml").cell()
     assert [robot.start for robot in cell.robots] == ["m-0", "m-1"]
     ways = [[stage.station for stage in product.routes[0]] for product in cell.products]
-    assert ways == [["in-buf", "m-0", "m-1", "out-buf"], ["in-buf", "m-1", "m-0", "out-buf"]]
-    assert cell.loaded_s[cell.index("m-1"), cell.index("out-buf")] == 6.0
+    assert ways == [["in-buf", "m-0", "m-1"], ["in-buf", "m-1", "m-0"]]
+    assert cell.loaded_s[cell.index("in-buf"), cell.index("m-1")] == 5.0
     assert len(read(TEXT, "two.yaml", Asked(robots=1)).cell().robots) == 1
 
 

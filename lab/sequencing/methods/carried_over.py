@@ -1,0 +1,66 @@
+"""A policy learned on small cells that orders larger ones: the decision whose features are worth most, without any search."""
+
+import numpy as np
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.objectives import MAKESPAN, cost
+from lab.sequencing.methods.carried_over_features import FeatureArrays, feature_arrays, features
+from lab.sequencing.methods.carried_over_policy import CarriedPolicy
+from lab.sequencing.methods.carried_over_weights import DEFAULT
+from lab.sequencing.methods.rules import Rule
+from lab.sequencing.search import SAME, Search, SequenceResult, only_one
+from lab.sequencing.simulate.cell_arrays import Floats, cell_arrays, run_arrays
+from lab.sequencing.simulate.run import Run, follow
+
+
+def rule_of(policy: CarriedPolicy) -> Rule:
+    """The policy as a dispatching rule, in plain Python."""
+    last: list[tuple[Cell, FeatureArrays]] = []
+
+    def choose(run: Run, allowed: tuple[int, ...]) -> int:
+        if not last or last[0][0] is not run.cell:
+            last[:] = [(run.cell, feature_arrays(run.cell, policy.objective))]
+        values = features(run, allowed, last[0][1]) @ policy.vector
+        best = 0
+        for i, value in enumerate(values):
+            if value > values[best] + SAME:
+                best = i
+        return allowed[best]
+
+    return choose
+
+
+class Decider:
+    """The policy's decisions in a cell, compiled; it is made once a cell."""
+
+    def __init__(self, cell: Cell, objective: str = MAKESPAN) -> None:
+        """objective: what runs are to be judged by, and whose data the features know."""
+        from lab.sequencing.methods import carried_over_kernels as kernels  # numba takes its time
+
+        self._kernels, self._work = kernels, kernels.work_arrays(cell)
+        self._cell, self._run = cell_arrays(cell, objective), run_arrays(cell)
+        self._known = feature_arrays(cell, objective)
+        self.stuck_cost = float(self._cell.stuck_cost)
+
+    def sequence(self, weights: Floats) -> tuple[int, ...]:
+        """What is decided with the weights (F,), to the end or to a deadlock."""
+        made = self._kernels.decide(self._cell, self._run, self._known, self._work, weights)
+        return tuple(self._work.sequence[:made].tolist())
+
+    def costs(self, candidates: Floats) -> Floats:
+        """What is decided with each of the weights (N, F) costs (N,)."""
+        costs = np.zeros(len(candidates))
+        self._kernels.costs_of(self._cell, self._run, self._known, self._work, candidates, costs)
+        return costs
+
+
+def carried(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
+    """The one sequence of the search's policy, or of the one that ships; it draws nothing from `rng`.
+
+    Raises BadInput for an objective that the cell has no data for, WorkFailed when it ends in a deadlock.
+    """
+    search.check(cell)
+    policy = search.policy or DEFAULT
+    sequence = Decider(cell, policy.objective if cell.due_s is not None else MAKESPAN).sequence(policy.vector)
+    run = follow(cell, sequence)
+    return only_one(cell, search, sequence, cost(run, search.objective), run.done)

@@ -1,0 +1,256 @@
+"""Features of decisions compiled (see `carried_over_features`), and runs that always take the decision of highest value."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lab.learning.compiled import inner, lean
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.routes import SERVER
+from lab.sequencing.methods.carried_over_features import WAITED
+from lab.sequencing.methods.carried_over_policy import FEATURES
+from lab.sequencing.search import SAME
+from lab.sequencing.simulate.cell_arrays import Floats, Ints, most_moves
+from lab.sequencing.simulate.kernels import cost, list_allowed, reached_s, reset, server_for, take
+
+(
+    DELAY,
+    EMPTY_WAY,
+    IDLE,
+    PART_WAITED,
+    DURATION,
+    TAIL,
+    WORK_LEFT,
+    LOAD_AHEAD,
+    STARVES,
+    QUEUE,
+    LOAD_BEHIND,
+    SERVED,
+    ROOM,
+    MOVES_LEFT,
+    SLACK,
+    WAY_ON,
+    OTHER_WAY,
+    ENTERS,
+    LOAD_AFTER,
+    QUEUED_TAIL,
+) = range(len(FEATURES))
+
+
+class WorkArrays(NamedTuple):
+    """Room for the features of D decisions of K parts at S stations, and for L decisions that were made.
+
+    begin_s, end_s (D,): of each decision. least_s (K,): the soonest end of each part's decisions. free_s, load_s (S + 1,): when a
+    machine is through with what it has, and its load. compared (4,): the latest tail, the mean work left, the highest load, the
+    first begin. features (F,): of one decision. sequence (L,).
+    """
+
+    begin_s: Floats
+    end_s: Floats
+    least_s: Floats
+    free_s: Floats
+    load_s: Floats
+    compared: Floats
+    features: Floats
+    sequence: Ints
+
+
+def work_arrays(cell: Cell) -> WorkArrays:
+    """Room for a run of the cell."""
+    decisions, size = cell.parts * cell.most_choices, len(cell.stations) + 1
+    return WorkArrays(
+        begin_s=np.zeros(decisions),
+        end_s=np.zeros(decisions),
+        least_s=np.zeros(cell.parts),
+        free_s=np.zeros(size),
+        load_s=np.zeros(size),
+        compared=np.zeros(4),
+        features=np.zeros(len(FEATURES)),
+        sequence=np.zeros(most_moves(cell), np.int64),
+    )
+
+
+@inner
+def _survey(cell: Any, run: Any, known: Any, work: Any) -> None:
+    """What the decisions are compared with, but for the first begin."""
+    last, tail_s, left_s, going = len(known.places) - 1, 0.0, 0.0, 0
+    for station in range(last):
+        work.load_s[station] = 0.0
+        if cell.first_server[station + 1] > cell.first_server[station]:
+            work.free_s[station] = _first_free(cell, run, station)
+        else:
+            work.free_s[station] = np.inf
+    for part in range(len(run.locations)):
+        place = run.locations[part]
+        first, machine = cell.first_option[place], known.machine[place]
+        if first == cell.first_option[place + 1]:
+            continue
+        going += 1
+        left_s += known.left_s[place]
+        tail_s = max(tail_s, max(run.clock[0], run.ready_s[part]) + known.left_s[place])
+        for station in range(last):
+            work.load_s[station] += known.load_s[place, station]
+        if cell.robot[first] == SERVER:
+            station = cell.target[first]
+            work.free_s[station] += cell.processing_s[cell.to[first]] / known.places[station]
+        elif machine < last and cell.first_server[machine + 1] == cell.first_server[machine]:
+            work.free_s[machine] = min(work.free_s[machine], run.ready_s[part])
+    highest_s = 0.0
+    for station in range(last):
+        if cell.first_server[station + 1] > cell.first_server[station]:
+            free_s = _first_free(cell, run, station)  # without what waits there, which is to come
+        else:
+            if run.room[station] > 0 or work.free_s[station] == np.inf:
+                work.free_s[station] = 0.0  # there is room, or what takes it stays for ever
+            free_s = work.free_s[station]
+        if work.load_s[station] > 0.0:
+            work.load_s[station] += max(0.0, free_s - run.clock[0])
+            highest_s = max(highest_s, work.load_s[station])
+    work.compared[0], work.compared[1] = tail_s, left_s / going
+    work.compared[2] = highest_s if highest_s > 0.0 else 1.0
+
+
+@inner
+def _first_free(cell: Any, run: Any, station: int) -> float:
+    """`Run.free_s`."""
+    free_s = np.inf
+    for server in range(cell.first_server[station], cell.first_server[station + 1]):
+        free_s = min(free_s, run.servers_s[server])
+    return free_s
+
+
+@inner
+def _times(cell: Any, run: Any, work: Any, count: int) -> None:
+    """When each decision begins and ends as far as there is room, the first begin, and the soonest end of each part."""
+    parts, first_s = len(run.locations), np.inf
+    for i in range(count):
+        work.least_s[(run.allowed[i] - 1) % parts] = np.inf
+    for i in range(count):
+        part, o = (run.allowed[i] - 1) % parts, run.options[i]
+        if cell.robot[o] == SERVER:
+            begin_s = server_for(cell, run, part, o)[0]
+            end_s = begin_s + cell.processing_s[cell.to[o]]
+        else:
+            begin_s = reached_s(cell, run, o)
+            if cell.waits[o]:
+                begin_s = max(begin_s, run.ready_s[part])
+            end_s = begin_s + cell.service_s[o] + cell.loaded_s[cell.robot[o], cell.origin[o], cell.target[o]]
+        work.begin_s[i], work.end_s[i] = begin_s, end_s
+        first_s = min(first_s, begin_s)
+        work.least_s[part] = min(work.least_s[part], end_s)
+    work.compared[3] = first_s
+
+
+@inner
+def _way_on(cell: Any, run: Any, work: Any, count: int, i: int) -> float:
+    """How long after the drop of the i-th decision its robot can pick another part, at the soonest."""
+    parts, robot, at = len(run.locations), cell.robot[run.options[i]], cell.target[run.options[i]]
+    part, soonest_s = (run.allowed[i] - 1) % parts, np.inf
+    for j in range(count):
+        o, other = run.options[j], (run.allowed[j] - 1) % parts
+        if cell.robot[o] == robot and other != part:
+            on_s = cell.empty_s[robot, at, cell.origin[o]]
+            if cell.waits[o] and run.ready_s[other] - work.end_s[i] > on_s:
+                on_s = run.ready_s[other] - work.end_s[i]
+            if on_s < soonest_s:  # not where there is no such way (NaN)
+                soonest_s = on_s
+    return soonest_s if soonest_s < np.inf else 0.0
+
+
+@inner
+def _describe(cell: Any, run: Any, known: Any, work: Any, count: int, i: int) -> None:
+    """The features of the i-th allowed decision."""
+    f, scale_s, last = work.features, known.scale_s, len(known.places) - 1
+    part, o = (run.allowed[i] - 1) % len(run.locations), run.options[i]
+    here, there, robot = run.locations[part], cell.to[o], cell.robot[o]
+    begin_s, end_s, left_s = work.begin_s[i], work.end_s[i], known.left_s[here]
+    ahead, behind, after = known.following[here], known.machine[here], known.following[there]
+    f[:] = 0.0
+    if robot == SERVER:
+        f[IDLE] = (begin_s - _first_free(cell, run, cell.target[o])) / scale_s
+        f[SERVED] = 1.0
+    else:
+        at_s = reached_s(cell, run, o)
+        f[EMPTY_WAY] = (at_s - run.robots_s[robot]) / scale_s
+        f[IDLE] = (begin_s - at_s) / scale_s
+        f[WAY_ON] = _way_on(cell, run, work, count, i) / scale_s
+        if ahead < last and known.machine[there] == ahead:
+            f[STARVES] = max(0.0, end_s - max(work.free_s[ahead], run.clock[0])) / scale_s
+            f[QUEUE] = max(0.0, work.free_s[ahead] - end_s) / scale_s
+        if behind < last and run.room[behind] <= 0:
+            f[LOAD_BEHIND] = work.load_s[behind] / work.compared[2]
+    if here == cell.starts[part]:
+        f[ENTERS] = 1.0
+    else:
+        f[PART_WAITED] = min(WAITED, max(0.0, begin_s - run.ready_s[part]) / scale_s)
+    f[DELAY] = (begin_s - work.compared[3]) / scale_s
+    f[DURATION] = (end_s - begin_s) / scale_s
+    f[TAIL] = (begin_s + left_s - work.compared[0]) / scale_s
+    f[WORK_LEFT] = (left_s - work.compared[1]) / scale_s
+    if ahead < last:
+        f[LOAD_AHEAD] = work.load_s[ahead] / work.compared[2] - 1.0
+    if cell.needs[o, 0] < last:
+        f[ROOM] = 1.0 / run.room[cell.needs[o, 0]]
+    f[MOVES_LEFT] = known.moves[here]
+    if known.due:
+        f[SLACK] = (cell.due_s[part] - begin_s - left_s) / scale_s
+    f[OTHER_WAY] = (end_s - work.least_s[part]) / scale_s
+    if after < last:
+        f[LOAD_AFTER] = work.load_s[after] / work.compared[2] - 1.0
+    work_s = cell.processing_s[there] if robot != SERVER and cell.begins[there] else 0.0
+    f[QUEUED_TAIL] = f[QUEUE] + (end_s + work_s + known.left_s[there] - work.compared[0]) / scale_s
+
+
+@lean
+def describe_all(cell: Any, run: Any, known: Any, work: Any, found: Any) -> int:
+    """`features` of a run as it stands, for all its allowed decisions, into the rows of found; how many there are."""
+    count = list_allowed(cell, run)
+    if count > 0:
+        _survey(cell, run, known, work)
+        _times(cell, run, work, count)
+    for i in range(count):
+        _describe(cell, run, known, work, count, i)
+        for k in range(len(work.features)):
+            found[i, k] = work.features[k]
+    return count
+
+
+@inner
+def _best(cell: Any, run: Any, known: Any, work: Any, weights: Any, count: int) -> int:
+    """Which of the allowed decisions has the highest value; of several the first."""
+    if count == 1:
+        return 0
+    _survey(cell, run, known, work)
+    _times(cell, run, work, count)
+    best, highest = 0, -np.inf
+    for i in range(count):
+        _describe(cell, run, known, work, count, i)
+        value = 0.0
+        for k in range(len(weights)):
+            value += weights[k] * work.features[k]
+        if value > highest + SAME:
+            best, highest = i, value
+    return best
+
+
+@lean
+def decide(cell: Any, run: Any, known: Any, work: Any, weights: Any) -> int:
+    """A whole run with the weights (F,); how many decisions it took, which stand in work.sequence."""
+    reset(cell, run, np.uint64(0))
+    parts, made = len(run.locations), 0
+    while True:
+        count = list_allowed(cell, run)
+        if count == 0:
+            return made
+        i = _best(cell, run, known, work, weights, count)
+        work.sequence[made] = run.allowed[i]
+        made += 1
+        take(cell, run, (run.allowed[i] - 1) % parts, run.options[i], np.uint64(0))
+
+
+@lean
+def costs_of(cell: Any, run: Any, known: Any, work: Any, candidates: Any, costs: Any) -> None:
+    """What the runs with N weights (N, F) cost (N,)."""
+    for n in range(len(candidates)):
+        decide(cell, run, known, work, candidates[n])
+        costs[n] = cost(cell, run)

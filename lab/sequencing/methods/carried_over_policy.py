@@ -1,0 +1,59 @@
+"""What a carried-over policy is: the features of a decision, and what each of them is worth."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+
+import numpy as np
+
+from lab.errors import BadInput, unknown
+from lab.sequencing.cell.objectives import BUILT_IN, MAKESPAN
+from lab.sequencing.simulate.cell_arrays import Floats
+
+FEATURES: Mapping[str, str] = {
+    "delay": "how much later it begins than the decision that may begin first",
+    "empty-way": "how long the robot drives to the pick",
+    "idle": "how long the robot waits at the pick, or the machine's server for the part",
+    "part-waited": "how long the part is ready by then, at most ten moves; 0 at the start of its route",
+    "duration": "how long robot or server then work",
+    "tail": "the part's end if nothing stops it any more, less the latest of such ends",
+    "work-left": "work left of the part, less the mean of the parts that are not finished",
+    "load-ahead": "load of the machine that works on the part next, as a share of the highest, less 1",
+    "starves": "how long that machine is through with all it has before the part is brought",
+    "queue": "how long the part waits there until the machine is through with what it has",
+    "load-behind": "load of the full machine that the part leaves, as a share of the highest",
+    "server": "1 where a machine's server takes the part, 0 where a robot does",
+    "room": "1 over the room that is left where it goes",
+    "moves-left": "the part's moves to its end",
+    "slack": "due time less the part's end if nothing stops it any more; 0 where no due times count",
+    "way-on": "how long until the robot can pick another part after the drop",
+    "other-way": "how much later it ends than the same part by the best of its ways",
+    "enters": "1 where the part is at the start of its route",
+    "load-after": "load of the machine after the next, as a share of the highest, less 1",
+    "queued-tail": "tail, with the wait in the queue",
+}
+MOST = 1e6  # of a weight
+
+
+@dataclass(frozen=True)
+class CarriedPolicy:
+    """What a feature of a decision is worth, by its name in FEATURES; one that is left out is worth 0.
+
+    objective: what it was learned for. learned_on: in words. BadInput for weights that cannot be, and names that nobody has.
+    """
+
+    weights: Mapping[str, float]
+    objective: str = MAKESPAN
+    learned_on: str = ""
+    vector: Floats = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for name, weight in self.weights.items():
+            if name not in FEATURES:
+                raise unknown("feature", name, FEATURES, "policy")
+            if not (isfinite(weight) and abs(weight) <= MOST):
+                raise BadInput(f"weight of '{name}' = {weight}: allowed are finite numbers from -{MOST:g} to {MOST:g}")
+        if self.objective not in BUILT_IN:
+            raise unknown("objective", self.objective, BUILT_IN, "policy")
+        vector = np.array([self.weights.get(name, 0.0) for name in FEATURES])
+        object.__setattr__(self, "vector", vector)

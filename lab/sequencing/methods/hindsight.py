@@ -1,0 +1,66 @@
+"""The best order of an episode whose times are known beforehand: what no policy can beat."""
+
+from dataclasses import dataclass, replace
+
+from lab.errors import WorkFailed
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import Episode
+from lab.sequencing.cell.stations import Begins, Product, Stage
+from lab.sequencing.methods.exact import optimum
+
+
+@dataclass(frozen=True)
+class Hindsight:
+    """The cost of the best order of an episode, or where that is not proven a bound that none is below."""
+
+    cost: float
+    proven: bool
+
+
+def in_hindsight(cell: Cell, times: Episode, max_expanded: int = 20_000) -> Hindsight:
+    """The shortest makespan of a cell with one robot in this episode, by states (`optimum`); WorkFailed where there is none."""
+    found = optimum(known_cell(cell, times), max_expanded)
+    return Hindsight(found.bound_s, found.proven)
+
+
+def known_cell(cell: Cell, times: Episode) -> Cell:
+    """The cell of an episode: each part a product of its own, which takes as long as it does there.
+
+    Where parts arrive after one another it is as the episode has it, too. WorkFailed for a cell whose parts are under way.
+    """
+    if cell.begin_at != cell.starts:
+        raise WorkFailed("hindsight: some parts are under way")
+    numbers = range(1, cell.parts + 1)
+    products = tuple(_as_drawn(cell, times, part) for part in numbers)
+    arrivals = cell.arrivals
+    if arrivals is not None:
+        arrivals = replace(arrivals, interval_s=tuple(times.interval_s(part) for part in numbers))
+    order = tuple(product.name for product in products)
+    known = replace(cell, products=products, order=order, arrivals=arrivals, begins=None)
+    come_s = [seconds + times.late_s(part) for part, seconds in zip(numbers, cell.begin_s, strict=True)]
+    if arrivals is not None or not any(come_s):
+        return known
+    return replace(known, begins=tuple(map(Begins, known.starts, come_s)))
+
+
+def _as_drawn(cell: Cell, times: Episode, part: int) -> Product:
+    product = next(one for one in cell.products if one.name == cell.order[part - 1])
+    number = cell.products.index(product)
+    working = {station.name for station in cell.stations if station.kind == "machine"}
+    # The positions in which work begins stand in the order of the routes and their stages.
+    drawn = iter(
+        (cell.names[at.holds[0]], times.processing_s(part, place))
+        for place, at in enumerate(cell.positions)
+        if at.product == number and at.processing_s is not None and at.holds and cell.names[at.holds[0]] in working
+    )
+    routes = tuple(
+        tuple(_timed(stage, next(drawn)) if stage.station in working else stage for stage in route)
+        for route in product.routes
+    )
+    return Product(f"{product.name} {part}", routes)
+
+
+def _timed(stage: Stage, drawn: tuple[str, float]) -> Stage:
+    station, processing_s = drawn
+    assert station == stage.station
+    return replace(stage, processing_s=processing_s)

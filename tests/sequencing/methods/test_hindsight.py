@@ -1,0 +1,33 @@
+"""The best order in hindsight: the optimum where nothing is drawn, and never above what a policy came to."""
+
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.cell.chance import NO_CHANCE, Chance, Episode
+from lab.sequencing.methods.exact import optimum
+from lab.sequencing.methods.hindsight import in_hindsight, known_cell
+from lab.sequencing.simulate.run import follow
+
+CellMaker = Callable[..., Cell]
+CHANCE = Chance("exponential", breaks_every_s=50.0, repair_s=20.0, late_s=30.0)
+
+
+@pytest.mark.parametrize("order", ["R", "SR", "RSR"])
+def test_without_chance_it_is_the_optimum(fms_cell: CellMaker, order: str) -> None:
+    cell = fms_cell(order)
+    assert in_hindsight(cell, Episode(cell, NO_CHANCE, 0)).cost == optimum(cell).cost
+
+
+@settings(max_examples=15)
+@given(episode=st.integers(0, 1000))
+def test_the_known_cell_is_the_episode(toast_cell: CellMaker, fms_cell: CellMaker, episode: int) -> None:
+    """The same list comes to the same end in both, and no list is better than in hindsight."""
+    for cell in (toast_cell("I", 3), fms_cell("SR")):
+        times, best = Episode(cell, CHANCE, episode), optimum(cell).sequence
+        kept = follow(cell, best, times)
+        assert follow(known_cell(cell, times), best).end_s == pytest.approx(kept.end_s)
+        assert in_hindsight(cell, times).cost <= kept.end_s + 1e-6

@@ -1,0 +1,38 @@
+"""The study of policies that react: what a setting comes to, and its rows."""
+
+import numpy as np
+import pytest
+
+from lab.studies.findings import those
+from lab.studies.ours import reacting as study
+from lab.studies.ours.reacting import ANEW, HINDSIGHT, LIST, ROLLING, RULE, Reacted, Setting, reacted, reacting, rows_of
+from lab.studies.runner import Job
+
+SETTING = Setting("toast-case-1", "TT", "exponential times")
+
+
+def test_nothing_beats_hindsight() -> None:
+    found = reacted(SETTING, 5, 0)
+    assert found.proven == 5
+    for name in (LIST, RULE, ANEW, ROLLING):
+        assert (found.costs[name] >= found.costs[HINDSIGHT] - 1e-6).all(), name
+
+
+def test_rows() -> None:
+    costs = {LIST: [110.0, 130.0], RULE: [120.0, 120.0], ANEW: [105.0, 125.0], ROLLING: [100.0, 120.0]}
+    found = Reacted(
+        {**{n: np.array(c) for n, c in costs.items()}, HINDSIGHT: np.array([100.0, 100.0])}, "fifo", 0.01, 2
+    )
+    rows = rows_of(SETTING, found)
+    assert [one["value"] for one in those(rows, measure="makespan_s")] == [120.0, 120.0, 115.0, 110.0, 100.0]
+    assert [one["value"] for one in those(rows, measure="saved over the list_s")] == [0.0, 5.0, 10.0]
+    assert those(rows, measure="over hindsight_percent", method=ROLLING)[0]["value"] == pytest.approx(10.0)
+    assert {one.get("rule") for one in rows} == {None, "fifo"}
+
+
+def test_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study, "WORKS", (("toast-case-1", "TT"),))
+    monkeypatch.setattr(study, "TROUBLES", {"times 10 % off": study.TROUBLES["times 10 % off"]})
+    found = reacting(Job(3), {})
+    assert len(found.figures) == 1
+    assert {f"{name}: mean over hindsight [%]" for name in (LIST, RULE, ANEW, ROLLING)} < set(found.summary)
