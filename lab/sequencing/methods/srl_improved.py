@@ -42,8 +42,9 @@ def srl_improved(cell: Cell, search: Search, rng: np.random.Generator) -> SrlImp
     It begins with the places of the best dispatching rule. A lesson draws an order from what was learned, improves it by a
     short annealing, and moves place, spread and ways towards it: by ALPHA exp((best - cost) / temperature), so that, as
     in SRL, the reward of the whole counts. Every sequence tried, the neighbours too, is an episode; what has become too long is
-    given up as in `anneal`. Much of what it finds is the search's: `anneal` with as many sequences stands beside it. It
-    works by the mean times. Raises BadInput and WorkFailed as the other methods do.
+    given up as in `anneal`. Most of what it finds is the search's: on the 80 of Bilge and Ulusoy what was learned, alone
+    (`final_cost`), is no better than a dispatching rule. It works by the mean times. Raises BadInput and WorkFailed as the
+    other methods do.
     Source: population-based incremental learning of real values, Sebag and Ducoulombier 1998; learning from improved
     solutions, Whitley, Gordon and Mathias 1994.
     """
