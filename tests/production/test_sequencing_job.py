@@ -20,6 +20,7 @@ from lab.sequencing import SEQUENCERS, find_sequence
 from lab.sequencing.cell.chance import NO_CHANCE, Chance
 from lab.sequencing.cell.objectives import OBJECTIVES
 from lab.sequencing.cell.schedule_rows import rows_of
+from lab.sequencing.methods.rules import RULES
 from lab.sequencing.search import Reference
 from lab.sequencing.simulate.run import simulate
 from lab.tasks.sequencing import search_for
@@ -42,17 +43,8 @@ FIELDS = (
     *("mean_best_cost", "best_s", "best_cost", "best_by", "best_sequence", "best_moves", "schedule", "srl_s", "proven"),
     *("robots", "advisor", "advice", "stochastic", "files", "interrupted"),
 )
-LEARNERS = ("srl", "srl-time", "mc")
-AT_ONCE = (
-    "fifo",
-    "exact",
-    "cp-sat",
-    "portfolio",
-    "shortest-move",
-    "longest-remaining-work",
-    "most-urgent-machine",
-    "nearest-ready",
-)
+LEARNERS = ("srl", "srl-time", "srl-improved", "mc")
+AT_ONCE = {"fifo", "exact", "cp-sat", "portfolio", "carried", *RULES}
 UNDUE = sorted(set(SEQUENCERS) - {"earliest-due"})  # those that need no due times
 
 
