@@ -57,8 +57,10 @@ class Job:
             self.progress(len(done), len(steps))
         return done
 
-    def computed(self, work: Callable[[Item], Result], items: list[Item]) -> Iterator[tuple[Item, Result]]:
-        """Each item with what `work` makes of it, as soon as it is done.
+    def computed(
+        self, work: Callable[[Item], Result], items: list[Item], most: int = BATCH
+    ) -> Iterator[tuple[Item, Result]]:
+        """Each item with what `work` makes of it, as soon as it is done; a process is handed `most` at a time at the most.
 
         Raises BadInput without Dask, WorkFailed when the cluster cannot be reached or is lost.
         """
@@ -70,9 +72,8 @@ class Job:
             from joblib import Parallel, delayed
 
             ending: dict[str, Any] = {"initializer": _end_with_parent, "initargs": (os.getpid(),)}
-            batch = min(
-                BATCH, max(1, len(items) // (4 * self.workers))
-            )  # few items are long ones: each is shared out alone
+            # few items are long ones: each is shared out alone
+            batch = min(most, max(1, len(items) // (4 * self.workers)))
             pool = Parallel(self.workers, return_as="generator", batch_size=batch, **ending)
             yield from zip(items, pool(delayed(work)(item) for item in items), strict=True)
 

@@ -21,7 +21,7 @@ Board = Mapping[Entry, Found]
 MEASURES = (
     "Costs are makespans (of a cyclic order: the period) in the instance's unit of time. Best: the least that anything on this "
     "board found, or that is printed. Gap: above the best. Bound: the highest that anything on this board proved; an order "
-    "that reaches it is an optimum, proven. Best after: when a method found the last of its improvements. One seed each."
+    "that reaches it is an optimum, proven. Seconds: when a method found the last of its improvements. One seed each."
 )
 TIMES = (
     "Each method has {seconds:g} s an instance, by the clock of this machine, other entries of the study beside it: with more "
@@ -94,7 +94,7 @@ def measured(job: Job, entries: Sequence[Entry]) -> dict[Entry, Found]:
             done[entry] = found
     left = [one for one in entries if one not in done]
     job.progress(len(done), len(entries))
-    for entry, found in job.computed(carried_out, left):
+    for entry, found in job.computed(carried_out, left, most=1):  # seconds each: a kill loses one a process
         done[entry] = found
         job.keep({"entry": _key(entry), "found": asdict(found)})
         job.progress(len(done), len(entries))
@@ -171,21 +171,20 @@ def rows_of(instance: Instance, of: Mapping[str, Found]) -> list[Row]:
     for method, one in of.items():
         if one.cost is None:
             continue
-        printed = None if instance.printed is None else f"{instance.printed:g} ({instance.printed_is})"
         named: Row = {
             "table": instance.family,
             "instance": instance.name,
-            "printed": printed,
-            "proven": f"by {by}" if one.cost <= bound + SAME else None,
+            "robots": len(cell_file(instance).cell().robots),
+            "printed": instance.printed,
+            "printed as": instance.printed_is or None,
+            "bound": bound,
+            "proven": one.cost <= bound + SAME,
+            "proven by": by if one.cost <= bound + SAME else None,
             "method": method,
             "found_by": one.found_by if one.found_by != method else None,
+            "seconds": round(one.trace[-1][0] if one.trace else one.wall_s, 3),
         }
-        rows += [
-            row(named, "cost", one.cost),
-            row(named, "gap_percent", 100.0 * gap(one.cost, best)),
-            row(named, "bound", bound),
-            row(named, "best after_s", one.trace[-1][0] if one.trace else one.wall_s),
-        ]
+        rows += [row(named, "cost", one.cost), row(named, "gap_percent", 100.0 * gap(one.cost, best))]
     return rows
 
 

@@ -17,7 +17,7 @@ from lab.studies.ours.transport_instances import Instance, board, cell_of, own
 from lab.studies.runner import STORE, Job
 
 TOAST = next(one for one in board() if one.name == "case I, 3 toasts")
-EX11 = next(one for one in board() if (one.name, one.robots) == ("EX11", 2))
+EX11 = next(one for one in board() if (one.name, one.robots) == ("bu-11", 2))
 HOIST = next(one for one in board() if one.is_cyclic)
 # One job of two operations, on two machines: 3 + 4.
 TINY = "1 2\n0 3 1 4\n"
@@ -74,8 +74,10 @@ def test_a_line_a_method() -> None:
     rows = rows_of(replace(EX11, printed=100.0), of)
     assert [one["method"] for one in those(rows, measure="cost")] == ["fifo", "portfolio"]
     assert [one["value"] for one in those(rows, measure="gap_percent")] == [pytest.approx(20.0), 0.0]
-    assert [one["proven"] for one in those(rows, measure="bound")] == [None, "by CP-SAT"]
-    assert {one["printed"] for one in rows} == {"100 (optimum)"}
+    costs = those(rows, measure="cost")
+    assert [(one["proven"], one["proven by"]) for one in costs] == [(False, None), (True, "CP-SAT")]
+    assert [(one["robots"], one["bound"], one["seconds"]) for one in costs] == [(2, 100.0, 0.01), (2, 100.0, 2.0)]
+    assert {(one["printed"], one["printed as"]) for one in rows} == {(100.0, EX11.printed_is)}
 
 
 def test_what_is_kept_is_not_measured_again(tiny: Instance, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
