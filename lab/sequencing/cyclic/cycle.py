@@ -10,7 +10,6 @@ from typing import Any
 from lab.errors import BadInput, WorkFailed, counted
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cyclic.line import CycleMove, Line, at_speed, away_s, lines
-from lab.sequencing.cyclic.model import CycleModel, Units
 from lab.sequencing.cyclic.times import shortest_period
 
 TIME_LIMIT_S = 60.0
@@ -104,6 +103,8 @@ def best_cycle(cell: Cell, mix: Sequence[str], time_limit_s: float = TIME_LIMIT_
     Raises BadInput for a cell that has no such cycle (`check_cyclic`) or too large a one, WorkFailed when none was found.
     Source: Phillips and Unger 1976, AIIE Transactions 8(2) (one hoist, time windows).
     """
+    from lab.sequencing.cyclic.model import CycleModel, Units  # only here: OR-Tools takes its time
+
     began = time.perf_counter()
     check_cyclic(cell, mix)
     cell = at_speed(cell)

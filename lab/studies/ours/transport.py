@@ -21,7 +21,10 @@ Board = Mapping[Entry, Found]
 MEASURES = (
     "Costs are makespans (of a cyclic order: the period) in the instance's unit of time. Best: the least that anything on this "
     "board found, or that is printed. Gap: above the best. Bound: the highest that anything on this board proved; an order "
-    "that reaches it is an optimum, proven. Seconds: when a method found the last of its improvements. One seed each."
+    "that reaches it is an optimum, proven; without a proof, a printed figure or a prover beside it, the best may be far from "
+    "that. Seconds: when a method found the last of its improvements. One seed each. JobShopLab's vehicles set out for a job "
+    "only when the operation before has begun; here they may set out earlier, so that its PPO's schedules are allowed here, "
+    "and those here not always there."
 )
 TIMES = (
     "Each method has {seconds:g} s an instance, by the clock of this machine, other entries of the study beside it: with more "
@@ -35,7 +38,7 @@ LEARNERS = (
     "cell's model."
 )
 CHECKED = (
-    "`--verify` holds each kept schedule against its instance with a checker that shares no code with the simulators or the "
+    "--verify holds each kept schedule against its instance with a checker that shares no code with the simulators or the "
     "methods (lab/studies/ours/schedule_checker.py): every operation in its turn, on its machine, long enough, no machine, "
     "place or robot in two places at once, and the end as it is claimed. Of the cyclic order it is shown {shown} parts."
 )

@@ -32,7 +32,7 @@ def tiny(tmp_path: Path) -> Instance:
 
 def test_every_instance_that_comes_with_the_lab_can_be_read() -> None:
     instances = board()
-    assert len({(one.family, one.name) for one in instances}) == len(instances) == 87
+    assert len({(one.family, one.name) for one in instances}) == len(instances) == 114
     assert [len(cell_of(one).order) for one in (EX11, TOAST)] == [5, 3]
     assert len(cell_of(EX11).robots) == 2
     assert all(cell_of(one).parts > 0 for one in instances)

@@ -184,7 +184,7 @@ class MadeUp(Job):
     """Sessions of which the expert's all succeed with 100 helped steps, the moderate one's never with 300, the others'
     in the first half of ten, with 200."""
 
-    def computed(self, work: Any, items: list[Any]) -> Iterator[tuple[Any, Any]]:
+    def computed(self, work: Any, items: list[Any], most: int = 4) -> Iterator[tuple[Any, Any]]:
         first = {0.01: 10, 0.1: 0}
         return ((s, made(first.get(s.tau or 0, 5), {0.01: 100, 0.1: 300}.get(s.tau or 0, 200))) for s in items)
 
