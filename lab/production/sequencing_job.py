@@ -40,6 +40,8 @@ from lab.tasks.task_file import load_beside
 from lab.teaching.events import PhaseBegan, SequenceFound, SequencingBegan, Tell, unheard
 from lab.teaching.teacher import Teacher
 
+PORTFOLIO = "portfolio"  # the method of which it is told what in it found the order
+
 
 @dataclass(frozen=True)
 class Wanted:
@@ -176,7 +178,7 @@ def _sessions(
     search = replace(search, policy=None if wanted.policy is None else read_policy(wanted.policy))
     check_objective(search.objective, cell)
     # The portfolio is what it is compared with: it is asked once, with its own time.
-    own = (TIME_LIMIT_S, WORKERS) if method == "portfolio" else ()
+    own = (TIME_LIMIT_S, WORKERS) if method == PORTFOLIO else ()
     known = reference(cell, search.objective, *own)
     found, interrupted = list[SequenceResult](), False
     shown = known if search.chance == NO_CHANCE else None
@@ -282,7 +284,8 @@ def _best_known(
     cell: Cell, method: str, objective: str, own: tuple[float, tuple[int, ...]], known: Reference
 ) -> dict[str, Any]:
     """The best order that anything found: the method's own, unless the one of what cannot be beaten costs less."""
-    value, sequence, by = *own, method
+    value, sequence = own
+    by = known.found_by if method == PORTFOLIO else method
     if known.sequence:
         theirs = cost(follow(cell, known.sequence), objective)
         if theirs < value - SAME or (theirs <= value + SAME and len(known.sequence) < len(sequence)):

@@ -192,6 +192,9 @@ def _advice(lesson: Mapping[str, Any]) -> str:
     return text if episode is None else f"{text}: rejected its advisor in episode {episode}"
 
 
+MOST_PRODUCTS = 3  # of which an order of one each is told product by product
+
+
 def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     """The end of `lab sequence`, from its JSON document."""
     what, unit = _measured(found["objective"])
@@ -251,8 +254,10 @@ def _measured(objective: str) -> tuple[str, str]:
 
 
 def _ordered(order: Sequence[str]) -> str:
-    """An order in words: how many of each product."""
+    """An order in words: how many of each product, or in all, where each of many is another one."""
     counts = Counter(order)
+    if len(counts) == len(order) > MOST_PRODUCTS:
+        return counted(len(order), "part")
     return ", ".join(counted(count, name) for name, count in counts.items())
 
 

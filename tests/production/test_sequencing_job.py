@@ -175,6 +175,11 @@ def test_several_sessions_are_summed_up(method: str) -> None:
     assert len(set(costs)) > 1
 
 
+def test_of_the_portfolio_it_is_told_what_in_it_found_the_order(lab: Lab) -> None:
+    document = asked(lab, "oven.toml --method portfolio")
+    assert (document["method"], document["best_by"], document["bound_by"]) == ("portfolio", "A*", "A*")
+
+
 def test_a_gap_is_told(lab: Lab) -> None:
     document = asked(lab, "toast-case-1 --method fifo --sessions 3")
     assert (document["makespan_s"], document["optimal_s"]) == (544.0, 513.0)

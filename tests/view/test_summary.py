@@ -256,6 +256,7 @@ def test_a_sequence() -> None:
         ({"optimum_proven": False, "bound_cost": 80.0}, "proven bound 80.00 s, gap 25.00% (A*)"),
         ({"best_by": "A*"}, "best order known: 100.00 s for 2 toasts (by A*; seed 3)"),
         ({"order": ["rook", "sign", "rook"]}, "best order known: 100.00 s for 2 rooks, 1 sign (by annealing; seed 3)"),
+        ({"order": ["job1", "job2", "job3", "job4"]}, "best order known: 100.00 s for 4 parts (by annealing; seed 3)"),
         (
             {"objective": "mean-tardiness"},
             "best order known: mean tardiness 100.00 s for 2 toasts (by annealing; seed 3)",
