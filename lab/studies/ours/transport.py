@@ -63,7 +63,7 @@ def transport(job: Job, reading: Mapping[str, Any]) -> Findings:
     figures = {
         "How many instances a method solves within a gap": profile(gaps_of(orders)),
         "The mean gap, second by second": by_seconds(
-            found, {one: least(one, of) for one, of in by_instance(found).items()}
+            orders, {one: least(one, of) for one, of in by_instance(orders).items()}
         ),
     }
     refused = {(e.method, f.refused) for e, f in found.items() if f.cost is None}
