@@ -1,3 +1,91 @@
-"""Teaching Lab: a robot that learns sub-tasks with advice, orders them and carries them out in physics."""
+"""Teaching Lab: a robot that learns sub-tasks with advice, orders them and carries them out in physics.
+
+What is listed in `__all__` is stable: see docs/api.md. Each is loaded when it is touched.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from lab.api.lessons import LessonResult, teach
+    from lab.api.orders import OrderResult, sequence
+    from lab.api.pictures import Page, Picture
+    from lab.api.runs import RunResult, run
+    from lab.api.scenes import show
+    from lab.api.studies import StudyResult, compare, study
+    from lab.errors import BadInput, LabError, WorkFailed
+    from lab.learning.gates import Gate, Steps
+    from lab.learning.problem import Problem
+    from lab.learning.requests import AdviceRequest, AdvisorLeft
+    from lab.mdp import Rewards, TabularMDP, grid
+    from lab.sequencing.cell.cell import Cell
+    from lab.tasks.grid_world import GridWorld
+    from lab.teaching.subjects import world
+    from lab.toolbox.policy import Policy
+    from lab.toolbox.registry import Toolbox
 
 __version__ = "0.1.0"
+
+_FACE = {
+    "lab.api.lessons": ("LessonResult", "teach"),
+    "lab.api.orders": ("OrderResult", "sequence"),
+    "lab.api.pictures": ("Page", "Picture"),
+    "lab.api.runs": ("RunResult", "run"),
+    "lab.api.scenes": ("show",),
+    "lab.api.studies": ("StudyResult", "compare", "study"),
+    "lab.teaching.subjects": ("world",),
+    "lab.errors": ("BadInput", "LabError", "WorkFailed"),
+    "lab.learning.gates": ("Gate", "Steps"),
+    "lab.learning.problem": ("Problem",),
+    "lab.learning.requests": ("AdviceRequest", "AdvisorLeft"),
+    "lab.mdp": ("Rewards", "TabularMDP", "grid"),
+    "lab.sequencing.cell.cell": ("Cell",),
+    "lab.tasks.grid_world": ("GridWorld",),
+    "lab.toolbox.policy": ("Policy",),
+    "lab.toolbox.registry": ("Toolbox",),
+}
+_MODULES = {name: module for module, names in _FACE.items() for name in names}
+
+__all__ = [
+    "AdviceRequest",
+    "AdvisorLeft",
+    "BadInput",
+    "Cell",
+    "Gate",
+    "GridWorld",
+    "LabError",
+    "LessonResult",
+    "OrderResult",
+    "Page",
+    "Picture",
+    "Policy",
+    "Problem",
+    "Rewards",
+    "RunResult",
+    "Steps",
+    "StudyResult",
+    "TabularMDP",
+    "Toolbox",
+    "WorkFailed",
+    "compare",
+    "grid",
+    "run",
+    "sequence",
+    "show",
+    "study",
+    "teach",
+    "world",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module 'lab' has no attribute '{name}'")
+    from importlib import import_module
+
+    value = getattr(import_module(_MODULES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -22,9 +22,11 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.advice", "lab.tasks"),
     ("lab.sim",),
     ("lab.skills", "lab.view", "lab.export"),
+    ("lab.gym",),
     ("lab.teaching",),
     ("lab.production",),
-    ("lab.studies", "lab.seat", "lab.gym"),
+    ("lab.studies", "lab.seat"),
+    ("lab.api",),
     ("lab.cli",),
 )
 ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
@@ -82,7 +84,9 @@ def within(module: str, room: str) -> bool:
 
 
 def layer(module: str) -> tuple[int, str]:
-    """The layer and the room of a module: the longest listed prefix."""
+    """The layer and the room of a module: the longest listed prefix; the package itself stands above all."""
+    if module == "lab":
+        return len(LAYERS), module
     rooms = [(len(room), number, room) for number, rooms in enumerate(LAYERS) for room in rooms if within(module, room)]
     assert rooms, f"{module} has no room: give it a row in LAYERS (tests/test_walls.py), as low as it can stand"
     _, number, room = max(rooms)
@@ -143,7 +147,7 @@ def code_faults(module: str, tree: ast.Module) -> Iterator[str]:
             called = ast.unparse(node.func)
             if called in ("print", "pprint", "rich.print") and module != "lab.cli.output":
                 yield f"{line} prints: only the CLI does"
-            if called in ("__import__", "import_module", "importlib.import_module"):
+            if called in ("__import__", "import_module", "importlib.import_module") and module != "lab":
                 yield f"{line} imports by a string, which no wall can see"
             if called.rpartition(".")[2] in GENERATORS and not (node.args or node.keywords):
                 yield f"{line} calls {called}() without a seed"
@@ -206,7 +210,8 @@ def test_a_module_keeps_the_walls(module: str) -> None:
 
 
 def test_no_import_runs_in_a_circle() -> None:
-    graph = {name: {to for item in found for to in loads(name, item)} for name, (_, found) in house().items()}
+    rooms = {name: found for name, (_, found) in house().items() if name != "lab"}  # which loads nothing by itself
+    graph = {name: {to for item in found for to in loads(name, item)} for name, found in rooms.items()}
     assert cycle(graph) == []
 
 
@@ -222,8 +227,8 @@ def test_the_architecture_is_the_one_that_is_told() -> None:
     assert [tuple(f"lab.{room}" for room in floor.split(", ")) for floor in floors] == list(LAYERS)
 
 
-def test_the_package_itself_imports_nothing() -> None:
-    assert house()["lab"][1] == []
+def test_the_package_itself_loads_nothing_until_it_is_touched() -> None:
+    assert {item.target for item in house()["lab"][1] if item.at_load} == {"typing"}
 
 
 def test_ctrl_c_is_heard_before_anything_is_loaded() -> None:

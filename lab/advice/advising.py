@@ -36,13 +36,18 @@ class Advising:
     @classmethod
     def of(
         cls,
-        names: Sequence[str],
+        names: "Sequence[str | Advisor | Ask]",
         people: Mapping[str, Ask] | None = None,
         asked: str = PanelSettings.asked,
         decide: str = PanelSettings.decide,
     ) -> "Advising":
-        """From names as they are typed; BadInput for one that no advisor has, and for an unknown way of asking or deciding."""
-        found = tuple(AdvisorName.of(name, "--advisor") for name in names)
+        """From names as they are typed, or advisors that were made in Python (see `AdvisorName.made`).
+
+        BadInput for a name that no advisor has, and for an unknown way of asking or deciding.
+        """
+        found = tuple(
+            AdvisorName.of(name, "--advisor") if isinstance(name, str) else AdvisorName.made(name) for name in names
+        )
         if "none" in names and len(names) > 1:
             raise BadInput(f"advisor 'none' (--advisor) beside {len(names) - 1} more: it is nobody or somebody")
         for name in PEOPLE:

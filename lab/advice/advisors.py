@@ -33,12 +33,26 @@ class Level(Protocol):
 
 @dataclass(frozen=True)
 class AdvisorName:
-    """An advisor as it was asked for: its row in ADVISORS, what was said beside that, and the text itself."""
+    """An advisor as it was asked for: its row in ADVISORS, what was said beside that, and the text itself.
+
+    itself: one that was made in Python; it is in no table.
+    """
 
     text: str
     row: str
     taus: tuple[float, ...] = ()
     folder: Path | None = None
+    itself: "Advisor | None" = None
+
+    @classmethod
+    def made(cls, advisor: "Advisor | Ask") -> "AdvisorName":
+        """For an advisor, or a function of a request; BadInput for anything else."""
+        text = getattr(advisor, "__name__", type(advisor).__name__)
+        if hasattr(advisor, "advise"):
+            return cls(text, PYTHON, itself=advisor)
+        if not callable(advisor):
+            raise BadInput(f"advisor {advisor!r}: wanted a name, a function of a request, or an object with `advise`")
+        return cls(text, PYTHON, itself=Person(advisor))
 
     @classmethod
     def of(cls, text: str, where: str = "advisor") -> "AdvisorName":
@@ -74,7 +88,7 @@ class AdvisorKind(NamedTuple):
 
 
 class Person:
-    """A person, asked through a prompt or a page that is brought along (see lab/seat)."""
+    """A person, asked through a prompt or a page that is brought along (see lab/seat), or any function of a request."""
 
     def __init__(self, ask: "Ask"):
         self._ask = ask
@@ -121,6 +135,7 @@ def _recorded(name: AdvisorName, level: Level) -> "Advisor":
     return RecordedAdvisor(said)
 
 
+PYTHON = "python"  # the row of an advisor that is in no table
 PEOPLE = {"terminal": "prompt", "web": "page"}
 SKILL_TAUS = {"expert": 0.01, "moderate": 0.1, "limited": 0.3, "novice": 1.0}
 
@@ -145,7 +160,7 @@ def make_advisor(name: AdvisorName, level: Level) -> "Advisor | None":
 
     Raises BadInput for a person who is not there, for a record that does not fit, and for what is too large to know.
     """
-    return ADVISORS[name.row].make(name, level)
+    return name.itself or ADVISORS[name.row].make(name, level)
 
 
 def recorded_fault(found: "Read", what: str, signature: str) -> BadInput:

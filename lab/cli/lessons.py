@@ -1,13 +1,12 @@
-"""What the commands that teach share: who hears of it, the teacher and the subject of the options, what a kept session reads."""
+"""What the commands that teach share: who hears of it, the teacher of the options, what a kept session reads."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from lab.cli.output import complain, console
-from lab.errors import BadInput, LabError
+from lab.errors import LabError
 
 if TYPE_CHECKING:
     from lab.advice.entries import Read
@@ -15,11 +14,8 @@ if TYPE_CHECKING:
     from lab.seat.lesson_seat import LessonSeat
     from lab.teaching.kept_order import OrderSession
     from lab.teaching.kept_session import KeptSession
-    from lab.teaching.lesson import Subject
     from lab.teaching.lesson_options import LessonOptions
     from lab.teaching.teacher import Teacher
-
-GYM = "gym:"  # as in `lab.gym`, which takes a while to load and is asked for such a name only
 
 
 @contextmanager
@@ -67,34 +63,6 @@ def teacher_of(toolbox: str | None, options: "LessonOptions", seat: "LessonSeat"
     return teacher
 
 
-def subject_of(options: "LessonOptions", kept: "KeptSession | None" = None) -> "Subject":
-    """The subject that the options name: an environment, a world or a skill of a task. BadInput for bad options.
-
-    A module whose name comes out of a file, `kept`, is imported only when the user has said that it is trusted.
-    """
-    from lab.tasks.task_file import names_file
-
-    if options.subtask.startswith(GYM):
-        from lab.gym import parse_name
-
-        module = "" if kept is None else parse_name(options.subtask, kept.where).module
-        if kept is not None and module and module not in kept.trusted:
-            raise BadInput(
-                f"journal '{kept.read.path}' ({kept.where}): it names the module '{module}', whose code would run: if you "
-                f"trust whoever made it, say --trust-module {quote(module)}"
-            )
-        from lab.gym.gym_subject import GymSubject
-
-        return GymSubject.of(options)
-    if names_file(options.subtask):
-        from lab.teaching.world_subject import WorldSubject
-
-        return WorldSubject.of(options)
-    from lab.teaching.skill_subject import SkillSubject
-
-    return SkillSubject.of(options)
-
-
 def sequenced(
     kept: "OrderSession", people: "Mapping[str, Ask]", seat: "LessonSeat", toolbox: str | None, files: dict[str, Path]
 ) -> dict[str, Any]:
@@ -138,7 +106,7 @@ def say_read(kept: "KeptSession | OrderSession", where: str) -> None:
         _say_cut(kept.read)
     options = kept.options
     named: list[object] = [getattr(options, "subtask", None), options.task]
-    if str(named[0]).startswith(GYM):
+    if str(named[0]).startswith("gym:"):
         from lab.gym import parse_name
 
         named = list(parse_name(str(named[0]), where).options.values())

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lab.cli.lessons import lesson_seat, say_read, sequenced, subject_of
+from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import Json, Plain, Port, ToolboxPlace, TrustModule
 from lab.cli.output import complain, end, show
 
@@ -50,6 +50,8 @@ def replay(
     if is_run(folder):
         _replay_run(folder, page, port, as_json)
         return
+    from lab.teaching.subjects import subject_of
+
     box = Toolbox(toolbox)
     kept: KeptSession | OrderSession
     if read_journal(folder, "DIR").session.command == "sequence":

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from lab.cli.families import offers
-from lab.cli.lessons import lesson_seat, say_read, subject_of, teacher_of
+from lab.cli.lessons import lesson_seat, say_read, teacher_of
 from lab.cli.options import (
     MAX_EPISODES,
     AdvisorNames,
@@ -90,6 +90,7 @@ def teach(
     from lab.teaching.kept_session import KeptSession, check_new
     from lab.teaching.lesson import teach as teach_session
     from lab.teaching.lesson_options import LessonOptions
+    from lab.teaching.subjects import subject_of
     from lab.view.summary import lesson_summary
 
     who = (tuple(advisor or ()), asked, decide)

@@ -1,29 +1,20 @@
 """`lab view`: a scene, a grid world or a replay on a page."""
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from lab.cli.options import Json, Parts, Seed, Toasts
 from lab.cli.output import end, show, write, write_json
-from lab.errors import BadInput, counted
+from lab.errors import BadInput
 
 if TYPE_CHECKING:
-    from lab.sim.frames import Recording
+    from lab.api.scenes import Asked
 
 Tell = Callable[[str, str], None]
-
-
-class Asked(NamedTuple):
-    """What of a task is shown: --toasts, --parts and --seed."""
-
-    toasts: int | None
-    parts: str | None
-    seed: int
 
 
 def view(
@@ -44,6 +35,8 @@ def view(
     as_json: Json = False,
 ) -> None:
     """Look at a task's scene, at a grid world in 3D or at a run's replay, on a page on 127.0.0.1, until Ctrl-C."""
+    from lab.api.scenes import Asked
+
     if out is not None:
         show(write_page(what, Asked(toasts, parts, seed), out), as_json, lambda document: document["file"])
         return
@@ -60,8 +53,9 @@ def view(
         end("stopped by Ctrl-C", 130)
 
 
-def serve(what: str, asked: Asked | None, port: int, tell: Tell) -> None:
+def serve(what: str, asked: "Asked | None", port: int, tell: Tell) -> None:
     """Serve a run's replay, a task's scene or a world on 127.0.0.1 until interrupted; `tell(url, hint)` once it is there."""
+    from lab.api.scenes import Asked, seen
     from lab.view.meshcat import LiveView
 
     if Path(what).is_dir():
@@ -73,15 +67,16 @@ def serve(what: str, asked: Asked | None, port: int, tell: Tell) -> None:
         with LiveView(port, replay=replay) as page:
             tell(page.url, page.hint)
             _wait()
-    with seen(what, asked or Asked(None, None, 0)) as (title, recording), LiveView(port, title=title) as live:
+    with seen(what, asked or Asked()) as (title, recording), LiveView(port, title=title) as live:
         live.show(recording.bodies, recording.camera)
         live.update(recording.frames[-1])
         tell(live.url, live.hint)
         _wait()
 
 
-def write_page(what: str, asked: Asked, out: Path) -> dict[str, str]:
+def write_page(what: str, asked: "Asked", out: Path) -> dict[str, str]:
     """Write a task's scene or a world as one HTML file; the document of `lab view --out --json`."""
+    from lab.api.scenes import seen
     from lab.view.meshcat import replay_html
 
     if Path(what).is_dir():
@@ -90,43 +85,6 @@ def write_page(what: str, asked: Asked, out: Path) -> dict[str, str]:
         raise BadInput(f"page '{out}' (--out): its name must end in .html")
     with seen(what, asked) as (title, recording):
         return {"file": str(replay_html(recording, out, title=title))}
-
-
-@contextmanager
-def seen(what: str, asked: Asked) -> "Iterator[tuple[str, Recording]]":
-    """What a page calls a task or a world, and one frame of it; a large world's mesh is there as long as the block lasts."""
-    from lab.mdp import shortest_way
-    from lab.production.recorder import show_scene
-    from lab.sim.scene.scene_check import check_scene
-    from lab.skills.prepared_scene import lay_out
-    from lab.tasks.cell_file import CellFile
-    from lab.tasks.grid_world import GridWorld
-    from lab.tasks.task import Task
-    from lab.tasks.task_file import load, load_any
-    from lab.view.still import Still
-    from lab.view.world_bodies import WorldBodies
-
-    found = load_any(what)
-    if isinstance(found, GridWorld):
-        mdp = found.mdp()
-        way = [mdp.state_cell(state) for state in shortest_way(mdp)]
-        with closing(WorldBodies(found)) as drawn:
-            said = [found.title or found.name, f"shortest way: {counted(len(way) - 1, 'move')}"]
-            if drawn.drawn < len(found.obstacles):
-                said.append(f"{drawn.drawn} of {len(found.obstacles)} obstacles drawn")
-            yield "; ".join(said), drawn.still(way)
-        return
-    if isinstance(found, CellFile) and found.in_physics is not None:
-        found = load(what)
-    if not isinstance(found, Task):
-        raise BadInput(
-            f"{what}: it is a cell, which has no scene: look at its order with lab sequence {what} --gantt x.svg"
-        )
-    order = found.ordered(asked.toasts, asked.parts)
-    check_scene(found)
-    still = Still()
-    show_scene(found, order, lay_out(found, order, asked.seed), still)
-    yield found.title or found.name, still.recording
 
 
 def _wait() -> None:

@@ -16,6 +16,7 @@ from lab.sequencing.cell.objectives import MAKESPAN, stuck_cost
 from lab.sequencing.cell.routes import entry
 from lab.sequencing.simulate.run import Run
 from lab.tasks.cell_file import order_from_word, toast_case
+from lab.tasks.task import TAUGHT_WITH
 from lab.tasks.task_file import load, load_cell, load_world
 from lab.view.grid_planes import GridPlanes
 
@@ -104,7 +105,6 @@ class InsertEnv(TableEnv):
         from lab.skills.insert import Insert
         from lab.skills.prepared_scene import prepare
         from lab.skills.skillset import SkillSet
-        from lab.teaching.skill_subject import TAUGHT_WITH
 
         found = load(task)
         order = found.fitting(TAUGHT_WITH)

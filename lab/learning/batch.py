@@ -64,7 +64,7 @@ def run_sessions(
     if not is_compiled(mdp, learner, gate):
         return _one_by_one(mdp, learner, gate, advice, seeds, keep_tables)
     found = _sessions(mdp, learner, seeds, keep_tables)
-    asking = _asking(gate, advice is not None)
+    asking = _asking(gate, advice is not None, learner.max_steps)
     learning, problem = _learning(mdp, learner), _problem(mdp, learner)
     said = (np.zeros((1, 1, mdp.n_actions)), np.zeros(mdp.n_states, np.bool_))
     if advice is not None:
@@ -85,7 +85,7 @@ def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings) -
     rules = GATES[gate.gate].compiled
     if UPDATES[learner.learner].compiled is None or SELECTIONS[learner.selection].compiled is None or rules is None:
         return False
-    return not rules.judges or (len(mdp.starts) < 2 and not gate.spare_best)  # it judges by the plain counts alone
+    return not rules.judges or len(mdp.starts) < 2  # it judges by the plain counts alone
 
 
 def _one_by_one(
@@ -173,9 +173,10 @@ def _learning(mdp: TabularMDP, learner: LearnerSettings) -> records.Learning:
     return records.Learning(**{name: given[name] for name in records.Learning._fields})
 
 
-def _asking(gate: GateSettings, somebody: bool) -> records.Asking:
+def _asking(gate: GateSettings, somebody: bool, max_steps: int) -> records.Asking:
     rules = GATES[gate.gate if somebody else "never"].compiled
     given = vars(gate) | {"gate": rules, "judge_unhelped": gate.judge_unhelped and not gate.memory}
+    given["max_steps"] = max_steps
     return records.Asking(**{name: given[name] for name in records.Asking._fields})
 
 

@@ -61,6 +61,7 @@ class TableAdvisor:
     """A simulated advisor: draws from its `Advice`, and says nothing where it does not see the robot."""
 
     def __init__(self, advice: Advice, draw: Draw):
+        self.advice = advice
         self._draw = draw
         self._region: list[bool] = advice.region.tolist()
         self._last = len(advice.thresholds) - 1

@@ -72,14 +72,26 @@ class Wanted:
 def sequence_named(
     name: str, case: str | None, toasts: int | None, wanted: Wanted, *, teacher: Teacher, files: dict[str, Path]
 ) -> dict[str, Any]:
-    """What `lab sequence` does: a cell file's cell, or a task's over durations measured in simulation, and its pictures.
+    """What `lab sequence` does: the document of `sequenced_named`, and its pictures.
 
-    files: pictures to draw, by name (see `draw`). Raises BadInput for a world and for what does not fit the file.
+    files: pictures to draw, by name (see `draw`).
     """
     from lab.view.canvas import check_picture
 
     for kind, path in files.items():
         check_table(path) if kind == "schedule" else check_picture(path)
+    cell, document, found = sequenced_named(name, case, toasts, wanted, teacher)
+    draw(cell, document, found, files)
+    return document
+
+
+def sequenced_named(
+    name: str, case: str | None, toasts: int | None, wanted: Wanted, teacher: Teacher
+) -> tuple[Cell, dict[str, Any], list[SequenceResult]]:
+    """A cell file's cell, or a task's over durations measured in simulation, with its document and its sessions.
+
+    Raises BadInput for a world and for what does not fit the file.
+    """
     if case is not None and name == "toast":
         name, case = toast_case(case), None
     loaded, case = load_beside(name, Asked(wanted.layout, wanted.robots, case))
@@ -98,9 +110,7 @@ def sequence_named(
     check_objective(wanted.objective or loaded.sequencing.objective, cell)
     teacher.tell(PhaseBegan("sequence", wanted.sessions))
     document, found = sequence_cell(cell, loaded.sequencing, wanted, chance, tell=teacher.tell)
-    document = {"task": loaded.name} | document
-    draw(cell, document, found, files)
-    return document
+    return cell, {"task": loaded.name} | document, found
 
 
 def _check_names(wanted: Wanted, settings: Sequencing) -> None:

@@ -187,33 +187,38 @@ def parse_shape(text: str, where: str) -> Coordinates:
 
 
 def from_text(path: Path) -> GridWorld:
+    """The world of a text grid in a file: see `from_rows`."""
+    name = re.sub(r"[^A-Za-z0-9 _-]", "-", path.stem).lstrip(" _-")[:40] or "world"
+    return from_rows(read_text(path), name, str(path))
+
+
+def from_rows(text: str, name: str, where: str) -> GridWorld:
     """The world of a text grid: rows of one length of '.' free, '#' obstacle, one 'S' start and one 'G' goal.
 
-    These are the rows that `lab see --json` calls "grid". Raises BadInput with file, line and column, and NoPath.
+    These are the rows that `lab see --json` calls "grid". Raises BadInput with where it stands, line and column, and NoPath.
     """
-    rows = [row.removesuffix("\r") for row in read_text(path).rstrip("\r\n").split("\n")]
+    rows = [row.removesuffix("\r") for row in text.rstrip("\r\n").split("\n")]
     if rows == [""]:
-        raise BadInput(f"{path}: it is empty: wanted rows of . # S G")
+        raise BadInput(f"{where}: it is empty: wanted rows of . # S G")
     cells: dict[str, list[Coordinates]] = {"#": [], "S": [], "G": []}
     for i, row in enumerate(rows):
         for j, mark in enumerate(row):
             if mark != "." and mark not in cells:
-                raise BadInput(f"{path}: line {i + 1}, column {j + 1}: {mark!r}: allowed are . # S G")
+                raise BadInput(f"{where}: line {i + 1}, column {j + 1}: {mark!r}: allowed are . # S G")
             if mark in ("S", "G") and cells[mark]:
                 (first,) = cells[mark]
                 place = f"line {first[0] + 1}, column {first[1] + 1}"
-                raise BadInput(f"{path}: line {i + 1}, column {j + 1}: a second '{mark}', the first is in {place}")
+                raise BadInput(f"{where}: line {i + 1}, column {j + 1}: a second '{mark}', the first is in {place}")
             if mark != ".":
                 cells[mark].append((i, j))
         if len(row) != len(rows[0]):
             raise BadInput(
-                f"{path}: line {i + 1}: {counted(len(row), 'cell')}, line 1 has {len(rows[0])}: wanted the same number"
+                f"{where}: line {i + 1}: {counted(len(row), 'cell')}, line 1 has {len(rows[0])}: wanted the same number"
             )
-    _check_shape((len(rows), len(rows[0])), str(path))
+    _check_shape((len(rows), len(rows[0])), where)
     for mark, what in (("S", "start"), ("G", "goal")):
         if not cells[mark]:
-            raise BadInput(f"{path}: no '{mark}' ({what}) in {len(rows)} lines: exactly one is wanted")
-    name = re.sub(r"[^A-Za-z0-9 _-]", "-", path.stem).lstrip(" _-")[:40] or "world"
+            raise BadInput(f"{where}: no '{mark}' ({what}) in {len(rows)} lines: exactly one is wanted")
     shape, (start,), (goal,) = (len(rows), len(rows[0])), cells["S"], cells["G"]
     return _fitted(GridWorld(name=name, shape=shape, start=start, goal=goal, obstacles=tuple(cells["#"])))
 

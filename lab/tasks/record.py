@@ -1,6 +1,6 @@
 """What task files are made of: frozen records of checked fields, names, and how a problem is learned."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any, Self, cast
@@ -9,13 +9,15 @@ from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, Validat
 from pydantic_core import CoreSchema
 
 from lab import files
-from lab.errors import BadInput, counted
+from lab.errors import BadInput, counted, unknown
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import Rewards
 
 MAX_FILE_BYTES = 10_000_000  # of a text file: a world of 100 x 100 x 100 cells has its obstacles in it
 MAX_SHORT_BYTES = 1_000_000  # of one that holds no world: reading a longer one takes seconds
 MAX_REWARD = 1_000_000  # sums of larger ones lose the small ones, and of much larger ones overflow
+
+SETTINGS = {field.name: field for kind in (LearnerSettings, GateSettings) for field in fields(kind)}  # by name
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$")]
 Count = Annotated[int, Field(ge=1, le=100)]
@@ -108,13 +110,22 @@ class Learned(Record):
 
         check_members(self.learner, self.gate, (f"{where}learner", f"{where}gate"))
 
-    def changed(self, learner: str | None, gate: str | None, episodes: int | None, memory: bool | None = None) -> Self:
-        """With what the options of a command say, None for what they leave; BadInput for an unknown learner or gate."""
-        own, when = self.learner, self.gate
-        own = replace(own, learner=own.learner if learner is None else learner, episodes=episodes or own.episodes)
-        when = replace(when, gate=gate or when.gate, memory=when.memory if memory is None else memory)
+    def changed(self, where: str = "--", **given: object) -> Self:
+        """With other settings of the learner and the gate, each by its name; None: left as it is.
+
+        Raises BadInput for a name that neither has, a value outside its range, and an unknown learner or gate; `where`
+        comes before the names of the tables.
+        """
+        named = {name: value for name, value in given.items() if value is not None}
+        for name in named:
+            if name not in SETTINGS:
+                raise unknown("setting", name, SETTINGS, where)
+        own, when = (
+            replace(settings, **{name: value for name, value in named.items() if name in vars(settings)})
+            for settings in (self.learner, self.gate)
+        )
         other = self.model_copy(update={"learner": own, "gate": when})
-        other.check_members("--")
+        other.check_members(where)
         return other
 
 

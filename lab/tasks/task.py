@@ -31,6 +31,7 @@ from lab.tasks.toml_text import TomlText
 
 RESERVED = ("robot", "table", "insert", "the part", "carried part")  # names of other things in the cell
 RESERVED_ENDS = (" marker", " column", " head")
+TAUGHT_WITH = 2  # parts of the first kind in the scene of a lesson, where there is room
 _COUNT = re.compile(r"\s*([^=,]+?)\s*=\s*(\d{1,6})\s*")
 
 Order = tuple[str, ...]  # the kind of each part, part 1 first

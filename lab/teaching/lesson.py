@@ -85,16 +85,22 @@ def one_lesson(
     solved when that succeeds, too; `failure` says why it did not. sessions: those of the run that the lesson belongs to.
     BadInput when the policy called `name` is of another problem.
     """
+    problem, lesson = taught(subject, teacher, name, sessions)
+    document = document_of(problem, lesson, teacher) | subject.facts()
+    if out is not None:
+        document["files"] = _draw_curve(problem.name, lesson.policy, out) | subject.draw(lesson.policy, out)
+    return document
+
+
+def taught(subject: Subject, teacher: Teacher, name: str | None = None, sessions: int = 1) -> tuple[Problem, Lesson]:
+    """What `one_lesson` surveyed and learned, before anything is written beside the policy."""
     check_name(name)
     problem = subject.prepare(teacher.seed)
     teacher.tell(ScenePrepared(subject.scene, problem))
     teacher = replace(teacher, advising=replace(teacher.advising, region=subject.region), trial=subject.tried)
     how = subject.settings
-    lesson = teacher.one_session(LessonPlan(problem, how.learner, how.gate, subject.name, name=name, sessions=sessions))
-    document = _document(problem, lesson, teacher) | subject.facts()
-    if out is not None:
-        document["files"] = _draw_curve(problem.name, lesson.policy, out) | subject.draw(lesson.policy, out)
-    return document
+    plan = LessonPlan(problem, how.learner, how.gate, subject.name, name=name, sessions=sessions)
+    return problem, teacher.one_session(plan)
 
 
 def replay(kept: KeptSession, subject: Subject, tell: Tell) -> dict[str, Any]:
@@ -118,7 +124,7 @@ def _nobody(request: AdviceRequest) -> int | None:
     raise AdvisorLeft
 
 
-def _document(problem: Problem, lesson: Lesson, teacher: Teacher) -> dict[str, Any]:
+def document_of(problem: Problem, lesson: Lesson, teacher: Teacher) -> dict[str, Any]:
     """The document of `lab teach --json`, before any file is written."""
     policy, result = lesson.policy, lesson.result
     assert result is not None

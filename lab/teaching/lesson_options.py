@@ -95,7 +95,7 @@ class LessonOptions(SessionOptions):
 
     def changed(self, settings: Settings) -> Settings:
         """How something is learned, with what these options say; BadInput for an unknown learner or gate."""
-        return settings.changed(self.learner, self.gate, self.episodes, self.memory)
+        return settings.changed(learner=self.learner, gate=self.gate, episodes=self.episodes, memory=self.memory)
 
     def advising(self, people: Mapping[str, Ask] | None = None) -> Advising:
         """Who advises, with the people behind such names as "terminal"."""

@@ -11,13 +11,11 @@ from lab.skills.prepared_scene import Prepared, prepare
 from lab.skills.skillset import SkillSet
 from lab.skills.trial import trial_of
 from lab.tasks.record import Learned
-from lab.tasks.task import Order, Task
+from lab.tasks.task import TAUGHT_WITH, Order, Task
 from lab.tasks.task_file import load, names_of
 from lab.teaching.lesson import Subject
 from lab.teaching.lesson_options import LessonOptions
 from lab.toolbox.policy import Policy
-
-TAUGHT_WITH = 2  # parts of the first kind in the scene of a lesson, where there is room
 
 
 @dataclass

@@ -6,7 +6,6 @@ from typing import Any
 
 from lab.errors import BadInput, unknown
 from lab.learning.problem import Problem
-from lab.mdp import greedy_path
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.task_file import load_world
 from lab.teaching.lesson import Subject
@@ -56,19 +55,8 @@ class WorldSubject(Subject):
         """The values of a world with two axes, and the learned way through it."""
         if len(self.world.shape) != 2:
             return {}
-        from lab.view.plots import Places, value_map
+        from lab.view.plots import grid_values
 
-        world, mdp, path = self.world, self.world.mdp(), out / "value-map.png"
-        states, _, _ = greedy_path(policy.q, mdp, mdp.n_states)
-        value_map(
-            policy.q.max(axis=1).reshape(world.shape),
-            None,
-            path,
-            places=Places(
-                route=[(row, column) for row, column in map(mdp.state_cell, states)],
-                blocked=world.blocked(),
-                start=(world.start[0], world.start[1]),
-                goal=(world.goal[0], world.goal[1]),
-            ),
-        )
+        path = out / "value-map.png"
+        grid_values(policy.q, self.world.mdp(), path)
         return {"value_map": str(path)}

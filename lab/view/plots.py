@@ -103,6 +103,16 @@ def value_map(
             figure.legend(loc="outside lower center", ncols=4)
 
 
+def grid_values(q: FloatArray, mdp: TabularMDP, path: Path) -> None:
+    """The values (S, A) of a grid problem with two axes, and the greedy way through it; see `value_map`."""
+    (goal, *_), (rows, columns) = np.flatnonzero(mdp.goal).tolist(), mdp.shape
+    states, _, _ = greedy_path(q, mdp, mdp.n_states)
+    route = [divmod(state, columns) for state in states]
+    blocked = (mdp.terminal & ~mdp.goal).reshape(mdp.shape)
+    places = Places(route, blocked, divmod(mdp.start, columns), divmod(goal, columns))
+    value_map(q.max(axis=1).reshape(rows, columns), None, path, places=places)
+
+
 def _fitting(
     table: NDArray[np.float64], corners: ArrayLike | None, blocked: ArrayLike | None
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

@@ -10,7 +10,8 @@ from urllib.request import urlopen
 
 import pytest
 
-from lab.cli.view import Asked, serve, write_page
+from lab.api.scenes import Asked
+from lab.cli.view import serve, write_page
 from lab.errors import BadInput
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
@@ -104,7 +105,7 @@ def test_a_page_that_cannot_be_written(tmp_path: Path, lab: Lab) -> None:
 
 
 def test_the_scene_of_a_task_holds_the_parts_that_are_asked_for() -> None:
-    from lab.cli.view import Asked, seen
+    from lab.api.scenes import Asked, seen
 
     with seen("breakfast", Asked(None, "slice=1,cup=1", 0)) as (title, recording):
         parts = {body.name for body in recording.bodies if body.name.startswith(("slice", "cup"))}

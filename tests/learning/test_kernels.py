@@ -89,6 +89,16 @@ def test_they_are_the_same_where_gates_judge_and_episodes_begin_anywhere(gate: s
     assert batch.misleads.sum() > 0
 
 
+@pytest.mark.parametrize("gate", ["ccrl", "combined"])
+def test_they_are_the_same_where_the_best_episodes_are_spared(gate: str) -> None:
+    how, seeds = replace(EAGER, gate=gate, spare_best=True), np.arange(12, dtype=np.uint64)
+    batch = run_sessions(board(), SHORT, how, advice(board(), 1.0), seeds, keep_tables=True)
+    for n in range(12):
+        assert_same(batch, n, alone(board(), SHORT, how, advice(board(), 1.0), n))
+    plain = run_sessions(board(), SHORT, replace(how, spare_best=False), advice(board(), 1.0), seeds)
+    assert 0 < batch.misleads.sum() < plain.misleads.sum()
+
+
 class EveryOther(Gate):
     """A gate of somebody else's, which has no compiled form."""
 

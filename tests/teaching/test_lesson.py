@@ -226,7 +226,7 @@ def test_a_world_is_learned_and_drawn(world: GridWorld, teacher: Teacher, tmp_pa
 
 
 def test_options_change_how_a_world_is_learned(world: GridWorld, teacher: Teacher) -> None:
-    changed = world.changed("sarsa", "never", 7)
+    changed = world.changed(learner="sarsa", gate="never", episodes=7)
     document = one_lesson(WorldSubject(changed), teacher, "mine")
     told = [document[name] for name in ("learner", "gate", "episodes", "requests", "saved_as", "files")]
     assert told == ["sarsa", "never", 7, 0, "mine", {}]
@@ -250,7 +250,7 @@ def test_with_a_limited_view_a_person_is_asked_inside_it_only(world: GridWorld, 
 
 
 def test_with_a_limited_view_simulated_advice_helps_less(world: GridWorld, teacher: Teacher) -> None:
-    once = world.changed(None, None, 1)
+    once = world.changed(episodes=1)
     full = one_lesson(WorldSubject(once), teacher)
     limited = one_lesson(WorldSubject(once, "limited"), teacher, "limited")
     assert (full["view"], full["helped_steps"]) == ("full", 7)  # the expert leads all the way

@@ -50,6 +50,8 @@ class Asking(NamedTuple):
     enough_steps: float
     budget: int
     judge_unhelped: bool
+    spare_best: bool
+    max_steps: int
 
 
 # What each of the sessions under way remembers; session -1: none. `converged` as in `gates.Ccrl`.

@@ -23,7 +23,6 @@ from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, LabError, WorkFailed
 from lab.gym.environment_name import names_environment, parse_name
 from lab.gym.gym_environment import ALONE, GymEnvironment
-from lab.gym.gym_subject import GymWorld, gym_world
 from lab.gym.space_numbering import Numbering, Unsupported
 from lab.gym.transition_model import TransitionModel, Worth
 from lab.learning.environment import Judged
@@ -32,6 +31,7 @@ from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import advice_chances
 from lab.tasks.task_file import load_world
+from lab.teaching.gym_subject import GymWorld, gym_world
 
 
 class Corridor(gymnasium.Env[Any, Any]):
@@ -467,12 +467,12 @@ def test_settings_fit_the_environment() -> None:
 
 
 def test_the_options_of_a_command_change_the_settings() -> None:
-    world = gym_world("gym:FrozenLake").changed("sarsa", "always", 7)
+    world = gym_world("gym:FrozenLake").changed(learner="sarsa", gate="always", episodes=7)
     assert (world.learner.learner, world.gate.gate, world.learner.episodes) == ("sarsa", "always", 7)
     assert (world.problem().name, world.problem().subtask) == ("FrozenLake", "gym")
     with pytest.raises(BadInput, match=r"learner 'afterstate' .* where the steps of 'FrozenLake' lead is not certain"):
-        world.changed("afterstate", None, None)
-    assert gym_world("gym:TeachingLab/World1-v0").changed("afterstate", None, None).learner.learner == "afterstate"
+        world.changed(learner="afterstate")
+    assert gym_world("gym:TeachingLab/World1-v0").changed(learner="afterstate").learner.learner == "afterstate"
 
 
 # ---- what can be wrong ----------------------------------------------------------------------------------------------
@@ -550,7 +550,7 @@ def test_an_own_one_lies_in_a_module_in_the_current_folder(tmp_path: Path, monke
     before = list(sys.path)
     try:
         world = gym_world("gym:lab_test_doors:Door-v0")
-        assert learned(world.changed(None, None, 3), 0).final_steps == 1
+        assert learned(world.changed(episodes=3), 0).final_steps == 1
         assert sys.path == before
         with pytest.raises(BadInput, match=r"unknown keyword 'width' .*'lab_test_doors:Door-v0\?width=3'"):
             gym_world("gym:lab_test_doors:Door-v0?width=3")

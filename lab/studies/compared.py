@@ -1,0 +1,215 @@
+"""Settings of learner, gate and advisor compared in one problem: many sessions each, all settings with the same chances."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
+from hashlib import sha256
+from itertools import product
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab import __version__
+from lab.advice.advising import Advising
+from lab.errors import BadInput
+from lab.learning.batch import run_sessions
+from lab.learning.environment import Environment, TableEnvironment
+from lab.learning.problem import Problem
+from lab.learning.requests import Advisor, Ask
+from lab.learning.session import run_session
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.simulated_advice import TableAdvisor
+from lab.mdp import BoolArray, FloatArray
+from lab.studies.compared_figures import figures
+from lab.studies.findings import Findings, Row, mean_row, share_row, varying_row
+from lab.studies.runner import Job
+from lab.teaching.lesson import Subject
+from lab.teaching.subjects import Teachable, subject_from
+
+MOST_SETTINGS = 1000
+MEASURES = (
+    "solved_percent: sessions whose greedy way is as good as can be in the end. mean_steps: of all episodes, a failed one as the "
+    "step limit + 1 (the area under the learning curve). last_steps: of the last episode. helped_steps, requests, misleads, "
+    "rejected_percent: of a session, as lab teach counts them. Every setting meets the same chances: session n has the same "
+    "seed in each."
+)
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What is compared: a problem (see `lab.teaching.subjects`), advisors, and values of settings by name.
+
+    Each combination is a setting. Raises BadInput for an empty list and for more than MOST_SETTINGS combinations.
+    """
+
+    problem: Teachable
+    advisors: Sequence[str | Advisor | Ask] = ("expert",)
+    values: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    task: str | None = None
+    sight: str | None = None
+
+    def __post_init__(self) -> None:
+        for name, several in (("advisor", self.advisors), *self.values.items()):
+            if not several:
+                raise BadInput(f"{name}: nothing to compare: wanted one value or several")
+        most = int(np.prod([len(several) for several in self.values.values()])) * len(self.advisors)
+        if most > MOST_SETTINGS:
+            raise BadInput(f"{most} settings to compare: allowed are {MOST_SETTINGS}")
+
+    def settings(self) -> "Iterator[Setting]":
+        """All combinations, the first name varying slowest."""
+        for values in product(*self.values.values()):
+            for advisor in self.advisors:
+                yield Setting(self, advisor, tuple(zip(self.values, values, strict=True)))
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """One combination: an advisor, and a value of each setting that is given."""
+
+    of: Compared
+    advisor: str | Advisor | Ask
+    values: tuple[tuple[str, Any], ...]
+
+    @property
+    def named(self) -> Row:
+        """What the rows call it."""
+        return {"advisor": str(Advising.of([self.advisor])), **dict(self.values)}
+
+    def subject(self) -> Subject:
+        """What is learned, with this setting's values. BadInput for a value that cannot be."""
+        subject = subject_from(self.of.problem, self.of.task, self.of.sight)
+        subject.settings = subject.settings.changed("--", **dict(self.values))
+        return subject
+
+
+@dataclass(frozen=True, eq=False)
+class Sessions:
+    """What N sessions of E episodes came to: curve (E,) the mean steps of each episode; the others (N,), one a session."""
+
+    curve: FloatArray
+    solved: BoolArray
+    mean_steps: FloatArray
+    last_steps: FloatArray
+    helped_steps: FloatArray
+    requests: FloatArray
+    misleads: FloatArray
+    rejected: BoolArray
+
+    def to_json(self) -> dict[str, list[float]]:
+        """Plain lists."""
+        return {name: np.asarray(value, np.float64).tolist() for name, value in vars(self).items()}
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, list[float]], sessions: int) -> "Sessions":
+        """What `to_json` wrote of so many sessions. Raises KeyError, TypeError or ValueError for anything else."""
+        kinds = {"solved": np.bool_, "rejected": np.bool_}
+        found = {name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__}
+        if any(one.shape != (sessions,) for name, one in found.items() if name != "curve") or found["curve"].ndim != 1:
+            raise ValueError("lists of other lengths")
+        return cls(**found)
+
+
+def compared(what: Compared, job: Job) -> Findings:
+    """The sessions of every setting, those that the job's folder holds read from it. BadInput before any of them is run."""
+    settings = list(what.settings())
+    for setting in settings:
+        setting.subject()
+    problem = _prepared(what, job.seed)
+    keys = {_key(setting, problem, job): setting for setting in settings}
+    done: dict[str, Sessions] = {}
+    for entry in job.kept():
+        try:
+            if entry["key"] in keys:
+                done[entry["key"]] = Sessions.from_json(entry, job.sessions)
+        except (KeyError, TypeError, ValueError):
+            continue  # not ours: run anew
+    left = [key for key in keys if key not in done]
+    job.progress(len(done), len(keys))
+    work = partial(sessions_of, sessions=job.sessions, seed=job.seed)
+    for setting, found in job.computed(work, [keys[key] for key in left], 1):
+        key = _key(setting, problem, job)
+        done[key] = found
+        job.keep({"key": key, **found.to_json()})
+        job.progress(len(done), len(keys))
+    results = {key: (setting.named, done[key]) for key, setting in keys.items()}
+    rows = [one for named, found in results.values() for one in rows_of(named, found)]
+    return Findings(rows, in_short(results.values()), figures([*results.values()]), (MEASURES,))
+
+
+def sessions_of(setting: Setting, sessions: int, seed: int) -> Sessions:
+    """So many sessions of a setting: compiled where learner, gate and advisor are, else one by one."""
+    subject, problem = setting.subject(), _prepared(setting.of, seed)
+    how, environment = subject.settings, problem.environment or TableEnvironment(problem.mdp)
+    advising = replace(Advising.of([setting.advisor]), region=subject.region)
+    seeds = np.random.default_rng([seed, crc32(problem.mdp.signature.encode())]).integers(
+        2**64, size=sessions, dtype=np.uint64
+    )
+    advisor = advising.gather(environment, how.learner, np.random.default_rng(0))
+    if problem.environment is None and (advisor is None or isinstance(advisor, TableAdvisor)):
+        advice = None if advisor is None else advisor.advice
+        batch = run_sessions(problem.mdp, how.learner, how.gate, advice, seeds, keep_tables=True)
+        rejected, steps, q = batch.rejected_at_episode > 0, batch.steps, batch.q
+        counts = batch.helped_steps, batch.requests, batch.misleads
+    else:
+        alone = [_alone(environment, how.learner, how.gate, advising, int(own)) for own in seeds]
+        rejected, steps, q = (np.array([one[n] for one in alone]) for n in range(3))
+        counts = tuple(np.array([one[n] for one in alone]) for n in range(3, 6))
+    solved = np.array([environment.judge(table, how.learner).solved for table in q])
+    helped, requests, misleads = (np.asarray(one, np.float64) for one in counts)
+    return Sessions(
+        steps.mean(axis=0), solved, steps.mean(axis=1), steps[:, -1].astype(float), helped, requests, misleads, rejected
+    )
+
+
+def _alone(
+    environment: Environment, learner: LearnerSettings, gate: GateSettings, advising: Advising, seed: int
+) -> tuple[bool, NDArray[np.int64], FloatArray, int, int, int]:
+    """One session in the readable loop: rejected, steps (E,), q (S, A), helped steps, requests, misleads."""
+    rng = np.random.default_rng(seed)
+    advisor = advising.gather(environment, learner, rng)
+    one = run_session(environment, learner, gate, advisor, rng)
+    if one.interrupted:
+        raise KeyboardInterrupt
+    return one.rejected_at_episode is not None, one.steps, one.q, one.helped_steps, one.requests, one.misleads
+
+
+def rows_of(named: Row, found: Sessions) -> list[Row]:
+    """The measures of one setting."""
+    return [
+        share_row(named, "solved_percent", found.solved),
+        mean_row(named, "mean_steps", found.mean_steps),
+        *(varying_row(named, name, getattr(found, name)) for name in ("last_steps", "helped_steps")),
+        *(varying_row(named, name, getattr(found, name)) for name in ("requests", "misleads")),
+        share_row(named, "rejected_percent", found.rejected),
+    ]
+
+
+def in_short(results: "Iterator[tuple[Row, Sessions]] | Any") -> Row:
+    """The setting that solves the most, of these the one with the least mean steps."""
+    named, best = max(results, key=lambda one: (one[1].solved.mean(), -one[1].mean_steps.mean()))
+    what = ", ".join(f"{name} {value}" for name, value in named.items())
+    return {"best": what, "best solves [%]": round(100 * float(best.solved.mean()), 1)}
+
+
+@lru_cache(maxsize=8)
+def _surveyed(problem: str, task: str | None, sight: str | None, seed: int) -> Problem:
+    return subject_from(problem, task, sight).prepare(seed)
+
+
+def _prepared(what: Compared, seed: int) -> Problem:
+    """The problem, surveyed once in this process where it has a name."""
+    if isinstance(what.problem, str):
+        return _surveyed(what.problem, what.task, what.sight, seed)
+    return subject_from(what.problem, what.task, what.sight).prepare(seed)
+
+
+def _key(setting: Setting, problem: Problem, job: Job) -> str:
+    """What names a setting's sessions among those that are kept."""
+    how = setting.subject().settings
+    region = None if setting.of.sight is None else setting.of.sight
+    whole = [__version__, problem.mdp.signature, region, setting.named, vars(how.learner), vars(how.gate)]
+    return sha256(json.dumps([*whole, job.sessions, job.seed], default=str).encode()).hexdigest()[:24]

@@ -1,0 +1,94 @@
+"""What a lesson is about, from what names it or is it: a world, a skill of a task, an environment, a table's problem."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from shlex import quote
+from typing import TYPE_CHECKING
+
+from lab.errors import BadInput
+from lab.learning.problem import Problem
+from lab.mdp import TabularMDP
+from lab.tasks.grid_world import GridWorld, from_rows
+from lab.tasks.record import Learned
+from lab.tasks.task_file import names_file
+from lab.teaching.lesson import Subject
+from lab.teaching.lesson_options import LessonOptions
+from lab.teaching.skill_subject import SkillSubject
+from lab.teaching.world_subject import WorldSubject
+from lab.toolbox.policy import Policy
+
+if TYPE_CHECKING:
+    from lab.teaching.kept_session import KeptSession
+
+GYM = "gym:"  # as in `lab.gym`, which takes a while to load and is asked for such a name only
+Teachable = str | Path | GridWorld | TabularMDP | Problem
+
+
+@dataclass
+class TableSubject(Subject):
+    """A table's problem that was made in Python."""
+
+    problem: Problem
+
+    def __post_init__(self) -> None:
+        self.name, self.settings = self.problem.name, Learned()
+
+    def prepare(self, seed: int) -> Problem:
+        """The problem as it is."""
+        return self.problem
+
+    def draw(self, policy: Policy, out: Path) -> dict[str, str]:
+        """The values of a grid with two axes."""
+        mdp, path = self.problem.mdp, out / "value-map.png"
+        if len(mdp.shape) != 2 or mdp.coverage_shape:
+            return {}
+        from lab.view.plots import grid_values
+
+        grid_values(policy.q, mdp, path)
+        return {"value_map": str(path)}
+
+
+def world(rows: str, name: str = "world") -> GridWorld:
+    """A grid world from its rows: '.' free, '#' obstacle, one 'S' start, one 'G' goal; BadInput, and NoPath."""
+    lines = [line.strip() for line in rows.strip().splitlines()]
+    return from_rows("\n".join(lines), name, f"world '{name}'")
+
+
+def subject_from(problem: Teachable, task: str | None = None, sight: str | None = None) -> Subject:
+    """What is to be learned: whatever `lab teach` takes by name, or a world or a problem itself. BadInput for anything else."""
+    if isinstance(problem, str | Path):
+        return subject_of(LessonOptions(str(problem), task, sight).complete())
+    if task is not None:
+        raise BadInput(f"task '{task}' beside {type(problem).__name__}: only a sub-task's name belongs to one")
+    if isinstance(problem, GridWorld):
+        return WorldSubject(problem, sight or "full")
+    if sight is not None:
+        raise BadInput(f"sight '{sight}' beside {type(problem).__name__}: only a world has one")
+    if isinstance(problem, TabularMDP):
+        problem = Problem("problem", "table", problem)
+    if not isinstance(problem, Problem):
+        wanted = "a name, a GridWorld, a TabularMDP or a Problem"
+        raise BadInput(f"problem {problem!r}: it is a {type(problem).__name__}: wanted {wanted}")
+    return TableSubject(problem)
+
+
+def subject_of(options: LessonOptions, kept: "KeptSession | None" = None) -> Subject:
+    """The subject that the options name: an environment, a world or a skill of a task. BadInput for bad options.
+
+    A module whose name comes out of a file, `kept`, is imported only when the user has said that it is trusted.
+    """
+    if options.subtask.startswith(GYM):
+        from lab.gym import parse_name
+
+        module = "" if kept is None else parse_name(options.subtask, kept.where).module
+        if kept is not None and module and module not in kept.trusted:
+            raise BadInput(
+                f"journal '{kept.read.path}' ({kept.where}): it names the module '{module}', whose code would run: if you "
+                f"trust whoever made it, say --trust-module {quote(module)}"
+            )
+        from lab.teaching.gym_subject import GymSubject
+
+        return GymSubject.of(options)
+    if names_file(options.subtask):
+        return WorldSubject.of(options)
+    return SkillSubject.of(options)
