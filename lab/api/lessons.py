@@ -15,9 +15,9 @@ from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.learning.session import SessionResult
 from lab.mdp import FloatArray
-from lab.teaching.lesson import document_of, taught
+from lab.teaching.lesson import Subject, document_of, taught
 from lab.teaching.lesson_plan import Lesson
-from lab.teaching.subjects import Subject, Teachable, subject_from
+from lab.teaching.subjects import Teachable, subject_from
 from lab.teaching.teacher import Teacher
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox

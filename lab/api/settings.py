@@ -49,5 +49,5 @@ def named(settings: Mapping[str, Any]) -> dict[str, Any]:
         own = changed.get(kind)
         if isinstance(own, type):
             changed[kind] = own.__name__
-            family[own.__name__] = Member(own, (own.__doc__ or own.__name__).splitlines()[0])  # type: ignore[index]
+            family[own.__name__] = Member(own, (own.__doc__ or own.__name__).splitlines()[0])
     return changed

@@ -10,6 +10,7 @@ import typer
 
 from lab import __version__
 from lab.cli import (
+    compare,
     export,
     new,
     operate,
@@ -89,6 +90,10 @@ COMMANDS = {  # what is typed after `lab` -> the command
     "task check": Command(task.task_check, "lab task check my-toast.toml"),
     "study list": Command(study.study_list, "lab study list"),
     "study run": Command(study.study_run, "lab study run table-9.2 --workers 2"),
+    "study compare": Command(
+        compare.study_compare,
+        "lab study compare maze.txt --gate ccrl,ia --advisor expert,novice --psi .05,.1 --workers 2",
+    ),
 }
 
 

@@ -19,6 +19,7 @@ def _of_teaching() -> Tables:
     from lab.advice.advisors import ADVISORS
     from lab.advice.panel import ASKED, DECISIONS
     from lab.learning.gates import GATES
+    from lab.learning.selection import SELECTIONS
     from lab.learning.updates import UPDATES
     from lab.skills import SKILLS
 
@@ -27,6 +28,7 @@ def _of_teaching() -> Tables:
         "skills": SKILLS,
         "learners": UPDATES,
         "gates": GATES,
+        "selections": SELECTIONS,
         "advisors": ADVISORS,
         "asked": ASKED,
         "decisions": DECISIONS,

@@ -1,10 +1,10 @@
 """The settings of a learner and of its gate, with the ranges that each may take."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import cache
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
-from annotated_types import Ge, Gt, Le
+from annotated_types import DocInfo, Ge, Gt, Le, doc
 
 from lab.errors import BadInput
 
@@ -32,37 +32,40 @@ def _require_allowed(settings: Any) -> None:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         field = model.model_fields[first["loc"][0]]
-        limits = [f"{WORDS[name]} {value}" for limit in field.metadata for name, value in asdict(limit).items()]
+        limits = _limits(field.metadata)
         is_type = first["type"].endswith("_type")
         allowed = f"it must be {field.annotation.__name__}" if is_type else f"allowed {' and '.join(limits)}"
         raise BadInput(f"{model.__name__}.{first['loc'][0]} = {first['input']!r}: {allowed}") from None
+
+
+def _limits(metadata: "list[Any] | tuple[Any, ...]") -> list[str]:
+    """What a field allows, in words."""
+    limits = (limit for limit in metadata if not isinstance(limit, DocInfo))
+    return [f"{WORDS[name]} {value}" for limit in limits for name, value in asdict(limit).items()]
 
 
 @dataclass(frozen=True)
 class LearnerSettings:
     """How a learner learns; the defaults are those of the thesis (sections 8.3 and 9.8).
 
-    learner: a name in UPDATES; alpha: learning rate; discount: gamma; trace: lambda of the learners with traces;
-    replacing: a trace is set to 1 on each visit instead of growing by 1; planning: how many earlier moves "dyna-q" learns
-    from again after each one; selection: a name in SELECTIONS; in episode n
-    its temperature (or epsilon) is exploration * n**-beta, constant with beta 0; episodes: session length N;
-    max_steps: steps after which an episode is broken off; count_start: the start counts as a step, as in the thesis's
-    listing, so that a way of 12 moves has 13 steps.
+    In episode n the temperature (or epsilon) is exploration * n**-beta, constant with beta 0.
     Raises BadInput for a value outside its range.
     """
 
-    learner: str = "q-lambda"
-    alpha: Annotated[float, Gt(0), Le(1)] = 0.95
-    discount: Annotated[float, Gt(0), Le(1)] = 0.99
-    trace: Annotated[float, Ge(0), Le(1)] = 0.5
-    replacing: bool = False
-    planning: Annotated[int, Ge(0), Le(1000)] = 5
-    selection: str = "softmax"
-    exploration: Annotated[float, Gt(0), Le(1_000_000)] = 1.0
-    beta: Annotated[float, Ge(0), Le(100)] = 1.3
-    episodes: Annotated[int, Ge(1), Le(1_000_000)] = 200
-    max_steps: Annotated[int, Ge(1), Le(1_000_000)] = 200
-    count_start: bool = False
+    learner: Annotated[str, doc("how it learns")] = "q-lambda"
+    alpha: Annotated[float, Gt(0), Le(1), doc("learning rate")] = 0.95
+    discount: Annotated[float, Gt(0), Le(1), doc("gamma: what the next step counts for, compared with this one")] = 0.99
+    trace: Annotated[float, Ge(0), Le(1), doc("lambda, of the learners with traces")] = 0.5
+    replacing: Annotated[bool, doc("a trace is set to 1 on each visit instead of growing by 1")] = False
+    planning: Annotated[int, Ge(0), Le(1000), doc("earlier moves that dyna-q learns from again after each one")] = 5
+    selection: Annotated[str, doc("how it chooses its actions")] = "softmax"
+    exploration: Annotated[float, Gt(0), Le(1_000_000), doc("temperature, or epsilon, of the first episode")] = 1.0
+    beta: Annotated[float, Ge(0), Le(100), doc("decay: in episode n it explores by exploration * n**-beta")] = 1.3
+    episodes: Annotated[int, Ge(1), Le(1_000_000), doc("session length N")] = 200
+    max_steps: Annotated[int, Ge(1), Le(1_000_000), doc("steps after which an episode is broken off")] = 200
+    count_start: Annotated[
+        bool, doc("the start counts as a step, as in the thesis's listing: a way of 12 moves has 13 steps")
+    ] = False
 
     def __post_init__(self) -> None:
         _require_allowed(self)
@@ -72,33 +75,34 @@ class LearnerSettings:
 class GateSettings:
     """When a learner asks for advice and when it stops; the defaults are those of the thesis (chapter 6, section 9.3).
 
-    gate: a name in GATES; lambda_threshold: Lambda, the improvement rate below which advice is requested; omega:
-    Omega, the misleads that are tolerated; first_episode: X, the first episode that may ask; window: K, the
-    episodes in a moving average; psi: Psi, a width of action values that "ia", "combined" and "importance" compare
-    with; spread: the deviation of its tables that lets "uncertainty" ask; rate: the share of steps that "random" asks
-    for; enough_steps: the mean step count that satisfies "cq"; ensemble: the tables of "uncertainty"; budget: the
-    helped steps that any gate may use in a session; judge_unhelped: an episode that was open for advice and got none,
-    as in a limited view, is judged too (the listing), or not (the text's words); spare_best: an episode that is as good
-    as the best so far is no mislead, though it is not better than those before; the default is as printed, lessons and
-    runs set it (see lab/tasks/record.py); memory: what was shown, or found alone, is remembered and practised without
-    asking again (see lab/learning/advice_memory.py).
+    spare_best is off as printed; lessons and runs set it (see lab/tasks/record.py). memory: see
+    lab/learning/advice_memory.py.
     Raises BadInput for a value outside its range, or for X < 2K with a gate that compares moving averages.
     """
 
-    gate: str = "ccrl"
-    lambda_threshold: Annotated[float, Ge(0), Le(1)] = 0.05
-    omega: Annotated[int, Ge(0), Le(1_000_000)] = 7
-    first_episode: Annotated[int, Ge(1), Le(1_000_000)] = 30
-    window: Annotated[int, Ge(1), Le(100_000)] = 5
-    psi: Annotated[float, Ge(0), Le(1_000_000)] = 1.0
-    spread: Annotated[float, Ge(0), Le(1_000_000)] = 0.1
-    rate: Annotated[float, Ge(0), Le(1)] = 0.1
-    enough_steps: Annotated[float, Gt(0), Le(1_000_000)] = 50.0
-    ensemble: Annotated[int, Ge(2), Le(100)] = 5
-    budget: Annotated[int, Ge(0), Le(1_000_000_000)] = 1_000_000_000
-    judge_unhelped: bool = True
-    spare_best: bool = False
-    memory: bool = False
+    gate: Annotated[str, doc("when it asks")] = "ccrl"
+    lambda_threshold: Annotated[float, Ge(0), Le(1), doc("Lambda: it asks while it improves by less")] = 0.05
+    omega: Annotated[int, Ge(0), Le(1_000_000), doc("Omega: misleads that are tolerated")] = 7
+    first_episode: Annotated[int, Ge(1), Le(1_000_000), doc("X: the first episode that may ask")] = 30
+    window: Annotated[int, Ge(1), Le(100_000), doc("K: episodes in a moving average")] = 5
+    psi: Annotated[
+        float, Ge(0), Le(1_000_000), doc("Psi: width of action values that ia, combined and importance compare with")
+    ] = 1.0
+    spread: Annotated[float, Ge(0), Le(1_000_000), doc("deviation of its tables that lets uncertainty ask")] = 0.1
+    rate: Annotated[float, Ge(0), Le(1), doc("share of the steps that random asks about")] = 0.1
+    enough_steps: Annotated[float, Gt(0), Le(1_000_000), doc("mean step count that satisfies cq")] = 50.0
+    ensemble: Annotated[int, Ge(2), Le(100), doc("tables of uncertainty")] = 5
+    budget: Annotated[int, Ge(0), Le(1_000_000_000), doc("helped steps that any gate may use in a session")] = (
+        1_000_000_000
+    )
+    judge_unhelped: Annotated[
+        bool,
+        doc("an episode that was open for advice and got none is judged, too (the thesis's listing; its words: not)"),
+    ] = True
+    spare_best: Annotated[bool, doc("an episode as good as the best so far is no mislead")] = False
+    memory: Annotated[bool, doc("what was shown, or found alone, is remembered and practised without asking again")] = (
+        False
+    )
 
     def __post_init__(self) -> None:
         _require_allowed(self)
@@ -107,3 +111,28 @@ class GateSettings:
                 f"GateSettings.first_episode = {self.first_episode}: the gate '{self.gate}' compares two windows of "
                 f"{self.window} episodes: allowed at least {2 * self.window}"
             )
+
+
+class Setting(NamedTuple):
+    """A setting of learner or gate: what it is, what it may be, and what it is by default."""
+
+    meaning: str
+    allowed: str
+    default: Any
+
+
+def _described() -> dict[str, Setting]:
+    found = {}
+    for kind in (LearnerSettings, GateSettings):
+        hints = get_type_hints(kind, include_extras=True)
+        for field in fields(kind):
+            metadata = hints[field.name].__metadata__
+            meaning = next(one.documentation for one in metadata if isinstance(one, DocInfo))
+            allowed = " and ".join(_limits(metadata)) or (
+                "true or false" if field.default in (True, False) else "a name"
+            )
+            found[field.name] = Setting(meaning, allowed, field.default)
+    return found
+
+
+SETTINGS = _described()  # of learner and gate, by name

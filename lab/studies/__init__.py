@@ -226,9 +226,6 @@ def run_study(name: str, job: "Job", out: Path, reading: Mapping[str, Any] | Non
     advisor table, a reading that the study has not got, too few sessions and a folder that cannot be; WorkFailed when it cannot
     be written.
     """
-    from lab.files import check_out
-    from lab.studies.runner import STORE
-
     study, reading = study_of(name), reading or {}
     if job.sessions < study.least:
         raise BadInput(f"{counted(job.sessions, 'session')} (--sessions): '{name}' takes {study.least} at the least")
@@ -238,28 +235,38 @@ def run_study(name: str, job: "Job", out: Path, reading: Mapping[str, Any] | Non
         if option not in study.reads:
             takes = ", ".join(one for one, other in STUDIES.items() if option in other.reads)
             raise BadInput(f"--{option.replace('_', '-')}: the study '{name}' has none to choose; it is for {takes}")
+    return carried_out(study, name, job, out, reading)
+
+
+def carried_out(
+    study: Study, name: str, job: "Job", out: Path, reading: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """As `run_study`, of a study that need not be in the table, and with a reading that fits it."""
+    from lab.files import check_out
+    from lab.studies.runner import STORE
+
     check_out(out)
     try:
-        found = study.run(replace(job, folder=out), reading)
+        found = study.run(replace(job, folder=out), reading or {})
     except KeyboardInterrupt:
         goes_on = f"'{out}' keeps what is done, and the same command goes on"
         kept = goes_on if (out / STORE).is_file() else "nothing is kept"
         raise KeyboardInterrupt(f"stopped by Ctrl-C; {kept}") from None
     found = replace(found, summary={"sessions": job.sessions, "seed": job.seed, **found.summary})
-    files = _written(name, found, out)
+    files = _written(study.title, name, found, out)
     if (out / STORE).is_file():
         files["sessions"] = str(out / STORE)
     document = {"study": name, "seed": job.seed, "sessions": job.sessions, "rows": found.rows}
     return document | {"summary": found.summary, "notes": list(found.notes), "files": files}
 
 
-def _written(name: str, found: "Findings", out: Path) -> dict[str, str]:
+def _written(title: str, name: str, found: "Findings", out: Path) -> dict[str, str]:
     """Rows, report and pictures are written; where they are."""
     from lab.studies.report import write_file, write_report, write_rows
 
     files = {"report": str(out / "report.html"), "rows": str(out / "rows.csv")}
     write_rows(out / "rows.csv", found.rows)
-    write_report(out / "report.html", STUDIES[name].title, name, found)
+    write_report(out / "report.html", title, name, found)
     for number, (caption, picture) in enumerate(found.figures.items(), start=1):
         path = out / f"{number:02}-{re.sub(r'[^a-z0-9.]+', '-', caption.lower()).strip('-')[:60]}.svg"
         write_file(path, picture.decode())

@@ -107,7 +107,9 @@ class Sessions:
     def from_json(cls, record: Mapping[str, list[float]], sessions: int) -> "Sessions":
         """What `to_json` wrote of so many sessions. Raises KeyError, TypeError or ValueError for anything else."""
         kinds = {"solved": np.bool_, "rejected": np.bool_}
-        found = {name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__}
+        found: dict[str, Any] = {
+            name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__
+        }
         if any(one.shape != (sessions,) for name, one in found.items() if name != "curve") or found["curve"].ndim != 1:
             raise ValueError("lists of other lengths")
         return cls(**found)
@@ -153,7 +155,7 @@ def sessions_of(setting: Setting, sessions: int, seed: int) -> Sessions:
         advice = None if advisor is None else advisor.advice
         batch = run_sessions(problem.mdp, how.learner, how.gate, advice, seeds, keep_tables=True)
         rejected, steps, q = batch.rejected_at_episode > 0, batch.steps, batch.q
-        counts = batch.helped_steps, batch.requests, batch.misleads
+        counts: tuple[NDArray[np.int64], ...] = (batch.helped_steps, batch.requests, batch.misleads)
     else:
         alone = [_alone(environment, how.learner, how.gate, advising, int(own)) for own in seeds]
         rejected, steps, q = (np.array([one[n] for one in alone]) for n in range(3))

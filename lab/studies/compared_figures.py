@@ -77,7 +77,7 @@ def _curves(results: Sequence[Result]) -> bytes:
         axes: Axes = figure.add_subplot()
         for n, (named, found) in enumerate(results):
             name = words(named, [other for other, _ in results])
-            look = {"color": COLOURS[n % len(COLOURS)], "linestyle": DASHES[n // len(COLOURS)]}
+            look: dict[str, Any] = {"color": COLOURS[n % len(COLOURS)], "linestyle": DASHES[n // len(COLOURS)]}
             axes.plot(np.arange(1, len(found.curve) + 1), found.curve, label=name, linewidth=1.3, **look)
         axes.set(xlabel="episode", ylabel="steps", ylim=(0, None))
         axes.yaxis.label.set_color(INK)

@@ -1,6 +1,6 @@
 """What task files are made of: frozen records of checked fields, names, and how a problem is learned."""
 
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any, Self, cast
@@ -10,14 +10,12 @@ from pydantic_core import CoreSchema
 
 from lab import files
 from lab.errors import BadInput, counted, unknown
-from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.settings import SETTINGS, GateSettings, LearnerSettings
 from lab.mdp import Rewards
 
 MAX_FILE_BYTES = 10_000_000  # of a text file: a world of 100 x 100 x 100 cells has its obstacles in it
 MAX_SHORT_BYTES = 1_000_000  # of one that holds no world: reading a longer one takes seconds
 MAX_REWARD = 1_000_000  # sums of larger ones lose the small ones, and of much larger ones overflow
-
-SETTINGS = {field.name: field for kind in (LearnerSettings, GateSettings) for field in fields(kind)}  # by name
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _-]{0,39}$")]
 Count = Annotated[int, Field(ge=1, le=100)]
@@ -116,14 +114,12 @@ class Learned(Record):
         Raises BadInput for a name that neither has, a value outside its range, and an unknown learner or gate; `where`
         comes before the names of the tables.
         """
-        named = {name: value for name, value in given.items() if value is not None}
+        named: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
         for name in named:
             if name not in SETTINGS:
                 raise unknown("setting", name, SETTINGS, where)
-        own, when = (
-            replace(settings, **{name: value for name, value in named.items() if name in vars(settings)})
-            for settings in (self.learner, self.gate)
-        )
+        own = replace(self.learner, **{name: value for name, value in named.items() if hasattr(self.learner, name)})
+        when = replace(self.gate, **{name: value for name, value in named.items() if hasattr(self.gate, name)})
         other = self.model_copy(update={"learner": own, "gate": when})
         other.check_members(where)
         return other

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 GYM = "gym:"  # as in `lab.gym`, which takes a while to load and is asked for such a name only
 Teachable = str | Path | GridWorld | TabularMDP | Problem
+KINDS = "a name, a GridWorld, a TabularMDP or a Problem"
 
 
 @dataclass
@@ -66,10 +67,9 @@ def subject_from(problem: Teachable, task: str | None = None, sight: str | None 
         raise BadInput(f"sight '{sight}' beside {type(problem).__name__}: only a world has one")
     if isinstance(problem, TabularMDP):
         problem = Problem("problem", "table", problem)
-    if not isinstance(problem, Problem):
-        wanted = "a name, a GridWorld, a TabularMDP or a Problem"
-        raise BadInput(f"problem {problem!r}: it is a {type(problem).__name__}: wanted {wanted}")
-    return TableSubject(problem)
+    if isinstance(problem, Problem):
+        return TableSubject(problem)
+    raise BadInput(f"problem {problem!r}: it is a {type(problem).__name__}: wanted {KINDS}")
 
 
 def subject_of(options: LessonOptions, kept: "KeptSession | None" = None) -> Subject:

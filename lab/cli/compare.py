@@ -1,0 +1,102 @@
+"""`lab study compare`: settings of learner, gate and advisor compared in a problem of the user's own."""
+
+from collections.abc import Callable
+from inspect import Parameter, signature
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from lab.cli.families import offers
+from lab.cli.options import Json, Seed
+from lab.cli.output import console, show
+from lab.errors import BadInput
+from lab.learning.settings import SETTINGS
+
+FAMILIES = {"learner": "learners", "gate": "gates", "selection": "selections"}
+SWITCHES = {"true": True, "false": False}
+
+
+def _with_settings(function: Callable[..., None]) -> Callable[..., None]:
+    """The command with an option for each setting of learner and gate, in place of **values."""
+    shown = signature(function)
+    own = [one for one in shown.parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
+    more = []
+    for name, setting in SETTINGS.items():
+        family = FAMILIES.get(name)
+        which = f": {{{family}}}" if family else f" ({setting.allowed})"
+        option = typer.Option(
+            f"--{name.replace('_', '-')}",
+            help=f"{setting.meaning[:1].upper()}{setting.meaning[1:]}{which}; default: the problem's.",
+            autocompletion=offers(family) if family else None,
+        )
+        kind = Annotated[str | None, option]
+        more.append(Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=kind))
+    function.__signature__ = shown.replace(parameters=[*own, *more])  # type: ignore[attr-defined]
+    function.__annotations__ = {one.name: one.annotation for one in (*own, *more)}
+    return function
+
+
+@_with_settings
+def study_compare(
+    problem: Annotated[
+        str,
+        typer.Argument(
+            help="A world: its name, a .toml file, a .txt grid, random:SHAPE:DENSITY:SEED; gym:ID; or a sub-task of --task."
+        ),
+    ],
+    *,
+    advisor: Annotated[
+        str,
+        typer.Option("--advisor", help="Who advises: {advisors}; several with commas between."),
+    ] = "expert",
+    task: Annotated[str | None, typer.Option("--task", help="The task that a sub-task is of; default: toast.")] = None,
+    sight: Annotated[
+        str | None, typer.Option("--sight", help="Where in a world the advisor sees the robot: full or limited.")
+    ] = None,
+    sessions: Annotated[int, typer.Option("--sessions", min=2, max=1_000_000, help="Of each setting.")] = 100,
+    workers: Annotated[int, typer.Option("--workers", min=1, max=256, help="Processes; the rows are the same.")] = 1,
+    dask: Annotated[str | None, typer.Option("--dask", help="The address of a Dask scheduler to work on.")] = None,
+    seed: Seed = 0,
+    out: Annotated[Path, typer.Option("--out", help="Folder for report, rows and sessions.")] = Path("compared"),
+    as_json: Json = False,
+    **values: str | None,
+) -> None:
+    """Compare settings: every combination of the values that the options name, with commas between, in many sessions each.
+
+    Same seed, same rows. What the folder already holds is not run again.
+    """
+    from lab.studies import Study, carried_out
+    from lab.studies.compared import Compared, compared
+    from lab.studies.runner import Job
+    from lab.view.progress import counting
+    from lab.view.summary import study_summary
+
+    given = {name: parsed(name, text) for name, text in values.items() if text is not None}
+    what = Compared(problem, listed("advisor", advisor), given, task, sight)
+    study = Study(f"Compared: {problem}", lambda job, reading: compared(what, job), least=2)
+    with counting(console(), f"settings in {problem}") as progress:
+        document = carried_out(study, "compare", Job(sessions, seed, workers, dask, progress=progress), out)
+    show(document, as_json, study_summary)
+
+
+def listed(name: str, text: str) -> list[str]:
+    """The values of an option, with commas between; BadInput for an empty one."""
+    found = [one.strip() for one in text.split(",")]
+    if not all(found):
+        raise BadInput(f"--{name.replace('_', '-')} '{text}': wanted one value, or several with commas between")
+    return found
+
+
+def parsed(name: str, text: str) -> list[Any]:
+    """The values of a setting's option, as its type is; BadInput for what is none."""
+    kind = type(SETTINGS[name].default)
+
+    def one(word: str) -> Any:
+        try:
+            return SWITCHES[word.lower()] if kind is bool else kind(word)
+        except (KeyError, ValueError):
+            allowed = {bool: "true or false", int: "whole numbers", float: "numbers"}[kind]
+            raise BadInput(f"--{name.replace('_', '-')} '{word}': allowed are {allowed}") from None
+
+    return [one(word) for word in listed(name, text)]
