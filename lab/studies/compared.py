@@ -22,8 +22,9 @@ from lab.learning.requests import Advisor, Ask
 from lab.learning.session import run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import TableAdvisor
-from lab.mdp import BoolArray, FloatArray
+from lab.mdp import FloatArray
 from lab.studies.compared_figures import figures
+from lab.studies.compared_sessions import Sessions
 from lab.studies.findings import Findings, Row, mean_row, share_row, varying_row
 from lab.studies.runner import Job
 from lab.teaching.lesson import Subject
@@ -86,35 +87,6 @@ class Setting:
         return subject
 
 
-@dataclass(frozen=True, eq=False)
-class Sessions:
-    """What N sessions of E episodes came to: curve (E,) the mean steps of each episode; the others (N,), one a session."""
-
-    curve: FloatArray
-    solved: BoolArray
-    mean_steps: FloatArray
-    last_steps: FloatArray
-    helped_steps: FloatArray
-    requests: FloatArray
-    misleads: FloatArray
-    rejected: BoolArray
-
-    def to_json(self) -> dict[str, list[float]]:
-        """Plain lists."""
-        return {name: np.asarray(value, np.float64).tolist() for name, value in vars(self).items()}
-
-    @classmethod
-    def from_json(cls, record: Mapping[str, list[float]], sessions: int) -> "Sessions":
-        """What `to_json` wrote of so many sessions. Raises KeyError, TypeError or ValueError for anything else."""
-        kinds = {"solved": np.bool_, "rejected": np.bool_}
-        found: dict[str, Any] = {
-            name: np.array(record[name], kinds.get(name, np.float64)) for name in cls.__dataclass_fields__
-        }
-        if any(one.shape != (sessions,) for name, one in found.items() if name != "curve") or found["curve"].ndim != 1:
-            raise ValueError("lists of other lengths")
-        return cls(**found)
-
-
 def compared(what: Compared, job: Job) -> Findings:
     """The sessions of every setting, those that the job's folder holds read from it. BadInput before any of them is run."""
     settings = list(what.settings())
@@ -147,9 +119,8 @@ def sessions_of(setting: Setting, sessions: int, seed: int) -> Sessions:
     subject, problem = setting.subject(), _prepared(setting.of, seed)
     how, environment = subject.settings, problem.environment or TableEnvironment(problem.mdp)
     advising = replace(Advising.of([setting.advisor]), region=subject.region)
-    seeds = np.random.default_rng([seed, crc32(problem.mdp.signature.encode())]).integers(
-        2**64, size=sessions, dtype=np.uint64
-    )
+    rng = np.random.default_rng([seed, crc32(problem.mdp.signature.encode())])
+    seeds = rng.integers(2**64, size=sessions, dtype=np.uint64)
     advisor = advising.gather(environment, how.learner, np.random.default_rng(0))
     if problem.environment is None and (advisor is None or isinstance(advisor, TableAdvisor)):
         advice = None if advisor is None else advisor.advice

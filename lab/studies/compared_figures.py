@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from lab.studies.compared import Sessions
+    from lab.studies.compared_sessions import Sessions
 
 Result = tuple[Row, "Sessions"]
 COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY, GREY)

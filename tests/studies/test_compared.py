@@ -1,0 +1,109 @@
+"""Settings compared: the same sessions compiled and one by one, the same chances for all, and nothing run twice."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+import pytest
+
+from lab.errors import BadInput
+from lab.learning.batch import run_sessions
+from lab.learning.gates import GATES
+from lab.learning.members import Member
+from lab.studies.compared import Compared, Setting, compared, sessions_of
+from lab.studies.compared_figures import words
+from lab.studies.runner import STORE, Job
+from lab.tasks.grid_world import from_rows
+
+WORLD = from_rows("S..\n.#.\n..G", "small", "test")
+SHORT: dict[str, Any] = {"episodes": [8]}
+
+
+def one(what: Compared) -> Setting:
+    (setting,) = what.settings()
+    return setting
+
+
+def test_every_combination_is_a_setting() -> None:
+    what = Compared(WORLD, ("expert", "novice"), {"gate": ["ccrl", "ia"], "psi": [0.1, 0.2]})
+    assert [setting.named for setting in what.settings()][:3] == [
+        {"advisor": "expert", "gate": "ccrl", "psi": 0.1},
+        {"advisor": "novice", "gate": "ccrl", "psi": 0.1},
+        {"advisor": "expert", "gate": "ccrl", "psi": 0.2},
+    ]
+    assert len([*what.settings()]) == 8
+
+
+def test_its_sessions_are_those_of_the_kernel() -> None:
+    """The seeds are drawn for the problem alone: every setting meets the same chances."""
+    setting = one(Compared(WORLD, ("none",), {"gate": ["never"], **SHORT}))
+    found, how = sessions_of(setting, 4, 0), setting.subject().settings
+    other = sessions_of(one(Compared(WORLD, ("none",), {"gate": ["always"], **SHORT})), 4, 0)
+    assert found.curve.tolist() == other.curve.tolist()
+    seeds = np.random.default_rng([0, crc32(WORLD.mdp().signature.encode())])
+    batch = run_sessions(WORLD.mdp(), how.learner, how.gate, None, seeds.integers(2**64, size=4, dtype=np.uint64))
+    assert found.mean_steps.tolist() == batch.steps.mean(axis=1).tolist()
+    assert found.last_steps.tolist() == batch.steps[:, -1].tolist()
+
+
+def test_what_is_not_compiled_is_run_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(GATES, "plain", Member(GATES["always"].make, "always, without a compiled form"))
+    for advisor in ("expert", lambda request: 3):
+        found = sessions_of(one(Compared(WORLD, (advisor,), {"gate": ["plain"], **SHORT})), 3, 0)
+        assert found.curve.shape == (8,)
+        assert (found.helped_steps > 0).all()
+
+
+@pytest.mark.parametrize("name", ["gym:FrozenLake-v1", "random:4x4:0.2:1"])
+def test_any_problem_is_compared(name: str) -> None:
+    found = sessions_of(one(Compared(name, ("expert",), SHORT)), 2, 0)
+    assert found.curve.shape == (8,)
+    assert found.solved.shape == (2,)
+
+
+def test_what_is_done_is_not_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    what = Compared(WORLD, ("expert", "wrong"), SHORT)
+    job = Job(3, 0, folder=tmp_path)
+    first = compared(what, job)
+    lines = (tmp_path / STORE).read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 2
+    with (tmp_path / STORE).open("a") as file:
+        file.write('{"key": 3}\n{"key"')  # cut off, and none of ours
+    monkeypatch.setattr("lab.studies.compared.run_sessions", None)  # nothing is run
+    assert compared(what, job).rows == first.rows
+    assert json.loads(lines[0])["solved"] is not None
+    monkeypatch.undo()
+    assert compared(what, replace(job, seed=1)).rows != first.rows
+
+
+def test_the_rows_do_not_depend_on_the_workers() -> None:
+    what = Compared("random:4x4:0.2:1", ("expert", "novice"), SHORT)
+    assert compared(what, Job(3, 0, workers=2)).rows == compared(what, Job(3, 0)).rows
+
+
+def test_names_say_what_differs() -> None:
+    rows = [{"advisor": "expert", "gate": "ia", "psi": psi} for psi in (0.1, 0.2)]
+    assert words(rows[0], rows) == "psi 0.1"
+    assert words(rows[0], rows[:1]) == "expert"
+
+
+@pytest.mark.parametrize(
+    ("what", "fault"),
+    [
+        ({"values": {"gate": []}}, "gate: nothing to compare"),
+        ({"advisors": ()}, "advisor: nothing to compare"),
+        ({"values": {"psi": [0.1] * 1001}}, "1001 settings to compare: allowed are 1000"),
+    ],
+)
+def test_what_cannot_be_compared(what: dict[str, Any], fault: str) -> None:
+    with pytest.raises(BadInput, match=fault):
+        Compared(WORLD, **what)
+
+
+def test_a_bad_value_is_found_before_anything_is_run(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"psi = -1.0: allowed at least 0"):
+        compared(Compared(WORLD, values={"psi": [0.1, -1.0]}), Job(3, 0, folder=tmp_path))
+    assert not [*tmp_path.iterdir()]
