@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from lab.learning.gates import Gate, Steps
     from lab.learning.problem import Problem
     from lab.learning.requests import AdviceRequest, AdvisorLeft
+    from lab.learning.updates import Update
     from lab.mdp import Rewards, TabularMDP, grid
     from lab.sequencing.cell.cell import Cell
     from lab.tasks.grid_world import GridWorld
@@ -37,6 +38,7 @@ _FACE = {
     "lab.learning.gates": ("Gate", "Steps"),
     "lab.learning.problem": ("Problem",),
     "lab.learning.requests": ("AdviceRequest", "AdvisorLeft"),
+    "lab.learning.updates": ("Update",),
     "lab.mdp": ("Rewards", "TabularMDP", "grid"),
     "lab.sequencing.cell.cell": ("Cell",),
     "lab.tasks.grid_world": ("GridWorld",),
@@ -65,6 +67,7 @@ __all__ = [
     "StudyResult",
     "TabularMDP",
     "Toolbox",
+    "Update",
     "WorkFailed",
     "compare",
     "grid",

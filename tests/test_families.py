@@ -5,7 +5,7 @@ Here stand nine members that do not ship. `add_all` is all that their authors wo
 
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, MutableMapping
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -34,7 +34,7 @@ from lab.studies.runner import Job
 from lab.tasks.task import Task
 
 Lab = Callable[..., Any]  # the fixture of tests/conftest.py; it returns a Ran
-Tables = tuple[tuple[dict[str, Any], str, Any], ...]
+Tables = tuple[tuple[MutableMapping[str, Any], str, Any], ...]
 
 
 # ---- the objects --------------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors",),
-    ("lab.files", "lab.mdp", "lab.statistics"),
+    ("lab.files", "lab.mdp", "lab.plugins", "lab.statistics"),
     ("lab.learning", "lab.vision"),
     ("lab.sequencing", "lab.toolbox"),
     ("lab.advice", "lab.tasks"),
@@ -26,7 +26,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.teaching",),
     ("lab.production",),
     ("lab.studies", "lab.seat"),
-    ("lab.api",),
+    ("lab.api", "lab.testing"),
     ("lab.cli",),
 )
 ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it

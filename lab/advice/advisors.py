@@ -8,9 +8,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from lab.errors import BadInput, unknown
+from lab.plugins.code_file import from_file
+from lab.plugins.family import Family, first_line, takes, wanted
 
 if TYPE_CHECKING:
     from lab.advice.entries import Read
@@ -57,8 +59,6 @@ class AdvisorName:
     @classmethod
     def of(cls, text: str, where: str = "advisor") -> "AdvisorName":
         """From "expert", "tau=0.2", "tau=1..0.01", "recorded:DIR" and so on; BadInput for what is none, `where` it was said."""
-        if text in named():
-            return cls(text, text, (SKILL_TAUS[text],) if text in SKILL_TAUS else ())
         if text.startswith("recorded:"):
             folder = Path(text.removeprefix("recorded:"))
             if not folder.name:
@@ -67,7 +67,9 @@ class AdvisorName:
                 )
             return cls(text, "recorded:DIR", folder=folder)
         if not text.startswith("tau="):
-            raise unknown("advisor", text, ADVISORS, where)
+            if text in ADVISORS:
+                return cls(text, text, (SKILL_TAUS[text],) if text in SKILL_TAUS else ())
+            raise from_file("advisor", text, where) or unknown("advisor", text, ADVISORS, where)
         try:
             taus = tuple(float(part) for part in text[4:].split("..", 1))
         except ValueError:
@@ -139,7 +141,16 @@ PYTHON = "python"  # the row of an advisor that is in no table
 PEOPLE = {"terminal": "prompt", "web": "page"}
 SKILL_TAUS = {"expert": 0.01, "moderate": 0.1, "limited": 0.3, "novice": 1.0}
 
-ADVISORS: dict[str, AdvisorKind] = {
+
+def _adopted(name: str, thing: Any) -> AdvisorKind:
+    if isinstance(thing, type) and hasattr(thing, "advise") and takes(thing):
+        return AdvisorKind(lambda name, level: thing(), first_line(thing))
+    if isinstance(thing, type) or not takes(thing, "request"):
+        raise wanted(thing, "a function of a request, or a class with `advise` that is made without arguments")
+    return AdvisorKind(lambda name, level: Person(thing), first_line(thing))
+
+
+_SHIPPED: dict[str, AdvisorKind] = {
     **{name: AdvisorKind(_simulated) for name in SKILL_TAUS},
     "wrong": AdvisorKind(lambda name, level: level.simulated((SKILL_TAUS["expert"],), -1.0)),
     **{name: AdvisorKind(_person) for name in PEOPLE},
@@ -148,6 +159,7 @@ ADVISORS: dict[str, AdvisorKind] = {
     "tau=X..Y": AdvisorKind(_simulated, "changing over the episodes"),
     "recorded:DIR": AdvisorKind(_recorded, "a session's folder"),
 }
+ADVISORS = Family("advisors", _SHIPPED, _adopted)
 
 
 def named() -> list[str]:

@@ -10,7 +10,7 @@ from lab.advice.advising import Advising
 from lab.api.data_frames import data_frame
 from lab.api.options import Advisors, ToolboxOrPlace, several, toolbox_of
 from lab.api.pictures import Picture
-from lab.api.settings import Settings, named
+from lab.api.settings import Settings
 from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.learning.session import SessionResult
@@ -123,7 +123,7 @@ def teach(
     Raises BadInput for whatever does not fit.
     """
     subject = subject_from(problem, task, sight)
-    subject.settings = subject.settings.changed("", **named(settings))
+    subject.settings = subject.settings.changed("", **settings)
     with TemporaryDirectory() as nowhere:
         teacher = Teacher(toolbox_of(toolbox, nowhere), Advising.of(several(advisor)), seed)
         learned, lesson = taught(subject, teacher)

@@ -1,11 +1,9 @@
 """How something is learned, said in Python: every setting of learner and gate by its name, classes of one's own too."""
 
-from collections.abc import Mapping
-from typing import Any, TypedDict
+from typing import TypedDict
 
-from lab.learning.gates import GATES, Gate
-from lab.learning.members import Member
-from lab.learning.updates import UPDATES
+from lab.learning.gates import Gate
+from lab.learning.updates import Update
 
 
 class Settings(TypedDict, total=False):
@@ -14,7 +12,7 @@ class Settings(TypedDict, total=False):
     learner and gate: a name, or a class of one's own.
     """
 
-    learner: str | type[Any]
+    learner: str | type[Update]
     alpha: float
     discount: float
     trace: float
@@ -40,14 +38,3 @@ class Settings(TypedDict, total=False):
     judge_unhelped: bool
     spare_best: bool
     memory: bool
-
-
-def named(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings with classes by their names, under which they are in their family from now on."""
-    changed = dict(settings)
-    for kind, family in (("learner", UPDATES), ("gate", GATES)):
-        own = changed.get(kind)
-        if isinstance(own, type):
-            changed[kind] = own.__name__
-            family[own.__name__] = Member(own, (own.__doc__ or own.__name__).splitlines()[0])
-    return changed

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from lab.api.data_frames import data_frame
 from lab.api.options import Advisors, several
 from lab.api.pictures import Picture
-from lab.api.settings import named
 from lab.studies import study_of
 from lab.studies.compared import Compared, compared
 from lab.studies.findings import Findings, Row
@@ -85,7 +84,6 @@ def compare(
     Raises BadInput for whatever does not fit.
     """
     values = {name: _listed(value) for name, value in settings.items()}
-    values = {name: [named({name: one})[name] for one in found] for name, found in values.items()}
     what = Compared(problem, several(advisor), values, task, sight)
     return StudyResult(
         f"Compared: {problem}" if isinstance(problem, str) else "Compared", compared(what, Job(sessions, seed, workers))

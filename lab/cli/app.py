@@ -113,6 +113,13 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
             end("", 1)
         except OSError as error:  # a full disk, a folder taken away meanwhile
             end(str(error), 1)
+        except Exception as error:
+            from lab.plugins.sources import blame
+
+            why = blame(error)
+            if why is None:
+                raise
+            end(why, 1)
 
     return run_guarded
 
@@ -161,6 +168,9 @@ def called() -> int:
 
 def _usage(error: Exception) -> int:
     """Say in one line what is wrong with the words of a command; raises again what is no complaint of typer's."""
+    if isinstance(error, LabError):  # of a callback: before the command itself
+        fail(str(error), error.exit_code)
+        return error.exit_code
     explain, context = getattr(error, "format_message", None), getattr(error, "ctx", None)
     if explain is None:
         raise error

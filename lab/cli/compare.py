@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from lab.cli.families import offers
+from lab.cli.families import from_files, offers
 from lab.cli.options import Json, Seed
 from lab.cli.output import console, show
 from lab.errors import BadInput
@@ -29,6 +29,7 @@ def _with_settings(function: Callable[..., None]) -> Callable[..., None]:
             f"--{name.replace('_', '-')}",
             help=f"{setting.meaning[:1].upper()}{setting.meaning[1:]}{which}; default: the problem's.",
             autocompletion=offers(family) if family else None,
+            callback=from_files(family) if family else None,
         )
         kind = Annotated[str | None, option]
         more.append(Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=kind))
@@ -48,7 +49,11 @@ def study_compare(
     *,
     advisor: Annotated[
         str,
-        typer.Option("--advisor", help="Who advises: {advisors}; several with commas between."),
+        typer.Option(
+            "--advisor",
+            help="Who advises: {advisors}; several with commas between.",
+            callback=from_files("advisors"),
+        ),
     ] = "expert",
     task: Annotated[str | None, typer.Option("--task", help="The task that a sub-task is of; default: toast.")] = None,
     sight: Annotated[

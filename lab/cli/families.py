@@ -6,11 +6,13 @@ are filled in when the help of that very command is asked for: `lab --help` load
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
+import typer
 from typer.core import TyperCommand
 
 from lab.cli.glossary import TERMS, TEXTS
+from lab.cli.output import complain
 
 Tables = dict[str, Mapping[str, Any] | Sequence[str]]
 
@@ -77,6 +79,24 @@ def offers(family: str) -> Callable[[str], list[str]]:
         return [name for name in members(family) if name.startswith(incomplete)]
 
     return offered
+
+
+def from_files(family: str) -> Callable[[Any, Any], Any]:
+    """What an option's words mean: "./mine.py:MyGate" is loaded into its family, which is said, for its code runs."""
+
+    def taken(context: typer.Context, value: Any) -> Any:
+        if context.resilient_parsing or not value:
+            return value
+        from lab.plugins.code_file import is_file_word, take
+
+        def member(word: str) -> str:
+            return take(cast(Any, members(family)), word.strip(), complain) if is_file_word(word.strip()) else word
+
+        if isinstance(value, str):
+            return ",".join(map(member, value.split(",")))
+        return [*map(member, value)]
+
+    return taken
 
 
 class CommandOfFamilies(TyperCommand):

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.families import offers
+from lab.cli.families import from_files, offers
 
 MAX_EPISODES = 1_000_000
 MAX_SESSIONS = 10_000
@@ -26,6 +26,7 @@ AdvisorNames = Annotated[
         help="Who advises: {advisors} (X..Y: changing over the episodes; DIR: a session's folder); "
         "several times for several advisors.",
         autocompletion=offers("advisors"),
+        callback=from_files("advisors"),
     ),
 ]
 Asked = Annotated[

@@ -3,6 +3,7 @@
 import json
 import os
 import sys
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -24,6 +25,15 @@ class Stdout:
 def begin() -> None:
     """A command begins: nothing is printed yet."""
     Stdout.told = False
+    warnings.showwarning = _warned
+
+
+def _warned(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+    """A plug-in that is left out is said in one line; any other warning as Python says it."""
+    if category.__name__ == "PluginFault":
+        complain(str(message))
+    else:
+        sys.stderr.write(warnings.formatwarning(message, category, *where[:2]))
 
 
 def write(text: str) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from lab.cli.cyclic import cyclic_found
-from lab.cli.families import offers
+from lab.cli.families import from_files, offers
 from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import MAX_EPISODES, MAX_SESSIONS, Json, Parts, Plain, Port, Seed, ShowPage, ToolboxPlace, Wait
 from lab.cli.output import end, show
@@ -46,7 +46,13 @@ def sequence(
     ] = None,
     parts: Parts = None,
     method: Annotated[
-        str | None, typer.Option("--method", help="{methods}; default: the file's.", autocompletion=offers("methods"))
+        str | None,
+        typer.Option(
+            "--method",
+            help="{methods}; default: the file's.",
+            autocompletion=offers("methods"),
+            callback=from_files("methods"),
+        ),
     ] = None,
     policy: Annotated[
         Path | None,

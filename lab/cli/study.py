@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.families import offers
+from lab.cli.families import from_files, offers
 from lab.cli.options import Json, Seed
 from lab.cli.output import console, show
 
@@ -20,7 +20,12 @@ def study_list(as_json: Json = False) -> None:
 
 
 def study_run(
-    name: Annotated[str, typer.Argument(help="A study; lab study list names them.", autocompletion=offers("studies"))],
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="A study; lab study list names them.", autocompletion=offers("studies"), callback=from_files("studies")
+        ),
+    ],
     sessions: Annotated[
         int | None,
         typer.Option(

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.families import offers
+from lab.cli.families import from_files, offers
 from lab.cli.lessons import lesson_seat, say_read, teacher_of
 from lab.cli.options import (
     MAX_EPISODES,
@@ -39,11 +39,21 @@ def teach(
     ] = None,
     learner: Annotated[
         str | None,
-        typer.Option("--learner", help="{learners}; default: the task's.", autocompletion=offers("learners")),
+        typer.Option(
+            "--learner",
+            help="{learners}; default: the task's.",
+            autocompletion=offers("learners"),
+            callback=from_files("learners"),
+        ),
     ] = None,
     gate: Annotated[
         str | None,
-        typer.Option("--gate", help="When it asks: {gates}; default: the task's.", autocompletion=offers("gates")),
+        typer.Option(
+            "--gate",
+            help="When it asks: {gates}, or one of your own, ./mine.py:MyGate, whose code runs; default: the task's.",
+            autocompletion=offers("gates"),
+            callback=from_files("gates"),
+        ),
     ] = None,
     memory: Annotated[
         bool | None,

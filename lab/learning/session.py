@@ -24,6 +24,7 @@ from lab.learning.session_events import (
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES, Update
 from lab.mdp import BoolArray, FloatArray, TabularMDP
+from lab.plugins.code_file import from_file
 
 CountArray = NDArray[np.int64]
 
@@ -79,7 +80,7 @@ def check_members(
         ("gate", gate.gate, GATES, where[1]),
     ):
         if name not in table:
-            raise unknown(kind, name, table, source)
+            raise from_file(kind, name, source) or unknown(kind, name, table, source)
 
 
 class Session:

@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from lab.errors import unknown
+from lab.plugins.family import Family, first_line, takes, wanted
 
 if TYPE_CHECKING:
     import numpy as np
@@ -169,7 +170,13 @@ def _rule(name: str, words: str) -> Sequencer:
     return Sequencer(load, f"a dispatching rule: {words}", react=partial(_asked, name))
 
 
-SEQUENCERS: dict[str, Sequencer] = {
+def _adopted(name: str, thing: Any) -> Sequencer:
+    if isinstance(thing, type) or not takes(thing, "cell", "search", "rng"):
+        raise wanted(thing, "a function of cell, search and generator that gives a SequenceResult")
+    return Sequencer(lambda: thing, first_line(thing))
+
+
+_SHIPPED: dict[str, Sequencer] = {
     "srl": Sequencer(_srl, "the thesis's: learns from the reward of whole episodes, as printed", drawn=True),
     "srl-time": Sequencer(
         _srl_time,
@@ -196,6 +203,7 @@ SEQUENCERS: dict[str, Sequencer] = {
     "nearest-ready": _rule("nearest-ready", "what can begin soonest"),
     "earliest-due": _rule("earliest-due", "the part that is due first"),
 }
+SEQUENCERS = Family("sequencers", _SHIPPED, _adopted)
 
 
 def check_method(name: str) -> None:

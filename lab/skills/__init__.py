@@ -1,5 +1,8 @@
 """The sub-tasks: one file a skill, all with the same life."""
 
+from typing import Any
+
+from lab.plugins.family import Family, wanted
 from lab.skills.cover import Cover
 from lab.skills.grasp import Grasp
 from lab.skills.insert import Insert
@@ -8,6 +11,15 @@ from lab.skills.skill import Skill
 from lab.skills.transfer import Transfer
 
 # in the order in which they bring a part on, and then what machines do
-SKILLS: dict[str, type[Skill]] = {skill.subtask: skill for skill in (Grasp, Transfer, Insert, Place, Cover)}
+_SHIPPED: dict[str, type[Skill]] = {skill.subtask: skill for skill in (Grasp, Transfer, Insert, Place, Cover)}
+
+
+def _adopted(name: str, thing: Any) -> type[Skill]:
+    if not (isinstance(thing, type) and issubclass(thing, Skill)):
+        raise wanted(thing, "a subclass of lab.skills.Skill")
+    return thing
+
+
+SKILLS = Family("skills", _SHIPPED, _adopted)
 
 __all__ = ["SKILLS", "Cover", "Grasp", "Insert", "Place", "Skill", "Transfer"]

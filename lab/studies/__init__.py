@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput, counted, unknown
+from lab.plugins.family import Family, first_line, takes, wanted
 
 if TYPE_CHECKING:
     from lab.studies.findings import Findings
@@ -147,7 +148,15 @@ def _speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return speed(job, reading)
 
 
-STUDIES: dict[str, Study] = {
+def _adopted(name: str, thing: Any) -> Study:
+    if isinstance(thing, Study):
+        return thing
+    if isinstance(thing, type) or not takes(thing, "job", "reading"):
+        raise wanted(thing, "a function of a job and a reading that gives Findings, or a Study")
+    return Study(first_line(thing), thing, sessions=100, least=2)
+
+
+_SHIPPED: dict[str, Study] = {
     "table-9.2": Study(
         "Table 9.2: best scores in world I with full view", _chapter_9("best_scores", "table-9.2"), ADVISED
     ),
@@ -210,6 +219,7 @@ STUDIES: dict[str, Study] = {
     ),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }
+STUDIES = Family("studies", _SHIPPED, _adopted)
 
 
 def study_of(name: str) -> Study:

@@ -14,15 +14,20 @@ from numpy.typing import NDArray
 
 from lab import __version__
 from lab.advice.advising import Advising
+from lab.advice.advisors import ADVISORS
 from lab.errors import BadInput
 from lab.learning.batch import run_sessions
 from lab.learning.environment import Environment, TableEnvironment
+from lab.learning.gates import GATES
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Ask
 from lab.learning.session import run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import TableAdvisor
+from lab.learning.updates import UPDATES
 from lab.mdp import FloatArray
+from lab.plugins.code_file import files_taken, take
+from lab.plugins.family import Family
 from lab.studies.compared_figures import figures
 from lab.studies.compared_sessions import Sessions
 from lab.studies.findings import Findings, Row, mean_row, share_row, varying_row
@@ -31,6 +36,7 @@ from lab.teaching.lesson import Subject
 from lab.teaching.subjects import Teachable, subject_from
 
 MOST_SETTINGS = 1000
+FAMILIES: dict[str, Family[Any]] = {"gates": GATES, "learners": UPDATES, "advisors": ADVISORS}
 MEASURES = (
     "solved_percent: sessions whose greedy way is as good as can be in the end. mean_steps: of all episodes, a failed one as the "
     "step limit + 1 (the area under the learning curve). last_steps: of the last episode. helped_steps, requests, misleads, "
@@ -51,6 +57,7 @@ class Compared:
     values: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     task: str | None = None
     sight: str | None = None
+    files: Mapping[str, tuple[str, str]] = field(default_factory=files_taken)  # for another process
 
     def __post_init__(self) -> None:
         for name, several in (("advisor", self.advisors), *self.values.items()):
@@ -78,7 +85,8 @@ class Setting:
     @property
     def named(self) -> Row:
         """What the rows call it."""
-        return {"advisor": str(Advising.of([self.advisor])), **dict(self.values)}
+        values = {name: value.__name__ if isinstance(value, type) else value for name, value in self.values}
+        return {"advisor": str(Advising.of([self.advisor])), **values}
 
     def subject(self) -> Subject:
         """What is learned, with this setting's values. BadInput for a value that cannot be."""
@@ -116,6 +124,8 @@ def compared(what: Compared, job: Job) -> Findings:
 
 def sessions_of(setting: Setting, sessions: int, seed: int) -> Sessions:
     """So many sessions of a setting: compiled where learner, gate and advisor are, else one by one."""
+    for kind, word in setting.of.files.values():
+        take(FAMILIES[kind], word)
     subject, problem = setting.subject(), _prepared(setting.of, seed)
     how, environment = subject.settings, problem.environment or TableEnvironment(problem.mdp)
     advising = replace(Advising.of([setting.advisor]), region=subject.region)

@@ -109,12 +109,19 @@ class Learned(Record):
         check_members(self.learner, self.gate, (f"{where}learner", f"{where}gate"))
 
     def changed(self, where: str = "--", **given: object) -> Self:
-        """With other settings of the learner and the gate, each by its name; None: left as it is.
+        """With other settings of the learner and the gate, each by its name, or a class for these two; None: left as it is.
 
         Raises BadInput for a name that neither has, a value outside its range, and an unknown learner or gate; `where`
         comes before the names of the tables.
         """
+        from lab.learning.gates import GATES
+        from lab.learning.updates import UPDATES
+
         named: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        if "learner" in named:
+            named["learner"] = UPDATES.named(named["learner"])
+        if "gate" in named:
+            named["gate"] = GATES.named(named["gate"])
         for name in named:
             if name not in SETTINGS:
                 raise unknown("setting", name, SETTINGS, where)

@@ -1,6 +1,6 @@
 """The one session: what every learner must do, what is reported, and how it ends early."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,12 +13,11 @@ from lab.learning.environment import Judged, Step, TableEnvironment
 from lab.learning.gates import GATES
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.selection import SELECTIONS, Draw
-from lab.learning.session import Session, SessionResult, run_session
+from lab.learning.session import Session, run_session
 from lab.learning.session_events import (
     AdviceEnded,
     AdviceRejected,
     AdviceRemembered,
-    AdviceRequested,
     EpisodeEnded,
     Event,
     Improvement,
@@ -26,32 +25,13 @@ from lab.learning.session_events import (
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.updates import UPDATES
 from lab.mdp import FloatArray, Rewards, TabularMDP, coverage, greedy_path, grid, optimal_values
+from lab.testing.learning import EARLY, SHORT, board, check_advisor, check_gate, check_learner, check_session, session
 
-EARLY = GateSettings(first_episode=5, window=2)
 WHOLE_WAYS = ("q-lambda", "sarsa-lambda", "monte-carlo", "dyna-q")  # with lambda 1 they learn a whole way at once
-SHORT = LearnerSettings(episodes=60, max_steps=30)
-
-
-def board(size: int) -> TabularMDP:
-    """A square board with obstacles beside the diagonal; 3 x 3: one in the middle."""
-    blocked = np.zeros((size, size), bool)
-    blocked[1, 1] = blocked[size - 2, 1] = True
-    return grid((size, size), blocked, (0, 0), (size - 1, size - 1), action_labels=("up", "down", "left", "right"))
 
 
 def corridor(length: int) -> TabularMDP:
     return grid((length,), np.zeros(length, bool), (0,), (length - 1,), action_labels=("left", "right"))
-
-
-def session(
-    mdp: TabularMDP, advisor: str = "expert", seed: int = 0, **changes: Any
-) -> tuple[SessionResult, list[Event]]:
-    learner = replace(SHORT, **{k: v for k, v in changes.items() if hasattr(SHORT, k)})
-    gate = replace(EARLY, **{k: v for k, v in changes.items() if hasattr(EARLY, k)})
-    events: list[Event] = []
-    adviser = TableLevel(mdp, learner.discount, np.random.default_rng([seed, 1])).advisor(AdvisorName.of(advisor))
-    result = run_session(mdp, learner, gate, adviser, np.random.default_rng(seed), on_event=events.append)
-    return result, events
 
 
 class Scripted:
@@ -66,47 +46,26 @@ class Scripted:
         return answer
 
 
-@pytest.mark.parametrize("size", [3, 4])
 @pytest.mark.parametrize("learner", UPDATES)
-def test_every_learner_solves_small_boards_with_an_expert(learner: str, size: int) -> None:
-    for seed in range(3):
-        result, _ = session(board(size), seed=seed, learner=learner, episodes=100)
-        assert result.solved
-        assert result.final_steps == result.optimal_steps == 2 * (size - 1)
-        assert result.helped_steps > 0
+def test_every_learner_solves_small_boards_with_an_expert(learner: str) -> None:
+    check_learner(learner)
+
+
+@pytest.mark.parametrize("gate", GATES)
+def test_every_gate_keeps_its_contract(gate: str) -> None:
+    check_gate(gate)
 
 
 @pytest.mark.parametrize("memory", [False, True])
 @pytest.mark.parametrize("learner", UPDATES)
 @pytest.mark.parametrize("gate", GATES)
 def test_results_fit_together_and_repeat(learner: str, gate: str, memory: bool) -> None:
-    mdp = board(4)
-    (result, events), (again, events_again) = (
-        session(mdp, "limited", 5, learner=learner, gate=gate, memory=memory) for _ in range(2)
-    )
-    for name, value in asdict(result).items():
-        np.testing.assert_array_equal(value, getattr(again, name))
-    assert events == events_again
-    assert result.q.shape == result.visits.shape == mdp.successor.shape
-    assert (result.q.dtype.name, result.visits.dtype.name, result.steps.dtype.name) == ("float64", "int64", "int64")
-    assert np.isfinite(result.q).all()
-    assert not result.q[mdp.terminal].any()
-    assert not result.visits[mdp.terminal].any()
-    ended = [event for event in events if isinstance(event, EpisodeEnded)]
-    assert [event.episode for event in ended] == list(range(1, 61))
-    assert [event.steps for event in ended] == result.steps.tolist()
-    assert [event.guided for event in ended] == result.guided.tolist()
-    assert sum(event.helped_steps for event in ended) == result.helped_steps
-    assert [event.reached for event in ended] == (result.steps <= 30).tolist()
-    assert result.requests == sum(isinstance(event, AdviceRequested) for event in events)
-    reached = result.steps[result.steps <= 30]
-    assert result.visits.sum() >= reached.sum()  # failed episodes walked too
-    path = greedy_path(result.q, mdp, 30)
-    assert result.final_steps == (len(path[1]) if path[2] else None)
+    check_session(learner, gate, memory)
 
 
 @pytest.mark.parametrize("advisor", [name for name in named() if name not in PEOPLE])
 def test_every_simulated_advisor_can_help(advisor: str) -> None:
+    check_advisor(advisor)
     result, _ = session(board(3), advisor, gate="always", episodes=20)
     assert (result.helped_steps > 0) == (advisor != "none")
     assert result.helped_steps in (0, result.visits.sum())

@@ -1,5 +1,7 @@
 """When a learner asks for advice, and when it stops: the gates, one file a family."""
 
+from typing import Any
+
 from lab.learning.gates import gate_rules as rules
 from lab.learning.gates.ccrl import Ccrl, Combined
 from lab.learning.gates.constant_performance import ConstantPerformance
@@ -8,10 +10,20 @@ from lab.learning.gates.gate_rules import CompiledGate, Steps, improvement
 from lab.learning.gates.per_step import Importance, Introspection, Random
 from lab.learning.gates.uncertainty import Uncertainty, deviation
 from lab.learning.members import Member
+from lab.plugins.family import Family, first_line, takes, wanted
 
 __all__ = ["GATES", "Gate", "Steps", "Surroundings", "deviation", "improvement"]
 
-GATES: dict[str, Member[GateClass]] = {
+GATE_TAKES = ("settings", "episodes", "max_steps", "around")
+
+
+def _adopted(name: str, thing: Any) -> Member[GateClass]:
+    if not (isinstance(thing, type) and issubclass(thing, Gate) and takes(thing, *GATE_TAKES)):
+        raise wanted(thing, f"a subclass of lab.Gate that is made with {', '.join(GATE_TAKES)}")
+    return Member(thing, first_line(thing))
+
+
+_SHIPPED: dict[str, Member[GateClass]] = {
     "ccrl": Member(
         Ccrl,
         "asks for whole episodes while its improvement is below Lambda; rejects an advisor after more than Omega misleads "
@@ -49,3 +61,4 @@ GATES: dict[str, Member[GateClass]] = {
         CompiledGate(rules.OPENS_FROM_X, rules.ASKS_WHERE_TABLES_DIFFER),
     ),
 }
+GATES = Family("gates", _SHIPPED, _adopted)

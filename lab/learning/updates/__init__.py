@@ -1,6 +1,7 @@
 """The learners: update rules on action-value tables, one file a family."""
 
 from collections.abc import Callable
+from typing import Any
 
 from lab.learning.members import Member
 from lab.learning.settings import LearnerSettings
@@ -11,10 +12,22 @@ from lab.learning.updates.planning import DynaQ
 from lab.learning.updates.traces import SarsaLambda, WatkinsQLambda
 from lab.learning.updates.update import ACTION_VALUES, STATE_VALUES, Row, Table, Update
 from lab.mdp import TabularMDP
+from lab.plugins.family import Family, first_line, takes, wanted
 
 __all__ = ["UPDATES", "Row", "Table", "Update"]
 
-UPDATES: dict[str, Member[Callable[[list[Row], LearnerSettings, TabularMDP], Update]]] = {
+Learner = Callable[[list[Row], LearnerSettings, TabularMDP], Update]
+
+LEARNER_TAKES = ("q", "settings", "mdp")
+
+
+def _adopted(name: str, thing: Any) -> Member[Learner]:
+    if not (isinstance(thing, type) and issubclass(thing, Update) and takes(thing, *LEARNER_TAKES)):
+        raise wanted(thing, f"a subclass of lab.Update that is made with {', '.join(LEARNER_TAKES)}")
+    return Member(thing, first_line(thing))
+
+
+_SHIPPED: dict[str, Member[Learner]] = {
     "q": Member(QLearning, "Q-learning: what a move is worth is judged by the best move after it", ACTION_VALUES),
     "sarsa": Member(Sarsa, "as q, but judged by the move that is really made next"),
     "q-lambda": Member(WatkinsQLambda, "as q, with traces: each step corrects the moves before it, too"),
@@ -27,3 +40,4 @@ UPDATES: dict[str, Member[Callable[[list[Row], LearnerSettings, TabularMDP], Upd
         Afterstate, "learns what the states are worth that moves lead to, not the moves", STATE_VALUES
     ),
 }
+UPDATES = Family("learners", _SHIPPED, _adopted)

@@ -1,0 +1,35 @@
+"""What is asked of a sequencer: its order is allowed, costs what it says, and beats no proof."""
+
+from lab.sequencing import SEQUENCERS, Find, find_sequence
+from lab.sequencing.cell.cell import Cell
+from lab.sequencing.methods.exact import optimum
+from lab.sequencing.search import EpisodeSequenced, Search, SequenceResult
+from lab.sequencing.simulate.run import simulate
+from lab.tasks.task_file import load_cell
+from lab.testing.requirement import require
+
+NEAR_S = 1e-5
+SMALL = ("toast-case-1", "toast-case-2", "toast-case-3")
+
+
+def check_sequencer(method: str | Find) -> None:
+    """A method, by name or as a function of cell, search and generator, on two toasts in each of the thesis's cells."""
+    name = method if isinstance(method, str) else method.__name__
+    if not isinstance(method, str) and name not in SEQUENCERS:
+        SEQUENCERS.adopted(name, method, "check_sequencer")
+    for cell in SMALL:
+        check_order(name, load_cell(cell).cell(2), seed=1)
+
+
+def check_order(name: str, cell: Cell, seed: int) -> SequenceResult:
+    """What a method finds for a cell: allowed, told episode by episode, not below the optimum, and the same again."""
+    seen: list[EpisodeSequenced] = []
+    result = find_sequence(cell, name, Search(20, on_episode=seen.append), seed)
+    cost, what = simulate(cell, result.sequence).makespan_s, f"method '{name}', seed {seed}"
+    require(abs(cost - result.cost) <= NEAR_S, f"{what}: its order takes {cost} s, it says {result.cost}")
+    best = optimum(cell).cost
+    require(result.cost >= best - NEAR_S, f"{what}: {result.cost} s is below the proven optimum, {best} s")
+    require(result.cost == min(result.episode_costs), f"{what}: its cost is not that of its best episode")
+    told = tuple(event.cost for event in seen)
+    require(told == result.episode_costs, f"{what}: {len(told)} episodes told, {len(result.episode_costs)} counted")
+    return result
