@@ -1,24 +1,75 @@
 """The documentation's examples are run, page by page, in an empty folder; its tables are those of the code."""
 
+import os
 import re
+import shlex
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+import typer
 
 import lab
+from lab.cli.app import made
 from lab.learning.settings import SETTINGS
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
-BLOCK = re.compile(r"^```python\n(\S.*?)^```", re.MULTILINE | re.DOTALL)  # one that begins indented is a fragment
-PAGES = [page for page in sorted(DOCS.glob("**/*.md")) if BLOCK.search(page.read_text(encoding="utf-8"))]
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+BLOCK = re.compile(r"^```(python|sh)\n(\S.*?)^```", re.MULTILINE | re.DOTALL)  # one that begins indented is a fragment
+MADE = re.compile(r"^<!-- made: (\S+) -> (\S+) -->\n!\[.*?\]\((\S+)\)", re.MULTILINE)
+KEPT = "LAB_DOCS_PICTURES"  # set: the pictures in docs/ are made anew by the pages that show them
+PAGES = sorted(DOCS.glob("**/*.md"))
+RUN = [page for page in PAGES if page.parent.name == "lessons" or "```python\n" in page.read_text(encoding="utf-8")]
+SHIM = f"""#!/bin/sh
+exec {shlex.quote(sys.executable)} -c "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()" "$@"
+"""
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", RUN, ids=lambda page: page.stem)
 def test_the_examples_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {"__name__": page.stem}
-    for block in BLOCK.findall(page.read_text(encoding="utf-8")):
-        exec(compile(block, str(page), "exec"), names)
+    """Python on every page, commands in the lessons; the pictures that a page shows are there afterwards."""
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "lab").write_text(SHIM)
+    (tmp_path / "bin" / "lab").chmod(0o755)
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.setenv("LAB_TOOLBOX", str(tmp_path / "toolbox"))
+    monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:{os.environ['PATH']}")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    text, names = page.read_text(encoding="utf-8"), {"__name__": page.stem}
+    for kind, block in BLOCK.findall(text):
+        if kind == "python":
+            exec(compile(block, str(page), "exec"), names)
+        elif page.parent.name == "lessons":
+            ran = subprocess.run(["bash", "-euo", "pipefail", "-c", block], capture_output=True, text=True, check=False)
+            assert ran.returncode == 0, ran.stderr[-2000:]
+    for made_as, kept, shown in MADE.findall(text):
+        (file,) = work.glob(made_as)
+        assert kept == shown
+        assert (page.parent / kept).is_file() or KEPT in os.environ
+        if KEPT in os.environ:
+            shutil.copy(file, page.parent / kept)
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.stem)
+def test_the_commands_on_a_page_can_be_said(page: Path) -> None:
+    """Each `lab ...` names a command that there is, with options that it has."""
+    top = typer.main.get_command(made())
+    for line in re.findall(r"(?:^|`)(lab [^`\n|&]*)", page.read_text(encoding="utf-8"), re.MULTILINE):
+        words = shlex.split(line.replace("'\\''", ""), comments=True)[1:]
+        if not words or words[0] not in top.commands or words[-1].endswith("\\"):  # type: ignore[attr-defined]
+            continue
+        command = top
+        while hasattr(command, "commands") and words and words[0] in command.commands:
+            command = command.commands[words.pop(0)]
+        known = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
+        for word in words:
+            if word.startswith("--"):
+                assert word.partition("=")[0] in known | {"--help"}, line
 
 
 def test_the_stable_names_are_those_of_the_package() -> None:

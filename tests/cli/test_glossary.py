@@ -1,4 +1,4 @@
-"""The glossary: words and members of families, in the help and in the README, from one table each."""
+"""The glossary: words and members of families, in the help and in the documentation, from one table each."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -28,7 +28,7 @@ def test_help_explains_every_word(lab: Lab) -> None:
     assert {"psi", "tau", "mislead", "helped step"} <= glossary.TERMS.keys()
 
 
-def test_the_readme_shows_the_same_table(root: Path) -> None:
+def test_the_documentation_shows_the_same_table(root: Path) -> None:
     meanings = glossary.TERMS | {name: row.help for name, row in GATES.items()}
     table = ["| word | what it means |", "|---|---|", *(f"| `{word}` | {means} |" for word, means in meanings.items())]
-    assert "\n".join(table) in (root / "README.md").read_text(encoding="utf-8")
+    assert "\n".join(table) in (root / "docs" / "words.md").read_text(encoding="utf-8")
