@@ -15,8 +15,10 @@ from lab.errors import BadInput
 from lab.learning.problem import Problem
 from lab.learning.session import SessionResult
 from lab.mdp import FloatArray
+from lab.teaching.events import unheard
 from lab.teaching.lesson import Subject, document_of, taught
 from lab.teaching.lesson_plan import Lesson
+from lab.teaching.step_record import StepRecord
 from lab.teaching.subjects import Teachable, subject_from
 from lab.teaching.teacher import Teacher
 from lab.toolbox.policy import Policy
@@ -37,6 +39,7 @@ class LessonResult:
     lesson: Lesson
     document: dict[str, Any]
     _subject: Subject
+    _record: StepRecord | None = None
 
     @property
     def policy(self) -> Policy:
@@ -92,6 +95,13 @@ class LessonResult:
         """Keep the policy in a toolbox, None: the user's own; the file. It is in use unless the one in use does better."""
         return (toolbox if isinstance(toolbox, Toolbox) else Toolbox(toolbox)).save(self.policy)
 
+    @property
+    def steps(self) -> StepRecord:
+        """Every step of the lesson, with `to_minari` and `to_tensorboard`. BadInput unless it was taught with record=True."""
+        if self._record is None:
+            raise BadInput(f"'{self.problem.name}': its steps were not recorded: teach it with record=True")
+        return self._record
+
     def __str__(self) -> str:
         how = f"{self.session.helped_steps} helped steps in {self.session.guided.sum()} of {len(self.session.steps)} episodes"
         return (
@@ -112,6 +122,7 @@ def teach(
     toolbox: ToolboxOrPlace = None,
     task: str | None = None,
     sight: str | None = None,
+    record: bool = False,
     **settings: Unpack[Settings],
 ) -> LessonResult:
     """One teaching session, as `lab teach` holds it: the same problem, settings and seed give the same table.
@@ -119,12 +130,15 @@ def teach(
     problem: what `lab teach` takes by name (a sub-task of `task`, a world, "gym:ID"), or a `GridWorld`, a `TabularMDP` or
     a `Problem`; advisor: a name ("expert", "tau=0.2", "none"), a function of a request that gives an action or None, an
     object with `advise`, or several of these; toolbox: where the policy is kept, and an unfinished one gone on with;
-    None: nothing is kept (see `LessonResult.keep`); sight: "limited": advice is heard in a world's region only.
+    None: nothing is kept (see `LessonResult.keep`); sight: "limited": advice is heard in a world's region only; record: each
+    step is recorded (see `LessonResult.steps`).
     Raises BadInput for whatever does not fit.
     """
     subject = subject_from(problem, task, sight)
     subject.settings = subject.settings.changed("", **settings)
     with TemporaryDirectory() as nowhere:
-        teacher = Teacher(toolbox_of(toolbox, nowhere), Advising.of(several(advisor)), seed)
+        steps = StepRecord() if record else None
+        tell = unheard if steps is None else steps.hear
+        teacher = Teacher(toolbox_of(toolbox, nowhere), Advising.of(several(advisor)), seed, tell)
         learned, lesson = taught(subject, teacher)
-    return LessonResult(learned, lesson, document_of(learned, lesson, teacher) | subject.facts(), subject)
+    return LessonResult(learned, lesson, document_of(learned, lesson, teacher) | subject.facts(), subject, steps)

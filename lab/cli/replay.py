@@ -27,6 +27,13 @@ def replay(
     page: Annotated[bool, typer.Option("--page", help="Show it on a page on 127.0.0.1, too.")] = False,
     port: Port = 0,
     plain: Plain = False,
+    minari: Annotated[
+        str | None,
+        typer.Option("--minari", help="Keep its steps as a Minari dataset of this name, such as lab/mine-v0."),
+    ] = None,
+    tensorboard: Annotated[
+        Path | None, typer.Option("--tensorboard", help="Write its learning curve for TensorBoard into this folder.")
+    ] = None,
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
@@ -37,9 +44,11 @@ def replay(
     from lab.production.run_journal import is_run
     from lab.seat.terminal.replay_keys import HELP as KEYS_HELP
     from lab.seat.terminal.replay_keys import replay_keys
+    from lab.teaching.events import told_to
     from lab.teaching.kept_order import OrderSession, kept_order
     from lab.teaching.kept_session import KeptSession, session_rows
     from lab.teaching.lesson import replay as replay_session
+    from lab.teaching.step_record import StepRecord
     from lab.toolbox.registry import Toolbox
     from lab.view.summary import replay_summary, table_of
 
@@ -68,7 +77,11 @@ def replay(
                 if isinstance(kept, OrderSession):
                     document = _replayed(kept, seat, toolbox)
                 else:
-                    document = replay_session(kept, subject_of(kept.options, kept), seat.hear)
+                    record = StepRecord()
+                    hear = told_to(seat.hear, record.hear) if minari or tensorboard else seat.hear
+                    document = replay_session(kept, subject_of(kept.options, kept), hear)
+                    if minari or tensorboard:
+                        document["files"] = record.written(minari, tensorboard)
             seat.lesson_over(document)
             show(document, as_json, replay_summary)
             seat.stay()

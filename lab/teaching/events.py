@@ -316,5 +316,15 @@ Event = (
 Tell = Callable[[Event], None]
 
 
+def told_to(*listeners: Tell) -> Tell:
+    """One listener that tells several."""
+
+    def tell(event: Any) -> None:
+        for listener in listeners:
+            listener(event)
+
+    return tell
+
+
 def unheard(event: Event) -> None:
     """Nobody listens."""

@@ -1,0 +1,163 @@
+"""Every step of a lesson, recorded as it is taught or told again, and written as data that others read."""
+
+import time
+import warnings
+from copy import copy
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lab.errors import BadInput, WorkFailed
+from lab.learning.environment import Environment, Step
+from lab.learning.selection import Draw
+from lab.learning.session_events import EpisodeEnded
+from lab.mdp import TabularMDP
+from lab.teaching.events import LessonBegan, LessonEvent, QuestionAnswered, SessionBegan
+
+EXTRA = "pip install 'teaching-lab[data]'"
+
+
+@dataclass
+class RecordedEpisode:
+    """One episode of T steps: states (T + 1 of them), actions, rewards, which steps were advised, and how it ended."""
+
+    states: list[int]
+    actions: list[int] = field(default_factory=list)
+    rewards: list[float] = field(default_factory=list)
+    advised: list[bool] = field(default_factory=list)
+    terminated: bool = False
+    steps: int = 0  # as the session counts them
+
+
+class StepRecord:
+    """Hears a lesson (`hear`), and keeps its finished episodes."""
+
+    def __init__(self) -> None:
+        self.episodes: list[RecordedEpisode] = []
+        self.mdp: TabularMDP | None = None
+        self.name = ""
+        self._now: RecordedEpisode | None = None
+        self._advised = False
+
+    def hear(self, event: Any) -> None:
+        """An event of the lesson."""
+        if isinstance(event, LessonBegan):
+            self.episodes, self._now = [], None
+            self.name, self.mdp = event.plan.problem.name, event.plan.problem.mdp
+        elif isinstance(event, SessionBegan):
+            event.session.environment = _recorded(event.session.environment, self)
+        elif isinstance(event, QuestionAnswered):
+            self._advised = event.action is not None
+        elif isinstance(event, LessonEvent) and isinstance(event.event, EpisodeEnded) and self._now is not None:
+            self._now.steps = int(event.event.steps)
+            self.episodes.append(self._now)
+            self._now = None
+
+    def began(self, state: int) -> None:
+        """An episode begins."""
+        self._now, self._advised = RecordedEpisode([state]), False
+
+    def moved(self, action: int, step: Step) -> None:
+        """A step was made."""
+        assert self._now is not None
+        self._now.states.append(step.state)
+        self._now.actions.append(action)
+        self._now.rewards.append(float(step.reward))
+        self._now.advised.append(self._advised)
+        self._now.terminated = step.terminated
+        self._advised = False
+
+    def written(self, minari: str | None, tensorboard: Path | None) -> dict[str, str]:
+        """What is asked for, by name, and where it is."""
+        files = {}
+        if minari is not None:
+            files["minari"] = str(self.to_minari(minari))
+        if tensorboard is not None:
+            files["tensorboard"] = str(self.to_tensorboard(tensorboard))
+        return files
+
+    def to_minari(self, dataset_id: str) -> Path:
+        """Keep the episodes as a Minari dataset, such as "lab/world-1-v0"; its folder.
+
+        Observations are states, infos tell which steps were advised. BadInput when Minari is not installed, when nothing was
+        recorded, and when there is a dataset of that name already.
+        """
+        try:
+            from gymnasium.spaces import Discrete
+            from minari import create_dataset_from_buffers
+            from minari.data_collector import EpisodeBuffer
+            from minari.storage import get_dataset_path
+        except ImportError as error:
+            raise BadInput(f"dataset '{dataset_id}': {error.name} is not installed: {EXTRA}") from None
+        if self.mdp is None or not self.episodes:
+            raise BadInput(f"dataset '{dataset_id}': no episode was recorded")
+        buffers = [
+            EpisodeBuffer(
+                id=n,
+                observations=np.array(one.states, np.int64),
+                actions=np.array(one.actions, np.int64),
+                rewards=one.rewards,
+                terminations=[*[False] * (len(one.actions) - 1), one.terminated],
+                truncations=[*[False] * (len(one.actions) - 1), not one.terminated],
+                infos={"advised": np.array([*one.advised, False])},
+            )
+            for n, one in enumerate(self.episodes)
+        ]
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # about authors and links that a session has not
+                create_dataset_from_buffers(
+                    dataset_id,
+                    buffers,
+                    observation_space=Discrete(self.mdp.n_states),
+                    action_space=Discrete(self.mdp.n_actions),
+                    algorithm_name="teaching-lab",
+                    description=f"A taught session: '{self.name}'; infos: which steps were advised.",
+                )
+        except (ValueError, AssertionError) as error:
+            raise BadInput(f"dataset '{dataset_id}': {error}") from None
+        except OSError as error:
+            raise WorkFailed(f"dataset '{dataset_id}' cannot be written: {error}") from error
+        return Path(get_dataset_path(dataset_id))
+
+    def to_tensorboard(self, folder: Path) -> Path:
+        """Write the learning curve for TensorBoard: steps, return and advised steps of each episode; the folder.
+
+        BadInput when TensorBoard is not installed or the folder cannot be written.
+        """
+        try:
+            from tensorboard.compat.proto.event_pb2 import Event
+            from tensorboard.compat.proto.summary_pb2 import Summary
+            from tensorboard.summary.writer.event_file_writer import EventFileWriter
+        except ImportError as error:
+            raise BadInput(f"folder '{folder}': {error.name} is not installed: {EXTRA}") from None
+        try:
+            writer = EventFileWriter(str(folder))
+        except OSError as error:
+            raise BadInput(f"folder '{folder}' cannot be written: {error.strerror or error}") from error
+        for n, one in enumerate(self.episodes, start=1):
+            values = {"steps": one.steps, "return": sum(one.rewards), "advised steps": sum(one.advised)}
+            said = [Summary.Value(tag=tag, simple_value=float(value)) for tag, value in values.items()]
+            writer.add_event(Event(wall_time=time.time(), step=n, summary=Summary(value=said)))
+        writer.close()
+        return folder
+
+
+def _recorded(inner: Environment, record: StepRecord) -> Environment:
+    """The same environment, of the same class, whose steps are recorded."""
+    made = copy(inner)
+
+    def reset(episode: int, draw: Draw) -> int:
+        state = inner.reset(episode, draw)
+        record.began(state)
+        return state
+
+    def step(state: int, action: int, draw: Draw) -> Step:
+        entered = inner.step(state, action, draw)
+        record.moved(action, entered)
+        return entered
+
+    vars(made).update(reset=reset, step=step)
+    return made
