@@ -1,13 +1,23 @@
 """The source of a module and of all that it imports, found as the interpreter finds them: in a folder, a wheel or a zip."""
 
 import ast
+import hashlib
+import json
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec, resolve_name
+from pathlib import Path
+from typing import Any
+
+from platformdirs import user_cache_dir
 
 from lab.errors import WorkFailed
+from lab.files import write_whole
+
+MOST_KEPT = 1000  # modules whose imports are kept
 
 
 @dataclass(frozen=True)
@@ -26,6 +36,7 @@ def sources(roots: Sequence[str], without: Sequence[str] = (), *, inside: bool =
     cannot be found, such as one that is there compiled only.
     """
     own = {root.partition(".")[0] for root in roots}
+    known = _KnownImports()
     pending, texts, libraries = list(roots), dict[str, str](), set[str]()
     while pending:
         module = pending.pop()
@@ -33,11 +44,12 @@ def sources(roots: Sequence[str], without: Sequence[str] = (), *, inside: bool =
             continue
         texts[module] = source(module)
         pending += [module.rpartition(".")[0]] if "." in module else []
-        for target in _imports(module, texts[module], inside):
+        for target in known.of(module, texts[module], inside):
             if target.partition(".")[0] in own:
                 pending.append(_module(target))
             else:
                 libraries.add(target.partition(".")[0])
+    known.keep()
     return Sources(dict(sorted(texts.items())), frozenset(libraries - sys.stdlib_module_names))
 
 
@@ -48,6 +60,41 @@ def source(module: str) -> str:
     if text is None:
         raise WorkFailed(f"the source of the module '{module}' cannot be found")
     return str(text)
+
+
+class _KnownImports:
+    """What modules import, by their text, kept in the user's cache: to parse a hundred files takes a second.
+
+    Where nothing can be read or written there, they are parsed each time.
+    """
+
+    def __init__(self) -> None:
+        self._path = Path(user_cache_dir("teaching-lab", appauthor=False), "imports.json")
+        self._used: dict[str, list[str]] = {}
+        self._new = False
+        try:
+            found = json.loads(self._path.read_bytes())
+        except (OSError, ValueError, RecursionError):
+            found = {}
+        self._kept: dict[str, Any] = found if isinstance(found, dict) else {}
+
+    def of(self, module: str, text: str, inside: bool) -> list[str]:
+        """The imports of a module with that text."""
+        key = hashlib.sha256(f"{module} {inside} {text}".encode()).hexdigest()[:24]
+        known = self._kept.get(key)
+        if not (isinstance(known, list) and all(isinstance(name, str) for name in known)):
+            known, self._new = [*_imports(module, text, inside)], True
+        self._used[key] = known
+        return known
+
+    def keep(self) -> None:
+        """Write what was new, and of the rest the newest."""
+        if not self._new:
+            return
+        newest = dict([*self._kept.items()][-MOST_KEPT:]) | self._used
+        with suppress(OSError):
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(self._path, json.dumps(newest).encode())
 
 
 @lru_cache(maxsize=256)

@@ -137,7 +137,7 @@ def unique_names(bodies: Sequence[Body]) -> set[str]:
 
 
 def _check_pose(pose: Sequence[float], where: str) -> None:
-    if len(pose) != 7 or not all(math.isfinite(value) for value in pose):
+    if len(pose) != 7 or not math.isfinite(sum(pose)):
         raise BadInput(f"{where}: pose {tuple(pose)}: must be 7 finite numbers x y z qx qy qz qw")
     length = math.hypot(*pose[3:])
     if abs(length - 1) > 1e-3:

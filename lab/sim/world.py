@@ -217,14 +217,19 @@ class World:
 
     def pose(self, name: str, link: str = "") -> tuple[Array, Array]:
         """Position (3,) [m] and quaternion (4,) xyzw of a body's or a link's frame in the world."""
+        position, turn = self._pose(name, link)
+        return np.array(position), np.array(turn)
+
+    def _pose(self, name: str, link: str) -> tuple[Any, Any]:
+        """As `pose`, as PyBullet gives it: a tuple or an array."""
         entry = self._bodies[name]
         if link and link in entry.links:
             state = self._call("getLinkState", entry.number, entry.links[link], computeForwardKinematics=1)
-            return np.array(state[4]), np.array(state[5])
+            return state[4], state[5]
         position, turn = self._call("getBasePositionAndOrientation", entry.number) if entry.moves else entry.pose
         if entry.moves and tuple(entry.turn) != NO_TURN:
             turn = self._turned(turn, self._p.invertTransform([0, 0, 0], list(entry.turn))[1])
-        return np.array(position), np.array(turn)
+        return position, turn
 
     # ---- joints -------------------------------------------------------------------------------------------------
 
@@ -349,8 +354,7 @@ class World:
         for name, entry in self._bodies.items():
             for link, shapes in entry.looks.items():
                 if shapes:
-                    position, turn = self.pose(name, link)
-                    x, y, z, i, j, k, w = (float(value) for value in (*position, *turn))
+                    (x, y, z), (i, j, k, w) = self._pose(name, link)
                     poses[_label(name, link)] = (x, y, z, i, j, k, w)
         return Frame(self.time_s, poses)
 

@@ -51,15 +51,24 @@ def learning_curves(policies: Mapping[str, Curve], path: Path) -> None:
         raise BadInput("learning curves: there is no policy to show")
     columns = min(3, len(policies))
     lines = -(-len(policies) // columns)
-    with picture_file(path, max(5.0, 1.2 + 3.4 * columns), 0.9 + 2.3 * lines) as figure:
+    width, height = max(5.0, 1.2 + 3.4 * columns), 0.9 + 2.3 * lines
+    with picture_file(path, width, height, solved=False) as figure:
+        figure.subplots_adjust(
+            left=0.65 / width,
+            right=1 - 0.12 / width,
+            bottom=0.85 / height,
+            top=1 - 0.3 / height,
+            wspace=0.25,
+            hspace=0.7,
+        )
         grid = figure.subplots(lines, columns, squeeze=False).ravel()
         for axes in grid[len(policies) :]:
             axes.remove()
         for axes, (name, policy) in zip(grid, policies.items(), strict=False):
             _draw_curve(axes, policy)
-            axes.set_title(name if policy.subtask in name else f"{name} ({policy.subtask})")
+            axes.set_title(name if policy.subtask in name else f"{name} ({policy.subtask})", fontsize=8.5)
         handles = list(grid[0].get_lines())
-        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+        figure.legend(handles=handles, loc="lower center", ncols=len(handles))
 
 
 def value_map(

@@ -7,8 +7,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
-from scipy.sparse import coo_array
 
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.routes import from_the_ends
@@ -111,6 +109,9 @@ def _credits(cell: Cell, ways: Sequence[Way], gaps: dict[tuple[int, int], int]) 
     bounds = [(0.0, 0.0) if number in fixed else (-limit_s, limit_s) for number in range(last + 1)]
     entries = [(number, column, sign) for number, (row, _) in enumerate(rows) for column, sign in row.items()]
     at = tuple(np.array(part) for part in zip(*entries, strict=True))
+    from scipy.optimize import linprog  # it takes a while to load, and few cells need it
+    from scipy.sparse import coo_array
+
     table = coo_array((at[2].astype(float), (at[0], at[1])), shape=(len(rows), last + 1)).tocsr()
     found = linprog(-gain, A_ub=table, b_ub=[most for _, most in rows], bounds=bounds, method="highs")
     if found.x is None:
