@@ -14,6 +14,7 @@ import typer
 import lab
 from lab.cli.app import made
 from lab.learning.settings import SETTINGS
+from lab.studies import STUDIES
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -84,3 +85,8 @@ def test_every_setting_is_told() -> None:
     for name, setting in SETTINGS.items():
         default = str(setting.default).lower() if isinstance(setting.default, bool) else setting.default
         assert f"| `{name}` | {setting.meaning} | {setting.allowed} | {default} |" in told
+
+
+def test_every_study_is_told() -> None:
+    told = re.findall(r"`([\w.-]+)`", (DOCS / "studies.md").read_text(encoding="utf-8"))
+    assert {*STUDIES} <= {*told}
