@@ -43,7 +43,7 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "ortools": {
         *(
             f"lab.sequencing.methods.cp_sat{part}"
-            for part in ("", "_free", "_model", "_tasks", "_rooms", "_solver", "_transport")
+            for part in ("", "_free", "_model", "_tasks", "_rooms", "_solver", "_track", "_transport")
         ),
         "lab.sequencing.cyclic.model",
     },

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from lab.errors import BadInput, unknown
 from lab.sequencing.cell.cell import MAX_PARTS, needed_moves
 from lab.sequencing.cell.stations import check_layout
+from lab.sequencing.cell.track import check_track
 from lab.tasks.cell_fields import CellFields, CellRobot
 from lab.tasks.toml_text import Loc
 
@@ -27,6 +28,7 @@ def file_faults(cell: CellFields) -> Iterator[Fault]:
     """Faults of all but stations, routes and times: the order, the robot's start, due times, names of methods."""
     yield from _order_faults(cell)
     yield from _robot_faults(cell)
+    yield from _track_faults(cell)
     if cell.due_s is not None and cell.due_factor is not None:
         yield Fault(("due_factor",), "due_s and due_factor: wanted is one of them, a time for each part or a rule")
     for field, error in cell.sequencing.faults(due=cell.due_s is not None or cell.due_factor is not None):
@@ -44,6 +46,20 @@ def _robot_faults(cell: CellFields) -> Iterator[Fault]:
                 yield Fault((*loc, field), str(unknown("station", name, cell.station_names, where)))
         if [other.name for other in cell.robots or ()].count(robot.name) > 1:
             yield Fault((*loc, "name"), f"robot '{robot.name}': the name is used twice; every robot needs its own")
+
+
+def _track_faults(cell: CellFields) -> Iterator[Fault]:
+    if cell.track is None:
+        return
+    for table in ("travel", "loaded"):
+        if getattr(cell, table):
+            yield Fault((table,), f"track and {table}: with a track, the times are those of the ways on it")
+    if len(cell.built_robots) < 2:
+        yield Fault(("track",), "track: it is for several robots (robots); one alone is never in its own way")
+    try:
+        check_track(cell.track.built(), cell.station_names)
+    except BadInput as error:
+        yield Fault(("track", "stretches"), str(error))
 
 
 def _order_faults(cell: CellFields) -> Iterator[Fault]:
@@ -104,7 +120,7 @@ def missing_times(cell: CellFields, parts: int) -> Iterator[Fault]:
     For a cell without the faults above.
     """
     needed = needed_moves(cell.built_stations, cell.built_products, cell.built_robots, parts, cell.buffers)
-    given = {(origin, target) for origin, row in cell.travel.items() for target in row}
+    given = {(origin, target) for origin, row in cell.times.items() for target in row}
     carried = given | {(origin, target) for origin, row in cell.loaded.items() for target in row}
     lacking = {pair: "go there empty" for pair in needed.empty if pair not in given}
     lacking |= {pair: "carry a part there" for pair in needed.loaded if pair not in carried}
@@ -122,7 +138,7 @@ def missing_times(cell: CellFields, parts: int) -> Iterator[Fault]:
     only = f"; no other time leads to '{target}'" if sum(pair[1] == target for pair in ways) == 1 else ""
     more = f" (and {len(lacking) - 1} more are missing)" if len(lacking) > 1 else ""
     missing = f"travel time '{origin}' -> '{target}' is missing: the robot may have to {why}{only}{more}"
-    yield Fault(("travel", origin), missing)
+    yield Fault(("travel", origin) if cell.track is None else ("track", "stretches"), missing)
 
 
 def loc_of(cell: CellFields, message: str) -> Loc:

@@ -9,6 +9,7 @@ from lab.errors import unknown
 from lab.sequencing.cell.cell import MAX_PARTS
 from lab.sequencing.cell.chance import LAWS, Chance
 from lab.sequencing.cell.stations import ROBOT, STATION_KINDS, UNLIMITED, Product, Robot, Stage, Station
+from lab.sequencing.cell.track import Stretch, travel_s, ways_on
 from lab.tasks.record import Name, Record, as_tuple
 from lab.tasks.sequencing import Sequencing
 from lab.tasks.toml_text import Loc
@@ -132,11 +133,26 @@ class Stochastic(Record):
         return Chance(**self.model_dump())
 
 
+class CellTrack(Record):
+    """What several robots drive on: stretches of so many seconds between two stations, each of which holds one at a time."""
+
+    stretches: Annotated[
+        tuple[Annotated[tuple[Name, Name, Seconds], BeforeValidator(as_tuple)], ...],
+        BeforeValidator(as_tuple),
+        Field(min_length=1, max_length=200),
+    ]
+
+    def built(self) -> tuple[Stretch, ...]:
+        """As the sequencer has it."""
+        return tuple(Stretch(*one) for one in self.stretches)
+
+
 class CellFields(Record):
     """All that a cell file may hold.
 
     Either `order`, a product for each part, or, for one product, `parts`. travel: seconds from a station (the row) to
-    another; a pair that is left out is no allowed move. loaded: those that differ when the robot carries something.
+    another; a pair that is left out is no allowed move; with a track, the times are those of its ways.
+    loaded: those that differ when the robot carries something.
     Either `robot`, the only one, or `robots`: several, or [] where parts go on by themselves. in_physics: the name of the task,
     or its file in the same folder, in which lab run carries such a cell out. due_s, release_s: one a part, when it is wanted, and
     when it is there at first; due_factor: a part is due so many times its own work after it arrives (see `CellFile.work_s`).
@@ -157,6 +173,7 @@ class CellFields(Record):
     stations: Annotated[tuple[CellStation, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=100)]
     products: Annotated[tuple[CellProduct, ...], BeforeValidator(as_tuple), Field(min_length=1, max_length=MAX_PARTS)]
     travel: Times = Field(default={})
+    track: CellTrack | None = None
     loaded: Times = Field(default={})
     arrivals: CellArrivals | None = None
     stochastic: Stochastic = Stochastic()
@@ -171,6 +188,16 @@ class CellFields(Record):
     def station_names(self) -> tuple[str, ...]:
         """The stations' names."""
         return tuple(station.name for station in self.stations)
+
+    @property
+    def times(self) -> Times:
+        """Seconds from a station to another: as given, or those of the ways on the track."""
+        if self.track is None:
+            return self.travel
+        names, found = self.station_names, Times()
+        for (origin, target), way in ways_on(self.track.built(), names).items():
+            found.setdefault(names[origin], {})[names[target]] = travel_s(way)
+        return found
 
     @property
     def built_stations(self) -> tuple[Station, ...]:

@@ -110,13 +110,14 @@ class CellFile(CellFields):
             self.built_stations,
             self.built_products,
             parts,
-            self._table(self.travel),
-            self._table(self.travel, self.loaded),
+            self._table(self.times),
+            self._table(self.times, self.loaded),
             self.built_robots,
             None if arrivals is None else Arrivals((arrivals.interval_s,) * len(parts), arrivals.after),
             self.buffers,
             due_s,
             None if self.release_s is None else self._begins(parts, self.release_s),
+            track=() if self.track is None else self.track.built(),
         )
 
     def _begins(self, parts: tuple[str, ...], release_s: tuple[float, ...]) -> tuple[Begins, ...]:

@@ -9,7 +9,7 @@ from lab.sequencing.cell.stations import UNLIMITED
 from lab.tasks.cell_file import CellFile
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-_TABLES = ("robot", "products", "robots", "travel", "loaded", "arrivals", "stochastic", "sequencing")
+_TABLES = ("robot", "products", "robots", "track", "travel", "loaded", "arrivals", "stochastic", "sequencing")
 
 
 def toml_of(file: CellFile) -> str:

@@ -6,7 +6,6 @@ from functools import cached_property
 
 from lab.errors import counted
 from lab.sequencing.cell.schedule import Activity, Schedule
-from lab.sequencing.cell.stations import ROBOT
 from lab.sequencing.cyclic.steady import Steady
 from lab.view.canvas import BLUE, GREEN, INK, ORANGE, PALE_GREY, PURPLE, RED, SKY, YELLOW, seconds
 
@@ -69,6 +68,11 @@ class Chart:
         parts = sorted((activity.part or 0, activity.resource) for activity in self.schedule.parts)
         names = [name for _, name in parts] + [activity.resource for activity in self.schedule.machines]
         return tuple(dict.fromkeys([*names, *(activity.resource for activity in self.schedule.robot)]))
+
+    @cached_property
+    def robots(self) -> frozenset[str]:
+        """What the robots are called."""
+        return frozenset(activity.resource for activity in self.schedule.robot)
 
     @cached_property
     def names(self) -> dict[int, str]:
@@ -149,7 +153,7 @@ class Chart:
         if bar.look == "outside":
             begins = activity.end_s <= self.begins_s.get(activity.resource, activity.end_s)
             return (name,) if begins else (f"finished at {seconds(activity.start_s)}", "finished")
-        if activity.resource == ROBOT:
+        if activity.resource in self.robots:
             return {
                 "carry": (f"{name} {to}", f"{number} {to}", number),
                 "pallet": (f"pallet {to}", "pallet"),
@@ -165,9 +169,9 @@ class Chart:
         """A bar in words."""
         span = f"{activity.start_s:g} to {activity.end_s:g} s ({activity.end_s - activity.start_s:g} s)"
         name, moves = self.name(activity.part), f"from {activity.origin} to {activity.target}"
-        own = "" if activity.resource in (name, ROBOT) else f" {name}"
+        own = "" if activity.resource in (name, *self.robots) else f" {name}"
         does = {
-            "carry": f"carries {name} {moves}" if activity.resource == ROBOT else f"carried {moves}",
+            "carry": f"carries {name} {moves}" if activity.resource in self.robots else f"carried {moves}",
             "pallet": f"carries the pallet of {name} {moves}",
             "empty": f"moves empty {moves}",
             "wait": f"waits at {activity.target} for {name}",

@@ -11,6 +11,7 @@ from hypothesis.strategies import SearchStrategy
 
 from lab.sequencing.cell.cell import Cell, needed_moves
 from lab.sequencing.cell.stations import UNLIMITED, Arrivals, Product, Robot, Route, Stage, Station, one_robot
+from lab.sequencing.cell.track import Stretch, travel_s, ways_on
 from lab.sequencing.simulate.run import Run, branch
 
 X = math.nan
@@ -215,7 +216,10 @@ def _random_route(
 
 @st.composite
 def random_shops(draw: st.DrawFn, max_parts: int = 3) -> Cell:
-    """A small cell with robots, several or none, machines with queues, and changeovers; some rooms are limited."""
+    """A small cell with robots, several or none, machines with queues, and changeovers; some rooms are limited.
+
+    Several robots may share a track: a tree of stretches that joins all stations.
+    """
     seconds = st.integers(0, 12).map(float)
     machines = [f"m{n}" for n in range(draw(st.integers(1, 3)))]
     robots = [f"robot {n}" for n in range(draw(st.integers(0, 3)))]
@@ -238,7 +242,15 @@ def random_shops(draw: st.DrawFn, max_parts: int = 3) -> Cell:
     table = np.array([[draw(seconds) if a != b else 0.0 for b in range(size)] for a in range(size)])
     own = tuple(Robot(name, draw(st.sampled_from(stations)).name, draw(st.sampled_from([1.0, 2.0]))) for name in robots)
     order = tuple(draw(st.sampled_from(names)) for _ in range(draw(st.integers(1, max_parts))))
-    return Cell(tuple(stations), tuple(products), order, table, 2.0 * table, own)
+    if len(own) < 2 or not draw(st.booleans()):
+        return Cell(tuple(stations), tuple(products), order, table, 2.0 * table, own)
+    called = [station.name for station in stations]
+    track = tuple(
+        Stretch(called[n], called[draw(st.integers(0, n - 1))], float(draw(st.integers(1, 12)))) for n in range(1, size)
+    )
+    for (a, b), way in ways_on(track, called).items():
+        table[a, b] = travel_s(way)
+    return Cell(tuple(stations), tuple(products), order, table, table, own, track=track)
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,6 @@
 """A cell: stations, products with their routes, an order of parts, and transfer robots. What is to be sequenced."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -32,8 +32,10 @@ from lab.sequencing.cell.stations import (
     is_count,
     one_robot,
 )
+from lab.sequencing.cell.track import Stretch, Way, check_track, travel_s, ways_on
 
 MAX_PARTS = 200
+TRACK_SLACK_S = 1e-9  # by what sums of times may differ
 BUFFER_USES = ("busy", "free")
 ARRIVALS_AFTER = ("clock", "pick")
 
@@ -44,7 +46,8 @@ class Cell:
 
     order: a product's name for each part. Parts are numbered from 1. empty_s and loaded_s: (n, n) seconds from station
     row to station column, in the order of `stations`, for a robot of speed 1; NaN: no such move; staying takes 0 s. robots: they
-    do not hinder each other; none: parts go on by themselves, at once, and wait wherever they are. arrivals None: all parts
+    hinder each other only on a `track`, on whose stretches all their ways lie (see `Run`), and whose times are then those of the
+    tables; none: parts go on by themselves, at once, and wait wherever they are. arrivals None: all parts
     wait at their first station, and may be taken in any order; else they come, and are taken, in their order. buffers:
     "busy", a buffer is used only when the station ahead is full; "free", the robot chooses. due_s: when each part is
     wanted [s]. begins: where each part is at time 0, None: all at their first stations; the makespan is then the last
@@ -65,6 +68,7 @@ class Cell:
     due_s: tuple[float, ...] | None = None
     begins: tuple[Begins, ...] | None = None
     closed: tuple[str, ...] = ()
+    track: tuple[Stretch, ...] = ()
 
     def __post_init__(self) -> None:
         check_layout(self.stations, self.products)
@@ -78,6 +82,12 @@ class Cell:
         self._check_times()
         for field, needed in (("empty_s", self.needed.empty), ("loaded_s", self.needed.loaded)):
             object.__setattr__(self, field, _checked_table(field, getattr(self, field), self.names, needed))
+        check_track(self.track, self.names)
+        for table, needed in ((self.empty_s, self.needed.empty), (self.loaded_s, self.needed.loaded)):
+            for origin, target in needed if self.track else ():
+                at = self.index(origin), self.index(target)
+                if at not in self.ways or abs(travel_s(self.ways[at]) - table[at]) > TRACK_SLACK_S:
+                    raise BadInput(f"track: no way of {table[at]:g} s leads from '{origin}' to '{target}' on it")
 
     @classmethod
     def alike(
@@ -119,6 +129,11 @@ class Cell:
     def serial(self) -> bool:
         """Whether one robot does all the work, so that what is decided later also happens later."""
         return is_serial(self.positions, self.robots)
+
+    @cached_property
+    def ways(self) -> Mapping[tuple[int, int], Way]:
+        """The way on the track from station to station, by their indices; none without a track."""
+        return ways_on(self.track, self.names)
 
     @cached_property
     def setups(self) -> tuple[dict[tuple[str, str], float], ...]:

@@ -11,7 +11,7 @@ from lab.sequencing.methods.carried_over_features import WAITED
 from lab.sequencing.methods.carried_over_policy import FEATURES
 from lab.sequencing.search import SAME
 from lab.sequencing.simulate.cell_arrays import Floats, Ints, most_moves
-from lab.sequencing.simulate.kernels import cost, list_allowed, reached_s, reset, server_for, take
+from lab.sequencing.simulate.kernels import cost, list_allowed, pick_times, reached_s, reset, server_for, take
 
 (
     DELAY,
@@ -131,10 +131,8 @@ def _times(cell: Any, run: Any, work: Any, count: int) -> None:
             begin_s = server_for(cell, run, part, o)[0]
             end_s = begin_s + cell.processing_s[cell.to[o]]
         else:
-            begin_s = reached_s(cell, run, o)
-            if cell.waits[o]:
-                begin_s = max(begin_s, run.ready_s[part])
-            end_s = begin_s + cell.service_s[o] + cell.loaded_s[cell.robot[o], cell.origin[o], cell.target[o]]
+            begin_s, pick_s = pick_times(cell, run, part, o)
+            end_s = pick_s + cell.loaded_s[cell.robot[o], cell.origin[o], cell.target[o]]
         work.begin_s[i], work.end_s[i] = begin_s, end_s
         first_s = min(first_s, begin_s)
         work.least_s[part] = min(work.least_s[part], end_s)

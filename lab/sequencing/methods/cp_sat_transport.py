@@ -5,7 +5,7 @@ the cells that it knows.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from graphlib import TopologicalSorter
 from heapq import heappop, heappush
 from itertools import pairwise
@@ -15,12 +15,13 @@ from ortools.sat.python import cp_model
 
 from lab.errors import BadInput, counted
 from lab.sequencing.cell.cell import Cell
-from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, machine_places
+from lab.sequencing.cell.objectives import MAKESPAN, WITH_DUE_TIMES, cost, machine_places
 from lab.sequencing.cell.routes import SERVER, choice_of, entry, part_of
 from lab.sequencing.methods.cp_sat_rooms import add_chains, add_rooms
 from lab.sequencing.methods.cp_sat_tasks import Task, Tasks, Team
 from lab.sequencing.methods.cp_sat_times import Times
-from lab.sequencing.simulate.run import Run
+from lab.sequencing.methods.cp_sat_track import Track
+from lab.sequencing.simulate.run import Run, follow
 
 Arcs = dict[tuple[int, int], cp_model.IntVar]
 
@@ -49,6 +50,7 @@ class TransportModel:
     def __init__(
         self, cell: Cell, objective: str, hint: Sequence[int], below: bool = False, free: bool = False
     ) -> None:
+        self._objective = objective
         self.cell, self.model, self.times, self._free = cell, cp_model.CpModel(), Times(cell, shortest=0), free
         known = _known(cell, self.times, hint) if hint else {}
         rounding = 2 * cell.possible_moves if self.times.rounded_s else 0
@@ -59,12 +61,19 @@ class TransportModel:
         self._end = self.tasks.moment("makespan")
         self._tours: list[Tours] = []
         self._idle: list[cp_model.LinearExprT] = []
+        self._track = Track(self.tasks) if cell.track and not free else None
         for team in self.tasks.teams:
             self._add_team(team, objective)
         for station in range(len(cell.stations)):
             self._add_servers(station)
         if not free:
             add_rooms(self.tasks)
+        if self._track is not None:
+            for task in self.tasks.all:
+                if task.option.robot != SERVER:
+                    ends = task.option.origin, task.option.target
+                    self._track.drive(task.option.robot, ends, task.left, task.done)
+            self._track.close()
         self._add_order(objective)
         for task in self.tasks.all:
             rest = self.tasks.least.tail[task.option.to]
@@ -75,7 +84,17 @@ class TransportModel:
         self._suggest(known)
 
     def sequence(self, solver: cp_model.CpSolver) -> tuple[int, ...]:
-        """The decisions of the solution: each after all that it waits for, else in the order of their times."""
+        """The decisions of the solution: each after all that it waits for, else in the order of their begins.
+
+        On a track, which a `Run` gives out in the order of decisions, in that of their ends where that is cheaper.
+        """
+        by_begin = self._in_order(solver, lambda task: (solver.value(task.begin), solver.value(task.end)))
+        if not self.cell.track:
+            return by_begin
+        by_end = self._in_order(solver, lambda task: (solver.value(task.end), solver.value(task.begin)))
+        return min(by_begin, by_end, key=lambda found: cost(follow(self.cell, found), self._objective))
+
+    def _in_order(self, solver: cp_model.CpSolver, when: Callable[[Task], tuple[int, int]]) -> tuple[int, ...]:
         number = {task: n for n, task in enumerate(self.tasks.all) if solver.boolean_value(task.done)}
         robot = dict[Task, int]()
         for team, tasks, arcs, firsts in self._tours:
@@ -86,14 +105,14 @@ class TransportModel:
                 free.remove(own)
                 robot |= {tasks[node - 1]: own for node in tour}
         order = TopologicalSorter[Task](dict.fromkeys(number, ()))
-        for before, task, when in self.tasks.follows:
-            if all(solver.boolean_value(literal) for literal in when):
+        for before, task, literals in self.tasks.follows:
+            if all(solver.boolean_value(literal) for literal in literals):
                 order.add(task, before)
         order.prepare()
         ready, found = list[tuple[int, int, int, Task]](), list[int]()
         while order.is_active():
             for task in order.get_ready():
-                heappush(ready, (solver.value(task.begin), solver.value(task.end), number[task], task))
+                heappush(ready, (*when(task), number[task], task))
             task = heappop(ready)[-1]
             option = next(way for way in task.options if way.robot == robot.get(task, SERVER))
             found.append(entry(task.part + 1, option.choice, self.cell.parts))
@@ -151,6 +170,8 @@ class TransportModel:
                 begun = firsts if len(starts) > 1 else arcs
                 for at, gap in gaps.items():
                     arc = self._arc(begun, at if len(starts) > 1 else 0, number, None, task, gap)
+                    if self._track is not None:
+                        self._track.drive_before(team.robots[0], (at, option.origin), 0, task.begin, arc)
                     spent.append(max(gap, head) * arc)
                     travels.append(gap * arc)
                 if len(starts) > 1:
@@ -165,6 +186,9 @@ class TransportModel:
                 if between is not None:
                     travel = self.times.travel(option.target, then.option.origin, team.robots[0])
                     arc = self._arc(arcs, number, other, task, then, travel)
+                    if self._track is not None:
+                        way = option.target, then.option.origin
+                        self._track.drive_before(team.robots[0], way, task.end, then.begin, arc)
                     spent.append(max(between, travel) * arc)
                     travels.append(travel * arc)
         if not self._free:
@@ -209,7 +233,7 @@ class TransportModel:
         done = arcs[left, then] = self.model.new_bool_var("follows")
         free = gap if before is None else before.end + gap
         self.model.add(task.begin >= free).only_enforce_if(done)
-        if task.waits is not None:
+        if task.waits is not None and not self.cell.track:  # there one may have to wait for it
             self.model.add(task.begin <= free).only_enforce_if(done, ~task.waits)
         if before is not None:
             self.tasks.after(task, before, done)

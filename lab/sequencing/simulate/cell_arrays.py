@@ -1,7 +1,7 @@
 """A cell and a run of it as plain arrays: what the compiled simulation works on."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,8 @@ class CellArrays(NamedTuple):
     windows: whether there is such a limit. rooms (S + 2,): room for parts. empty_s, loaded_s (S, S) [s];
     starts, begin_at (K,): the first position of a part's routes, and the one in which it begins; begin_s (K,): when it may be
     picked there [s]; coming (C,): the parts, from 0, that begin at a start.
+    tracked: whether there is a track; first_held (S * S + 1,): where the stretches of each way on it begin in held (H,);
+    held_from_s, held_until_s (R, H): from when until when a robot on that way is on each [s].
     interval_s, due_s (K,) [s]. many: whether a part may have several choices. The codes are those of this module.
     """
 
@@ -77,6 +79,11 @@ class CellArrays(NamedTuple):
     breaks_every_s: float
     repair_s: float
     late_s: float
+    tracked: bool
+    first_held: Ints
+    held: Ints
+    held_from_s: Floats
+    held_until_s: Floats
 
 
 class RunArrays(NamedTuple):
@@ -84,7 +91,8 @@ class RunArrays(NamedTuple):
 
     locations, ready_s, finished_s (K,). room (S + 2,): what is left. clock (4,): when a robot is free first, waited,
     processed, the end of all that was decided [s]. whole (2,): parts fetched, parts not yet finished. robots_at,
-    robots_s (R,): the robots. rooms_s, servers_s: since when each room and server is free, those of a station ascending as
+    robots_s (R,): the robots. track_s: since when each stretch is free.
+    rooms_s, servers_s: since when each room and server is free, those of a station ascending as
     far as they are free; worked: the last product of each server, -1: none. allowed: decisions, ascending; options: what
     each means.
     """
@@ -97,6 +105,7 @@ class RunArrays(NamedTuple):
     whole: Ints
     robots_at: Ints
     robots_s: Floats
+    track_s: Floats
     rooms_s: Floats
     servers_s: Floats
     worked: Ints
@@ -154,6 +163,8 @@ def cell_arrays(cell: Cell, objective: str = MAKESPAN, chance: Chance = NO_CHANC
         breaks_every_s=float(chance.breaks_every_s),
         repair_s=float(chance.repair_s),
         late_s=float(chance.late_s),
+        tracked=bool(cell.track),
+        **_held(cell),
     )
 
 
@@ -169,6 +180,7 @@ def run_arrays(cell: Cell) -> RunArrays:
         whole=np.zeros(2, np.int64),
         robots_at=np.zeros(len(cell.robots), np.int64),
         robots_s=np.zeros(len(cell.robots)),
+        track_s=np.zeros(len(cell.track)),
         rooms_s=np.zeros(sum(_rooms(cell))),
         servers_s=np.zeros(sum(_servers(cell))),
         worked=np.zeros(sum(_servers(cell)), np.int64),
@@ -198,6 +210,19 @@ def _with_stays(table: Floats, robots: Sequence[Robot]) -> Floats:
     table = table.copy()
     np.fill_diagonal(table, 0.0)
     return np.array([table / robot.speed for robot in robots]).reshape(len(robots), *table.shape)
+
+
+def _held(cell: Cell) -> dict[str, Any]:
+    """The stretches of every way on the track."""
+    pairs = [(a, b) for a in range(len(cell.stations)) for b in range(len(cell.stations))]
+    ways = [cell.ways.get(pair, ()) for pair in pairs] if cell.track else []
+    held, speeds = [one for way in ways for one in way], np.array([robot.speed for robot in cell.robots])
+    return {
+        "first_held": np.cumsum([0, *map(len, ways)]),
+        "held": np.array([one.stretch for one in held], np.int64),
+        "held_from_s": np.array([one.from_s for one in held]) / speeds[:, None],
+        "held_until_s": np.array([one.until_s for one in held]) / speeds[:, None],
+    }
 
 
 def _rooms(cell: Cell) -> list[int]:

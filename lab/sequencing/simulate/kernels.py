@@ -95,13 +95,52 @@ def reset(cell: Any, run: Any, seed: Any) -> None:
         run.robots_at[robot], run.robots_s[robot] = cell.robot_starts[robot], 0.0
     if not cell.serial:
         run.rooms_s[:], run.servers_s[:], run.worked[:] = 0.0, 0.0, -1
+        run.track_s[:] = 0.0
+
+
+@inner
+def _clear_s(cell: Any, run: Any, robot: int, origin: int, target: int, at_s: float) -> float:
+    """`Run._clear_s`."""
+    if cell.tracked:
+        way = origin * (len(cell.rooms) - 2) + target
+        for i in range(cell.first_held[way], cell.first_held[way + 1]):
+            at_s = max(at_s, run.track_s[cell.held[i]] - cell.held_from_s[robot, i])
+    return at_s
+
+
+@inner
+def _hold(cell: Any, run: Any, robot: int, origin: int, target: int, leave_s: float) -> None:
+    """`Run._hold`."""
+    way = origin * (len(cell.rooms) - 2) + target
+    for i in range(cell.first_held[way], cell.first_held[way + 1]):
+        run.track_s[cell.held[i]] = leave_s + cell.held_until_s[robot, i]
+
+
+@inner
+def _leaves_s(cell: Any, run: Any, o: int) -> float:
+    """When the robot of a way sets out for where it picks."""
+    robot = cell.robot[o]
+    return float(_clear_s(cell, run, robot, run.robots_at[robot], cell.origin[o], run.robots_s[robot]))
 
 
 @inner
 def reached_s(cell: Any, run: Any, o: int) -> float:
     """`Run.reach_s`."""
     robot = cell.robot[o]
-    return float(run.robots_s[robot] + cell.empty_s[robot, run.robots_at[robot], cell.origin[o]])
+    return float(_leaves_s(cell, run, o) + cell.empty_s[robot, run.robots_at[robot], cell.origin[o]])
+
+
+@inner
+def pick_times(cell: Any, run: Any, part: int, o: int) -> Any:
+    """When a robot, if it goes there now, begins the service that ends with the pick of a part (from 0), and when it picks."""
+    robot, begin_s = cell.robot[o], reached_s(cell, run, o)
+    if cell.waits[o]:
+        begin_s = max(begin_s, run.ready_s[part])
+    pick_s = begin_s + cell.service_s[o]
+    if cell.tracked:
+        pick_s = _clear_s(cell, run, robot, cell.origin[o], cell.target[o], pick_s)
+        begin_s = pick_s - cell.service_s[o]
+    return begin_s, pick_s
 
 
 @inner
@@ -110,8 +149,11 @@ def _too_late(cell: Any, run: Any, part: int, o: int) -> bool:
     at_most_s = cell.at_most_s[run.locations[part]]
     if at_most_s == np.inf or not cell.waits[o]:
         return False
-    begin_s = server_for(cell, run, part, o)[0] if cell.robot[o] == SERVER else reached_s(cell, run, o)
-    return bool(max(begin_s, run.ready_s[part]) + cell.service_s[o] > run.ready_s[part] + at_most_s + SLACK_S)
+    if cell.robot[o] == SERVER:
+        pick_s = max(server_for(cell, run, part, o)[0], run.ready_s[part]) + cell.service_s[o]
+    else:
+        pick_s = pick_times(cell, run, part, o)[1]
+    return bool(pick_s > run.ready_s[part] + at_most_s + SLACK_S)
 
 
 @inner
@@ -207,10 +249,14 @@ def take(cell: Any, run: Any, part: int, o: int, seed: Any) -> None:
         drop_s = pick_s
     else:
         reach_s = reached_s(cell, run, o)
-        ready_s = max(reach_s, run.ready_s[part]) if cell.waits[o] else reach_s
-        pick_s = ready_s + cell.service_s[o]
+        begin_s, pick_s = pick_times(cell, run, part, o)
         drop_s = pick_s + cell.loaded_s[robot, cell.origin[o], cell.target[o]]
-        run.clock[1] += ready_s - reach_s
+        if cell.tracked:
+            leave_s = _leaves_s(cell, run, o)
+            run.clock[1] += leave_s - run.robots_s[robot]
+            _hold(cell, run, robot, run.robots_at[robot], cell.origin[o], leave_s)
+            _hold(cell, run, robot, cell.origin[o], cell.target[o], pick_s)
+        run.clock[1] += begin_s - reach_s
     if here == cell.starts[part]:
         run.whole[0] += 1
         if cell.arrivals == PICK and run.whole[0] < len(cell.coming):

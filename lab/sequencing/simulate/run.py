@@ -29,6 +29,9 @@ class Run:
     it). robots_at, robots_s: where each robot is after what it was given to do, and when. end_s: when all that was decided
     is done. fetched: how many parts were taken from the start of their routes. waited_s: how long the robots have waited.
     processed_s: how long machines were given work for.
+    On a track a robot stands beside it at a station, drives the shortest way without stopping, and holds each stretch while it
+    is on it; it sets out, and picks what it carries, as soon as the stretches will be free when it comes to them, after what
+    was decided before.
     Source: thesis ch. 7.4, 7.5; App. III; serial schedule generation, Kolisch 1996.
     """
 
@@ -41,6 +44,7 @@ class Run:
             self.occupied[held] += 1
         self.robots_at = [cell.index(robot.start) for robot in cell.robots]
         self.robots_s = [0.0] * len(cell.robots)
+        self.track_s = [0.0] * len(cell.track)  # since when each stretch is free
         self.end_s = self.waited_s = self.processed_s = 0.0
         self.finished_s: list[float | None] = [None if n in cell.unfinished else 0.0 for n in range(1, cell.parts + 1)]
         self.fetched = 0
@@ -116,8 +120,8 @@ class Run:
         if option.robot == SERVER:
             return self._serve(part, option)
         there, robot = cell.positions[option.to], option.robot
-        start, leave_s = self.robots_at[robot], self.robots_s[robot]
-        reach_s, ready_s, pick_s = self._times_s(part, option)
+        start, free_s = self.robots_at[robot], self.robots_s[robot]
+        leave_s, reach_s, served_s, pick_s = self._times_s(part, option)
         drop_s = carried_s = pick_s + self.carry_s(option)
         if self.locations[part - 1] == cell.starts[part - 1]:
             self._fetch(pick_s)
@@ -125,8 +129,10 @@ class Run:
             drop_s = max(drop_s, self._room_s(option.needs))
             self.waited_s += drop_s - carried_s
         self._leave(part, option, pick_s)
+        self._hold(robot, start, option.origin, leave_s)
+        self._hold(robot, option.origin, option.target, pick_s)
         self.robots_at[robot], self.robots_s[robot] = option.target, drop_s
-        self.waited_s += ready_s - reach_s
+        self.waited_s += leave_s - free_s + served_s - reach_s
         process_s = 0.0
         if there.processing_s is not None:
             process_s = self.times.processing_s(part, option.to)
@@ -228,15 +234,32 @@ class Run:
 
     def reach_s(self, option: Option) -> float:
         """When the robot of a way is where it picks, if it goes there now."""
-        at, cell = self.robots_at[option.robot], self.cell
-        empty_s = (
-            0.0 if at == option.origin else float(cell.empty_s[at, option.origin]) / cell.robots[option.robot].speed
-        )
-        return self.robots_s[option.robot] + empty_s
+        return self._reached_s(option)[1]
+
+    def _reached_s(self, option: Option) -> tuple[float, float]:
+        """When the robot of a way sets out for where it picks, and when it is there."""
+        at, robot, cell = self.robots_at[option.robot], option.robot, self.cell
+        leave_s = self._clear_s(robot, at, option.origin, self.robots_s[robot])
+        empty_s = 0.0 if at == option.origin else float(cell.empty_s[at, option.origin]) / cell.robots[robot].speed
+        return leave_s, leave_s + empty_s
+
+    def _clear_s(self, robot: int, origin: int, target: int, at_s: float) -> float:
+        """From when on, not before a time, a robot finds every stretch of its way free when it comes to it."""
+        if not self.track_s:
+            return at_s
+        speed = self.cell.robots[robot].speed
+        way = self.cell.ways[origin, target]
+        return max([at_s, *(self.track_s[held.stretch] - held.from_s / speed for held in way)])
+
+    def _hold(self, robot: int, origin: int, target: int, leave_s: float) -> None:
+        """A robot sets out on a way: each of its stretches is free when it has left it."""
+        speed = self.cell.robots[robot].speed
+        for held in self.cell.ways[origin, target] if self.track_s else ():
+            self.track_s[held.stretch] = leave_s + held.until_s / speed
 
     def pick_s(self, part: int, option: Option) -> float:
         """When a way takes a part up, if that were done now; where a server works on it: when it begins."""
-        return self._server(part, option)[0] if option.robot == SERVER else self._times_s(part, option)[2]
+        return self._server(part, option)[0] if option.robot == SERVER else self._times_s(part, option)[3]
 
     def drop_s(self, part: int, option: Option) -> float:
         """When a way brings a part to its end, by the cell's own times, as soon as there is room."""
@@ -248,11 +271,12 @@ class Run:
         """How long a robot's way with a part is [s]."""
         return float(self.cell.loaded_s[option.origin, option.target]) / self.cell.robots[option.robot].speed
 
-    def _times_s(self, part: int, option: Option) -> tuple[float, float, float]:
-        """When the robot is there, when the part may be picked, and when it is, the service done."""
-        reach_s = self.reach_s(option)
+    def _times_s(self, part: int, option: Option) -> tuple[float, float, float, float]:
+        """When the robot sets out, when it is there, when it begins its service, and when it picks the part, that done."""
+        leave_s, reach_s = self._reached_s(option)
         ready_s = max(reach_s, self.ready_s[part - 1]) if option.waits else reach_s
-        return reach_s, ready_s, ready_s + option.service_s
+        pick_s = self._clear_s(option.robot, option.origin, option.target, ready_s + option.service_s)
+        return leave_s, reach_s, pick_s - option.service_s if self.track_s else ready_s, pick_s
 
     def _first_ready_s(self) -> list[float]:
         arrivals, came_s = self.cell.arrivals, 0.0
@@ -278,7 +302,8 @@ class Run:
         return self.cell.arrivals is None or not waits or part == self.cell.coming[self.fetched]
 
     def take_times(self, state: "Run") -> None:
-        """Since when rooms and servers are free is as in another run of the cell."""
+        """Since when rooms, servers and the track are free is as in another run of the cell."""
+        self.track_s = state.track_s.copy()
         self._rooms_s = {station: times_s.copy() for station, times_s in state._rooms_s.items()}
         self._servers = {station: servers.copy() for station, servers in state._servers.items()}
 

@@ -5,7 +5,7 @@ Not looked at: whether a buffer for when the machine ahead is full (buffers = "b
 """
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
@@ -42,10 +42,46 @@ def faults(cell: Row, rows: Sequence[Row], makespan_s: float) -> list[str]:
         found += _crowd(one, [(a, b) for at, a, b in taken if at == one["name"]]) + _overload(one, work)
     for name, robot in robots.items():
         found += _trips(cell, robot, [row for row in rows if row["robot"] == name])
+    if cell.get("track"):
+        found += _collisions(cell, robots, [row for row in rows if row["operation"] in ("empty", "carry", "pallet")])
     return found + ([] if abs(end_s - makespan_s) <= EPS else [f"the makespan is {end_s:g}, not {makespan_s:g}"])
 
 
+def _ways(cell: Row) -> dict[str, dict[str, list[tuple[int, float, float]]]]:
+    """The shortest way on the track between any two stations: its stretches, from when until when one is on each [s]."""
+    stretches = [
+        (n, a, b, seconds)
+        for n, one in enumerate(cell["track"]["stretches"])
+        for a, b, seconds in (one, [*one[1::-1], one[2]])
+    ]
+    ways: dict[str, Any] = {one["name"]: {one["name"]: []} for one in cell["stations"]}
+    for _ in cell["stations"]:
+        for own in ways.values():
+            for n, a, b, seconds in stretches:
+                way = [*own[a], (n, (at := own[a][-1][2] if own[a] else 0.0), at + seconds)] if a in own else None
+                if way and (b not in own or (own[b] and (way[-1][2], len(way)) < (own[b][-1][2], len(own[b])))):
+                    own[b] = way
+    return ways
+
+
+def _collisions(cell: Row, robots: Row, rows: Sequence[Row]) -> list[str]:
+    """Two robots on one stretch at a time: all drive without stopping from when they set out."""
+    held, ways = list[tuple[int, float, float]](), _ways(cell)
+    for row in rows:
+        speed = float(robots[row["robot"]].get("speed") or 1.0)
+        held += [
+            (n, row["start_s"] + a / speed, row["start_s"] + b / speed)
+            for n, a, b in ways[row["station"]][row["target"]]
+        ]
+    held.sort()
+    met = [one for one, then in pairwise(held) if one[0] == then[0] and one[2] > then[1] + EPS]
+    return [f"two on stretch {n} of the track at {until_s:g}" for n, _, until_s in met]
+
+
 def _travel_s(cell: Row, robot: Row, ends: Sequence[str], tables: Sequence[str] = ("travel",)) -> float:
+    if cell.get("track"):
+        way = _ways(cell)[ends[0]].get(ends[-1])
+        return NEVER if way is None else (way[-1][2] if way else 0.0) / float(robot.get("speed") or 1.0)
     times = [row[ends[-1]] for table in tables if ends[-1] in (row := (cell.get(table) or {}).get(ends[0], {}))]
     return float([*times, 0.0 if ends[0] == ends[-1] else NEVER][0]) / float(robot.get("speed") or 1.0)
 

@@ -80,6 +80,10 @@ def plain_cells(draw: st.DrawFn) -> Plain:
     cell: Plain = {"name": "drawn", "order": order, "stations": stations, "products": products, "robots": robots}
     if draw(st.booleans()):
         cell["release_s"] = [draw(seconds) for _ in order]
+    if len(robots) > 1 and draw(st.booleans()):
+        ends = [(names[n], names[draw(st.integers(0, n - 1))]) for n in range(1, len(names))]
+        cell["track"] = {"stretches": [[a, b, float(draw(st.integers(1, 9)))] for a, b in ends]}
+        return cell
     for table in ("travel", "loaded"):
         cell[table] = {a: {b: draw(seconds) for b in names if b != a} for a in names}
     return cell
@@ -128,6 +132,7 @@ def least_of_all(cell: Cell) -> float | None:
                 ahead.end_s,
                 repr(ahead._rooms_s),
                 repr(ahead._servers),
+                *ahead.track_s,
             )
             if ahead.end_s < best and key not in seen:
                 seen.add(key)
@@ -290,6 +295,18 @@ def test_the_right_one_by_hand_passes() -> None:
 )
 def test_each_kind_of_fault_is_caught(cell: Plain, rows: Rows, said: str) -> None:
     assert any(said in fault for fault in faults(cell, rows, 18.0)), faults(cell, rows, 18.0)
+
+
+def test_two_on_a_stretch_are_seen() -> None:
+    """r1 brings a 1 to the saw in 2 s, and r2 comes from the oven: on the stretch between they meet, one second too early."""
+    cell = shop(track={"stretches": [["in", "saw", 2.0], ["saw", "oven", 3.0], ["oven", "out", 2.0]]})
+    del cell["travel"]
+    late = [row("a 1", "carry", "in > saw", 0, 2, "r1"), row("b 2", "carry", "in > saw", 2, 4, "r2")]
+    assert not [one for one in faults(cell, late, 4.0) if "two on stretch" in one]
+    early = [late[0], late[1] | {"start_s": 1.0, "end_s": 3.0}]
+    assert "two on stretch 0 of the track at 2" in faults(cell, early, 4.0)
+    back = [row("a 1", "carry", "in > oven", 0, 5, "r1"), row("b 2", "carry", "oven > in", 2, 7, "r2")]
+    assert "two on stretch 1 of the track at 5" in faults(cell, back, 7.0)
 
 
 def test_service_is_by_who_picks_and_as_long_as_it_takes() -> None:

@@ -1,0 +1,78 @@
+"""A track that several robots share: stretches between stations, each of which holds one robot at a time."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import NamedTuple
+
+from lab.errors import BadInput, unknown
+from lab.sequencing.cell.stations import check_seconds
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A piece of track between two stations, driven in both directions in so many seconds at speed 1."""
+
+    origin: str
+    target: str
+    seconds: float
+
+
+class Held(NamedTuple):
+    """A stretch, by its number, on a way: from when until when it is held, after setting out, at speed 1 [s]."""
+
+    stretch: int
+    from_s: float
+    until_s: float
+
+
+Way = tuple[Held, ...]
+
+
+def check_track(track: Sequence[Stretch], names: Sequence[str]) -> None:
+    """BadInput for a stretch that leads nowhere, takes no time, or is there twice."""
+    seen = set[frozenset[str]]()
+    for stretch in track:
+        where = f"track '{stretch.origin}' - '{stretch.target}'"
+        for name in (stretch.origin, stretch.target):
+            if name not in names:
+                raise unknown("station", name, names, where)
+        check_seconds(where, stretch.seconds)
+        if stretch.origin == stretch.target or stretch.seconds == 0.0:
+            raise BadInput(f"{where} of {stretch.seconds:g} s: wanted two stations, and more than 0 s")
+        ends = frozenset((stretch.origin, stretch.target))
+        if ends in seen:
+            raise BadInput(f"{where}: it is there twice")
+        seen.add(ends)
+
+
+def ways_on(track: Sequence[Stretch], names: Sequence[str]) -> Mapping[tuple[int, int], Way]:
+    """The shortest way between every two stations that the track joins, by their indices; of ways as long, the one with fewer
+    stretches, then the one whose stretches come first.
+    """
+    number = {name: n for n, name in enumerate(names)}
+    beside: dict[int, list[tuple[int, int, float]]] = {}
+    for n, stretch in enumerate(track):
+        a, b = number[stretch.origin], number[stretch.target]
+        beside.setdefault(a, []).append((b, n, stretch.seconds))
+        beside.setdefault(b, []).append((a, n, stretch.seconds))
+    found: dict[tuple[int, int], Way] = {}
+    for start in beside:
+        ahead: list[tuple[float, int, tuple[int, ...], int, Way]] = [(0.0, 0, (), start, ())]
+        reached = set[int]()
+        while ahead:
+            at_s, count, by, here, way = heappop(ahead)
+            if here in reached:
+                continue
+            reached.add(here)
+            found[start, here] = way
+            for there, n, seconds in beside[here]:
+                if there not in reached:
+                    held = Held(n, at_s, at_s + seconds)
+                    heappush(ahead, (at_s + seconds, count + 1, (*by, n), there, (*way, held)))
+    return found
+
+
+def travel_s(way: Way) -> float:
+    """How long a way takes at speed 1 [s]."""
+    return way[-1].until_s if way else 0.0
