@@ -22,7 +22,7 @@ def test_wheel_and_sdist_take_both_folders(project: dict[str, Any], root: Path) 
     assert into == {name: f"lab/_data/{name}" for name in ("tasks", "assets")}
     assert {f"/{name}" for name in into} < set(targets["sdist"]["include"])
     assert targets["wheel"]["packages"] == ["lab"]
-    assert all((root / name.strip("/")).is_dir() for name in (*into, *targets["sdist"]["include"]))
+    assert all((root / name.strip("/")).exists() for name in (*into, *targets["sdist"]["include"]))
 
 
 def test_dependencies_have_lower_bounds_and_no_upper_ones(project: dict[str, Any]) -> None:

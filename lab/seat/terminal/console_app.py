@@ -1,6 +1,7 @@
 """The operator's console at a terminal: a live panel, keys that act at once, and a line for commands."""
 
 import sys
+from contextlib import suppress
 from io import StringIO
 from threading import Thread
 from typing import TYPE_CHECKING
@@ -116,7 +117,10 @@ class OperatorConsole:
             self._log.append((f"{done.words}: {done.failed}", "bold red"))
         else:
             self._log.append((f"{done.words}: {done.said or 'done'}", "green"))
-        self._app.invalidate()
+        loop = self._app.loop
+        if loop is not None:
+            with suppress(RuntimeError):  # it has just ended
+                loop.call_soon_threadsafe(self._app.invalidate)
 
     # ---- the screen --------------------------------------------------------------------------------------------------
 
