@@ -81,8 +81,11 @@ def offers(family: str) -> Callable[[str], list[str]]:
     return offered
 
 
-def from_files(family: str) -> Callable[[Any, Any], Any]:
-    """What an option's words mean: "./mine.py:MyGate" is loaded into its family, which is said, for its code runs."""
+def from_files(*families: str) -> Callable[[Any, Any], Any]:
+    """What an option's words mean: "./mine.py:MyGate" is loaded into its family, which is said, for its code runs.
+
+    Of several families it is the first that it fits.
+    """
 
     def taken(context: typer.Context, value: Any) -> Any:
         if context.resilient_parsing or not value:
@@ -90,7 +93,9 @@ def from_files(family: str) -> Callable[[Any, Any], Any]:
         from lab.plugins.code_file import is_file_word, take
 
         def member(word: str) -> str:
-            return take(cast(Any, members(family)), word.strip(), complain) if is_file_word(word.strip()) else word
+            if not is_file_word(word.strip()):
+                return word
+            return take([cast(Any, members(family)) for family in families], word.strip(), complain)
 
         if isinstance(value, str):
             return ",".join(map(member, value.split(",")))

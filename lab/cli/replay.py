@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from lab.cli.families import from_files
 from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import Json, Plain, Port, ToolboxPlace, TrustModule
 from lab.cli.output import complain, end, show
@@ -27,6 +28,14 @@ def replay(
     page: Annotated[bool, typer.Option("--page", help="Show it on a page on 127.0.0.1, too.")] = False,
     port: Port = 0,
     plain: Plain = False,
+    own: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--own",
+            help="A gate, learner or advisor of your own that the session had, ./mine.py:MyGate; its code runs.",
+            callback=from_files("gates", "learners", "advisors"),
+        ),
+    ] = None,
     minari: Annotated[
         str | None,
         typer.Option("--minari", help="Keep its steps as a Minari dataset of this name, such as lab/mine-v0."),

@@ -1,7 +1,7 @@
 """Members from a file that the user names: "./mine.py:MyGate"."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,11 @@ def is_file_word(word: str) -> bool:
     return bool(colon) and path.endswith(".py") and name.isidentifier()
 
 
-def take(family: Family[Any], word: str, tell: Callable[[str], None] = lambda line: None) -> str:
-    """Load the object that "./mine.py:MyGate" names into its family; the name it has there, "mine.MyGate".
+def take(
+    families: Family[Any] | Sequence[Family[Any]], word: str, tell: Callable[[str], None] = lambda line: None
+) -> str:
+    """Load the object that "./mine.py:MyGate" names into its family, of several the first that it fits; its name there,
+    "mine.MyGate".
 
     Only for words that the user has typed: its code runs, which `tell` hears before. Any other word is given back as it is.
     BadInput when there is no such file or object, when its code fails, and when it is no member.
@@ -37,12 +40,16 @@ def take(family: Family[Any], word: str, tell: Callable[[str], None] = lambda li
     module = _run(file, word)
     if not hasattr(module, name):
         raise unknown("object", name, [one for one in vars(module) if not one.startswith("_")], str(file))
-    try:
-        family.adopted(own, getattr(module, name), str(file))
-    except BadInput as error:
-        raise BadInput(f"{word}: {error}") from None
-    _files[own] = family.kind, f"{file.resolve()}:{name}"
-    return own
+    faults = []
+    for family in [families] if isinstance(families, Family) else families:
+        try:
+            family.adopted(own, getattr(module, name), str(file))
+        except BadInput as error:
+            faults.append(str(error))
+            continue
+        _files[own] = family.kind, f"{file.resolve()}:{name}"
+        return own
+    raise BadInput(f"{word}: {', or '.join(faults)}")
 
 
 def from_file(kind: str, name: str, where: str) -> BadInput | None:
@@ -50,7 +57,7 @@ def from_file(kind: str, name: str, where: str) -> BadInput | None:
     stem, dot, thing = name.partition(".")
     if not (dot and stem.isidentifier() and thing.isidentifier()):
         return None
-    again = f"name it again, such as --{kind} ./{stem}.py:{thing}"
+    again = f"name it again, such as --{kind} ./{stem}.py:{thing} (lab replay: --own ./{stem}.py:{thing})"
     return BadInput(f"{kind} '{name}' ({where}): it came from a file, whose code is not run unasked: {again}")
 
 

@@ -66,6 +66,21 @@ def test_a_name_from_a_file_is_never_loaded_unasked() -> None:
     Path("mine.py").write_text("raise AssertionError")
     assert str(from_file("gate", "mine.Gate", "--gate")) == (
         "gate 'mine.Gate' (--gate): it came from a file, whose code is not run unasked: "
-        "name it again, such as --gate ./mine.py:Gate"
+        "name it again, such as --gate ./mine.py:Gate (lab replay: --own ./mine.py:Gate)"
     )
     assert from_file("gate", "ccrl", "--gate") is None
+
+
+def test_of_several_families_it_is_the_first_that_it_fits() -> None:
+    Path("mine.py").write_text("NUMBER = 7\nNOTHING = None\n")
+
+    def numbers(name: str, thing: object) -> object:
+        if not isinstance(thing, int):
+            raise BadInput("it is no number")
+        return thing
+
+    first, second = family(), Family("learners", {}, numbers)
+    assert take([second, first], "mine.py:NUMBER") == "mine.NUMBER"
+    assert ("mine.NUMBER" in second, "mine.NUMBER" in first) == (True, False)
+    with pytest.raises(BadInput, match=r"mine\.py:NOTHING: it is no number, or it is nothing"):
+        take([second, first], "mine.py:NOTHING")

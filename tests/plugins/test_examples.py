@@ -115,6 +115,18 @@ def test_what_is_faulty_is_named_and_left_out(package: Path, tmp_path: Path) -> 
     assert "package" not in quiet.stderr  # what ships is found without looking
 
 
+def test_a_session_with_ones_own_code_is_told_again_when_it_is_named(tmp_path: Path) -> None:
+    gate = f"{EXAMPLES}/own_gate.py:WhileLost"
+    assert (
+        lab(tmp_path, "teach", "world-1", "--gate", gate, "--episodes", "20", "--out", "kept", "--json").returncode == 1
+    )
+    refused = lab(tmp_path, "replay", "kept", "--json")
+    assert "its code is not run unasked" in refused.stderr.replace("whose code is not", "its code is not")
+    assert refused.returncode == 2
+    told = lab(tmp_path, "replay", "kept", "--own", gate, "--json")
+    assert told.returncode == 0, told.stderr
+
+
 def test_whose_code_failed_is_said(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(
         "import lab\nclass Mine(lab.Gate):\n    def opens(self, episode, steps):\n        return 1 / 0\n"
