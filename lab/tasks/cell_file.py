@@ -84,7 +84,8 @@ class CellFile(CellFields):
             raise BadInput(f"--robots {count}: cell '{self.name}' has none: its parts go on by themselves")
         named = tuple(first.model_copy(update={"name": f"{ROBOT} {n}"}) for n in range(1, count + 1))
         several = {"robot": None, "robots": named}
-        found = self.model_copy(update=several if count > 1 else {"robot": first, "robots": None})
+        alone = {"robot": first, "robots": None, "track": None, "travel": self.times}  # which is never in its own way
+        found = self.model_copy(update=several if count > 1 else alone)
         found.cell()
         return found
 
