@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from lab.api.data_frames import data_frame
 from lab.api.options import Advisors, several
 from lab.api.pictures import Picture
-from lab.studies import study_of
+from lab.studies import checked, study_of
 from lab.studies.compared import Compared, compared
 from lab.studies.findings import Findings, Row
 from lab.studies.runner import Job
@@ -62,8 +62,8 @@ class StudyResult:
 
 def study(name: str, *, sessions: int | None = None, seed: int = 0, workers: int = 1, **reading: Any) -> StudyResult:
     """A study of `lab study list`; reading: the options that only some have. BadInput for what it does not know."""
-    known = study_of(name)
-    job = Job(sessions or known.sessions, seed, workers)
+    job = Job(sessions or study_of(name).sessions, seed, workers)
+    known = checked(name, job, reading)
     return StudyResult(known.title, known.run(job, reading))
 
 

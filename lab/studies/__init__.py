@@ -236,7 +236,12 @@ def run_study(name: str, job: "Job", out: Path, reading: Mapping[str, Any] | Non
     advisor table, a reading that the study has not got, too few sessions and a folder that cannot be; WorkFailed when it cannot
     be written.
     """
-    study, reading = study_of(name), reading or {}
+    return carried_out(checked(name, job, reading or {}), name, job, out, reading)
+
+
+def checked(name: str, job: "Job", reading: Mapping[str, Any]) -> Study:
+    """The study called `name`; BadInput for what `run_study` refuses."""
+    study = study_of(name)
     if job.sessions < study.least:
         raise BadInput(f"{counted(job.sessions, 'session')} (--sessions): '{name}' takes {study.least} at the least")
     if (table := reading.get("advisor_table", TABLES[0])) not in TABLES:
@@ -245,7 +250,7 @@ def run_study(name: str, job: "Job", out: Path, reading: Mapping[str, Any] | Non
         if option not in study.reads:
             takes = ", ".join(one for one, other in STUDIES.items() if option in other.reads)
             raise BadInput(f"--{option.replace('_', '-')}: the study '{name}' has none to choose; it is for {takes}")
-    return carried_out(study, name, job, out, reading)
+    return study
 
 
 def carried_out(

@@ -34,3 +34,7 @@ def test_a_study_is_run_by_its_name() -> None:
     assert found.rows
     with pytest.raises(lab.BadInput, match="unknown study"):
         lab.study("figure-9.44")
+    with pytest.raises(lab.BadInput, match="takes 10 at the least"):
+        lab.study("figure-9.4", sessions=3)
+    with pytest.raises(lab.BadInput, match="has none to choose"):
+        lab.study("figure-9.4", sessions=10, seconds=3.0)
