@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from math import sqrt
+from math import hypot, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -75,6 +75,22 @@ def share(success: ArrayLike) -> tuple[float, float, float]:
     """`proportion_interval` of sessions of which each succeeded or not, (N,) bool."""
     ended = np.asarray(success, np.bool_)
     return proportion_interval(int(ended.sum()), len(ended))
+
+
+def share_error(percent: float, n: float) -> float:
+    """The standard error of a share [percent] of n sessions, in points.
+
+    Two successes and two failures are added, so that 0 and 100 % have one, too. Source: A. Agresti, B. Coull, Am. Stat.
+    52 (1998), 119-126.
+    """
+    p = (percent / 100 * n + 2) / (n + 4)
+    return 100 * sqrt(p * (1 - p) / (n + 4))
+
+
+def mean_error(values: ArrayLike, n: float | None = None) -> float:
+    """The standard error of the mean of values (m,), or of n values that spread as these do."""
+    sample = _sample(values, "standard error")
+    return float(np.std(sample, ddof=1)) / sqrt(n or len(sample))
 
 
 def score(sp: ArrayLike, hs: ArrayLike, sp_range: Range, hs_range: Range) -> FloatArray:
@@ -170,6 +186,17 @@ def within(value: float, ci: Sequence[float] | None, thesis: float, measure: str
     if ci is not None and ci[0] <= thesis <= ci[1]:
         return True
     return bool(abs(value - thesis) <= allowed(thesis, measure) + NOISE * max(abs(value), abs(thesis)))
+
+
+def within_errors(value: float, thesis: float, errors: tuple[float, float]) -> bool:
+    """Whether a measured value differs from the printed one by no more than the standard errors of both explain (95 %).
+
+    Rounding of the printed figure is left out.
+    """
+    from scipy.special import ndtri
+
+    room = -float(ndtri(TAIL)) * hypot(*errors)
+    return bool(abs(value - thesis) <= room + NOISE * max(abs(value), abs(thesis)))
 
 
 def _sample(values: ArrayLike, what: str, at_least: int = 2) -> FloatArray:

@@ -13,11 +13,14 @@ from lab.statistics import (
     allowed,
     compare,
     interval,
+    mean_error,
     proportion_interval,
     ranges,
     ranks,
     score,
+    share_error,
     within,
+    within_errors,
 )
 
 # Smallest and largest SP [%] and HS [steps] of the printed rows of Appendix V with one advisor, by world and view.
@@ -314,3 +317,17 @@ def test_within(value: float, ci: tuple[float, float] | None, thesis: float, mea
 def test_allowed() -> None:
     assert allowed(63, "SP_percent") == 5
     assert allowed(-200, "BR_s") == pytest.approx(30)
+
+
+def test_standard_errors_by_hand() -> None:
+    """Of 96 sessions half, and 4 more: 50 / 10 points; none of 96: 2 of 100. 1 and 3: a deviation of sqrt(2)."""
+    assert share_error(50, 96) == pytest.approx(5.0)
+    assert [share_error(percent, 96) for percent in (0, 100)] == pytest.approx([1.4, 1.4])
+    assert mean_error([1.0, 3.0]) == pytest.approx(1.0)
+    assert mean_error([1.0, 3.0], 8) == pytest.approx(0.5)
+
+
+def test_within_both_errors() -> None:
+    """Errors of 3 and 4 make 5, and 1.96 of these 9.8."""
+    assert [within_errors(50, thesis, (3, 4)) for thesis in (59.7, 59.9, 40.3)] == [True, False, True]
+    assert within_errors(1.0, 1.0, (0, 0))

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lab.sequencing.search import SAME
-from lab.statistics import interval, share, within
+from lab.statistics import interval, mean_error, share, share_error, within, within_errors
+from lab.studies.counted_apart import in_short, ranked
 
-Row = dict[str, Any]  # settings under their names, then measure, value, ci95, thesis, within
+# settings under their names, then measure, value, ci95, thesis, within; where known also within_errors, used, easy
+Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -24,23 +26,45 @@ class Findings:
     notes: tuple[str, ...] = ()
 
 
-def row(named: Row, measure: str, value: float, ci: Sequence[float] | None = None, thesis: float | None = None) -> Row:
-    """One row of a study: its settings, the measured value with its interval, the printed one, whether they agree."""
+def row(
+    named: Row,
+    measure: str,
+    value: float,
+    ci: Sequence[float] | None = None,
+    thesis: float | None = None,
+    errors: tuple[float, float] | None = None,
+) -> Row:
+    """One row of a study: its settings, the measured value with its interval, the printed one, whether they agree.
+
+    errors: the standard errors of both, where the thesis says how many sessions it ran.
+    """
     ends = None if ci is None else [float(ci[0]), float(ci[1])]
     agrees = None if thesis is None else within(value, ends, thesis, measure)
-    return {**named, "measure": measure, "value": float(value), "ci95": ends, "thesis": thesis, "within": agrees}
+    found = {**named, "measure": measure, "value": float(value), "ci95": ends, "thesis": thesis, "within": agrees}
+    if thesis is not None and errors is not None:
+        found["within_errors"] = within_errors(value, thesis, errors)
+    return found
 
 
-def share_row(named: Row, measure: str, success: ArrayLike, thesis: float | None = None) -> Row:
-    """The row of how many sessions succeeded, (N,) bool, in percent."""
+def share_row(
+    named: Row, measure: str, success: ArrayLike, thesis: float | None = None, theirs: int | None = None
+) -> Row:
+    """The row of how many sessions succeeded, (N,) bool, in percent; theirs: sessions of the thesis."""
     percent, *ends = share(success)
-    return row(named, measure, percent, ends, thesis)
+    if thesis is None or theirs is None:
+        return row(named, measure, percent, ends, thesis)
+    return row(
+        named, measure, percent, ends, thesis, (share_error(percent, np.size(success)), share_error(thesis, theirs))
+    )
 
 
-def mean_row(named: Row, measure: str, values: ArrayLike, thesis: float | None = None) -> Row:
-    """The row of the mean of values (N,), one a session."""
+def mean_row(
+    named: Row, measure: str, values: ArrayLike, thesis: float | None = None, theirs: float | None = None
+) -> Row:
+    """The row of the mean of values (N,), one a session; theirs: how many such values the thesis had, spread alike."""
     mean, *ends = interval(values)
-    return row(named, measure, mean, ends, thesis)
+    errors = None if theirs is None else (mean_error(values), mean_error(values, theirs))
+    return row(named, measure, mean, ends, thesis, errors)
 
 
 def varying_row(named: Row, measure: str, values: ArrayLike) -> Row:
@@ -66,8 +90,5 @@ def agreement(rows: Sequence[Row]) -> Row:
     for measure in dict.fromkeys(one["measure"] for one in compared):
         of = [one["within"] for one in those(compared, measure=measure)]
         summary[f"{measure} cells"], summary[f"{measure} within"] = len(of), sum(of)
-    ranked = [one for one in those(rows, measure="score") if one.get("thesis_rank")]
-    if ranked:
-        summary["ranks"] = len(ranked)
-        summary["ranks as printed"] = sum(one["rank"] == one["thesis_rank"] for one in ranked)
-    return summary
+    scores = [one for one in those(rows, measure="score") if one.get("thesis_rank")]
+    return summary | in_short(compared) | (ranked(scores) if scores else {})

@@ -13,18 +13,21 @@ from typing import Any
 from lab import __version__, files
 from lab.errors import BadInput, WorkFailed
 from lab.statistics import PERCENT_POINTS, RELATIVE, allowed
+from lab.studies.counted_apart import JUDGED, counts, share
 from lab.studies.findings import Findings
 
 Row = Mapping[str, Any]  # settings under their names, and RESULTS; `lab_version` where another version measured it
 Line = tuple[tuple[str, Any], ...]  # some settings of a row
 
-RESULTS = ("measure", "value", "ci95", "thesis", "within", "lab_version")  # every other key of a row is a setting
-COLUMNS = ("measure", "value", "ci95_low", "ci95_high", "thesis", "within", "lab_version")  # in a CSV file
+RESULTS = ("measure", "value", "ci95", "thesis", *JUDGED, "lab_version")  # every other key of a row is a setting
+COLUMNS = ("measure", "value", "ci95_low", "ci95_high", "thesis", *JUDGED, "lab_version")  # in a CSV file
+WHERE_KNOWN = JUDGED[1:]  # columns that stand there only if a row has them
 TABLE_KEYS = ("table", "environment", "case", "world", "view")  # rows that agree in these are one table
 METHOD_KEYS = ("gate", "method", "name")
 SYMBOLS = {"beta": "β", "tau": "τ", "lambda_threshold": "Λ", "omega": "Ω", "psi": "Ψ"}
 LARGEST = 10  # differences that are listed
 MARKS = {True: ("in", "✓", "inside"), False: ("out", "✗", "outside"), None: ("", "–", "nothing printed")}
+SIGNS = {"within_errors": "e", "used": "u", "easy": "n"}  # behind a printed figure
 TEMPLATE = Path(__file__).with_name("report.html")
 
 
@@ -74,6 +77,7 @@ def write_report(path: Path, title: str, name: str, found: Findings) -> None:
         marks=MARKS,
         points=f"{PERCENT_POINTS:g}",
         percent=f"{100 * RELATIVE:g}",
+        apart=_apart(found.rows),
         agreement=_agreement(found.rows),
         figures=[(caption, _source(caption, picture)) for caption, picture in found.figures.items()],
         largest=_largest(found.rows),
@@ -92,13 +96,14 @@ def write_rows(path: Path, rows: Sequence[Row]) -> None:
     taken = [name for name in settings if name in COLUMNS]
     if taken:
         raise BadInput(f"study rows: a setting is named '{taken[0]}', as a column of results is")
+    columns = [*settings, *(name for name in COLUMNS if name not in WHERE_KNOWN or any(name in row for row in rows))]
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*settings, *COLUMNS])
+    writer.writerow(columns)
     for row in rows:
         low, high = row.get("ci95") or (None, None)
         results = {**row, "ci95_low": low, "ci95_high": high, "lab_version": row.get("lab_version", __version__)}
-        writer.writerow([_cell(name, results.get(name)) for name in (*settings, *COLUMNS)])
+        writer.writerow([_cell(name, results.get(name)) for name in columns])
     write_file(path, text.getvalue())
 
 
@@ -119,6 +124,17 @@ def write_file(path: Path, text: str) -> None:
         files.write_whole(path, text.encode(errors="backslashreplace"))
     except OSError as error:
         raise WorkFailed(f"study report '{path}' cannot be written: {error.strerror or error}") from None
+
+
+def _apart(rows: Sequence[Row]) -> Table | None:
+    """Agreement by both rules, counted apart for cells that were used to choose, that were not, and easy ones."""
+    parts = counts([dict(row) for row in rows if row.get("within") is not None])
+    lines = [
+        [TableCell(name, ""), *(TableCell(share(of, judged)) for judged in ("within", "within_errors"))]
+        for name, of in parts.items()
+        if of
+    ]
+    return Table("", ["cells", "by the rule", "within both sampling errors"], lines) if lines else None
 
 
 def _agreement(rows: Sequence[Row]) -> Table | None:
@@ -212,10 +228,17 @@ def _result(row: Row, printed: bool) -> list[TableCell]:
     interval = f"{_number(ends[0])} to {_number(ends[1])}" if ends else ""
     cells = [TableCell(_number(value), small=interval, is_interval=True)]
     if printed and thesis is not None and isfinite(thesis):
-        cells.append(TableCell(f"{thesis:.10g}", f"number {MARKS[within][0]}", is_printed=True, within=within))
+        cells.append(
+            TableCell(f"{thesis:.10g}", f"number {MARKS[within][0]}", _signs(row), is_printed=True, within=within)
+        )
     elif printed:
         cells.append(TableCell("–"))
     return cells
+
+
+def _signs(row: Row) -> str:
+    """What else is said of a printed figure, a letter each: see report.html."""
+    return " ".join(sign for name, sign in SIGNS.items() if row.get(name))
 
 
 def _settings(row: Row, names: Iterable[str] | None = None) -> Line:

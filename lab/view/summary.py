@@ -287,7 +287,7 @@ def table_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> Table
 
 def study_summary(study: Mapping[str, Any]) -> RenderableType:
     """What `lab study run` shows, from its JSON document: up to 30 rows; the report has all."""
-    shown = ("measure", "value", "ci95", "thesis", "within", "lab_version")
+    shown = ("measure", "value", "ci95", "thesis", "within", "within_errors", "used", "easy", "lab_version")
     settings = list(dict.fromkeys(key for row in study["rows"] for key in row if key not in shown))
     first = study["rows"][:_STUDY_ROWS]
     varied = [key for key in settings if len({str(row.get(key)) for row in study["rows"]}) > 1]

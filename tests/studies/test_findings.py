@@ -25,7 +25,7 @@ def test_a_row_says_whether_it_agrees() -> None:
 
 
 def made_up(measure: str, inside: bool | None, **more: Any) -> dict[str, Any]:
-    return {"measure": measure, "within": inside, **more}
+    return {"measure": measure, "value": 1.0, "within": inside, **more}
 
 
 def test_agreement_counts() -> None:
@@ -35,7 +35,7 @@ def test_agreement_counts() -> None:
         made_up("SP_percent", None),
         made_up("HS_steps", True, rank="1", thesis_rank="1"),  # a rank counts once, with the score
         made_up("score", True, rank="1", thesis_rank="1"),
-        made_up("score", False, rank="2", thesis_rank="1-2"),
+        made_up("score", False, rank="2", thesis_rank="1-2", value=0.5),
         made_up("score", True, rank="1", thesis_rank=None),
         made_up("score", False, rank="1-2", thesis_rank="1-2"),
         made_up("AR_requests", None),
@@ -51,6 +51,8 @@ def test_agreement_counts() -> None:
         "score within": 2,
         "ranks": 3,
         "ranks as printed": 2,
+        "ranks as printed by chance": 1.0,
+        "pairs in the printed order": "1 of 2 (1 by chance, p = 0.67)",
     }
     assert agreement([]) == {"cells": 0, "within": 0}
 
@@ -63,6 +65,19 @@ def test_rows_of_sessions_by_hand() -> None:
     assert median_row({}, "wall_s", [1.0, 3.0, 2.0])["ci95"] == [1.0, 3.0]
     assert varying_row({}, "HS_steps", [1, 2, 3])["ci95"] == mean["ci95"]
     assert [varying_row({}, "HS_steps", [7, 7])[name] for name in ("value", "ci95")] == [7.0, None]
+
+
+def test_both_sampling_errors() -> None:
+    """Of 100 sessions half: 5 points, with the added ones 4.90; with as many of the thesis 1.96 * 6.93 is 13.6 points."""
+    half = [True, False] * 50
+    for thesis, agrees in ((63, True), (64, False)):
+        one = share_row({}, "SP_percent", half, thesis, 100)
+        assert one["within_errors"] is agrees
+    """1 and 3 in turn spread by 1.01, of 100 that is .1005; of the thesis's 25 .201: 1.96 * .2247 is .440."""
+    steps = [1, 3] * 50
+    assert [mean_row({}, "HS_steps", steps, thesis, 25)["within_errors"] for thesis in (2.43, 2.45)] == [True, False]
+    assert "within_errors" not in mean_row({}, "HS_steps", steps, None, 25)
+    assert "within_errors" not in share_row({}, "SP_percent", half, 50)
 
 
 def test_those_rows() -> None:

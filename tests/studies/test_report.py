@@ -96,6 +96,28 @@ def test_shares_of_cells_that_agree(tmp_path: Path) -> None:
     ]
 
 
+def test_agreement_counted_apart(tmp_path: Path) -> None:
+    """One cell was used to choose, one not, one is easy; each printed figure says so, and a file has the columns."""
+    told: list[dict[str, Any]] = [
+        {"within_errors": True, "used": True, "easy": False},
+        {"within_errors": False, "used": False, "easy": False},
+        {"used": True, "easy": True},
+    ]
+    rows = [one | more for one, more in zip(ROWS, told, strict=False)]
+    text, reader = page(tmp_path, rows)
+    assert reader.tables[0] == [
+        ["cells", "by the rule", "within both sampling errors"],
+        ["not used", "1 of 1 agree", "0 of 1 agree"],
+        ["used to choose", "1 of 1 agree", "1 of 1 agree"],
+        ["easy", "0 of 1 agree", "0 of 0 agree"],
+    ]
+    shown = [cell for table in reader.tables[3:] for line in table for cell in line]
+    assert {"98 e u ✓", "268.62 ✓", "61 u n ✗"} <= {*shown}
+    assert "<b>u</b> the printed one was used to choose" in text
+    write_rows(tmp_path / "rows.csv", rows)
+    assert [one["used"] for one in read(tmp_path / "rows.csv")] == ["true", "false", "true"]
+
+
 def test_the_largest_differences_come_first(tmp_path: Path) -> None:
     """21 points are 4.2 times 5; 18.62 of 40.3 allowed steps; 42.53 of 396.4; 1 of 5 points."""
     _, reader = page(tmp_path, ROWS)

@@ -7,6 +7,7 @@ V(s)), and a terminal state gets its own value when it is entered. Each runs on 
 
 import ctypes
 import subprocess
+from functools import cache
 from pathlib import Path
 from shutil import which
 from tempfile import TemporaryDirectory
@@ -24,8 +25,9 @@ from lab.studies.ours.learning_speed_session import MOVES, Measured, Missing, Ri
 if TYPE_CHECKING:
     from gymnasium import Env
 
-C_SOURCE = Path(__file__).with_name("learning_speed_rival.c")
+SCALAR_SOURCE, LANES_SOURCE = "learning_speed_rival.c", "learning_speed_lanes.c"
 C_FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")
+C_LANES, MOST_LANES = "c lanes", 32  # sessions side by side there: two vectors of sixteen
 
 
 def gymnasium_loop(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
@@ -91,7 +93,7 @@ def _tutorial_session(env: "Env[int, int]", job: Session, rng: np.random.Generat
 def c_scalar(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
     """One session after another in C (learning_speed_rival.c), compiled for this very processor."""
     job, rng = session_of(mdp, settings, sessions), np.random.default_rng(seed)
-    learn = _compiled_c()
+    learn = _compiled(SCALAR_SOURCE, np.uint16, np.float64, np.uint64)
     near = np.pad(job.successor, ((0, 0), (0, 2)), "edge").astype(np.uint16)
     ends = np.where(job.goal, 1, np.where(job.terminal, 2, 0)).astype(np.uint8)
     stream, table = rng.integers(0, 2**64, 4, np.uint64), np.empty(job.states)
@@ -103,27 +105,63 @@ def c_scalar(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: in
     return Measured(moves, seconds, 100.0 * won.value / sessions)
 
 
-def _compiled_c() -> Any:
-    """The function `learn` of rival.c."""
+def c_lanes(mdp: TabularMDP, settings: LearnerSettings, sessions: int, seed: int) -> Measured:
+    """A session in each SIMD lane in C (learning_speed_lanes.c), compiled for this very processor."""
+    job, rng = session_of(mdp, settings, sessions), np.random.default_rng(seed)
+    learn = _compiled(LANES_SOURCE, np.int32, np.float32, np.uint32)
+    order = np.argsort(job.terminal, kind="stable")  # states that end an episode come last
+    number = np.argsort(order)
+    near = number[job.successor[order]].T.astype(np.uint32)  # (MOVES, S)
+    pairs = (near[::2] | near[1::2] << 16).view(np.int32)
+    start, live, goal = int(number[job.start]), int((~job.terminal).sum()), job.goal[order].astype(np.uint8)
+    arrival, sharpness = job.arrival[order].astype(np.float32), (job.sharpness / np.log(2)).astype(np.float32)
+    rules = (start, job.loss, job.discount, job.alpha, job.episodes, sharpness, job.max_moves, job.optimal)
+    stream = rng.integers(0, 2**32, 4 * MOST_LANES, np.uint32)
+    table = np.empty(MOST_LANES * job.states, np.float32)
+    won = ctypes.c_int64()
+    began = perf_counter()
+    moves = learn(
+        job.states, np.ascontiguousarray(pairs), live, arrival, goal, *rules, sessions, stream, table, ctypes.byref(won)
+    )
+    seconds = perf_counter() - began
+    return Measured(moves, seconds, 100.0 * won.value / sessions)
+
+
+def _compiled(source: str, near: type, real: type, seed: type) -> Any:
+    """The function `learn` of a C file beside this one; the types of its neighbours, its reals and its seeds."""
     compiler = which("cc")
     if compiler is None:
         raise Missing("no C compiler: `cc` is not on the path")
+    learn = _library(source, compiler, C_FLAGS).learn
+    array: Any = np.ctypeslib.ndpointer
+    whole, one = ctypes.c_int64, ctypes.c_float if real is np.float32 else ctypes.c_double
+    live = [whole] if source == LANES_SOURCE else []
+    rules = (whole, one, one, one, whole, array(real), whole, whole)
+    learned = (whole, array(seed), array(real), ctypes.POINTER(whole))
+    learn.argtypes = (whole, array(near), *live, array(real), array(np.uint8), *rules, *learned)
+    learn.restype = whole
+    return learn
+
+
+@cache
+def _library(source: str, compiler: str, flags: tuple[str, ...]) -> ctypes.CDLL:
+    """A C file compiled, once in a process."""
     with TemporaryDirectory() as folder:
         library = Path(folder, "rival.so")
-        command = [compiler, *C_FLAGS, str(C_SOURCE), "-o", str(library)]
+        command = [compiler, *flags, str(Path(__file__).with_name(source)), "-o", str(library)]
         try:
             result = subprocess.run(command, capture_output=True, text=True, check=False)
             if result.returncode:
-                raise Missing(f"cc does not compile rival.c: {(result.stderr.strip() or 'no reason').splitlines()[0]}")
-            learn = ctypes.CDLL(str(library)).learn
+                raise Missing(f"cc does not compile {source}: {_reason(result.stderr)}")
+            return ctypes.CDLL(str(library))
         except OSError as error:
             raise Missing(f"cc or what it made cannot be run: {error}") from None
-    whole, real, reals = ctypes.c_int64, ctypes.c_double, np.ctypeslib.ndpointer(np.float64)
-    problem = (whole, np.ctypeslib.ndpointer(np.uint16), reals, np.ctypeslib.ndpointer(np.uint8))
-    rules = (whole, real, real, real, whole, reals, whole, whole)
-    learn.argtypes = (*problem, *rules, whole, np.ctypeslib.ndpointer(np.uint64), reals, ctypes.POINTER(whole))
-    learn.restype = whole
-    return learn
+
+
+def _reason(stderr: str) -> str:
+    """The first line of a compiler that says why; else its first."""
+    lines = stderr.strip().splitlines() or ["no reason"]
+    return next((line for line in lines if "error" in line), lines[0])
 
 
 RIVALS: dict[str, Rival] = {
@@ -131,4 +169,5 @@ RIVALS: dict[str, Rival] = {
     "numpy lock step": numpy_lock_step,
     "jax lock step": jax_lock_step,
     "c scalar": c_scalar,
+    C_LANES: c_lanes,
 }

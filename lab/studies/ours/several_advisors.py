@@ -18,6 +18,7 @@ from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, share_row, those, varying_row
 from lab.studies.runner import Job, seeds_of
+from lab.studies.thesis.chapter_9 import known
 from lab.studies.thesis.chapter_9_sessions import (
     AdviceSetting,
     gate_of,
@@ -99,7 +100,7 @@ def advisors(job: Job, reading: Mapping[str, Any]) -> Findings:
         ),
         "Helped steps of a session": _picture(rows, "HS_steps", "helped steps"),
     }
-    return Findings(rows, in_short(rows), pictures, (MEASURES, WAYS_NOTE, LIMITS))
+    return Findings(rows, in_short(rows), pictures, (MEASURES, WAYS_NOTE, known(reading), LIMITS))
 
 
 def _merit(found: PanelOutcome) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from lab.statistics import Comparison
+from lab.studies.counted_apart import marked
 from lab.studies.findings import Findings, Row, agreement, row
 from lab.studies.runner import Job
 from lab.studies.thesis import appendix_4
@@ -21,14 +22,15 @@ from lab.studies.thesis.chapter_7_cells import (
     SequencingSetting,
     describe,
     printed,
+    printed_sessions,
     short_name,
 )
+from lab.studies.thesis.used_to_choose import DECAY_TABLE, SAYS_7
 
 Comparisons = dict[SequencingSetting, Comparison]
 Changes = Mapping[str, Any]  # to all settings: {"reading": "figure 5.1"}
 TABLES = {"I": "Table 7.4", "II": "Table 7.5", "III": "Table 7.6"}
-DECAY_TABLE, FACTOR_TABLE = "Table IV.1", "Table IV.2"
-PRINTED_SESSIONS, DECAY_SESSIONS = {3: 1000, 4: 300}, 100  # section 7.6, by number of toasts; for table IV.1
+FACTOR_TABLE = "Table IV.2"
 SIGNIFICANT = 0.05
 EXAMPLE = "F = 93.8, srl B 72.5 %, random 68.8 %, mc 49.9 %"
 
@@ -74,14 +76,14 @@ def best_results(job: Job, changes: Changes, case: str) -> Findings:
     rows, found = _compared(Measured(job, [cell.setting for cell in cells]), cells, table)
     pictures = figures.lengths(rows, figures.of_case(case, table))
     notes = (SYMBOLS, READ_AS, SHADED, HOW_MANY, _assumptions([*found.values()]), *examples(found))
-    return Findings(rows, summary(rows, job.sessions), pictures, notes)
+    return _findings(rows, job, pictures, notes)
 
 
 def table_iv_1(job: Job, changes: Changes) -> Findings:
     """Table IV.1 and fig. 7.5: beta."""
     rows = _decay_rows(Measured(job, _decay_settings(changes)), changes)
     pictures = {"Figure 7.5: SP and CE by beta": figures.by_beta(rows)}
-    return Findings(rows, summary(rows, job.sessions), pictures, (SYMBOLS, READ_AS, DECAY, HOW_MANY))
+    return _findings(rows, job, pictures, (SYMBOLS, READ_AS, DECAY, SAYS_7, HOW_MANY))
 
 
 def table_iv_2(job: Job, changes: Changes) -> Findings:
@@ -89,7 +91,7 @@ def table_iv_2(job: Job, changes: Changes) -> Findings:
     cells = _changed([cell for cell in printed(SESSION_LENGTHS) if cell.setting.method == "srl"], changes)
     rows, _ = _compared(Measured(job, [cell.setting for cell in cells]), cells, FACTOR_TABLE)
     pictures = figures.lengths(rows, {name: figures.COMPARED[name] for name in figures.OF_FACTORS})
-    return Findings(rows, summary(rows, job.sessions), pictures, (SYMBOLS, READ_AS, FACTORS, SHADED, HOW_MANY))
+    return _findings(rows, job, pictures, (SYMBOLS, READ_AS, FACTORS, SAYS_7, SHADED, HOW_MANY))
 
 
 def chapter_7(job: Job, changes: Changes) -> Findings:
@@ -103,8 +105,8 @@ def chapter_7(job: Job, changes: Changes) -> Findings:
     factors = _compared(measured, [cell for cell in cells if cell.setting.method == "srl"], FACTOR_TABLE)[0]
     pictures |= figures.lengths([*rows, *factors], figures.COMPARED) | appendix_4.pictures()
     rows += [one for one in factors if one.get("reward_factor") != "B"]  # type B stands in the other tables
-    notes = (SYMBOLS, READ_AS, FACTORS, DECAY, SHADED, HOW_MANY)
-    return Findings(rows, summary(rows, job.sessions), pictures, notes)
+    notes = (SYMBOLS, READ_AS, FACTORS, DECAY, SAYS_7, SHADED, HOW_MANY)
+    return _findings(rows, job, pictures, notes)
 
 
 def readings(job: Job, changes: Changes) -> Findings:
@@ -124,6 +126,11 @@ def readings(job: Job, changes: Changes) -> Findings:
     notes = (DISTANCES, SYMBOLS, READ_AS)
     found = {"readings": len(READINGS), "cells": 0, "within": 0}
     return Findings(rows, found, figures.readings(rows), notes)
+
+
+def _findings(rows: list[Row], job: Job, pictures: Mapping[str, bytes], notes: tuple[str, ...]) -> Findings:
+    told = marked(rows)
+    return Findings(told, summary(told, job.sessions), pictures, notes)
 
 
 def _of_case(cells: Sequence[PrintedFigure], case: str) -> list[PrintedFigure]:
@@ -208,7 +215,7 @@ def deviation(rows: Sequence[Row], sessions: int) -> tuple[float, float]:
     """
     off, chance = [], []
     for one in rows:
-        theirs = DECAY_SESSIONS if one["table"] == DECAY_TABLE else PRINTED_SESSIONS[one["toasts"]]
+        theirs = printed_sessions(one["table"], one["toasts"])
         error = (one["ci95"][1] - one["ci95"][0]) / 2 / 1.96
         off.append(abs(one["value"] - one["thesis"]))
         chance.append(sqrt(2 / pi) * error * sqrt(1 + sessions / theirs))

@@ -19,6 +19,7 @@ from lab.studies.runner import Job, seeds_of
 from lab.studies.thesis import chapter_7_listing as listing
 from lab.studies.thesis import printed_lines
 from lab.studies.thesis.chapter_7_listing import LISTING, Reading
+from lab.studies.thesis.used_to_choose import DECAY_TABLE, is_used_7
 
 Floats = NDArray[np.float64]
 Environment = Literal["deterministic", "stochastic"]
@@ -27,6 +28,7 @@ Factor = Literal["A", "B"]
 SESSION_LENGTHS, DECAY_FACTORS = "tables-7.4-7.6-iv.2.csv", "table-iv.1.csv"
 SPREAD = 0.1  # section 7.6: the standard deviation of processing times as a share of their mean
 REPLICATIONS = 10  # section 7.6
+PRINTED_SESSIONS, DECAY_SESSIONS = {3: 1000, 4: 300}, 100  # section 7.6, by number of toasts; for table IV.1
 DECAY_EPISODES = 200  # section 7.6, the test of beta
 LISTED = "listing"
 AS_PRINTED = "figure 5.1"
@@ -178,10 +180,13 @@ class Measured:
     def row(self, table: str, setting: SequencingSetting, measure: str, thesis: float | None, **more: Any) -> Row:
         """One row of a study; `more` stands after the settings. Source: section 7.6 (SP, CE, BR)."""
         named, outcome = {"table": table, **describe(setting), **more}, self.outcomes[setting]
+        theirs = printed_sessions(table, setting.toasts)
         if measure in ("BR_s", "CE_episode"):
-            return mean_row(named, measure, outcome.best_s if measure == "BR_s" else outcome.converged, thesis)
-        times_s = outcome.last_s if measure == "final_percent" else outcome.best_s
-        return share_row(named, measure, self.succeeds(setting, times_s), thesis)
+            found = mean_row(named, measure, outcome.best_s if measure == "BR_s" else outcome.converged, thesis, theirs)
+        else:
+            times_s = outcome.last_s if measure == "final_percent" else outcome.best_s
+            found = share_row(named, measure, self.succeeds(setting, times_s), thesis, theirs)
+        return found if thesis is None else found | {"used": is_used_7(table, setting.reward_factor, setting.toasts)}
 
     def replicated(self, setting: SequencingSetting) -> Floats:
         """SP [%] of each of ten replications, or BR [s] where times are left to chance."""
@@ -194,6 +199,11 @@ class Measured:
         """Several methods, or reward factors, at one session length (Appendix II)."""
         groups = {short_name(setting): self.replicated(setting) for setting in settings}
         return compare(groups, lowest_is_best=settings[0].environment == "stochastic")
+
+
+def printed_sessions(table: str, toasts: int) -> int:
+    """How many sessions the thesis ran for each cell of a table."""
+    return DECAY_SESSIONS if table == DECAY_TABLE else PRINTED_SESSIONS[toasts]
 
 
 def describe(setting: SequencingSetting) -> Row:

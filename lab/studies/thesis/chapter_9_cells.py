@@ -10,10 +10,12 @@ import numpy as np
 from lab.advice.advisors import SKILL_TAUS
 from lab.mdp import FloatArray
 from lab.statistics import Comparison, Range, compare, part_means, ranges, score
+from lab.studies.counted_apart import marked
 from lab.studies.findings import Row, mean_row, row, share_row
 from lab.studies.runner import Job
 from lab.studies.thesis import printed_lines
 from lab.studies.thesis.chapter_9_sessions import AdviceOutcome, AdviceSetting, learner_of, measured
+from lab.studies.thesis.used_to_choose import ALL_ADVISORS, is_used
 
 View = Literal["full", "limited"]
 
@@ -29,7 +31,7 @@ TABLES: dict[str, tuple[str, View]] = {
 TAUS = tuple(SKILL_TAUS.values())
 BETAS = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5)
 BEST_BETA = {"world-1": (1.3, 63.0), "world-2": (0.7, 37.0)}  # section 9.9.1: beta, success percentage
-REPLICATIONS = 5  # section 9.8: five of 100 sessions each
+REPLICATIONS, PRINTED_SESSIONS = 5, 500  # section 9.8: five of 100 sessions each
 
 
 @dataclass(frozen=True)
@@ -105,18 +107,19 @@ class Grid:
     def rows(self, cell: PrintedLine) -> list[Row]:
         """SP, HS and score of a cell beside the printed ones; for CCRL its requests, which are not printed."""
         outcomes, setting = self.of(cell), self._asked(cell.setting)
-        named = describe(setting, "all" if cell.average else setting.tau)
+        named = describe(setting, ALL_ADVISORS if cell.average else setting.tau)
         if len(outcomes) == 1:
-            succeeded = share_row(named, "SP_percent", outcomes[0].success, cell.sp)
+            succeeded = share_row(named, "SP_percent", outcomes[0].success, cell.sp, PRINTED_SESSIONS)
         else:
             means = np.mean([100.0 * outcome.success for outcome in outcomes], axis=0)
-            succeeded = mean_row(named, "SP_percent", means, cell.sp)
+            succeeded = mean_row(named, "SP_percent", means, cell.sp, PRINTED_SESSIONS)
         helped = np.mean([outcome.helped_steps for outcome in outcomes], axis=0)
         rows = [
             succeeded,
-            mean_row(named, "HS_steps", helped, cell.hs),
-            mean_row(named, "score", self.scores(cell), cell.score),
+            mean_row(named, "HS_steps", helped, cell.hs, PRINTED_SESSIONS),
+            mean_row(named, "score", self.scores(cell), cell.score, REPLICATIONS * PRINTED_SESSIONS / len(helped)),
         ]
+        rows = [one | {"used": is_used(setting.world, named["tau"])} for one in rows]
         if setting.gate == "ccrl":
             asked = np.mean([outcome.requests for outcome in outcomes], axis=0)
             rows.append(mean_row(named, "AR_requests", asked))
@@ -141,7 +144,7 @@ def describe(setting: AdviceSetting, tau: float | str | None = None) -> Row:
 def appendix(job: Job, places: Iterable[tuple[str, View]], reading: Mapping[str, Any]) -> list[Row]:
     """Every line of Appendix V for these worlds and views."""
     grids = (Grid(job, place, view, reading) for place, view in places)
-    return [one for grid in grids for cell in grid.cells for one in grid.rows(cell)]
+    return marked(one for grid in grids for cell in grid.cells for one in grid.rows(cell))
 
 
 def table(job: Job, name: str, reading: Mapping[str, Any]) -> list[Row]:
@@ -156,9 +159,14 @@ def table(job: Job, name: str, reading: Mapping[str, Any]) -> list[Row]:
         for cell in chosen:
             ranked = {"rank": found.ranks[cell.setting.gate], "thesis_rank": cell.rank}
             rows += [{**one, **ranked} for one in grid.rows(cell)]
-        about = {"table": "comparison of scores", "world": place, "view": view, "tau": "all" if tau is None else tau}
+        about = {
+            "table": "comparison of scores",
+            "world": place,
+            "view": view,
+            "tau": ALL_ADVISORS if tau is None else tau,
+        }
         tests += _tests(about, found)
-    return rows + tests
+    return marked(rows) + tests
 
 
 def _tests(named: Row, found: Comparison) -> list[Row]:
@@ -175,5 +183,9 @@ def by_beta(job: Job) -> list[Row]:
     for setting, outcome in measured(job, settings).items():
         best, percent = BEST_BETA[setting.world]
         named = {"table": "Figure 9.4", **describe(setting)}
-        rows.append(share_row(named, "SP_percent", outcome.success, percent if setting.beta == best else None))
-    return rows
+        if setting.beta == best:
+            one = share_row(named, "SP_percent", outcome.success, percent, PRINTED_SESSIONS)
+            rows.append(one | {"used": is_used(setting.world, None)})
+        else:
+            rows.append(share_row(named, "SP_percent", outcome.success))
+    return marked(rows)

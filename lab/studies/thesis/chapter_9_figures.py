@@ -15,6 +15,7 @@ from lab.studies.findings import Row, mean_row, share_row, those
 from lab.studies.runner import Job
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, TAUS, describe
 from lab.studies.thesis.chapter_9_sessions import AdviceSetting, example, measured, table_of, walk_of_advisor, world
+from lab.studies.thesis.used_to_choose import is_used
 from lab.view.canvas import BLUE, GREY, INK, ORANGE, RED, picture_bytes
 
 if TYPE_CHECKING:
@@ -128,7 +129,8 @@ def walks(reading: Mapping[str, Any]) -> list[Row]:
         steps = walk_of_advisor(place, table, tau)
         named = {"table": "Figure 9.1", "world": "world-1", "advisor": "alone", "tau": tau, "advisor_table": known}
         share, mean = PRINTED_WALKS.get(tau, (None, None))
-        rows += [share_row(named, "SP_percent", steps == OPTIMUM, share), mean_row(named, "mean_steps", steps, mean)]
+        more = [share_row(named, "SP_percent", steps == OPTIMUM, share), mean_row(named, "mean_steps", steps, mean)]
+        rows += [one if one["thesis"] is None else one | {"used": is_used("world-1", tau)} for one in more]
     return rows
 
 

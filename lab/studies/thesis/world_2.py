@@ -22,6 +22,7 @@ from lab.statistics import PERCENT_POINTS, RELATIVE
 from lab.studies.runner import Progress
 from lab.studies.thesis.chapter_9_cells import BEST_BETA, PrintedLine, printed
 from lab.studies.thesis.chapter_9_sessions import gate_of, learned_table
+from lab.studies.thesis.used_to_choose import RECONSTRUCTED_BY
 from lab.tasks.grid_world import AdvisorView, GridWorld
 from lab.tasks.record import write_whole
 
@@ -103,7 +104,7 @@ def _with(world: GridWorld, view: Ints) -> GridWorld:
 def is_compared(cell: PrintedLine, view: str) -> bool:
     """The printed lines that layouts and views are compared by: experts and novices of world II."""
     setting = cell.setting
-    return (setting.world, setting.view) == ("world-2", view) and setting.tau in (0.01, 1.0)
+    return (setting.world, setting.view) == ("world-2", view) and setting.tau in RECONSTRUCTED_BY
 
 
 def _alike(rng: np.random.Generator, seed: int) -> Iterator[GridWorld]:

@@ -8,7 +8,7 @@ from lab.learning.settings import LearnerSettings
 from lab.mdp import TabularMDP
 from lab.studies.ours import learning_speed as module
 from lab.studies.ours.learning_speed import FEW, REPEATS, SESSIONS, speed
-from lab.studies.ours.learning_speed_rivals import RIVALS
+from lab.studies.ours.learning_speed_rivals import C_LANES, RIVALS
 from lab.studies.ours.learning_speed_session import Measured, Missing
 from lab.studies.runner import Job
 from lab.studies.thesis.chapter_9_sessions import world
@@ -44,7 +44,7 @@ def test_the_kernel_beside_rivals(asked: Asked) -> None:
     for one in found.rows:
         assert (one["world"], one["thesis"], one["within"]) == ("world-1", None, None)
     assert len({one["measure"] for one in found.rows}) == 1
-    ratio = {"kernel to the fastest rival": pytest.approx(kernel["value"] / 1.5, abs=0.01)}
+    ratio = {"kernel to the fastest rival": pytest.approx(kernel["value"] / 1.5, abs=0.01), "kernel to C lanes": None}
     assert found.summary == {"cells": 0, "within": 0} | ratio  # nothing of this is printed
     assert found.notes[-1] == "gone: not measured: no such processor"
     place = world("world-1")
@@ -61,10 +61,21 @@ def test_slow_rivals_learn_few_sessions(asked: Asked, monkeypatch: pytest.Monkey
     assert max(FEW.values()) < SESSIONS
 
 
+def test_the_kernel_beside_c_lanes(asked: Asked, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both rivals are the same one: it slows down, so that the second is slower."""
+    quick = vars(module)["RIVALS"]["quick"]
+    monkeypatch.setattr(module, "RIVALS", {"first": quick, C_LANES: quick})
+    found = speed(Job(sessions=10), {})
+    kernel, _, first, lanes = (one["value"] for one in found.rows)
+    assert first > lanes
+    assert found.summary["kernel to the fastest rival"] == pytest.approx(kernel / first, abs=0.01)
+    assert found.summary["kernel to C lanes"] == pytest.approx(kernel / lanes, abs=0.01)
+
+
 def test_without_any_rival(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "RIVALS", {})
     monkeypatch.setattr(module, "REPEATS", 1)
     found = speed(Job(sessions=10), {})
     assert [one["name"] for one in found.rows] == ["kernel", "kernel gated"]
-    assert found.summary == {"cells": 0, "within": 0, "kernel to the fastest rival": None}
+    assert found.summary == {"cells": 0, "within": 0, "kernel to the fastest rival": None, "kernel to C lanes": None}
     assert "not measured" not in "".join(found.notes)

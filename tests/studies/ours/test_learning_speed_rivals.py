@@ -8,7 +8,8 @@ import pytest
 from lab.errors import BadInput
 from lab.learning.settings import LearnerSettings
 from lab.mdp import TabularMDP, coverage, grid
-from lab.studies.ours.learning_speed_rivals import RIVALS
+from lab.studies.ours import learning_speed_rivals
+from lab.studies.ours.learning_speed_rivals import C_LANES, RIVALS
 from lab.studies.ours.learning_speed_session import Measured, Missing
 from lab.tasks.grid_world import GridWorld
 from lab.tasks.task_file import load_world
@@ -73,18 +74,40 @@ def test_what_no_rival_learns_is_refused(name: str, world: GridWorld) -> None:
         RIVALS[name](world.mdp(), world.learner, 0, 0)
 
 
-def test_without_a_compiler_c_is_missing(world: GridWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("sessions", [1, 31, 33])
+def test_lanes_without_a_session_count_for_nothing(world: GridWorld, sessions: int) -> None:
+    """Fewer sessions than lanes, or one more: every episode takes its 3 moves."""
+    settings = replace(world.learner, episodes=5, max_steps=3, count_start=False)
+    assert run(C_LANES, world.mdp(), settings, sessions).moves == sessions * 5 * 3
+
+
+@pytest.mark.parametrize(("flag", "says"), [("-mno-avx512f", None), ("-mno-avx2", "needs a processor with AVX2")])
+def test_other_processors(flag: str, says: str | None, world: GridWorld, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight lanes do as sixteen; what has neither is told."""
+    run(C_LANES, world.mdp(), world.learner, 1)  # skipped where this processor has no lanes at all
+    monkeypatch.setattr(learning_speed_rivals, "C_FLAGS", (*learning_speed_rivals.C_FLAGS, flag))
+    if says is None:
+        return test_a_rival_learns_world_1(C_LANES, world)
+    with pytest.raises(Missing, match=says):
+        RIVALS[C_LANES](world.mdp(), world.learner, 1, 0)
+    return None
+
+
+@pytest.mark.parametrize("name", ["c scalar", C_LANES])
+def test_without_a_compiler_c_is_missing(
+    name: str, world: GridWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(Missing, match="no C compiler"):
-        RIVALS["c scalar"](world.mdp(), world.learner, 1, 0)
+        RIVALS[name](world.mdp(), world.learner, 1, 0)
     compiler = tmp_path / "cc"
     compiler.write_text("#!/bin/sh\necho 'no such processor' >&2\nexit 1\n", encoding="utf-8")
     compiler.chmod(0o755)
     with pytest.raises(Missing, match="no such processor"):
-        RIVALS["c scalar"](world.mdp(), world.learner, 1, 0)
+        RIVALS[name](world.mdp(), world.learner, 1, 0)
     compiler.write_text("#!/bin/nothing\n", encoding="utf-8")
     with pytest.raises(Missing, match="cannot be run"):
-        RIVALS["c scalar"](world.mdp(), world.learner, 1, 0)
+        RIVALS[name](world.mdp(), world.learner, 1, 0)
 
 
 def test_without_jax_its_rival_is_missing(world: GridWorld, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

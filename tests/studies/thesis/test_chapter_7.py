@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from lab.statistics import compare
+from lab.studies.counted_apart import JUDGED
 from lab.studies.findings import Findings, agreement, row, those
 from lab.studies.report import write_report, write_rows
 from lab.studies.runner import Job
@@ -196,7 +197,7 @@ def test_the_whole_chapter(tmp_path: Path) -> None:
         assert values[_key(one), one["measure"]] == one["value"]
 
 
-_RESULTS = ("measure", "value", "ci95", "thesis", "within", "rank", "shaded", "table")
+_RESULTS = ("measure", "value", "ci95", "thesis", *JUDGED, "rank", "shaded", "table")
 
 
 def _key(one: dict[str, Any]) -> str:

@@ -213,6 +213,8 @@ def test_a_row_has_what_applies(measured: Measured) -> None:
         "ci95": [low, high],
         "thesis": 73,
         "within": True,
+        "within_errors": True,
+        "used": False,
     }
     assert describe(RANDOM).keys() == {"environment", "case", "toasts", "method", "episodes", "reading"}
 

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
+from lab.studies.counted_apart import JUDGED
 from lab.studies.findings import row, those
 from lab.studies.runner import Job
 from lab.studies.thesis import chapter_9_figures as figures
@@ -58,7 +59,7 @@ def test_cells_of_the_figures() -> None:
 
 
 def _named(one: dict[str, Any]) -> str:
-    results = ("value", "ci95", "thesis", "within", "table")
+    results = ("value", "ci95", "thesis", *JUDGED, "table")
     return json.dumps({name: value for name, value in one.items() if name not in results}, sort_keys=True)
 
 
