@@ -1,5 +1,6 @@
 """What every test stands on: a toolbox of its own, hypothesis without a clock, the command, pages with and without a browser."""
 
+import gc
 import json
 import os
 import shutil
@@ -26,6 +27,19 @@ if TYPE_CHECKING:
 
 settings.register_profile("lab", deadline=None, derandomize=bool(os.environ.get("CI")), max_examples=50)
 settings.load_profile("lab")
+
+
+def pytest_collection() -> None:
+    """Thousands of tests are collected without looking for garbage among them, which took half of that time."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """What was collected stays until the end: no later search for garbage goes through it."""
+    gc.freeze()
+    gc.set_threshold(10_000)
+    gc.enable()
+
 
 ROOT = Path(__file__).resolve().parent.parent
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")

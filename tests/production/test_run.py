@@ -72,10 +72,10 @@ class Ran:
     folder: Path
 
 
-def run_toast(folder: Path, root: Path, *options: str) -> Ran:
+def run_toast(folder: Path, root: Path) -> Ran:
     code = "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()"
     ran = subprocess.run(
-        [sys.executable, "-c", code, "run", "toast", "--toasts", "1", "--json", *options],
+        [sys.executable, "-c", code, "run", "toast", "--toasts", "1", "--json"],
         cwd=folder,
         env={**os.environ, "LAB_TOOLBOX": str(folder / "toolbox"), "PYTHONPATH": str(root)},
         capture_output=True,
@@ -96,10 +96,15 @@ def warm(cold: Ran, root: Path) -> Ran:
     return run_toast(cold.folder, root)
 
 
-def test_a_robot_that_is_slower_than_believed_is_known_by_its_second_run(warm: Ran, root: Path, tmp_path: Path) -> None:
+def test_a_robot_that_is_slower_than_believed_is_known_by_its_second_run(
+    warm: Ran, lab: Lab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Timed at full speed, carried out at 60 % of it, as set on an operator's pendant."""
     copytree(warm.folder / "toolbox", tmp_path / "toolbox")
-    first, second = (run_toast(tmp_path, root, "--override", "60").document for _ in range(2))
+    monkeypatch.setenv("LAB_TOOLBOX", str(tmp_path / "toolbox"))
+    monkeypatch.chdir(tmp_path)
+    slower = ("run", "toast", "--toasts", "1", "--override", "60", "--json")
+    first, second = (lab(*slower).json for _ in range(2))
     wrong = [abs(one["predicted_makespan_s"] - one["measured_makespan_s"]) for one in (first, second)]
     assert first["measured_makespan_s"] > 1.05 * warm.document["measured_makespan_s"]
     assert wrong[1] < 0.1 * wrong[0]
