@@ -27,8 +27,11 @@ class Family(MutableMapping[str, Row]):
     def __init__(self, kind: str, rows: Mapping[str, Row], adopt: Callable[[str, Any], Row]):
         self.kind, self._rows, self._adopt = kind, dict(rows), adopt
         self._complete = False
+        self._used: dict[str, Row] = {}
 
     def __getitem__(self, name: str) -> Row:
+        if name in self._used:
+            return self._used[name]
         if name not in self._rows:
             self._look()
         return self._rows[name]
@@ -48,9 +51,9 @@ class Family(MutableMapping[str, Row]):
         return len(self._rows)
 
     def __contains__(self, name: object) -> bool:
-        if name not in self._rows:
+        if name not in self._rows and name not in self._used:
             self._look()
-        return name in self._rows
+        return name in self._rows or name in self._used
 
     def adopted(self, name: str, thing: Any, source: str) -> None:
         """Take in a member; BadInput for what is none, and for a name that another one has."""
@@ -60,11 +63,13 @@ class Family(MutableMapping[str, Row]):
         known_source(thing, source)
 
     def named(self, thing: Any) -> Any:
-        """The name of a class that is used in Python, under which it is a member from now on; anything else as it is."""
-        if not isinstance(thing, type):
-            return thing
-        self._rows[thing.__name__] = self._adopt(thing.__name__, thing)
-        return thing.__name__
+        """The name of a class that is used in Python (see `use`); anything else as it is."""
+        return self.use(thing.__name__, thing) if isinstance(thing, type) else thing
+
+    def use(self, name: str, thing: Any) -> str:
+        """Let something be found under a name that is not listed; the name. BadInput for what is no member."""
+        self._used[name] = self._adopt(name, thing)
+        return name
 
     def _look(self) -> None:
         """Take in what installed packages add."""

@@ -14,9 +14,7 @@ SMALL = ("toast-case-1", "toast-case-2", "toast-case-3")
 
 def check_sequencer(method: str | Find) -> None:
     """A method, by name or as a function of cell, search and generator, on two toasts in each of the thesis's cells."""
-    name = method if isinstance(method, str) else method.__name__
-    if not isinstance(method, str) and name not in SEQUENCERS:
-        SEQUENCERS.adopted(name, method, "check_sequencer")
+    name = method if isinstance(method, str) else SEQUENCERS.use(method.__name__, method)
     for cell in SMALL:
         check_order(name, load_cell(cell).cell(2), seed=1)
 

@@ -20,6 +20,11 @@ def check_skill(skill: str | type[Skill], task: str = "toast") -> None:
     subtask = skill if isinstance(skill, str) else skill.subtask
     if not isinstance(skill, str) and subtask not in SKILLS:
         SKILLS.adopted(subtask, skill, "check_skill")
+        try:
+            check_skill(subtask, task)
+        finally:
+            del SKILLS[subtask]
+        return
     require(bool(SKILLS[subtask].help), f"skill '{subtask}': it has no `help`")
     subject, again = (SkillSubject.of(LessonOptions(subtask), load(task)) for _ in range(2))
     problem = subject.prepare(0)

@@ -30,6 +30,8 @@ def test_a_class_is_a_member_by_its_name() -> None:
     assert family.named("own") == "own"
     assert family.named(int) == "int"
     assert family["int"] == "intint"
+    assert "int" in family
+    assert [*family] == ["own"]  # it is found, and not listed
 
 
 def test_a_name_is_taken_once() -> None:
