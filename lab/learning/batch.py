@@ -11,15 +11,18 @@ from numpy.typing import NDArray
 from lab.errors import BadInput
 from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Memory, places
+from lab.learning.chance_table import ChanceTable
+from lab.learning.environment import TableEnvironment
 from lab.learning.gates import GATES
-from lab.learning.gates.gate_rules import ASKS_WHERE_TABLES_DIFFER
+from lab.learning.gates.gate_rules import ASKS_WHERE_TABLES_DIFFER, WEIGHS_NOTHING
+from lab.learning.gates.heard import Heard
 from lab.learning.kernels import records
 from lab.learning.kernels.records import LANES
 from lab.learning.kernels.session_loop import run
 from lab.learning.selection import SELECTIONS
 from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.learning.simulated_advice import Advice, TableAdvisor
+from lab.learning.simulated_advice import SPEAKS_ALWAYS, SPEAKS_AS_EXPECTED, Advice, TableAdvisor
 from lab.learning.updates import UPDATES
 from lab.learning.updates.update import STATE_VALUES
 from lab.mdp import FloatArray, TabularMDP
@@ -51,8 +54,9 @@ def run_sessions(
     seeds: NDArray[np.uint64],
     *,
     keep_tables: bool = False,
+    chances: ChanceTable | None = None,
 ) -> Batch:
-    """Learns a table in each of N sessions, seeds (N,) uint64; advice None: nobody to ask.
+    """Learns a table in each of N sessions, seeds (N,) uint64; advice None: nobody to ask; chances: where moves lead by chance.
 
     The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix.stream(seed)` and
     a `TableAdvisor` on the same draws. Raises BadInput for an unknown learner, selection or gate, or advice of another
@@ -62,7 +66,7 @@ def run_sessions(
     if advice is not None and advice.thresholds.shape[1:] != mdp.successor.shape:
         raise BadInput(f"advice of shape {advice.thresholds.shape}: the problem has {mdp.successor.shape}")
     if not is_compiled(mdp, learner, gate):
-        return _one_by_one(mdp, learner, gate, advice, seeds, keep_tables)
+        return _one_by_one(chances or TableEnvironment(mdp), learner, gate, advice, seeds, keep_tables)
     found = _sessions(mdp, learner, seeds, keep_tables)
     asking = _asking(gate, advice is not None, learner.max_steps)
     learning, problem = _learning(mdp, learner), _problem(mdp, learner)
@@ -72,7 +76,8 @@ def run_sessions(
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, found.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
-    run(records.Work(problem, learning, asking, *said, found, lanes), memories)
+    hearing = _hearing(mdp, asking, advice)
+    run(records.Work(problem, learning, asking, *said, found, lanes), memories, hearing, _chances(chances))
     return _batch(found.steps, found.guided, found.counts, _action_values(mdp, learning, found.kept))
 
 
@@ -88,8 +93,36 @@ def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings) -
     return not rules.judges or len(mdp.starts) < 2  # it judges by the plain counts alone
 
 
+def _hearing(mdp: TabularMDP, asking: records.Asking, advice: Advice | None) -> records.Hearing | None:
+    """What gates that weigh and advisors that hold back need, None where neither does."""
+    if advice is None:
+        return None
+    weighs = asking.gate.weighs != WEIGHS_NOTHING
+    if not weighs and not advice.late and advice.speaks == SPEAKS_ALWAYS:
+        return None
+    states, actions = mdp.successor.shape if weighs else (1, 1)
+    sizes = (states, states * actions, states * actions, states * actions, states, states)  # as the fields of Heard
+    cells = (np.zeros((LANES, size), np.int32) for size in sizes)
+    told = Heard._make((*cells, np.zeros((LANES, 2 * states)), np.zeros(LANES, records.HEARD_NOW)))
+    chose = np.zeros((LANES, mdp.n_states if advice.speaks == SPEAKS_AS_EXPECTED else 0), np.int32)
+    return records.Hearing(
+        heard=told,
+        values=np.zeros((LANES, mdp.n_actions)),
+        u=np.zeros(LANES),
+        before=np.zeros(LANES, np.int64),
+        chose=chose,
+        late=advice.late,
+        speaks=advice.speaks,
+        several=float(bool(mdp.starts)),
+    )
+
+
+def _chances(table: ChanceTable | None) -> records.Chances | None:
+    return None if table is None else records.Chances(table.below, table.entered, table.reward)
+
+
 def _one_by_one(
-    mdp: TabularMDP,
+    environment: TableEnvironment,
     learner: LearnerSettings,
     gate: GateSettings,
     advice: Advice | None,
@@ -97,13 +130,14 @@ def _one_by_one(
     keep_tables: bool,
 ) -> Batch:
     """The same sessions, each with the draws that it would have in the kernel."""
+    mdp = environment.mdp
     steps, counts = np.zeros((len(seeds), learner.episodes), np.int32), np.zeros(len(seeds), records.COUNTS)
     q = np.zeros((len(seeds) if keep_tables else 0, *mdp.successor.shape))
     found = _batch(steps, np.zeros(steps.shape, np.bool_), counts, q)
     for n, seed in enumerate(seeds):
         draw = splitmix.stream(int(seed))
         advisor = None if advice is None else TableAdvisor(advice, draw)
-        one = run_session(mdp, learner, gate, advisor, draw)
+        one = run_session(environment, learner, gate, advisor, draw)
         if one.interrupted:
             raise KeyboardInterrupt
         found.steps[n], found.guided[n], found.moves[n] = one.steps, one.guided, one.visits.sum()

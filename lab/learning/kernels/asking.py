@@ -7,6 +7,8 @@ import numpy as np
 from lab.learning import advice_memory as memory
 from lab.learning.compiled import inlined, inner
 from lab.learning.gates import gate_rules as rules
+from lab.learning.gates.heard import NOTHING
+from lab.learning.kernels.hearing import answered, takes, wants
 from lab.learning.kernels.learners import draw, gauge
 
 _window_mean: Any = inner(rules.window_mean)
@@ -105,7 +107,7 @@ def advised(work: Any, j: int, state: Any) -> Any:
 
 
 @inlined
-def decided(work: Any, memories: Any, j: int) -> Any:
+def decided(work: Any, memories: Any, hearing: Any, j: int) -> Any:
     """The action of lane j's next step and where it comes from: its own, of the way that it practises, or advised."""
     lanes, state = work.lanes, work.lanes.states[j]
     action, source = np.uint64(lanes.chosen[j]), np.int64(memory.OWN)
@@ -115,9 +117,24 @@ def decided(work: Any, memories: Any, j: int) -> Any:
             action, source = np.uint64(memories.way[j, state]), np.int64(memory.PRACTISED)
     if lanes.is_open[j]:
         lane = lanes.lane[j]
-        if lane.helped < lane.left and asks(work, j, state):
-            lane.asked = 1
-            if work.region[state]:
-                lane.helped += 1
-                action, source = advised(work, j, state), np.int64(memory.ASKED)
+        if hearing is None:
+            if lane.helped < lane.left and asks(work, j, state):
+                lane.asked = 1
+                if work.region[state]:
+                    lane.helped += 1
+                    action, source = advised(work, j, state), np.int64(memory.ASKED)
+        else:
+            weighs, said = work.asking.gate.weighs != rules.WEIGHS_NOTHING, np.int64(NOTHING)
+            may = lane.helped < lane.left
+            wanted = wants(work, hearing, j, state) if weighs else may and asks(work, j, state)
+            if wanted and may:
+                lane.asked = 1
+                said = np.int64(answered(work, hearing, j, state, action))
+                if said != NOTHING:
+                    lane.helped += 1
+                    source = np.int64(memory.ASKED)
+            if weighs:
+                action = takes(work, hearing, j, state, action, said)
+            elif said != NOTHING:
+                action = np.uint64(said)
     return action, source
