@@ -65,7 +65,7 @@ def run_sessions(
     check_members(learner, gate)
     if advice is not None and advice.thresholds.shape[1:] != mdp.successor.shape:
         raise BadInput(f"advice of shape {advice.thresholds.shape}: the problem has {mdp.successor.shape}")
-    if not is_compiled(mdp, learner, gate):
+    if not is_compiled(learner, gate):
         return _one_by_one(chances or TableEnvironment(mdp), learner, gate, advice, seeds, keep_tables)
     found = _sessions(mdp, learner, seeds, keep_tables)
     asking = _asking(gate, advice is not None, learner.max_steps)
@@ -76,8 +76,8 @@ def run_sessions(
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, found.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
-    hearing = _hearing(mdp, asking, advice)
-    run(records.Work(problem, learning, asking, *said, found, lanes), memories, hearing, _chances(chances))
+    hearing, walks = _hearing(mdp, asking, advice), _walks(mdp, asking, learning, learner.episodes)
+    run(records.Work(problem, learning, asking, *said, found, lanes), memories, hearing, _chances(chances), walks)
     return _batch(found.steps, found.guided, found.counts, _action_values(mdp, learning, found.kept))
 
 
@@ -85,12 +85,10 @@ def _batch(steps: NDArray[np.int32], guided: NDArray[np.bool_], counts: NDArray[
     return Batch(steps, guided, **{name: counts[name] for name in records.COUNTS.names or ()}, q=q)
 
 
-def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings) -> bool:
-    """Whether the kernel knows this learner, its selection, and this gate by all of its settings."""
-    rules = GATES[gate.gate].compiled
-    if UPDATES[learner.learner].compiled is None or SELECTIONS[learner.selection].compiled is None or rules is None:
-        return False
-    return not rules.judges or len(mdp.starts) < 2  # it judges by the plain counts alone
+def is_compiled(learner: LearnerSettings, gate: GateSettings) -> bool:
+    """Whether the kernel knows this learner, its selection, and this gate."""
+    forms = UPDATES[learner.learner].compiled, SELECTIONS[learner.selection].compiled, GATES[gate.gate].compiled
+    return all(form is not None for form in forms)
 
 
 def _hearing(mdp: TabularMDP, asking: records.Asking, advice: Advice | None) -> records.Hearing | None:
@@ -115,6 +113,16 @@ def _hearing(mdp: TabularMDP, asking: records.Asking, advice: Advice | None) -> 
         speaks=advice.speaks,
         several=float(bool(mdp.starts)),
     )
+
+
+def _walks(
+    mdp: TabularMDP, asking: records.Asking, learning: records.Learning, episodes: int
+) -> records.Walks | None:
+    """What gates that judge need where episodes begin in different states."""
+    if not asking.gate.judges or len(mdp.starts) < 2:
+        return None
+    walk, begun = np.zeros((LANES, learning.max_moves), np.int32), np.zeros((LANES, episodes), np.int32)
+    return records.Walks(np.full((LANES, mdp.n_states), np.inf), walk, begun)
 
 
 def _chances(table: ChanceTable | None) -> records.Chances | None:

@@ -143,3 +143,15 @@ class Chances(NamedTuple):
     below: FloatArray
     entered: NDArray[np.int32]
     reward: FloatArray
+
+
+class Walks(NamedTuple):
+    """What gates that judge know where episodes begin in different states, as `gates.Ccrl` does.
+
+    fewest (LANES, S): the known steps to the goal, inf where none are; walk (LANES, moves): the states that the episode left;
+    begun (LANES, E): where each episode began.
+    """
+
+    fewest: FloatArray
+    walk: NDArray[np.int32]
+    begun: NDArray[np.int32]

@@ -1,0 +1,129 @@
+"""The sessions of AdviceBench: every rule of when to ask, beside one advisor, in one problem, at each budget."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+from zlib import crc32
+
+import numpy as np
+
+from lab.learning.batch import run_sessions
+from lab.learning.settings import GateSettings
+from lab.learning.simulated_advice import SPEAKS_AS_EXPECTED, SPEAKS_TO_CORRECT, Advice
+from lab.mdp import FloatArray
+from lab.studies.ours.advice_bench.bad_advisors import ADVISORS, importance
+from lab.studies.ours.advice_bench.problems import RANDOM_WORLDS, Benched, problem
+
+BUDGETS = {"100": 100, "any": GateSettings.budget}  # answers of a session
+LAST = 0.1  # the share of the episodes that shows what was learned
+BINS = 40  # of a learning curve
+NOBODY, OURS = "nobody", "trust"
+
+
+class Rule(NamedTuple):
+    """A rule of when to ask: the gate with its settings, and what the advisor itself holds back."""
+
+    gate: GateSettings
+    important: bool = False  # it speaks only where most is at stake
+    speaks: int = 0
+
+
+def _gate(gate: str, **settings: Any) -> GateSettings:
+    return GateSettings(gate, spare_best=True, **settings)
+
+
+EARLY: Any = {"first_episode": 1}
+RULES: Mapping[str, Rule] = {
+    "always": Rule(_gate("always")),
+    "random": Rule(_gate("random", **EARLY)),
+    "introspection": Rule(_gate("ia", psi=0.1, **EARLY)),
+    "importance (learner's)": Rule(_gate("importance", psi=0.1, **EARLY)),
+    "uncertainty": Rule(_gate("uncertainty", **EARLY)),
+    "ccrl": Rule(_gate("ccrl", first_episode=10)),
+    "ccrl with memory": Rule(_gate("ccrl", first_episode=10, memory=True)),
+    "combined": Rule(_gate("combined", first_episode=10, psi=0.1)),
+    "cq": Rule(_gate("cq", first_episode=5)),
+    "novelty": Rule(_gate("novelty")),
+    "fading": Rule(_gate("fading")),
+    "shaping": Rule(_gate("shaping")),
+    "reliability": Rule(_gate("reliability")),
+    "two levels": Rule(_gate("two-levels")),
+    "importance (teacher's)": Rule(_gate("always"), important=True),
+    "correcting": Rule(_gate("always"), important=True, speaks=SPEAKS_TO_CORRECT),
+    "predictive": Rule(_gate("always"), important=True, speaks=SPEAKS_AS_EXPECTED),
+    OURS: Rule(_gate(OURS)),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """An advisor in a problem; None: nobody."""
+
+    problem: str
+    advisor: str | None
+
+
+class Outcome(NamedTuple):
+    """What N sessions came to: points (N,) over all episodes, last (N,) over the last ones, answers (N,); curve (BINS,) of points."""
+
+    points: FloatArray
+    last: FloatArray
+    answers: FloatArray
+    curve: FloatArray
+
+    def to_json(self) -> list[list[float]]:
+        """Plain lists, to a hundredth of a point."""
+        return [np.round(one, 2).tolist() for one in self]
+
+    @classmethod
+    def from_json(cls, lists: Any) -> "Outcome":
+        """What `to_json` wrote. Raises TypeError or ValueError for anything else."""
+        return cls(*(np.array(one, np.float64) for one in lists))
+
+
+Outcomes = dict[tuple[str, str], Outcome]  # by rule and budget
+
+
+def tried(case: Case, sessions: int, seed: int, rules: tuple[str, ...] = tuple(RULES)) -> Outcomes:
+    """Every rule at every budget, the same chances for each; of nobody one outcome, ("nobody", "any")."""
+    worlds = min(RANDOM_WORLDS, sessions) if case.problem == "random-worlds" else 1
+    seeds = np.random.default_rng([seed, crc32(case.problem.encode())]).integers(2**64, size=sessions, dtype=np.uint64)
+    shares = np.array_split(seeds, worlds)
+    found: dict[tuple[str, str], list[Any]] = {}
+    for world, own in enumerate(shares):
+        place = problem(case.problem, world)
+        for key, part in _of_place(place, case.advisor, rules, own).items():
+            found.setdefault(key, []).append(part)
+    return {key: _joined(parts) for key, parts in found.items()}
+
+
+def _of_place(
+    place: Benched, advisor: str | None, rules: tuple[str, ...], seeds: np.ndarray
+) -> dict[tuple[str, str], Any]:
+    if advisor is None:
+        return {(NOBODY, "any"): _points(place, GateSettings("never"), None, seeds)}
+    advice = ADVISORS[advisor](place)
+    found = {}
+    for name in rules:
+        rule = RULES[name]
+        spoken = advice
+        if rule.important:
+            region = advice.region & importance(place)
+            spoken = replace(advice, region=region, speaks=rule.speaks)
+        for budget, most in BUDGETS.items():
+            found[name, budget] = _points(place, replace(rule.gate, budget=most), spoken, seeds)
+    return found
+
+
+def _points(place: Benched, gate: GateSettings, advice: Advice | None, seeds: np.ndarray) -> Any:
+    """Points (N, E) and answers (N,): 100 is the best policy's mean, 0 an episode that fails."""
+    batch = run_sessions(place.mdp, place.learner, gate, advice, seeds, chances=place.chances)
+    most = place.learner.max_steps + 1
+    return 100.0 * (most - batch.steps) / (most - place.par), batch.helped_steps
+
+
+def _joined(parts: list[Any]) -> Outcome:
+    points, answers = np.concatenate([one[0] for one in parts]), np.concatenate([one[1] for one in parts])
+    last = max(1, round(LAST * points.shape[1]))
+    curve = np.array([part.mean() for part in np.array_split(points.mean(axis=0), BINS)])
+    return Outcome(points.mean(axis=1), points[:, -last:].mean(axis=1), answers.astype(np.float64), curve)
