@@ -76,6 +76,12 @@ def _advice_worth(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return advice_worth(job, reading)
 
 
+def _advice_bench(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.advice_bench.advice_bench import advice_bench
+
+    return advice_bench(job, reading)
+
+
 def _advisors(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.several_advisors import advisors
 
@@ -179,6 +185,13 @@ _SHIPPED: dict[str, Study] = {
     ),
     "advice-budget": Study("Success against helped steps: every gate with and without memory", _advice_budget, ADVISED),
     "advice-worth": Study("What an advisor's help is worth over nobody's, for every skill of toast", _advice_worth),
+    "advicebench": Study(
+        "AdviceBench: rules of when to ask, whatever the advisor, the budget and the problem",
+        _advice_bench,
+        ("methods", "problem", "advisors"),
+        sessions=100,
+        least=2,
+    ),
     "advisors": Study("Several advisors at once, beside the best and the worst of them alone", _advisors, ADVISED),
     "table-7.4": Study("Table 7.4: sequencing case I by session length", _chapter_7("best_results", "I")),
     "table-7.5": Study("Table 7.5: sequencing case II by session length", _chapter_7("best_results", "II")),

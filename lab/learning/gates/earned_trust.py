@@ -1,11 +1,14 @@
 """The rule of the gate "trust": follow advice while it does better than going alone, remember it, drop what leads round.
 
-1. An answer is remembered: in that state it is followed again without asking. It is blamed, and followed there no more,
-   once it led back to where it was given by advised moves alone, or into an end that is no goal; the learner then asks
-   again, three times a state in all. Where moves are seen to be left to chance, nothing is blamed.
-2. An episode follows advice or none. The first does. While no advised one has reached the goal, the (n+1)th does with
-   chance 1/(n+1)**4; then with the share of the recent ones that did.
-3. It goes alone where its own greedy way, walked in thought by the moves it has made, reaches the goal in no more steps
+1. Answers are counted, state by state, and the one that was given most often is followed, also without asking. The learner asks
+   while none leads clearly: by SURE times the root of how many there were, ANSWERS at the most.
+2. An answer is blamed, and followed there no more, once it led back to where it was given by advised moves alone, or into an
+   end that is no goal. Where moves are seen to be left to chance, nothing is blamed. An episode with BLAMES of them goes on
+   alone.
+3. An episode follows advice or none. The first does. While no advised one has reached the goal, the (n+1)th does with
+   chance 1/(n+1)**4; then with the share that its successes have in those of both, and the less, the fewer of its moves were
+   advised.
+4. It goes alone where its own greedy way, walked in thought by the moves it has made, reaches the goal in no more steps
    than the recent advised episodes took, or where its own recent episodes did better.
 
 As in `heard`, numba compiles these functions, too.
@@ -15,7 +18,9 @@ from collections.abc import Sequence
 
 from lab.learning.gates.heard import GOAL, NOTHING, NOWHERE, Heard, answers, best_of
 
-ANSWERS = 3  # in a state
+SURE = 1.0
+ANSWERS = 20  # in a state
+BLAMES = 1000000
 RECENT = 0.3  # the weight of the last episode in a running mean
 
 
@@ -38,9 +43,9 @@ def rehearsed(heard: Heard, start: int) -> int:
 
 
 def starts(heard: Heard, start: int, u: float) -> None:
-    """An episode begins: whether it follows advice (rules 2 and 3)."""
+    """An episode begins: whether it follows advice (rules 3 and 4)."""
     now = heard.now
-    now.followed = 0.0
+    now.followed = now.moves = now.heeded = now.blames = 0.0
     now.since = now.clock = now.clock + 1.0
     chance = 1.0
     if now.helped > 0.0:
@@ -51,27 +56,48 @@ def starts(heard: Heard, start: int, u: float) -> None:
             chance = 0.0
         elif now.own >= 3.0 and now.own_rate >= now.rate and now.own_steps <= now.steps:
             chance = 0.0
-        else:
-            chance = now.rate
-    now.mode = 1.0 if u < chance else 0.0
+        elif now.rate > 0.0:
+            chance = now.rate * (0.5 + 0.5 * now.heed)
+    now.advised = now.mode = 1.0 if u < chance else 0.0
 
 
-def remembers(heard: Heard, state: int) -> bool:
-    """Whether an answer is known here that nothing speaks against."""
-    said = heard.said[state]
-    return said != NOTHING and heard.blamed[state * (len(heard.led) // len(heard.said)) + said] == 0
+def favourite(heard: Heard, state: int) -> int:
+    """The answer that was given most often and is not blamed, NOTHING where there is none; ties: the lowest index."""
+    actions = len(heard.led) // len(heard.said)
+    found, most = NOTHING, 0
+    for action in range(actions):
+        number = state * actions + action
+        if heard.times[number] > most and heard.blamed[number] == 0:
+            found, most = action, heard.times[number]
+    return found
 
 
 def wants(heard: Heard, state: int) -> bool:
     """Whether to ask (rule 1)."""
-    return heard.now.mode > 0.0 and not remembers(heard, state) and answers(heard, state) < ANSWERS
+    if heard.now.mode == 0.0:
+        return False
+    given = answers(heard, state)
+    if given >= ANSWERS:
+        return False
+    actions = len(heard.led) // len(heard.said)
+    most = second = 0
+    for number in range(state * actions, (state + 1) * actions):
+        if heard.blamed[number] == 0:
+            times = heard.times[number]
+            if times > most:
+                most, second = times, most
+            elif times > second:
+                second = times
+    return most - second <= SURE * given**0.5
 
 
 def takes(heard: Heard, state: int, own: int) -> int:
     """What is known of this state, or the learner's own choice."""
-    if heard.now.mode > 0.0 and remembers(heard, state):
-        return heard.said[state]
-    return own
+    if heard.now.mode == 0.0:
+        return own
+    said = favourite(heard, state)
+    heard.now.followed = 0.0 if said == NOTHING else 1.0
+    return own if said == NOTHING else said
 
 
 def saw(heard: Heard, number: int, entered: int, over: bool, values: Sequence[float]) -> None:
@@ -80,6 +106,8 @@ def saw(heard: Heard, number: int, entered: int, over: bool, values: Sequence[fl
     actions = len(led) // len(heard.said)
     state = number // actions
     now.clock += 1.0
+    now.moves += 1.0
+    now.heeded += now.followed
     now.last = number
     heard.greedy[state] = best_of(values)
     if over:
@@ -94,10 +122,12 @@ def saw(heard: Heard, number: int, entered: int, over: bool, values: Sequence[fl
         now.since = now.clock
         return
     heard.left[state] = int(now.clock)
-    if heard.left[entered] > now.since:
-        said = heard.said[entered]
-        if said != NOTHING and now.uncertain == 0.0:
-            heard.blamed[entered * actions + said] = 1
+    heard.said[state] = number - state * actions
+    if heard.left[entered] > now.since and now.uncertain == 0.0:
+        heard.blamed[entered * actions + heard.said[entered]] = 1
+        now.blames += 1.0
+        if now.blames >= BLAMES:
+            now.mode = 0.0
 
 
 def ended(heard: Heard, result: float, reached: bool, over: bool) -> None:
@@ -111,9 +141,11 @@ def ended(heard: Heard, result: float, reached: bool, over: bool) -> None:
         if now.blame != NOTHING and now.uncertain == 0.0:
             heard.blamed[int(now.blame)] = 1
     won = 1.0 if reached else 0.0
-    if now.mode > 0.0:
+    if now.advised > 0.0:
+        heed = now.heeded / max(now.moves, 1.0)
         now.rate = won if now.helped == 0.0 else now.rate + RECENT * (won - now.rate)
         now.steps = result if now.helped == 0.0 else now.steps + RECENT * (result - now.steps)
+        now.heed = heed if now.helped == 0.0 else now.heed + RECENT * (heed - now.heed)
         now.helped += 1.0
         now.won += won
     else:

@@ -23,8 +23,9 @@ class HeardNow:
 
     right, wrong: answers that the learner's own values bore out, or not; helped, won, rate, steps: episodes that followed advice,
     those that reached the goal, and running means; own_rate, own_steps: of those that did not; several: episodes begin in different
-    states; uncertain: a move has led to different places; mode: this episode follows advice; followed: the last move
-    did; last: its place in `led`; blame: that of a followed move that ended the episode, -1: none; clock: moves so far;
+    states; uncertain: a move has led to different places; advised: this episode follows
+    advice, or did at first; mode: it does now; moves, heeded: of it, and those on advice; heed: the running mean of their
+    share; blames: of this episode; followed: the last move was on advice; last: its place in `led`; blame: that of a followed move that ended the episode, -1: none; clock: moves so far;
     since: when the moves that were all followed began.
     """
 
@@ -39,7 +40,12 @@ class HeardNow:
     own_steps: float = 0.0
     several: float = 0.0
     uncertain: float = 0.0
+    advised: float = 0.0
     mode: float = 0.0
+    moves: float = 0.0
+    heeded: float = 0.0
+    heed: float = 0.0
+    blames: float = 0.0
     followed: float = 0.0
     last: float = 0.0
     blame: float = -1.0
@@ -85,6 +91,7 @@ def clear(heard: Heard, several: float) -> None:
     now = heard.now
     now.right = now.wrong = 1.0
     now.helped = now.won = now.rate = now.steps = now.own = now.own_rate = now.own_steps = 0.0
+    now.heed = now.advised = now.moves = now.heeded = now.blames = 0.0
     now.uncertain = now.mode = now.followed = now.last = now.clock = now.since = 0.0
     now.several, now.blame = several, -1.0
 

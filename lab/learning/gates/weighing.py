@@ -39,16 +39,12 @@ class Weighing(Gate):
         """What is said is kept, and followed or not, as `weighed` has it."""
         if said is not None:
             heard.hear(self.heard, state, said)
-        self.heard.now.followed = float(self.follows(state, said))
+        self.heard.now.followed = float(said is not None)
         return self.weighed(state, own, said)
 
     def weighed(self, state: int, own: int, said: int | None) -> int:
         """The action, once what was said is kept."""
         return own if said is None else said
-
-    def follows(self, state: int, said: int | None) -> bool:
-        """Whether the move is taken because it was said."""
-        return said is not None
 
     def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
         """A step was made and learned from; the next one follows advice only if `takes` says so."""
@@ -143,7 +139,7 @@ class Trust(Weighing):
         earned_trust.starts(self.heard, state, self._around.draw())
 
     def asks(self, state: int, values: Values) -> bool:
-        """Whether this episode follows advice and none is known here that nothing speaks against."""
+        """Whether this episode follows advice and the answers so far leave it unsure."""
         now = self.heard.now
         self.why = Trusted(now.rate) if now.helped else Reason()
         return earned_trust.wants(self.heard, state)
@@ -151,10 +147,6 @@ class Trust(Weighing):
     def weighed(self, state: int, own: int, said: int | None) -> int:
         """What is known of this state, or the learner's own choice."""
         return earned_trust.takes(self.heard, state, own)
-
-    def follows(self, state: int, said: int | None) -> bool:
-        """An episode that follows advice takes what is known."""
-        return self.heard.now.mode > 0.0 and earned_trust.remembers(self.heard, state)
 
     def learns(self, state: int, action: int, reward: float, discount: float, entered: int) -> None:
         """Where the move led, and whether it led round."""

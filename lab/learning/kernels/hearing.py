@@ -25,9 +25,8 @@ _borne_out: Any = inlined(linked(heard.borne_out, best_of=_best_of))
 _asks_by_worth: Any = inlined(heard.asks_by_worth)
 _learn_worth: Any = inlined(linked(heard.learn_worth, towards=inlined(update.towards)))
 _starts: Any = inner(linked(earned_trust.starts, rehearsed=inner(earned_trust.rehearsed)))
-_remembers: Any = inlined(earned_trust.remembers)
-_wants: Any = inlined(linked(earned_trust.wants, remembers=_remembers, answers=_answers))
-_takes: Any = inlined(linked(earned_trust.takes, remembers=_remembers))
+_wants: Any = inlined(linked(earned_trust.wants, answers=_answers))
+_takes: Any = inlined(linked(earned_trust.takes, favourite=inlined(earned_trust.favourite)))
 _saw: Any = inlined(linked(earned_trust.saw, best_of=_best_of))
 _ended: Any = inner(earned_trust.ended)
 
@@ -81,10 +80,7 @@ def takes(work: Any, hearing: Any, j: int, state: Any, own: Any, said: int) -> A
     at, actions = np.int64(state), len(work.learning.actions)
     if said != heard.NOTHING:
         _hear(told, at, said)
-    follows = said != heard.NOTHING
-    if how == rules.WEIGHS_TRUST:
-        follows = told.now.mode > 0.0 and _remembers(told, at)
-    told.now.followed = 1.0 if follows else 0.0
+    told.now.followed = 0.0 if said == heard.NOTHING else 1.0
     action = np.int64(own) if said == heard.NOTHING else np.int64(said)
     if how == rules.WEIGHS_TRUST:
         action = np.int64(_takes(told, at, np.int64(own)))

@@ -6,8 +6,10 @@ from zlib import crc32
 
 import numpy as np
 
-from lab.advice.advisors import SKILL_TAUS
-from lab.learning.simulated_advice import Advice, advice_chances
+from lab.advice.advisors import SKILL_TAUS, AdvisorName
+from lab.advice.table_level import TableLevel
+from lab.learning.requests import AdviceRequest
+from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.mdp import BoolArray, FloatArray
 from lab.studies.ours.advice_bench.problems import Benched
 
@@ -80,6 +82,31 @@ ADVISORS: Mapping[str, Made] = {
     "long-winded": long_winded,
     "silent": silent,
 }
+
+
+def advice_of(name: str, of: Benched) -> Advice:
+    """Of an advisor of the bench, or of any other that answers a question always alike, such as one that was recorded.
+
+    BadInput for a name that no advisor has, and for a record that is about another problem.
+    """
+    if name in ADVISORS:
+        return ADVISORS[name](of)
+    level = TableLevel(of.mdp, of.learner.discount, np.random.default_rng(0), episodes=of.learner.episodes)
+    advisor = level.advisor(AdvisorName.of(name, "--advisors"))
+    if isinstance(advisor, TableAdvisor):
+        return advisor.advice
+    says = np.zeros(of.mdp.successor.shape)
+    q = [[0.0] * of.mdp.n_actions] * of.mdp.n_states
+    for state in np.flatnonzero(~of.mdp.terminal).tolist():
+        request = AdviceRequest(
+            episode=1, step=1, state=state, own=0, allowed=range(of.mdp.n_actions), mdp=of.mdp, q=q
+        )
+        action = None if advisor is None else advisor.advise(request)
+        if action is not None:
+            says[state, action] = 1.0
+    heard = says.any(axis=1)
+    says[~heard, 0] = 1.0
+    return Advice.of(says, heard)
 
 
 def importance(of: Benched, share: float = 0.5) -> BoolArray:
