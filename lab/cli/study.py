@@ -54,7 +54,9 @@ def study_run(
     ] = None,
     advisors: Annotated[
         str | None,
-        typer.Option("--advisors", help="advicebench: some only, or others, such as recorded:DIR, with commas between."),
+        typer.Option(
+            "--advisors", help="advicebench: some only, or others, such as recorded:DIR, with commas between."
+        ),
     ] = None,
     instances: Annotated[
         list[Path] | None, typer.Option("--instances", help="transport: files or folders of your own instead.")

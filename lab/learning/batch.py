@@ -115,9 +115,7 @@ def _hearing(mdp: TabularMDP, asking: records.Asking, advice: Advice | None) -> 
     )
 
 
-def _walks(
-    mdp: TabularMDP, asking: records.Asking, learning: records.Learning, episodes: int
-) -> records.Walks | None:
+def _walks(mdp: TabularMDP, asking: records.Asking, learning: records.Learning, episodes: int) -> records.Walks | None:
     """What gates that judge need where episodes begin in different states."""
     if not asking.gate.judges or len(mdp.starts) < 2:
         return None

@@ -109,4 +109,6 @@ class Trusted(Reason):
     rate: float
 
     def __str__(self) -> str:
-        return f"it knows nothing to hold on to here, and {self.rate:.0%} of the recent advised episodes reached the goal"
+        return (
+            f"it knows nothing to hold on to here, and {self.rate:.0%} of the recent advised episodes reached the goal"
+        )

@@ -82,6 +82,12 @@ def _advice_bench(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return advice_bench(job, reading)
 
 
+def _whom_to_believe(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.whom_to_believe import whom_to_believe
+
+    return whom_to_believe(job, reading)
+
+
 def _advisors(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.several_advisors import advisors
 
@@ -189,6 +195,12 @@ _SHIPPED: dict[str, Study] = {
         "AdviceBench: rules of when to ask, whatever the advisor, the budget and the problem",
         _advice_bench,
         ("methods", "problem", "advisors"),
+        sessions=100,
+        least=2,
+    ),
+    "whom-to-believe": Study(
+        "Whom to believe: is a panel of seven ranked rightly, and are three limited advisors better than nobody?",
+        _whom_to_believe,
         sessions=100,
         least=2,
     ),

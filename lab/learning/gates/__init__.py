@@ -65,9 +65,7 @@ _SHIPPED: dict[str, Member[GateClass]] = {
         "several tables learn side by side, and it asks where they disagree",
         CompiledGate(rules.OPENS_FROM_X, rules.ASKS_WHERE_TABLES_DIFFER),
     ),
-    "novelty": Member(
-        Novelty, "asks in every state until it has been answered there", _weighing(rules.WEIGHS_NOVELTY)
-    ),
+    "novelty": Member(Novelty, "asks in every state until it has been answered there", _weighing(rules.WEIGHS_NOVELTY)),
     "fading": Member(
         Fading, "asks about a share of the steps that fades with the episodes", _weighing(rules.WEIGHS_FADING)
     ),

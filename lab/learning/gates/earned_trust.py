@@ -3,11 +3,10 @@
 1. Answers are counted, state by state, and the one that was given most often is followed, also without asking. The learner asks
    while none leads clearly: by SURE times the root of how many there were, ANSWERS at the most.
 2. An answer is blamed, and followed there no more, once it led back to where it was given by advised moves alone, or into an
-   end that is no goal. Where moves are seen to be left to chance, nothing is blamed. An episode with BLAMES of them goes on
-   alone.
+   end that is no goal. Where moves are seen to be left to chance, nothing is blamed.
 3. An episode follows advice or none. The first does. While no advised one has reached the goal, the (n+1)th does with
-   chance 1/(n+1)**4; then with the share that its successes have in those of both, and the less, the fewer of its moves were
-   advised.
+   chance 1/(n+1)**4; then with the share of the recent ones that did, up to half of it the less, the fewer of their moves
+   were advised.
 4. It goes alone where its own greedy way, walked in thought by the moves it has made, reaches the goal in no more steps
    than the recent advised episodes took, or where its own recent episodes did better.
 
@@ -20,12 +19,12 @@ from lab.learning.gates.heard import GOAL, NOTHING, NOWHERE, Heard, answers, bes
 
 SURE = 1.0
 ANSWERS = 20  # in a state
-BLAMES = 1000000
+OWN = 3.0  # episodes of its own that it has judged itself by
 RECENT = 0.3  # the weight of the last episode in a running mean
 
 
 def rehearsed(heard: Heard, start: int) -> int:
-    """The moves of the greedy way from a state to the goal by moves that were made, NOTHING where it is not known to get there."""
+    """The moves of the greedy way from a state to the goal by moves that were made, NOTHING where it is not known."""
     states, actions = len(heard.said), len(heard.led) // len(heard.said)
     state, moves = start, 0
     while moves < states:
@@ -45,20 +44,20 @@ def rehearsed(heard: Heard, start: int) -> int:
 def starts(heard: Heard, start: int, u: float) -> None:
     """An episode begins: whether it follows advice (rules 3 and 4)."""
     now = heard.now
-    now.followed = now.moves = now.heeded = now.blames = 0.0
+    now.followed = now.moves = now.heeded = 0.0
     now.since = now.clock = now.clock + 1.0
     chance = 1.0
     if now.helped > 0.0:
         moves = rehearsed(heard, start)
+        known = moves != NOTHING and (now.several > 0.0 or moves <= now.steps)
+        better = now.own >= OWN and now.own_rate >= now.rate and now.own_steps <= now.steps
         if now.won == 0.0:
             chance = (now.helped + 1.0) ** -4.0
-        elif moves != NOTHING and (now.several > 0.0 or moves <= now.steps):
+        elif known or better:
             chance = 0.0
-        elif now.own >= 3.0 and now.own_rate >= now.rate and now.own_steps <= now.steps:
-            chance = 0.0
-        elif now.rate > 0.0:
+        else:
             chance = now.rate * (0.5 + 0.5 * now.heed)
-    now.advised = now.mode = 1.0 if u < chance else 0.0
+    now.advised = 1.0 if u < chance else 0.0
 
 
 def favourite(heard: Heard, state: int) -> int:
@@ -74,7 +73,7 @@ def favourite(heard: Heard, state: int) -> int:
 
 def wants(heard: Heard, state: int) -> bool:
     """Whether to ask (rule 1)."""
-    if heard.now.mode == 0.0:
+    if heard.now.advised == 0.0:
         return False
     given = answers(heard, state)
     if given >= ANSWERS:
@@ -88,12 +87,12 @@ def wants(heard: Heard, state: int) -> bool:
                 most, second = times, most
             elif times > second:
                 second = times
-    return most - second <= SURE * given**0.5
+    return bool(most - second <= SURE * given**0.5)
 
 
 def takes(heard: Heard, state: int, own: int) -> int:
     """What is known of this state, or the learner's own choice."""
-    if heard.now.mode == 0.0:
+    if heard.now.advised == 0.0:
         return own
     said = favourite(heard, state)
     heard.now.followed = 0.0 if said == NOTHING else 1.0
@@ -125,9 +124,6 @@ def saw(heard: Heard, number: int, entered: int, over: bool, values: Sequence[fl
     heard.said[state] = number - state * actions
     if heard.left[entered] > now.since and now.uncertain == 0.0:
         heard.blamed[entered * actions + heard.said[entered]] = 1
-        now.blames += 1.0
-        if now.blames >= BLAMES:
-            now.mode = 0.0
 
 
 def ended(heard: Heard, result: float, reached: bool, over: bool) -> None:

@@ -1,7 +1,7 @@
 """What all gates have in common, and the two that look at nothing."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from lab.learning.gates.gate_rules import Steps
 from lab.learning.reasons import Reason
@@ -27,16 +27,17 @@ class Surroundings:
     several_starts: bool = False
     values: Callable[[int], Values] = lambda state: ()
     size: tuple[int, int] = (0, 0)
-    learner: LearnerSettings = LearnerSettings()
+    learner: LearnerSettings = field(default_factory=LearnerSettings)
 
 
 class Gate:
     """The base of all gates, and the gate "always": every step of every episode asks, and nothing is ever rejected.
 
     A session calls `opens` before each episode, `begins` where it begins, `asks` before each step of an open one, `takes`
-    with what was answered (if `weighs`), `saw` after each step (if `watches`), and `judges` after the episode. `steps` holds the step counts of the finished
-    episodes, a failed one as max_steps + 1. `why`: the reason of the last question; `verdict`: what the gate makes of
-    the episode that ended last, see `Verdict`.
+    with what was answered, `saw` after each step (if `watches`), and `judges` after the episode. `steps` holds the step
+    counts of the finished episodes, a failed one as max_steps + 1. `why`: the reason of the last question; `verdict`: what
+    the gate makes of the episode that ended last, see `Verdict`. weighs: it is asked and given to take also where the
+    budget is spent.
     """
 
     watches = weighs = False

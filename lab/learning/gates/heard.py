@@ -21,12 +21,12 @@ Numbers = MutableSequence[float]
 class HeardNow:
     """The numbers of what was heard; the kernel keeps them in a record of the same names.
 
-    right, wrong: answers that the learner's own values bore out, or not; helped, won, rate, steps: episodes that followed advice,
-    those that reached the goal, and running means; own_rate, own_steps: of those that did not; several: episodes begin in different
-    states; uncertain: a move has led to different places; advised: this episode follows
-    advice, or did at first; mode: it does now; moves, heeded: of it, and those on advice; heed: the running mean of their
-    share; blames: of this episode; followed: the last move was on advice; last: its place in `led`; blame: that of a followed move that ended the episode, -1: none; clock: moves so far;
-    since: when the moves that were all followed began.
+    right, wrong: answers that the learner's own values bore out, or not. helped, won: episodes that followed advice, and those
+    of them that reached the goal; rate, steps, heed: running means of whether they did, how long they took, and the share of
+    their moves that were advised; own, own_rate, own_steps: of the others. several: episodes begin in different states;
+    uncertain: a move has led to different places. Of the episode under way: advised: it follows advice; moves, heeded: all,
+    and those on advice; followed: the last one was; last: its place in `led`; blame: that of a followed move that ended the
+    episode, -1: none; clock: moves of the session; since: when the moves that were all followed began.
     """
 
     right: float = 1.0
@@ -41,11 +41,9 @@ class HeardNow:
     several: float = 0.0
     uncertain: float = 0.0
     advised: float = 0.0
-    mode: float = 0.0
     moves: float = 0.0
     heeded: float = 0.0
     heed: float = 0.0
-    blames: float = 0.0
     followed: float = 0.0
     last: float = 0.0
     blame: float = -1.0
@@ -91,8 +89,8 @@ def clear(heard: Heard, several: float) -> None:
     now = heard.now
     now.right = now.wrong = 1.0
     now.helped = now.won = now.rate = now.steps = now.own = now.own_rate = now.own_steps = 0.0
-    now.heed = now.advised = now.moves = now.heeded = now.blames = 0.0
-    now.uncertain = now.mode = now.followed = now.last = now.clock = now.since = 0.0
+    now.heed = now.advised = now.moves = now.heeded = 0.0
+    now.uncertain = now.followed = now.last = now.clock = now.since = 0.0
     now.several, now.blame = several, -1.0
 
 
@@ -145,7 +143,10 @@ def shaped(heard: Heard, state: int, values: Sequence[float], per_tau: float, od
 
 # Reliability, as CLUE estimates it
 
-EXPLORING, FOLLOWED_FROM = 0.8, 0.25  # share of the episodes in which it explores; the least chance that an answer is right
+EXPLORING, FOLLOWED_FROM = (
+    0.8,
+    0.25,
+)  # share of the episodes in which it explores; the least chance that an answer is right
 
 
 def explores(episode: int, episodes: int, u: float) -> bool:

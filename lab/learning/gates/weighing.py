@@ -158,5 +158,3 @@ class Trust(Weighing):
         """How the episode went."""
         reached = steps[-1] <= self.max_steps
         earned_trust.ended(self.heard, float(steps[-1]), reached, self._over)
-
-

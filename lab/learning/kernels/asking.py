@@ -50,7 +50,9 @@ def judge(asking: Any, lane: Any, steps: Any, count: Any) -> None:
         return
     result = steps[episode - 1]
     if _misled(result, _window_mean(steps, episode - 1, window)):
-        best = bool(asking.spare_best and result <= asking.max_steps)  # the fewest known steps: those of the best episode
+        best = bool(
+            asking.spare_best and result <= asking.max_steps
+        )  # the fewest known steps: those of the best episode
         if best:
             for i in range(episode - 1):
                 best = best and result <= steps[i]
@@ -163,12 +165,12 @@ def decided(work: Any, memories: Any, hearing: Any, j: int) -> Any:
                     lane.helped += 1
                     action, source = advised(work, j, state), np.int64(memory.ASKED)
         else:
-            weighs, said = work.asking.gate.weighs != rules.WEIGHS_NOTHING, np.int64(NOTHING)
+            weighs, said = work.asking.gate.weighs != rules.WEIGHS_NOTHING, NOTHING
             may = lane.helped < lane.left
             wanted = wants(work, hearing, j, state) if weighs else may and asks(work, j, state)
             if wanted and may:
                 lane.asked = 1
-                said = np.int64(answered(work, hearing, j, state, action))
+                said = answered(work, hearing, j, state, action)
                 if said != NOTHING:
                     lane.helped += 1
                     source = np.int64(memory.ASKED)

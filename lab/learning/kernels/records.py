@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.learning.advice_memory import Now
-from lab.learning.gates.heard import Heard, HeardNow
 from lab.learning.gates.gate_rules import CompiledGate
+from lab.learning.gates.heard import Heard, HeardNow
 from lab.mdp import FloatArray
 
 LANES = 24

@@ -98,13 +98,11 @@ def advice_of(name: str, of: Benched) -> Advice:
     says = np.zeros(of.mdp.successor.shape)
     q = [[0.0] * of.mdp.n_actions] * of.mdp.n_states
     for state in np.flatnonzero(~of.mdp.terminal).tolist():
-        request = AdviceRequest(
-            episode=1, step=1, state=state, own=0, allowed=range(of.mdp.n_actions), mdp=of.mdp, q=q
-        )
+        request = AdviceRequest(episode=1, step=1, state=state, own=0, allowed=range(of.mdp.n_actions), mdp=of.mdp, q=q)
         action = None if advisor is None else advisor.advise(request)
         if action is not None:
             says[state, action] = 1.0
-    heard = says.any(axis=1)
+    heard: BoolArray = says.sum(axis=1) > 0.0
     says[~heard, 0] = 1.0
     return Advice.of(says, heard)
 
@@ -115,5 +113,3 @@ def importance(of: Benched, share: float = 0.5) -> BoolArray:
     width: FloatArray = of.values.max(axis=1) - of.values.min(axis=1)
     wide: BoolArray = width >= np.quantile(width[live], 1.0 - share)
     return wide & live
-
-

@@ -1,6 +1,7 @@
-"""Problems of the field rebuilt as tables: MiniGrid's empty, door-key and lava layouts, and the order of toasts in steps of 10 s."""
+"""Problems of the field rebuilt as tables: MiniGrid's empty, door-key and lava layouts, and the order of toasts."""
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,14 +17,27 @@ FOUR_ROOMS_ROWS = ("S..#....", "...#....", "........", "...#....", "#.####.#", "
 CROSSING_ROWS = ("S.~....", "..~....", "....~..", "..~.~..", "..~.~..", "..~.~..", "..~.~.G")
 LAVA_ROWS = ("S..~...", "...~...", "...~...", "...~...", ".......", "...~...", "...~..G")
 WON, LOST = "won", "lost"
+ENDS = {"G": WON, "~": LOST}
 
-State = Hashable
-Leads = Callable[[State, int], State]  # WON and LOST end an episode
+Leads = Callable[
+    [Any, int], Any
+]  # from a state, whatever can be in a dictionary, to another; WON and LOST end an episode
 
 
-def explored(start: State, actions: Sequence[str], leads: Leads) -> TabularMDP:
+class At(NamedTuple):
+    """Where an agent of MiniGrid is: row, column, which of AHEAD it faces, whether it has the key and the door is open."""
+
+    row: int
+    column: int
+    facing: int = 0
+    has_key: bool = False
+    is_open: bool = False
+
+
+def explored(start: Any, actions: Sequence[str], leads: Leads) -> TabularMDP:
     """The states that can be reached from one, by number in the order found, as a decision problem with the lab's rewards."""
-    rewards, found, queue = Rewards(), {start: 0}, [start]
+    rewards, queue = Rewards(), [start]
+    found: dict[Any, int] = {start: 0}
     rows: list[list[int]] = []
     for state in queue:
         ends = state in (WON, LOST)
@@ -53,28 +67,29 @@ def minigrid(rows: Sequence[str]) -> TabularMDP:
     (start,) = (cell for cell, mark in cells.items() if mark == "S")
     doors = "D" in cells.values()
 
-    def leads(state: State, action: int) -> State:
-        (row, column), facing, has_key, is_open = state  # type: ignore[misc]
-        ahead = row + AHEAD[facing][0], column + AHEAD[facing][1]
-        mark = cells.get(ahead, "#")
+    def leads(at: At, action: int) -> At | str:
         if action in (LEFT, RIGHT):
-            return (row, column), (facing + (1 if action == RIGHT else -1)) % 4, has_key, is_open
+            return at._replace(facing=(at.facing + (1 if action == RIGHT else -1)) % len(AHEAD))
+        down, right = AHEAD[at.facing]
+        ahead = at.row + down, at.column + right
+        mark = cells.get(ahead, "#")
         if action == PICK_UP:
-            return (row, column), facing, has_key or mark == "k", is_open
+            return at._replace(has_key=at.has_key or mark == "k")
         if action == TOGGLE:
-            return (row, column), facing, has_key, is_open or (mark == "D" and has_key)
-        if mark == "G":
-            return WON
-        if mark == "~":
-            return LOST
-        shut = mark == "#" or (mark == "k" and not has_key) or (mark == "D" and not is_open)
-        return state if shut else (ahead, facing, has_key, is_open)
+            return at._replace(is_open=at.is_open or (mark == "D" and at.has_key))
+        if mark in ENDS:
+            return ENDS[mark]
+        shut = mark == "#" or (mark == "k" and not at.has_key) or (mark == "D" and not at.is_open)
+        return at if shut else at._replace(row=ahead[0], column=ahead[1])
 
-    return explored((start, 0, False, False), TURNS if doors else TURNS[:3], leads)
+    return explored(At(*start), TURNS if doors else TURNS[:3], leads)
 
 
 TOASTS, TOASTING, BUTTERING, SLOTS = 3, 4, 2, 2  # times in steps of 10 s
 BREAD, IN_TOASTER, TOASTED, IN_APPLIER, BUTTERED, DONE = range(6)
+
+
+Toasts = tuple[tuple[int, int], ...]  # of each toast its stage, and how long it still stays there
 
 
 def toast_order() -> TabularMDP:
@@ -84,8 +99,7 @@ def toast_order() -> TabularMDP:
     action moves one toast on, or waits; a move that cannot be made is a wait. All else about the cell is left out.
     """
 
-    def leads(state: State, action: int) -> State:
-        toasts = list(state)  # type: ignore[call-overload]
+    def leads(toasts: Toasts, action: int) -> Toasts | str:
         moved = None
         if action < TOASTS:
             stage, _ = toasts[action]

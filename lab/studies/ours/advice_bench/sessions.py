@@ -66,7 +66,7 @@ class Case:
 
 
 class Outcome(NamedTuple):
-    """What N sessions came to: points (N,) over all episodes, last (N,) over the last ones, answers (N,); curve (BINS,) of points."""
+    """What N sessions came to: points (N,) of all episodes, last (N,) of the last ones, answers (N,); curve (BINS,) of points."""
 
     points: FloatArray
     last: FloatArray
@@ -89,7 +89,8 @@ Outcomes = dict[tuple[str, str], Outcome]  # by rule and budget
 def tried(case: Case, sessions: int, seed: int, rules: tuple[str, ...] = tuple(RULES)) -> Outcomes:
     """Every rule at every budget, the same chances for each; of nobody one outcome, ("nobody", "any")."""
     worlds = min(RANDOM_WORLDS, sessions) if case.problem in SEVERAL else 1
-    seeds = np.random.default_rng([seed, crc32(case.problem.encode())]).integers(2**64, size=sessions, dtype=np.uint64)
+    rng = np.random.default_rng([seed, crc32(case.problem.encode())])
+    seeds = rng.integers(2**64, size=sessions, dtype=np.uint64)
     shares = np.array_split(seeds, worlds)
     found: dict[tuple[str, str], list[Any]] = {}
     for world, own in enumerate(shares):
