@@ -5,7 +5,7 @@
 2. An answer is blamed, and followed there no more, once it led back to where it was given by advised moves alone, or into an
    end that is no goal. Where moves are seen to be left to chance, nothing is blamed.
 3. An episode follows advice or none. The first does. While no advised one has reached the goal, the (n+1)th does with
-   chance 1/(n+1)**4; then with the share of the recent ones that did, up to half of it the less, the fewer of their moves
+   chance 1/(n+1)**5; then with the share of the recent ones that did, up to half of it the less, the fewer of their moves
    were advised.
 4. It goes alone where its own greedy way, walked in thought by the moves it has made, reaches the goal in no more steps
    than the recent advised episodes took, or where its own recent episodes did better.
@@ -52,7 +52,7 @@ def starts(heard: Heard, start: int, u: float) -> None:
         known = moves != NOTHING and (now.several > 0.0 or moves <= now.steps)
         better = now.own >= OWN and now.own_rate >= now.rate and now.own_steps <= now.steps
         if now.won == 0.0:
-            chance = (now.helped + 1.0) ** -4.0
+            chance = (now.helped + 1.0) ** -5.0
         elif known or better:
             chance = 0.0
         else:

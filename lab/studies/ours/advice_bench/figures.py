@@ -26,7 +26,7 @@ def distances(ranked: Ranks) -> bytes:
             rank, colour = ranked.mean[rule], ORANGE if rule == OURS else BLUE
             axes.hlines(line, rank, rank + ranked.critical, color=GREY, linewidth=1.0)
             axes.plot(rank, line, "o", color=colour, markersize=5)
-            axes.text(rank - 0.15, line, f"{rank:.1f}", ha="right", va="center", color=INK)
+            axes.text(rank - 0.3, line, f"{rank:.1f}", ha="right", va="center", color=INK)
         axes.set_yticks(range(len(rules)), rules)
         axes.set(xlabel=f"mean rank (bar: critical difference {ranked.critical:.1f})", ylim=(len(rules) - 0.5, -0.5))
         axes.set_xlim(0.0, len(rules) + ranked.critical)
@@ -95,7 +95,8 @@ def answers_and_gain(rows: Sequence[Row], rules: Sequence[str]) -> bytes:
                 own = [one for one in rows if (one["rule"], one["budget"]) == (rule, budget)]
                 at = max(1.0, float(np.mean([one["answers"] for one in own]))), np.mean([one["value"] for one in own])
                 axes.plot(*at, marker, color=ORANGE if rule == OURS else BLUE, markersize=5)
-                axes.annotate(rule, at, xytext=(4, 2), textcoords="offset points", fontsize=6.5)
+                if budget == "any" or rule == OURS:
+                    axes.annotate(rule, at, xytext=(4, 2), textcoords="offset points", fontsize=6.5)
             axes.plot([], [], marker, color=INK, label=f"budget: {budget}")
         axes.axhline(0.0, color=GREY, linewidth=0.8)
         axes.set(xscale="log", xlabel="answers of a session", ylabel="points gained over nobody")

@@ -15,6 +15,7 @@ from lab.studies.ours.advice_bench.bad_advisors import advice_of, importance
 from lab.studies.ours.advice_bench.problems import RANDOM_WORLDS, SEVERAL, Benched, problem
 
 BUDGETS = {"100": 100, "any": GateSettings.budget}  # answers of a session
+CHANCE_TIMES = 4  # as many sessions where moves are left to chance: their points vary more
 LAST = 0.1  # the share of the episodes that shows what was learned
 BINS = 40  # of a learning curve
 NOBODY, OURS = "nobody", "trust"
@@ -74,8 +75,8 @@ class Outcome(NamedTuple):
     curve: FloatArray
 
     def to_json(self) -> list[list[float]]:
-        """Plain lists, to a hundredth of a point."""
-        return [np.round(one, 2).tolist() for one in self]
+        """Plain lists."""
+        return [one.tolist() for one in self]
 
     @classmethod
     def from_json(cls, lists: Any) -> "Outcome":
@@ -89,6 +90,7 @@ Outcomes = dict[tuple[str, str], Outcome]  # by rule and budget
 def tried(case: Case, sessions: int, seed: int, rules: tuple[str, ...] = tuple(RULES)) -> Outcomes:
     """Every rule at every budget, the same chances for each; of nobody one outcome, ("nobody", "any")."""
     worlds = min(RANDOM_WORLDS, sessions) if case.problem in SEVERAL else 1
+    sessions *= CHANCE_TIMES if problem(case.problem).chances is not None else 1
     rng = np.random.default_rng([seed, crc32(case.problem.encode())])
     seeds = rng.integers(2**64, size=sessions, dtype=np.uint64)
     shares = np.array_split(seeds, worlds)
@@ -129,4 +131,5 @@ def _joined(parts: list[Any]) -> Outcome:
     points, answers = np.concatenate([one[0] for one in parts]), np.concatenate([one[1] for one in parts])
     last = max(1, round(LAST * points.shape[1]))
     curve = np.array([part.mean() for part in np.array_split(points.mean(axis=0), BINS)])
-    return Outcome(points.mean(axis=1), points[:, -last:].mean(axis=1), answers.astype(np.float64), curve)
+    found = points.mean(axis=1), points[:, -last:].mean(axis=1), answers.astype(np.float64), curve
+    return Outcome(*(np.round(one, 2) for one in found))  # to a hundredth of a point: so they are kept
