@@ -11,14 +11,14 @@ Cell = tuple[str, str, str]  # problem, advisor, budget
 
 
 class Ranks(NamedTuple):
-    """Mean ranks by rule, best first; critical: two that lie less apart are not told apart; p: that all are alike.
+    """Mean ranks by rule, best first; critical: two that lie less apart are not told apart; p: that all are alike, None for one problem or two rules.
 
     beaten: of one rule, the p that it scores no more than each other (Wilcoxon's signed ranks over problems, Holm's correction).
     """
 
     mean: dict[str, float]
     critical: float
-    p: float
+    p: float | None
     beaten: dict[str, float]
 
 
@@ -40,7 +40,7 @@ def ranks(scores: Mapping[str, Mapping[Cell, float]], problems: Sequence[str], o
     )
     mean, (n, k) = by_problem.mean(axis=0), by_problem.shape
     critical = float(studentized_range.ppf(0.95, k, np.inf) / np.sqrt(2.0) * np.sqrt(k * (k + 1) / (6.0 * n)))
-    p = float(friedmanchisquare(*by_problem.T).pvalue) if n > 1 and k > 2 else float("nan")
+    p = float(friedmanchisquare(*by_problem.T).pvalue) if n > 1 and k > 2 else None
     ordered = sorted(zip(rules, mean.tolist(), strict=True), key=lambda one: one[1])
     means = {
         rule: np.array([np.mean([of[cell] for cell in cells if cell[0] == name]) for name in dict.fromkeys(problems)])
