@@ -114,6 +114,11 @@ class TabularMDP:
         """The number of actions A."""
         return int(self.successor.shape[1])
 
+    @property
+    def cells(self) -> tuple[int, ...]:
+        """The grid whose cells the states are, as far as tile coding goes by it; () when they are no grid."""
+        return self.shape
+
     @cached_property
     def signature(self) -> str:
         """The first 16 hex digits of a SHA-256 over all that defines the problem: equal problems, equal signatures."""

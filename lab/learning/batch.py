@@ -13,16 +13,22 @@ from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Memory, places
 from lab.learning.gates import GATES
 from lab.learning.gates.gate_rules import ASKS_WHERE_TABLES_DIFFER
-from lab.learning.kernels import records
+from lab.learning.environment import TableEnvironment
+from lab.learning.kernels import linear_loop, records
 from lab.learning.kernels.records import LANES
 from lab.learning.kernels.session_loop import run
+from lab.learning.physics.environment import CellTable, PhysicsEnvironment
 from lab.learning.selection import SELECTIONS
 from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.learning.simulated_advice import Advice, TableAdvisor
-from lab.learning.updates import UPDATES
+from lab.learning.tiles import TileCoding
+from lab.learning.updates import LINEAR, UPDATES
+from lab.learning.updates.linear import TileSarsa
 from lab.learning.updates.update import STATE_VALUES
 from lab.mdp import FloatArray, TabularMDP
+
+CHOICES = {"softmax": linear_loop.SOFTMAX, "epsilon-greedy": linear_loop.EPSILON_GREEDY, "greedy": linear_loop.GREEDY}
 
 
 class Batch(NamedTuple):
@@ -63,12 +69,18 @@ def run_sessions(
         raise BadInput(f"advice of shape {advice.thresholds.shape}: the problem has {mdp.successor.shape}")
     if not is_compiled(mdp, learner, gate):
         return _one_by_one(mdp, learner, gate, advice, seeds, keep_tables)
-    found = _sessions(mdp, learner, seeds, keep_tables)
     asking = _asking(gate, advice is not None, learner.max_steps)
     learning, problem = _learning(mdp, learner), _problem(mdp, learner)
     said = (np.zeros((1, 1, mdp.n_actions)), np.zeros(mdp.n_states, np.bool_))
     if advice is not None:
         said = advice.thresholds, advice.region
+    if learner.tilings > 1:
+        found = _sessions(learner, seeds, TileCoding(mdp.cells, learner.tilings).count * mdp.n_actions, keep_tables)
+        lanes = _lanes(mdp.n_actions, learner.episodes, 0, 0)
+        learning = learning._replace(actions=np.zeros(mdp.n_actions))  # of any length: compiled once for all
+        return _on_tiles(mdp, learner, records.Work(problem, learning, asking, *said, found, lanes))
+    size = mdp.n_states * (1 if _is_afterstate(learner) else mdp.n_actions)
+    found = _sessions(learner, seeds, size, keep_tables)
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, found.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
@@ -83,6 +95,11 @@ def _batch(steps: NDArray[np.int32], guided: NDArray[np.bool_], counts: NDArray[
 def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings) -> bool:
     """Whether the kernel knows this learner, its selection, and this gate by all of its settings."""
     rules = GATES[gate.gate].compiled
+    if learner.tilings > 1:
+        known = rules is not None and learner.learner in LINEAR and learner.selection in CHOICES and not gate.memory
+        return known and rules.asks != ASKS_WHERE_TABLES_DIFFER and (not rules.judges or len(mdp.starts) < 2)
+    if isinstance(mdp, CellTable):
+        return False  # its steps are made by the kernel of tiles alone
     if UPDATES[learner.learner].compiled is None or SELECTIONS[learner.selection].compiled is None or rules is None:
         return False
     return not rules.judges or len(mdp.starts) < 2  # it judges by the plain counts alone
@@ -100,10 +117,11 @@ def _one_by_one(
     steps, counts = np.zeros((len(seeds), learner.episodes), np.int32), np.zeros(len(seeds), records.COUNTS)
     q = np.zeros((len(seeds) if keep_tables else 0, *mdp.successor.shape))
     found = _batch(steps, np.zeros(steps.shape, np.bool_), counts, q)
+    place = PhysicsEnvironment(mdp.physics) if isinstance(mdp, CellTable) else TableEnvironment(mdp)
     for n, seed in enumerate(seeds):
         draw = splitmix.stream(int(seed))
         advisor = None if advice is None else TableAdvisor(advice, draw)
-        one = run_session(mdp, learner, gate, advisor, draw)
+        one = run_session(place, learner, gate, advisor, draw)
         if one.interrupted:
             raise KeyboardInterrupt
         found.steps[n], found.guided[n], found.moves[n] = one.steps, one.guided, one.visits.sum()
@@ -114,8 +132,53 @@ def _one_by_one(
     return found
 
 
-def _sessions(mdp: TabularMDP, learner: LearnerSettings, seeds: NDArray[np.uint64], keep: bool) -> records.Sessions:
-    shape, size = (len(seeds), learner.episodes), mdp.n_states * (1 if _is_afterstate(learner) else mdp.n_actions)
+def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> Batch:
+    """The sessions of a learner whose values are sums of weights of tiles."""
+    coding, rule = TileCoding(mdp.cells, learner.tilings), LINEAR[learner.learner]
+    size, episodes = coding.count * mdp.n_actions, range(1, learner.episodes + 1)
+    linear = linear_loop.Linear(
+        active=coding.active,
+        weights=np.zeros(size),
+        listed=np.zeros(size, np.int64),
+        strength=np.zeros(size),
+        place=np.full(size, -1, np.int64),
+        traces=np.zeros(1, np.int64),
+        values=np.zeros(mdp.n_actions),
+        warm=np.array([selection.temperature(n, learner.beta, learner.exploration) for n in episodes]),
+        alpha=learner.alpha / learner.tilings,
+        decay=learner.discount * learner.trace if rule.decays else 0.0,
+        growing=not learner.replacing,
+        on_policy=issubclass(rule, TileSarsa),
+        lookahead=rule.lookahead,
+        selection=CHOICES[learner.selection],
+    )
+    linear_loop.run(work, linear, _world(mdp))
+    found, tables = work.sessions, work.sessions.kept.reshape(-1, coding.count, mdp.n_actions)
+    q = np.array([coding.values(weights) for weights in tables]).reshape(-1, *mdp.successor.shape)
+    return _batch(found.steps, found.guided, found.counts, q)
+
+
+def _world(mdp: TabularMDP) -> linear_loop.World:
+    if not isinstance(mdp, CellTable):
+        none, cells = np.zeros(1), np.ones(1, np.int64)
+        return linear_loop.World(linear_loop.TABLE, none, none, none, cells, 0.0, 0.0, False)
+    physics, bounds = mdp.physics, mdp.physics.bounds
+    ends, cells = (np.array(bounds.low), np.array(bounds.high)), np.array(bounds.shape)
+    rewards = physics.reward, physics.last_reward
+    return linear_loop.World(physics.number, np.zeros(len(cells)), *ends, cells, *rewards, physics.falls)
+
+
+def play(mdp: CellTable, policy: NDArray[np.int64], drawn: FloatArray, most: int) -> NDArray[np.int64]:
+    """The moves (N,) of a policy (S,) from starts made of uniform numbers (N, D), at most so many; negative: it goes on."""
+    starts, moves = drawn.copy(), np.zeros(len(drawn), np.int64)
+    for start in starts:
+        mdp.physics.begin(start)
+    linear_loop.play(_world(mdp), policy, starts, most, moves)
+    return moves
+
+
+def _sessions(learner: LearnerSettings, seeds: NDArray[np.uint64], size: int, keep: bool) -> records.Sessions:
+    shape = (len(seeds), learner.episodes)
     warm = [selection.temperature(n, learner.beta, learner.exploration) for n in range(1, learner.episodes + 1)]
     return records.Sessions(
         seeds=np.asarray(seeds, np.uint64),
@@ -154,7 +217,7 @@ def _memories(states: int, actions: int, moves: int) -> Memory:
 
 
 def _is_afterstate(learner: LearnerSettings) -> bool:
-    return bool(UPDATES[learner.learner].compiled == STATE_VALUES)
+    return bool(UPDATES[learner.learner].compiled == STATE_VALUES) and learner.tilings == 1
 
 
 def _problem(mdp: TabularMDP, learner: LearnerSettings) -> records.ProblemArrays:
