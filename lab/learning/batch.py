@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from lab.errors import BadInput
 from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Memory, places
+from lab.learning.environment import Environment, TableEnvironment
 from lab.learning.gates import GATES
 from lab.learning.gates.gate_rules import ASKS_WHERE_TABLES_DIFFER
-from lab.learning.environment import TableEnvironment
 from lab.learning.kernels import linear_loop, records
 from lab.learning.kernels.records import LANES
 from lab.learning.kernels.session_loop import run
-from lab.learning.physics.environment import CellTable, PhysicsEnvironment
+from lab.learning.physics.cells import CellTable
 from lab.learning.selection import SELECTIONS
 from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -50,7 +50,7 @@ class Batch(NamedTuple):
 
 
 def run_sessions(
-    mdp: TabularMDP,
+    problem: TabularMDP | Environment,
     learner: LearnerSettings,
     gate: GateSettings,
     advice: Advice | None,
@@ -60,17 +60,21 @@ def run_sessions(
 ) -> Batch:
     """Learns a table in each of N sessions, seeds (N,) uint64; advice None: nobody to ask.
 
+    problem: a table, or the environment whose steps are made; compiled are a table's own and those of `physics`.
+
     The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix.stream(seed)` and
     a `TableAdvisor` on the same draws. Raises BadInput for an unknown learner, selection or gate, or advice of another
     shape.
     """
     check_members(learner, gate)
+    place = TableEnvironment(problem) if isinstance(problem, TabularMDP) else problem
+    mdp = place.mdp
     if advice is not None and advice.thresholds.shape[1:] != mdp.successor.shape:
         raise BadInput(f"advice of shape {advice.thresholds.shape}: the problem has {mdp.successor.shape}")
-    if not is_compiled(mdp, learner, gate):
-        return _one_by_one(mdp, learner, gate, advice, seeds, keep_tables)
+    if not (is_compiled(mdp, learner, gate) and (isinstance(place, TableEnvironment) or isinstance(mdp, CellTable))):
+        return _one_by_one(place, learner, gate, advice, seeds, keep_tables)
     asking = _asking(gate, advice is not None, learner.max_steps)
-    learning, problem = _learning(mdp, learner), _problem(mdp, learner)
+    learning, arrays = _learning(mdp, learner), _problem(mdp, learner)
     said = (np.zeros((1, 1, mdp.n_actions)), np.zeros(mdp.n_states, np.bool_))
     if advice is not None:
         said = advice.thresholds, advice.region
@@ -78,13 +82,13 @@ def run_sessions(
         found = _sessions(learner, seeds, TileCoding(mdp.cells, learner.tilings).count * mdp.n_actions, keep_tables)
         lanes = _lanes(mdp.n_actions, learner.episodes, 0, 0)
         learning = learning._replace(actions=np.zeros(mdp.n_actions))  # of any length: compiled once for all
-        return _on_tiles(mdp, learner, records.Work(problem, learning, asking, *said, found, lanes))
+        return _on_tiles(mdp, learner, records.Work(arrays, learning, asking, *said, found, lanes))
     size = mdp.n_states * (1 if _is_afterstate(learner) else mdp.n_actions)
     found = _sessions(learner, seeds, size, keep_tables)
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, found.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
-    run(records.Work(problem, learning, asking, *said, found, lanes), memories)
+    run(records.Work(arrays, learning, asking, *said, found, lanes), memories)
     return _batch(found.steps, found.guided, found.counts, _action_values(mdp, learning, found.kept))
 
 
@@ -106,7 +110,7 @@ def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings) -
 
 
 def _one_by_one(
-    mdp: TabularMDP,
+    place: Environment,
     learner: LearnerSettings,
     gate: GateSettings,
     advice: Advice | None,
@@ -115,9 +119,8 @@ def _one_by_one(
 ) -> Batch:
     """The same sessions, each with the draws that it would have in the kernel."""
     steps, counts = np.zeros((len(seeds), learner.episodes), np.int32), np.zeros(len(seeds), records.COUNTS)
-    q = np.zeros((len(seeds) if keep_tables else 0, *mdp.successor.shape))
+    q = np.zeros((len(seeds) if keep_tables else 0, *place.mdp.successor.shape))
     found = _batch(steps, np.zeros(steps.shape, np.bool_), counts, q)
-    place = PhysicsEnvironment(mdp.physics) if isinstance(mdp, CellTable) else TableEnvironment(mdp)
     for n, seed in enumerate(seeds):
         draw = splitmix.stream(int(seed))
         advisor = None if advice is None else TableAdvisor(advice, draw)

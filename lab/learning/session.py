@@ -10,7 +10,7 @@ from lab.errors import BadInput, unknown
 from lab.learning.advice_memory import Recall
 from lab.learning.environment import Environment, TableEnvironment, check_solvable
 from lab.learning.gates import GATES, Surroundings, improvement
-from lab.learning.physics.environment import PhysicsEnvironment
+from lab.learning.physics.cells import CellTable
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked, allowed_words
 from lab.learning.selection import COLDEST, SELECTIONS, Draw, temperature, uniforms
 from lab.learning.session_events import (
@@ -84,7 +84,9 @@ def check_members(
             raise from_file(kind, name, source) or unknown(kind, name, table, source)
     if learner.tilings > 1 and learner.learner not in LINEAR:
         known = ", ".join(LINEAR)
-        raise BadInput(f"learner '{learner.learner}' ({where[0]}) with tilings = {learner.tilings}: allowed are {known}")
+        raise BadInput(
+            f"learner '{learner.learner}' ({where[0]}) with tilings = {learner.tilings}: allowed are {known}"
+        )
 
 
 class Session:
@@ -120,9 +122,11 @@ class Session:
         self.q = self.update.q
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
         self.actions = range(mdp.n_actions)
-        self.lasts = isinstance(environment, PhysicsEnvironment) and environment.physics.falls
+        self.lasts = isinstance(mdp, CellTable) and mdp.physics.falls
         self.choose, self.draw = SELECTIONS[learner.selection].make, draw
-        several_starts = bool(mdp.starts) or not isinstance(environment, TableEnvironment | PhysicsEnvironment)
+        several_starts = bool(mdp.starts) or not (
+            isinstance(environment, TableEnvironment) or isinstance(mdp, CellTable)
+        )
         around = Surroundings(draw, self._others, several_starts)
         make = GATES[gate.gate if self.advised else "never"].make
         self.gate = make(gate, learner.episodes, learner.max_steps, around)

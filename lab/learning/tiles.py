@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from lab.errors import BadInput
 
 TileArray = NDArray[np.int32]
+Cell = TypeVar("Cell", int, TileArray)
 
 
 def cell_along(value: float, low: float, high: float, cells: int) -> int:
@@ -34,8 +36,8 @@ def shift(tiling: int, axis: int, tilings: int) -> int:
     return tiling * (2 * axis + 1) % tilings
 
 
-def tile_along(cell: int, shifted: int, tilings: int) -> int:
-    """The tile of a cell along an axis of a shifted tiling."""
+def tile_along(cell: Cell, shifted: int, tilings: int) -> Cell:
+    """The tile of a cell, or of each of several, along an axis of a shifted tiling."""
     return (cell + shifted) // tilings
 
 
@@ -102,7 +104,9 @@ class TileCoding:
         for tiling in range(self.tilings):
             number = np.full(cells.shape[1], tiling, np.int32)
             for axis, cell in enumerate(cells):
-                number = number * self.per_tiling[axis] + tile_along(cell, shift(tiling, axis, self.tilings), self.tilings)
+                number = number * self.per_tiling[axis] + tile_along(
+                    cell, shift(tiling, axis, self.tilings), self.tilings
+                )
             found[:, tiling] = number
         return found
 

@@ -38,7 +38,13 @@ def assert_same(batch: Batch, n: int, one: SessionResult) -> None:
     np.testing.assert_array_equal(batch.steps[n], one.steps)
     np.testing.assert_array_equal(batch.guided[n], one.guided)
     np.testing.assert_array_equal(batch.q[n], one.q)
-    counted = (batch.requests[n], batch.helped_steps[n], batch.misleads[n], batch.rejected_at_episode[n], batch.moves[n])
+    counted = (
+        batch.requests[n],
+        batch.helped_steps[n],
+        batch.misleads[n],
+        batch.rejected_at_episode[n],
+        batch.moves[n],
+    )
     wanted = (one.requests, one.helped_steps, one.misleads, one.rejected_at_episode or 0, one.visits.sum())
     assert counted == wanted
 
@@ -47,10 +53,10 @@ def both(place: Environment, learner: LearnerSettings, gate: GateSettings, who: 
     """Two sessions each way, compared; the compiled ones."""
     seeds = np.array([5, 2**63], np.uint64)
     assert is_compiled(place.mdp, learner, gate)
-    batch = run_sessions(place.mdp, learner, gate, who, seeds, keep_tables=True)
+    batch = run_sessions(place, learner, gate, who, seeds, keep_tables=True)
     for n, seed in enumerate(seeds.tolist()):
         draw = stream(seed)
-        assert_same(batch, n, run_session(place, learner, gate, who and TableAdvisor(who, draw), draw))
+        assert_same(batch, n, run_session(place, learner, gate, None if who is None else TableAdvisor(who, draw), draw))
     return batch
 
 
@@ -60,7 +66,7 @@ def test_every_gate_in_the_car(gate: str) -> None:
     assert (batch.helped_steps > 0).all() == (gate != "never")
 
 
-@pytest.mark.parametrize("selection", ("softmax", "epsilon-greedy", "greedy"))
+@pytest.mark.parametrize("selection", ["softmax", "epsilon-greedy", "greedy"])
 @pytest.mark.parametrize("learner", LINEAR)
 def test_every_learner_and_selection_on_a_grid(learner: str, selection: str) -> None:
     settings = LearnerSettings(
@@ -76,7 +82,7 @@ def test_several_starts_are_drawn_alike() -> None:
     both(place, LearnerSettings("sarsa", tilings=2, episodes=20, max_steps=40), replace(EAGER, gate="ia"), None)
 
 
-@pytest.mark.parametrize("name", ("Acrobot-v1", "CartPole-v1"))
+@pytest.mark.parametrize("name", ["Acrobot-v1", "CartPole-v1"])
 def test_the_other_worlds(name: str) -> None:
     place = PhysicsEnvironment(PHYSICS[name])
     both(place, replace(fitting(place.physics), episodes=3, max_steps=60), GateSettings("never"), None)
@@ -88,17 +94,17 @@ def test_what_has_no_compiled_form_runs_one_by_one() -> None:
     short, who = replace(SHORT, episodes=3), advice(CAR)
     draw = stream(7)
     one = run_session(CAR, short, gate, TableAdvisor(who, draw), draw)
-    assert_same(run_sessions(CAR.mdp, short, gate, who, np.array([7], np.uint64), keep_tables=True), 0, one)
+    assert_same(run_sessions(CAR, short, gate, who, np.array([7], np.uint64), keep_tables=True), 0, one)
 
 
 def test_the_car_is_learned_alone_and_its_master_is_a_good_one() -> None:
     seeds = np.arange(20, dtype=np.uint64)
-    batch = run_sessions(CAR.mdp, fitting(CAR.physics), GateSettings("never"), None, seeds)
+    batch = run_sessions(CAR, fitting(CAR.physics), GateSettings("never"), None, seeds)
     assert batch.steps[:, 0].min() == 201
     assert batch.steps[:, -50:].mean() < 130
     assert CAR.judge(CAR.values(1.0), replace(SHORT, max_steps=200)).solved
 
 
 def test_learners_that_keep_a_value_per_state_have_no_tiles() -> None:
-    with pytest.raises(BadInput, match="'dyna-q'.*tilings = 8: allowed are q, sarsa, q-lambda, sarsa-lambda"):
+    with pytest.raises(BadInput, match=r"'dyna-q'.*tilings = 8: allowed are q, sarsa, q-lambda, sarsa-lambda"):
         run_session(CAR, replace(SHORT, learner="dyna-q"), EAGER, None, stream(0))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from lab.learning.physics import PHYSICS, Physics
-from lab.learning.physics.environment import CellTable, PhysicsEnvironment, fitting
+from lab.learning.physics.cells import CellTable
+from lab.learning.physics.environment import PhysicsEnvironment, fitting
 from lab.learning.physics.mountain_car import energy_rule
 
 

@@ -14,9 +14,7 @@ from lab.learning.updates import update_of
 from lab.learning.updates.linear import OnTiles
 from lab.mdp import grid
 
-codings = st.builds(
-    TileCoding, st.lists(st.integers(1, 9), min_size=1, max_size=3).map(tuple), st.integers(1, 6)
-)
+codings = st.builds(TileCoding, st.lists(st.integers(1, 9), min_size=1, max_size=3).map(tuple), st.integers(1, 6))
 
 
 def test_four_cells_in_two_tilings_by_hand() -> None:

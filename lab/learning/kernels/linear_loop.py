@@ -226,10 +226,12 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
     """`Session._walk`, and what is booked of it."""
     lanes, learning, problem, sessions = work.lanes, work.learning, work.problem, work.sessions
     lane = lanes.lane[0]
-    state = _start(work, world)
+    state: Any = _start(work, world)
     _choose(work, linear, state)
-    action = np.int64(decided(work, None, 0)[0])
-    moves, over, won, following = 0, False, False, np.int64(0)
+    action: Any = np.int64(decided(work, None, 0)[0])
+    moves, over, won = 0, False, False
+    entered: Any = 0
+    following: Any = np.int64(0)
     while not over and moves < learning.max_moves:
         moves += 1
         if world.number == TABLE:

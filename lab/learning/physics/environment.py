@@ -1,59 +1,23 @@
 """A world of continuous states as the place where the lab's learners act: its states are the numbers of its cells."""
 
-from dataclasses import dataclass, replace
-from functools import cached_property
-from hashlib import sha256
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from lab.learning import splitmix
 from lab.learning.environment import Judged, Step
-from lab.learning.physics import PHYSICS, Physics
+from lab.learning.physics import Physics
+from lab.learning.physics.cells import CellTable
 from lab.learning.physics.pictures import drawn
 from lab.learning.selection import Draw
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.mdp import FloatArray, TabularMDP
+from lab.mdp import FloatArray
 
 JUDGED = 200  # starts from which a policy is tried
-MASTERS, MASTERS_SEED = 8, 17  # sessions alone whose best table is what an advisor knows
+MASTERS = 8  # sessions alone, of the seeds 0, 1, ..., whose best table is what an advisor knows
+JUDGES_SEED = 0
 GOOD_ENOUGH = 0.5  # of the starts: a policy that gets to the goal from fewer has no way there
-
-
-@dataclass(frozen=True, eq=False)
-class CellTable(TabularMDP):
-    """The cells of a world of continuous states; where its steps lead, only the world itself knows."""
-
-    world: str = ""
-
-    @classmethod
-    def of(cls, physics: Physics) -> "CellTable":
-        """Every move stays where it is, nothing ends; the start is the middle of where episodes begin."""
-        states, actions = int(np.prod(physics.bounds.shape)), len(physics.actions)
-        stays = np.repeat(np.arange(states, dtype=np.int32)[:, None], actions, axis=1)
-        no, middle = np.zeros(states, bool), [0.5] * len(physics.axes)
-        physics.begin(middle)
-        start = physics.bounds.number(middle)
-        return cls(stays, np.zeros(stays.shape), no, no, start, physics.actions, world=physics.name)
-
-    @property
-    def physics(self) -> Physics:
-        """The world itself."""
-        return PHYSICS[self.world]
-
-    @property
-    def cells(self) -> tuple[int, ...]:
-        """Those of the world's bounds."""
-        return self.physics.bounds.shape
-
-    @cached_property
-    def signature(self) -> str:
-        """As `TabularMDP.signature`, the world and its cells included."""
-        return sha256(f"{self.world} {self.physics.bounds} {super().signature}".encode()).hexdigest()[:16]
-
-    def state_label(self, state: int) -> str:
-        """The middle of a cell in words, such as "position -0.51, speed +0.003"."""
-        named = zip(self.physics.axes, self.physics.bounds.centre(state), strict=True)
-        return ", ".join(f"{axis} {value:+.3f}" for axis, value in named)
 
 
 class PhysicsEnvironment:
@@ -87,8 +51,8 @@ class PhysicsEnvironment:
             from lab.learning.batch import run_sessions
 
             learner = replace(fitting(self.physics), discount=discount)
-            seeds = np.random.default_rng(MASTERS_SEED).integers(2**64, size=MASTERS, dtype=np.uint64)
-            found = run_sessions(self.mdp, learner, GateSettings("never"), None, seeds, keep_tables=True)
+            seeds = np.arange(MASTERS, dtype=np.uint64)
+            found = run_sessions(self, learner, GateSettings("never"), None, seeds, keep_tables=True)
             best = min(found.q, key=lambda q: float(np.abs(self.played(q, self.physics.limit)).mean()) * self._better)
             best.flags.writeable = False
             self._known[discount] = best
@@ -102,7 +66,9 @@ class PhysicsEnvironment:
         """The moves (JUDGED,) of the greedy policy of a table from drawn starts, negative where they did not end it."""
         from lab.learning.batch import play
 
-        return play(self.mdp, q.argmax(axis=1), np.random.default_rng(0).random((JUDGED, len(self.physics.axes))), most)
+        axes = len(self.physics.axes)
+        drawn = np.array([splitmix.uniform(JUDGES_SEED, n) for n in range(JUDGED * axes)]).reshape(JUDGED, axes)
+        return play(self.mdp, q.argmax(axis=1), drawn, most)
 
     def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
         """From JUDGED drawn starts: the mean steps, nobody knows the fewest, and whether they reach the world's threshold."""

@@ -29,5 +29,3 @@ def _mountain_car(position: float, speed: float) -> str:
 def _row(position: float) -> int:
     """The line of the ground, from above."""
     return round((1.0 - sin(3 * position)) / 2.0 * (HEIGHT - 2)) + 1
-
-
