@@ -92,14 +92,14 @@ def fitting(physics: Physics) -> LearnerSettings:
     """
     return LearnerSettings(
         "sarsa-lambda",
-        alpha=0.5,
+        alpha=0.3,
         discount=1.0 if not physics.falls else 0.99,
         trace=0.9,
         replacing=True,
         tilings=physics.tilings,
         selection="epsilon-greedy",
         exploration=0.1,
-        beta=0.5,
+        beta=1.5,
         episodes=500,
         max_steps=physics.limit,
     )
