@@ -102,7 +102,7 @@ def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings) -
     if learner.tilings > 1:
         known = rules is not None and learner.learner in LINEAR and learner.selection in CHOICES and not gate.memory
         return known and rules.asks != ASKS_WHERE_TABLES_DIFFER and (not rules.judges or len(mdp.starts) < 2)
-    if isinstance(mdp, CellTable):
+    if isinstance(mdp, CellTable) or learner.start_value:
         return False  # its steps are made by the kernel of tiles alone
     if UPDATES[learner.learner].compiled is None or SELECTIONS[learner.selection].compiled is None or rules is None:
         return False
@@ -148,6 +148,7 @@ def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> 
         traces=np.zeros(1, np.int64),
         values=np.zeros(mdp.n_actions),
         warm=np.array([selection.temperature(n, learner.beta, learner.exploration) for n in episodes]),
+        start=learner.start_value / learner.tilings,
         alpha=learner.alpha / learner.tilings,
         decay=learner.discount * learner.trace if rule.decays else 0.0,
         growing=not learner.replacing,

@@ -63,6 +63,14 @@ class LearnerSettings:
         Le(64),
         doc("tile coding: values are sums over so many shifted grids of tiles, each so many cells wide; 1: a table"),
     ] = 1
+    start_value: Annotated[
+        float,
+        Ge(-1_000_000),
+        Le(1_000_000),
+        doc(
+            "what every move is thought to be worth at first: above the truth it tries all out, below it keeps to what it knows"
+        ),
+    ] = 0.0
     planning: Annotated[int, Ge(0), Le(1000), doc("earlier moves that dyna-q learns from again after each one")] = 5
     selection: Annotated[str, doc("how it chooses its actions")] = "softmax"
     exploration: Annotated[float, Gt(0), Le(1_000_000), doc("temperature, or epsilon, of the first episode")] = 1.0

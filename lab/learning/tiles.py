@@ -119,8 +119,8 @@ class TileCoding:
 
     def weights(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weights (count, A) whose values come nearest to given ones (S, A): exactly where tile coding has made these."""
-        if not values.any():
-            return np.zeros((self.count, values.shape[1]))
+        if (values == values[0, 0]).all():
+            return np.full((self.count, values.shape[1]), values[0, 0] / self.tilings)
         from scipy.sparse import csr_matrix
         from scipy.sparse.linalg import lsqr
 

@@ -136,6 +136,12 @@ def _reacting(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return reacting(job, reading)
 
 
+def _mountain_car(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.mountain_car import mountain_car
+
+    return mountain_car(job, reading)
+
+
 def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.sequencing_speed import sequencing_speed
 
@@ -180,6 +186,9 @@ _SHIPPED: dict[str, Study] = {
     "advice-budget": Study("Success against helped steps: every gate with and without memory", _advice_budget, ADVISED),
     "advice-worth": Study("What an advisor's help is worth over nobody's, for every skill of toast", _advice_worth),
     "advisors": Study("Several advisors at once, beside the best and the worst of them alone", _advisors, ADVISED),
+    "mountain-car": Study(
+        "Mountain Car: when a teacher should speak, at equal budgets", _mountain_car, sessions=30, least=2
+    ),
     "table-7.4": Study("Table 7.4: sequencing case I by session length", _chapter_7("best_results", "I")),
     "table-7.5": Study("Table 7.5: sequencing case II by session length", _chapter_7("best_results", "II")),
     "table-7.6": Study("Table 7.6: sequencing case III by session length", _chapter_7("best_results", "III")),

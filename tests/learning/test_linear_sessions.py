@@ -108,3 +108,14 @@ def test_the_car_is_learned_alone_and_its_master_is_a_good_one() -> None:
 def test_learners_that_keep_a_value_per_state_have_no_tiles() -> None:
     with pytest.raises(BadInput, match=r"'dyna-q'.*tilings = 8: allowed are q, sarsa, q-lambda, sarsa-lambda"):
         run_session(CAR, replace(SHORT, learner="dyna-q"), EAGER, None, stream(0))
+
+
+def test_start_values_hold_wherever_nothing_was_learned() -> None:
+    settings = LearnerSettings("q", alpha=0.5, start_value=-3.0, episodes=1, max_steps=1)
+    mdp = board()
+    for tilings in (1, 2):
+        q = run_session(mdp, replace(settings, tilings=tilings), EAGER, None, stream(0)).q
+        assert q[-2].tolist() == [-3.0] * 4
+        assert q[0].min() < -3.0  # a step costs
+    both(CAR, replace(SHORT, start_value=-50.0, episodes=4), GateSettings("never"), None)
+    assert not is_compiled(mdp, settings, EAGER)

@@ -18,6 +18,7 @@ def test_the_defaults_are_those_of_the_thesis() -> None:
         "trace": 0.5,
         "replacing": False,
         "tilings": 1,
+        "start_value": 0.0,
         "planning": 5,
         "selection": "softmax",
         "exploration": 1.0,

@@ -46,7 +46,8 @@ class Linear(NamedTuple):
     """The learner on tiles: weights (tiles * A,), active (S, T), and the traces.
 
     listed, strength (tiles * A,): which weights have a trace, and how strong; place: where each stands there, -1: nowhere;
-    traces (1,): how many; values (A,): room for those of a state; warm (E,): temperature, or epsilon.
+    traces (1,): how many; start: each weight at first; values (A,): room for those of a state; warm (E,): temperature or
+    epsilon.
     """
 
     active: TileArray
@@ -57,6 +58,7 @@ class Linear(NamedTuple):
     traces: NDArray[np.int64]
     values: FloatArray
     warm: FloatArray
+    start: float
     alpha: float
     decay: float
     growing: bool
@@ -202,7 +204,7 @@ def _begin_session(work: Any, linear: Any, n: int) -> None:
     lane.session, lane.episode, lanes.rng[0] = n, 0, work.sessions.seeds[n]
     lane.last_result, lane.equal_results, lane.converged = 0, 0, 0
     for i in range(len(linear.weights)):
-        linear.weights[i] = 0.0
+        linear.weights[i] = linear.start
 
 
 @inlined
