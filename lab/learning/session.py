@@ -118,7 +118,7 @@ class Session:
         self.advisor, self.advised = advisor, advisor is not None
         self.tell: OnEvent = lambda event: None
         mdp = self.mdp
-        self.update = update_of(learner, mdp, _start_values(mdp, q0, learner.start_value))
+        self.update = update_of(learner, mdp, _start_values(mdp, q0, learner))
         self.q = self.update.q
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
         self.actions = range(mdp.n_actions)
@@ -330,9 +330,10 @@ class Session:
         )
 
 
-def _start_values(mdp: TabularMDP, q0: FloatArray | None, value: float) -> FloatArray:
-    start = np.full(mdp.successor.shape, value) if q0 is None else np.array(q0, np.float64)
+def _start_values(mdp: TabularMDP, q0: FloatArray | None, learner: LearnerSettings) -> FloatArray:
+    start = np.full(mdp.successor.shape, learner.start_value) if q0 is None else np.array(q0, np.float64)
     if start.shape != mdp.successor.shape or not np.isfinite(start).all():
         raise BadInput(f"start values: shape {start.shape}, allowed {mdp.successor.shape} with finite values")
-    start[mdp.terminal] = 0.0
+    if learner.tilings == 1:  # on tiles, what is worth nothing would take from what lies beside it
+        start[mdp.terminal] = 0.0
     return start

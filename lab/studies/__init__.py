@@ -148,6 +148,12 @@ def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return sequencing_speed(job, reading)
 
 
+def _tiles_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.tiles_speed import tiles_speed
+
+    return tiles_speed(job, reading)
+
+
 def _speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.learning_speed import speed
 
@@ -225,6 +231,9 @@ _SHIPPED: dict[str, Study] = {
         ("seconds", "methods", "instances", "verify"),
         sessions=1,
         least=1,
+    ),
+    "tiles-speed": Study(
+        "Speed on tiles: steps of Mountain Car a second, beside Gymnasium's loop", _tiles_speed, sessions=50, least=1
     ),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }

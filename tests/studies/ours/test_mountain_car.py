@@ -7,6 +7,7 @@ import pytest
 
 from lab.studies import carried_out, checked
 from lab.studies.ours import mountain_car as study
+from lab.studies.ours import tiles_speed as speeds
 from lab.studies.ours.mountain_car import RULES, STUDENTS, TEACHERS, Outcome, Setting, episodes_to_solve, rows_of
 from lab.studies.runner import Job
 
@@ -62,3 +63,12 @@ def test_the_study_has_all_rules_and_says_what_differs(tmp_path: Path, monkeypat
     assert helped["sober", "nobody"] == 0.0
     assert helped["sober", "early"] == 1000.0
     assert any("differs from Torrey" in note for note in document["notes"])
+
+
+def test_speeds_are_of_all_ways_to_make_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speeds, "EPISODES", 20)
+    monkeypatch.setattr(speeds, "READABLE_EPISODES", 2)
+    found = speeds.tiles_speed(Job(sessions=2), {})
+    rates = {one["name"]: one["value"] for one in found.rows}
+    assert list(rates) == ["kernel", "session", "session through gymnasium", "gymnasium alone"]
+    assert rates["kernel"] > 3 * max(rate for name, rate in rates.items() if name != "kernel")
