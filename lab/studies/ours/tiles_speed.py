@@ -26,7 +26,7 @@ NOBODY = GateSettings("never")
 ABOUT = (
     "Steps of MountainCar-v0 a second, one process on one core, median of five runs; compile time is not counted. The learner is "
     f"SARSA(lambda) with replacing traces on eight tilings: {EPISODES} episodes a session in the kernel, "
-    f"{READABLE_EPISODES} in the readable session, on the lab's own physics and on Gymnasium's. 'gymnasium alone' learns nothing, "
+    f"{READABLE_EPISODES} in the readable one, on the lab's own physics and on Gymnasium's. 'gymnasium alone' learns nothing: "
     "it moves by chance."
 )
 
