@@ -12,7 +12,6 @@ from lab.learning.settings import LearnerSettings
 from lab.learning.values import greedy_moves, values_of_ways
 from lab.mdp import FloatArray, TabularMDP, greedy_path, optimal_values, shortest_steps
 
-
 LARGE = 100_000  # states: sweeps through as many take long
 
 

@@ -314,7 +314,10 @@ def _fitted(world: GridWorld) -> GridWorld:
     if moves > _FAR:
         learner = replace(learner, **_SHOWN, discount=1.0 - 1.0 / (10.0 * moves), max_steps=room)
         lost = round(walking(world.rewards.step, learner), 6)
-        learner, collision = replace(learner, start_value=lost), lost - world.rewards.goal  # what is not shown is not tried
+        learner, collision = (
+            replace(learner, start_value=lost),
+            lost - world.rewards.goal,
+        )  # what is not shown is not tried
         gate, rewards = replace(world.gate, window=2, first_episode=4), replace(world.rewards, collision=collision)
         return world.model_copy(update={"learner": learner, "gate": gate, "rewards": rewards})
     learner = replace(learner, **_ALONE, max_steps=room)

@@ -100,3 +100,25 @@ def test_the_energy_rule_gets_the_car_out() -> None:
     assert judged.optimal_steps is None
     nothing = place.judge(np.zeros_like(q), fitting(place.physics))
     assert (nothing.final_steps, nothing.solved) == (None, False)
+
+
+def test_shapes_stand_where_the_world_stands() -> None:
+    car = PhysicsEnvironment(PHYSICS["MountainCar-v0"])
+    car.point = [-math.pi / 6, 0.0]
+    lying = car.shapes(car.physics.bounds.number(car.point))
+    assert not [shape for shape in lying if shape["kind"] == "motion"]  # it stands: no arrow
+    wheels = [shape["disc"] for shape in lying if "disc" in shape]
+    assert wheels[0][1] == pytest.approx(wheels[1][1], abs=0.01)  # level at the bottom of the valley
+    pole = PhysicsEnvironment(PHYSICS["CartPole-v1"])
+    pole.point = [0.0, 0.0, 0.0, 0.0]
+    (line,) = [
+        shape["line"] for shape in pole.shapes(pole.physics.bounds.number(pole.point)) if shape["kind"] == "goal"
+    ]
+    assert line == [[50.0, 40.0], [50.0, 10.0]]
+    links = PhysicsEnvironment(PHYSICS["Acrobot-v1"])
+    links.point = [0.0, 0.0, 0.0, 0.0]
+    shapes = links.shapes(links.physics.bounds.number(links.point))
+    assert [shape["line"] for shape in shapes if shape["kind"] == "body" and "line" in shape] == [
+        [[50.0, 25.0], [50.0, 36.0]],
+        [[50.0, 36.0], [50.0, 47.0]],
+    ]

@@ -1,5 +1,6 @@
 """A world of continuous states as the place where the lab's learners act: its states are the numbers of its cells."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +10,7 @@ from lab.learning import splitmix
 from lab.learning.environment import Judged, Step
 from lab.learning.physics import Physics
 from lab.learning.physics.cells import CellTable
-from lab.learning.physics.pictures import drawn
+from lab.learning.physics.pictures import Shape, drawn, shapes
 from lab.learning.selection import Draw
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import FloatArray
@@ -42,8 +43,15 @@ class PhysicsEnvironment:
 
     def picture(self, state: int) -> str:
         """The world in lines of text: as it is, or where the learner is not, as it would be in the middle of the cell."""
+        return drawn(self.physics.name, self._shown(state))
+
+    def shapes(self, state: int) -> list[Shape]:
+        """As `picture`, as lines, areas and discs in a drawing of 100 x 50: see `pictures.shapes`."""
+        return shapes(self.physics.name, self._shown(state))
+
+    def _shown(self, state: int) -> Sequence[float]:
         here = bool(self.point) and self.physics.bounds.number(self.point) == state
-        return drawn(self.physics.name, self.point if here else self.physics.bounds.centre(state))
+        return self.point if here else self.physics.bounds.centre(state)
 
     def values(self, discount: float) -> FloatArray:
         """What the best of MASTERS sessions alone has learned, compiled: (S, A)."""
