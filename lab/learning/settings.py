@@ -57,6 +57,20 @@ class LearnerSettings:
     discount: Annotated[float, Gt(0), Le(1), doc("gamma: what the next step counts for, compared with this one")] = 0.99
     trace: Annotated[float, Ge(0), Le(1), doc("lambda, of the learners with traces")] = 0.5
     replacing: Annotated[bool, doc("a trace is set to 1 on each visit instead of growing by 1")] = False
+    tilings: Annotated[
+        int,
+        Ge(1),
+        Le(64),
+        doc("tile coding: values are sums over so many shifted grids of tiles, each so many cells wide; 1: a table"),
+    ] = 1
+    start_value: Annotated[
+        float,
+        Ge(-1_000_000),
+        Le(1_000_000),
+        doc(
+            "what every move is thought to be worth at first: above the truth it tries all out, below it keeps to what it knows"
+        ),
+    ] = 0.0
     planning: Annotated[int, Ge(0), Le(1000), doc("earlier moves that dyna-q learns from again after each one")] = 5
     selection: Annotated[str, doc("how it chooses its actions")] = "softmax"
     exploration: Annotated[float, Gt(0), Le(1_000_000), doc("temperature, or epsilon, of the first episode")] = 1.0

@@ -148,10 +148,22 @@ def _reacting(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return reacting(job, reading)
 
 
+def _mountain_car(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.mountain_car import mountain_car
+
+    return mountain_car(job, reading)
+
+
 def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.sequencing_speed import sequencing_speed
 
     return sequencing_speed(job, reading)
+
+
+def _tiles_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.tiles_speed import tiles_speed
+
+    return tiles_speed(job, reading)
 
 
 def _speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
@@ -205,6 +217,9 @@ _SHIPPED: dict[str, Study] = {
         least=2,
     ),
     "advisors": Study("Several advisors at once, beside the best and the worst of them alone", _advisors, ADVISED),
+    "mountain-car": Study(
+        "Mountain Car: when a teacher should speak, at equal budgets", _mountain_car, sessions=30, least=2
+    ),
     "table-7.4": Study("Table 7.4: sequencing case I by session length", _chapter_7("best_results", "I")),
     "table-7.5": Study("Table 7.5: sequencing case II by session length", _chapter_7("best_results", "II")),
     "table-7.6": Study("Table 7.6: sequencing case III by session length", _chapter_7("best_results", "III")),
@@ -241,6 +256,9 @@ _SHIPPED: dict[str, Study] = {
         ("seconds", "methods", "instances", "verify"),
         sessions=1,
         least=1,
+    ),
+    "tiles-speed": Study(
+        "Speed on tiles: steps of Mountain Car a second, beside Gymnasium's loop", _tiles_speed, sessions=50, least=1
     ),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }

@@ -111,7 +111,8 @@ def seeds_of(setting: Any, sessions: int, seed: int) -> NDArray[np.uint64]:
 
 def said(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """What seeds and stored results go by: a switch that was added later counts only where it is on."""
-    return {name: value for name, value in pairs if name not in ("memory", "wrong") or value}
+    off = {"memory": False, "wrong": False, "tilings": 1, "start_value": 0.0}
+    return {name: value for name, value in pairs if name not in off or value != off[name]}
 
 
 def _end_with_parent(parent: int) -> None:

@@ -50,7 +50,7 @@ def test_compiled_sessions_are_the_same(gate: str, speaks: int) -> None:
     table, how = slippery(), replace(EAGER, gate=gate)
     who = replace(advice(table.mdp), late=speaks == SPEAKS_TO_CORRECT, speaks=speaks)
     seeds = np.arange(40, 70, dtype=np.uint64)
-    batch = run_sessions(table.mdp, LEARNER, how, who, seeds, keep_tables=True, chances=table)
+    batch = run_sessions(table, LEARNER, how, who, seeds, keep_tables=True)
     for n in (0, 5, 29):
         draw = stream(int(seeds[n]))
         one = run_session(table, LEARNER, how, TableAdvisor(who, draw), draw)

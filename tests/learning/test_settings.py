@@ -17,6 +17,8 @@ def test_the_defaults_are_those_of_the_thesis() -> None:
         "discount": 0.99,
         "trace": 0.5,
         "replacing": False,
+        "tilings": 1,
+        "start_value": 0.0,
         "planning": 5,
         "selection": "softmax",
         "exploration": 1.0,

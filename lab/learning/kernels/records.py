@@ -26,7 +26,9 @@ class ProblemArrays(NamedTuple):
 
 
 class Learning(NamedTuple):
-    """The learner's settings, see `LearnerSettings`; actions: a tuple of A numbers, whose length the compiler knows."""
+    """The learner's settings, see `LearnerSettings`; actions: a tuple of A numbers, whose length the compiler knows, or an
+    array of them.
+    """
 
     afterstate: bool
     alpha: float
@@ -34,7 +36,7 @@ class Learning(NamedTuple):
     max_moves: int
     max_steps: int
     count_start: bool
-    actions: tuple[int, ...]
+    actions: tuple[int, ...] | FloatArray
 
 
 class Asking(NamedTuple):

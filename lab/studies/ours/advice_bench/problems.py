@@ -32,15 +32,18 @@ class Benched:
     values: FloatArray
     chances: ChanceTable | None = None
 
+    @property
+    def place(self) -> TabularMDP | ChanceTable:
+        """What sessions are run in."""
+        return self.mdp if self.chances is None else self.chances
+
     @cached_property
     def par(self) -> float:
         """The mean steps of the best policy, an episode that it does not finish as the step limit + 1."""
         best = Advice.of(advice_chances(self.values, 1e-6))
         learner = replace(self.learner, episodes=1)
         seeds = np.arange(WALKS, dtype=np.uint64)
-        return float(
-            run_sessions(self.mdp, learner, GateSettings("always"), best, seeds, chances=self.chances).steps.mean()
-        )
+        return float(run_sessions(self.place, learner, GateSettings("always"), best, seeds).steps.mean())
 
 
 def _table(mdp: TabularMDP, **changes: Any) -> Benched:

@@ -11,7 +11,8 @@ Cell = tuple[str, str, str]  # problem, advisor, budget
 
 
 class Ranks(NamedTuple):
-    """Mean ranks by rule, best first; critical: two that lie less apart are not told apart; p: that all are alike, None for one problem or two rules.
+    """Mean ranks by rule, best first; critical: two that lie less apart are not told apart; p: that all are alike,
+    None for one problem or two rules.
 
     beaten: of one rule, the p that it scores no more than each other (Wilcoxon's signed ranks over problems, Holm's correction).
     """

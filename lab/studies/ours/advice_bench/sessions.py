@@ -122,7 +122,7 @@ def _of_place(
 
 def _points(place: Benched, gate: GateSettings, advice: Advice | None, seeds: np.ndarray) -> Any:
     """Points (N, E) and answers (N,): 100 is the best policy's mean, 0 an episode that fails."""
-    batch = run_sessions(place.mdp, place.learner, gate, advice, seeds, chances=place.chances)
+    batch = run_sessions(place.place, place.learner, gate, advice, seeds)
     most = place.learner.max_steps + 1
     return 100.0 * (most - batch.steps) / (most - place.par), batch.helped_steps
 
