@@ -8,6 +8,7 @@ import json
 import os
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from hashlib import sha256
@@ -70,6 +71,9 @@ class Job:
             yield from ((item, work(item)) for item in items)
         else:
             from joblib import Parallel, delayed
+
+            # a process that has grown is replaced, and nothing is lost
+            warnings.filterwarnings("ignore", "A worker stopped while some jobs were given", UserWarning)
 
             ending: dict[str, Any] = {"initializer": _end_with_parent, "initargs": (os.getpid(),)}
             # few items are long ones: each is shared out alone
