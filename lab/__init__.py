@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from lab.mdp import Rewards, TabularMDP, grid
     from lab.sequencing.cell.cell import Cell
     from lab.tasks.grid_world import GridWorld
+    from lab.teaching.mentor import watch
     from lab.teaching.subjects import world
     from lab.toolbox.policy import Policy
     from lab.toolbox.registry import Toolbox
@@ -33,6 +34,7 @@ _FACE = {
     "lab.api.runs": ("RunResult", "run"),
     "lab.api.scenes": ("show",),
     "lab.api.studies": ("StudyResult", "compare", "study"),
+    "lab.teaching.mentor": ("watch",),
     "lab.teaching.subjects": ("world",),
     "lab.errors": ("BadInput", "LabError", "WorkFailed"),
     "lab.learning.gates": ("Gate", "Steps"),
@@ -76,6 +78,7 @@ __all__ = [
     "show",
     "study",
     "teach",
+    "watch",
     "world",
 ]
 

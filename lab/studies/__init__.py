@@ -82,6 +82,12 @@ def _advice_bench(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return advice_bench(job, reading)
 
 
+def _mentor(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.mentor import mentor
+
+    return mentor(job, reading)
+
+
 def _whom_to_believe(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.whom_to_believe import whom_to_believe
 
@@ -209,6 +215,9 @@ _SHIPPED: dict[str, Study] = {
         ("methods", "problem", "advisors"),
         sessions=100,
         least=2,
+    ),
+    "mentor": Study(
+        "A mentor for other people's policies: when they should ask, at equal questions", _mentor, sessions=40, least=2
     ),
     "whom-to-believe": Study(
         "Whom to believe: is a panel of seven ranked rightly, and are three limited advisors better than nobody?",
