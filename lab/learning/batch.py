@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from lab.errors import BadInput
 from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Memory, places
+from lab.learning.chance_table import ChanceTable
 from lab.learning.environment import Environment, TableEnvironment
 from lab.learning.gates import GATES
-from lab.learning.gates.gate_rules import ASKS_WHERE_TABLES_DIFFER
+from lab.learning.gates.gate_rules import ASKS_WHERE_TABLES_DIFFER, WEIGHS_NOTHING
+from lab.learning.gates.heard import Heard
 from lab.learning.kernels import linear_loop, records
 from lab.learning.kernels.records import LANES
 from lab.learning.kernels.session_loop import run
@@ -21,7 +23,7 @@ from lab.learning.physics.cells import CellTable
 from lab.learning.selection import SELECTIONS
 from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.learning.simulated_advice import Advice, TableAdvisor
+from lab.learning.simulated_advice import SPEAKS_ALWAYS, SPEAKS_AS_EXPECTED, Advice, TableAdvisor
 from lab.learning.tiles import TileCoding
 from lab.learning.updates import LINEAR, UPDATES
 from lab.learning.updates.linear import TileSarsa
@@ -60,7 +62,8 @@ def run_sessions(
 ) -> Batch:
     """Learns a table in each of N sessions, seeds (N,) uint64; advice None: nobody to ask.
 
-    problem: a table, or the environment whose steps are made; compiled are a table's own and those of `physics`.
+    problem: a table, or the environment whose steps are made; compiled are a table's own, those of a
+    `ChanceTable` and those of `physics`.
 
     The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix.stream(seed)` and
     a `TableAdvisor` on the same draws. Raises BadInput for an unknown learner, selection or gate, or advice of another
@@ -71,7 +74,9 @@ def run_sessions(
     mdp = place.mdp
     if advice is not None and advice.thresholds.shape[1:] != mdp.successor.shape:
         raise BadInput(f"advice of shape {advice.thresholds.shape}: the problem has {mdp.successor.shape}")
-    if not (is_compiled(mdp, learner, gate) and (isinstance(place, TableEnvironment) or isinstance(mdp, CellTable))):
+    steps_known = isinstance(place, TableEnvironment) or isinstance(mdp, CellTable)
+    by_chance_on_tiles = isinstance(place, ChanceTable) and learner.tilings > 1
+    if by_chance_on_tiles or not (steps_known and is_compiled(mdp, learner, gate, advice)):
         return _one_by_one(place, learner, gate, advice, seeds, keep_tables)
     asking = _asking(gate, advice is not None, learner.max_steps)
     learning, arrays = _learning(mdp, learner), _problem(mdp, learner)
@@ -88,7 +93,8 @@ def run_sessions(
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, found.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
-    run(records.Work(arrays, learning, asking, *said, found, lanes), memories)
+    hearing, walks = _hearing(mdp, asking, advice), _walks(mdp, asking, learning, learner.episodes)
+    run(records.Work(arrays, learning, asking, *said, found, lanes), memories, hearing, _chances(place), walks)
     return _batch(found.steps, found.guided, found.counts, _action_values(mdp, learning, found.kept))
 
 
@@ -96,17 +102,57 @@ def _batch(steps: NDArray[np.int32], guided: NDArray[np.bool_], counts: NDArray[
     return Batch(steps, guided, **{name: counts[name] for name in records.COUNTS.names or ()}, q=q)
 
 
-def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings) -> bool:
-    """Whether the kernel knows this learner, its selection, and this gate by all of its settings."""
+def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings, advice: Advice | None = None) -> bool:
+    """Whether a kernel knows this learner, its selection, this gate by all of its settings, and when the advisor speaks."""
     rules = GATES[gate.gate].compiled
+    if rules is None:
+        return False
     if learner.tilings > 1:
-        known = rules is not None and learner.learner in LINEAR and learner.selection in CHOICES and not gate.memory
-        return known and rules.asks != ASKS_WHERE_TABLES_DIFFER and (not rules.judges or len(mdp.starts) < 2)
+        known = learner.learner in LINEAR and learner.selection in CHOICES and not gate.memory
+        plain = rules.weighs == WEIGHS_NOTHING and (advice is None or _speaks_at_once(advice))
+        simple = rules.asks != ASKS_WHERE_TABLES_DIFFER and (not rules.judges or len(mdp.starts) < 2)
+        return known and plain and simple
     if isinstance(mdp, CellTable) or learner.start_value:
         return False  # its steps are made by the kernel of tiles alone
-    if UPDATES[learner.learner].compiled is None or SELECTIONS[learner.selection].compiled is None or rules is None:
-        return False
-    return not rules.judges or len(mdp.starts) < 2  # it judges by the plain counts alone
+    return UPDATES[learner.learner].compiled is not None and SELECTIONS[learner.selection].compiled is not None
+
+
+def _speaks_at_once(advice: Advice) -> bool:
+    return not advice.late and advice.speaks == SPEAKS_ALWAYS
+
+
+def _hearing(mdp: TabularMDP, asking: records.Asking, advice: Advice | None) -> records.Hearing | None:
+    """What gates that weigh and advisors that hold back need, None where neither does."""
+    weighs = asking.gate.weighs != WEIGHS_NOTHING
+    if advice is None or (not weighs and _speaks_at_once(advice)):
+        return None
+    states, actions = mdp.successor.shape if weighs else (1, 1)
+    sizes = (states, states * actions, states * actions, states * actions, states, states)  # as the fields of Heard
+    cells = (np.zeros((LANES, size), np.int32) for size in sizes)
+    told = Heard._make((*cells, np.zeros((LANES, 2 * states)), np.zeros(LANES, records.HEARD_NOW)))
+    chose = np.zeros((LANES, mdp.n_states if advice.speaks == SPEAKS_AS_EXPECTED else 0), np.int32)
+    return records.Hearing(
+        heard=told,
+        values=np.zeros((LANES, mdp.n_actions)),
+        u=np.zeros(LANES),
+        before=np.zeros(LANES, np.int64),
+        chose=chose,
+        late=advice.late,
+        speaks=advice.speaks,
+        several=float(bool(mdp.starts)),
+    )
+
+
+def _walks(mdp: TabularMDP, asking: records.Asking, learning: records.Learning, episodes: int) -> records.Walks | None:
+    """What gates that judge need where episodes begin in different states."""
+    if not asking.gate.judges or len(mdp.starts) < 2:
+        return None
+    walk, begun = np.zeros((LANES, learning.max_moves), np.int32), np.zeros((LANES, episodes), np.int32)
+    return records.Walks(np.full((LANES, mdp.n_states), np.inf), walk, begun)
+
+
+def _chances(place: Environment) -> records.Chances | None:
+    return records.Chances(place.below, place.entered, place.reward) if isinstance(place, ChanceTable) else None
 
 
 def _one_by_one(

@@ -127,7 +127,8 @@ class Session:
         several_starts = bool(mdp.starts) or not (
             isinstance(environment, TableEnvironment) or isinstance(mdp, CellTable)
         )
-        around = Surroundings(draw, self._others, several_starts)
+        size = mdp.n_states, mdp.n_actions
+        around = Surroundings(draw, self._others, several_starts, self.update.gauge, size, learner)
         make = GATES[gate.gate if self.advised else "never"].make
         self.gate = make(gate, learner.episodes, learner.max_steps, around)
         self.max_moves = learner.max_steps - learner.count_start
@@ -261,17 +262,17 @@ class Session:
 
     def _advised_choice(self, state: int, step: int) -> int:
         """What the advisor says, where the gate asks, else the learner's own."""
-        own, recall = self._own_choice(state, step), self.recall
+        own, recall, gate = self._own_choice(state, step), self.recall, self.gate
         advisor = self.advisor if self.helped_steps + self.helped_now < self.gate_settings.budget else None
-        if advisor is None or (recall is not None and not recall.trusts):
+        if (advisor is None and not gate.weighs) or (recall is not None and not recall.trusts):
             return own
-        action = self._asks(advisor, state, step, own) if self.gate.asks(state, self.update.gauge(state)) else None
-        if action is None:
-            return own
-        self.helped_now += 1
-        if recall is not None:
-            recall.asked()
-        return action
+        wanted = gate.asks(state, self.update.gauge(state))
+        said = None if advisor is None or not wanted else self._asks(advisor, state, step, own)
+        if said is not None:
+            self.helped_now += 1
+            if recall is not None:
+                recall.asked()
+        return gate.takes(state, own, said)
 
     def _asks(self, advisor: Advisor, state: int, step: int, own: int) -> int | None:
         """The advisor's action, None when nothing is said."""

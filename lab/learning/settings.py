@@ -4,12 +4,12 @@ from dataclasses import asdict, dataclass, fields
 from functools import cache
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
-from annotated_types import DocInfo, Ge, Gt, Le, doc
+from annotated_types import DocInfo, Ge, Gt, Le, Lt, doc
 
 from lab.errors import BadInput
 
 COMPARE_WINDOWS = ("ccrl", "combined")
-WORDS = {"gt": "above", "ge": "at least", "le": "at most"}
+WORDS = {"gt": "above", "ge": "at least", "le": "at most", "lt": "below"}
 
 
 @cache
@@ -104,6 +104,10 @@ class GateSettings:
     ] = 1.0
     spread: Annotated[float, Ge(0), Le(1_000_000), doc("deviation of its tables that lets uncertainty ask")] = 0.1
     rate: Annotated[float, Ge(0), Le(1), doc("share of the steps that random asks about")] = 0.1
+    fading: Annotated[
+        float, Ge(0), Le(1), doc("by what fading multiplies the share of the steps that it asks about, each episode")
+    ] = 0.97
+    consistency: Annotated[float, Gt(0.5), Lt(1), doc("how often shaping takes an answer to be right")] = 0.9
     enough_steps: Annotated[float, Gt(0), Le(1_000_000), doc("mean step count that satisfies cq")] = 50.0
     ensemble: Annotated[int, Ge(2), Le(100), doc("tables of uncertainty")] = 5
     budget: Annotated[int, Ge(0), Le(1_000_000_000), doc("helped steps that any gate may use in a session")] = (

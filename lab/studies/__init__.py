@@ -76,6 +76,18 @@ def _advice_worth(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return advice_worth(job, reading)
 
 
+def _advice_bench(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.advice_bench.advice_bench import advice_bench
+
+    return advice_bench(job, reading)
+
+
+def _whom_to_believe(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.whom_to_believe import whom_to_believe
+
+    return whom_to_believe(job, reading)
+
+
 def _advisors(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.several_advisors import advisors
 
@@ -191,6 +203,19 @@ _SHIPPED: dict[str, Study] = {
     ),
     "advice-budget": Study("Success against helped steps: every gate with and without memory", _advice_budget, ADVISED),
     "advice-worth": Study("What an advisor's help is worth over nobody's, for every skill of toast", _advice_worth),
+    "advicebench": Study(
+        "AdviceBench: rules of when to ask, whatever the advisor, the budget and the problem",
+        _advice_bench,
+        ("methods", "problem", "advisors"),
+        sessions=100,
+        least=2,
+    ),
+    "whom-to-believe": Study(
+        "Whom to believe: is a panel of seven ranked rightly, and are three limited advisors better than nobody?",
+        _whom_to_believe,
+        sessions=100,
+        least=2,
+    ),
     "advisors": Study("Several advisors at once, beside the best and the worst of them alone", _advisors, ADVISED),
     "mountain-car": Study(
         "Mountain Car: when a teacher should speak, at equal budgets", _mountain_car, sessions=30, least=2

@@ -36,6 +36,8 @@ def test_the_defaults_are_those_of_the_thesis() -> None:
         "psi": 1.0,
         "spread": 0.1,
         "rate": 0.1,
+        "fading": 0.97,
+        "consistency": 0.9,
         "enough_steps": 50.0,
         "ensemble": 5,
         "budget": 1_000_000_000,

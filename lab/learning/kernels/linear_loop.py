@@ -230,7 +230,7 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
     lane = lanes.lane[0]
     state: Any = _start(work, world)
     _choose(work, linear, state)
-    action: Any = np.int64(decided(work, None, 0)[0])
+    action: Any = np.int64(decided(work, None, None, 0)[0])
     moves, over, won = 0, False, False
     entered: Any = 0
     following: Any = np.int64(0)
@@ -247,11 +247,11 @@ def _episode(work: Any, linear: Any, world: Any) -> None:
         last = moves == learning.max_moves
         if linear.lookahead and not over:
             _choose(work, linear, entered)
-            following = np.int64(lanes.chosen[0]) if last else np.int64(decided(work, None, 0)[0])
+            following = np.int64(lanes.chosen[0]) if last else np.int64(decided(work, None, None, 0)[0])
         _learn(linear, state, action, reward, 0.0 if over else learning.discount, entered, following)
         if not linear.lookahead and not over and not last:
             _choose(work, linear, entered)
-            following = np.int64(decided(work, None, 0)[0])
+            following = np.int64(decided(work, None, None, 0)[0])
         state, action = entered, following
     n, count = lane.session, sessions.counts[lane.session]
     if world.falls:
