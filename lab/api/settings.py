@@ -17,6 +17,8 @@ class Settings(TypedDict, total=False):
     discount: float
     trace: float
     replacing: bool
+    tilings: int
+    start_value: float
     planning: int
     selection: str
     exploration: float

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput
 
+MOST_ROUNDS = 300  # in which weights are found that made a table
+
 TileArray = NDArray[np.int32]
 Cell = TypeVar("Cell", int, TileArray)
 
@@ -127,4 +129,6 @@ class TileCoding:
         rows = np.arange(0, self.active.size + 1, self.tilings)
         shape = (len(self.active), self.count)
         matrix = csr_matrix((np.ones(self.active.size), self.active.ravel(), rows), shape=shape)
-        return np.stack([lsqr(matrix, column, atol=1e-13, btol=1e-13)[0] for column in values.T], axis=1)
+        return np.stack(
+            [lsqr(matrix, column, atol=1e-13, btol=1e-13, iter_lim=MOST_ROUNDS)[0] for column in values.T], axis=1
+        )

@@ -48,7 +48,7 @@ def test_a_session_goes_on_from_another_folder(lab: Lab, folder: Path, monkeypat
         ("teach world-1 --advisor web --advisor web", "advisor 'web' (--advisor) is named 2 times: once is enough"),
         ("teach world-1 --wait 0", "invalid value for '--wait'"),
         ("teach gym:FrozenLak-v1", "FrozenLake-v1"),
-        ("teach gym:Pendulum-v1", "its observation space is Box"),
+        ("teach gym:Pendulum-v1", "its action space is Box"),
         ("teach gym:Pendulum-v1", "supported are Discrete, MultiDiscrete, MultiBinary"),
         (
             "teach gym:FrozenLake-v1 --task toast",

@@ -1,6 +1,7 @@
 """Grid worlds: small ones by hand, drawn ones always with a way, text grids with every slip said by line and column."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
+from lab.learning.environment import TableEnvironment
 from lab.learning.requests import AdviceRequest
+from lab.learning.selection import uniforms
+from lab.learning.session import run_session
 from lab.learning.settings import LearnerSettings
+from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances
 from lab.mdp import NoPath, Rewards, greedy_path, optimal_values, shortest_steps
 from lab.seat.grid_text import Marks, picture_of
 from lab.seat.terminal.typed_answer import understand
@@ -23,6 +28,7 @@ from lab.tasks.grid_world import (
     parse_shape,
     random_world,
 )
+from lab.tasks.record import walking
 from lab.tasks.task_file import load_world
 
 SMALL = GridWorld(
@@ -262,3 +268,19 @@ def test_a_person_sees_a_cube_from_above() -> None:
     assert picture is not None
     assert [line.plain[:6] for line in picture.lines[1:3]] == [" ↑ # g", " R . ."]
     assert [understand(word, cube.mdp()) for word in ("left", "back", "forward", "↑", "up")] == [0, 2, 3, 3, 5]
+
+
+# ---- goals far away -----------------------------------------------------------------------------------------------
+
+
+def test_a_goal_that_nobody_finds_by_chance_is_learned_from_being_shown() -> None:
+    world = random_world((700, 2), 0.0, 3)
+    mdp, learner = world.check(), world.learner
+    assert shortest_steps(mdp) > 300
+    assert learner.start_value == pytest.approx(walking(world.rewards.step, learner), abs=1e-6)
+    place, draw = TableEnvironment(mdp), uniforms(np.random.default_rng(0))
+    expert = TableAdvisor(Advice.of(advice_chances(place.values(learner.discount), 0.01)), draw)
+    result = run_session(mdp, replace(learner, episodes=30), world.gate, expert, draw)
+    assert result.solved
+    assert 0 < result.helped_steps <= 12 * shortest_steps(mdp)
+    assert random_world((30, 30), 0.1, 3).learner.learner == "afterstate"  # a near one is found alone

@@ -18,14 +18,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+import lab
 from lab.advice.advisors import AdvisorName
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, LabError, WorkFailed
 from lab.gym.environment_name import names_environment, parse_name
 from lab.gym.gym_environment import ALONE, GymEnvironment
-from lab.gym.space_numbering import Numbering, Unsupported
+from lab.gym.space_numbering import CellNumbering, Numbering, Unsupported
 from lab.gym.transition_model import TransitionModel, Worth
 from lab.learning.environment import Judged
+from lab.learning.physics.environment import PhysicsEnvironment
+from lab.learning.physics.mountain_car import energy_rule
 from lab.learning.selection import Draw, uniforms
 from lab.learning.session import SessionResult, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -486,8 +489,11 @@ def test_the_options_of_a_command_change_the_settings() -> None:
         ("gym:FrozenLake-v99", "did you mean 'FrozenLake-v1'?"),
         ("gym:nowhere:Thing-v0", "it needs what is not installed: ModuleNotFoundError: No module named 'nowhere'"),
         ("gym:Ant-v5", "it needs what is not installed: "),
-        ("gym:CartPole-v1", "its observation space is Box("),
-        ("gym:CartPole-v1", "supported are Discrete, MultiDiscrete, MultiBinary, and Tuple or Dict of these"),
+        ("gym:Pendulum-v1", "its action space is Box("),
+        ("gym:Pendulum-v1", "supported are Discrete, MultiDiscrete, MultiBinary, and Tuple or Dict of these"),
+        ("gym:CartPole-v1?sutton_barto_reward=true", "its observation space is Box("),  # its speeds have no bounds
+        ("gym:CartPole-v1?sutton_barto_reward=true", "wanted 1 to 4 axes with finite bounds"),
+        ("gym:MountainCar-v0?max_episode_steps=0", "it cannot be made with max_episode_steps: ValueError: "),
         ("gym:FrozenLake-v1?slippery=true", "unknown keyword 'slippery'"),
         ("gym:FrozenLake-v1?slippery=true", "did you mean 'is_slippery'? known: desc, is_slippery, map_name, max_ep"),
         ("gym:FrozenLake-v1?map_name=9x9", "it cannot be made with map_name: KeyError: '9x9'"),
@@ -585,3 +591,64 @@ def test_an_expert_knows_the_lake_better_than_a_novice() -> None:
     assert expert > 0.6
     assert expert > moderate > novice
     assert novice < 0.1
+
+
+# ---- continuous observations ----------------------------------------------------------------------------------------
+
+
+def test_the_car_is_taught_by_the_labs_own_physics_unless_its_rules_are_others() -> None:
+    own, longer = gym_world("gym:MountainCar-v0"), gym_world("gym:MountainCar-v0?max_episode_steps=500")
+    theirs = gym_world("gym:MountainCar-v0?goal_velocity=0.01")
+    assert [type(one.problem().environment).__name__ for one in (own, longer, theirs)] == [
+        "PhysicsEnvironment",
+        "PhysicsEnvironment",
+        "GymEnvironment",
+    ]
+    assert (own.learner.tilings, own.learner.max_steps, longer.learner.max_steps) == (8, 200, 500)
+    with pytest.raises(BadInput, match=r"with tilings = 8: allowed are q, sarsa, q-lambda, sarsa-lambda"):
+        own.changed(learner="dyna-q")
+
+
+def test_gymnasiums_car_is_learned_in_the_same_cells_as_the_labs_own() -> None:
+    """The same table and settings, alone and through Gymnasium: the walk from a start is cell by cell the same."""
+    own, theirs = (gym_world(f"gym:MountainCar-v0{query}") for query in ("", "?goal_velocity=0"))
+    ours, others = own.problem().environment, theirs.problem().environment
+    assert isinstance(ours, PhysicsEnvironment)
+    assert isinstance(others, GymEnvironment)
+    assert ours.mdp.cells == others.mdp.cells == (64, 64)
+    state, draw = others.reset(1, uniforms(np.random.default_rng(3))), uniforms(np.random.default_rng(0))
+    ours.point = list(others.live.inside.state)
+    steps, terminated = 0, False
+    while not terminated and steps < 200:
+        action = 2 if ours.point[1] >= 0.0 else 0
+        one, other = ours.step(state, action, draw), others.step(state, action, draw)
+        assert one[:4] == other[:4]
+        state, terminated, steps = other.state, other.terminated, steps + 1
+    assert steps < 150
+    short = replace(theirs.learner, episodes=2)
+    found = run_session(others, short, GateSettings("never"), None, np.random.default_rng(0))
+    assert found.steps.tolist() == [201, 201]
+
+
+def test_cells_of_a_box_are_numbered_by_its_bounds() -> None:
+    cells = CellNumbering(spaces.Box(np.array([-1.0, 0.0]), np.array([1.0, 4.0]), dtype=np.float64))
+    assert (cells.sizes, cells.number([-1.0, 0.0]), cells.number([1.0, 4.0])) == ((64, 64), 0, 64 * 64 - 1)
+    assert cells.number(cells.value(1234)) == 1234
+    for wrong in ([0.0], [0.0, float("nan")]):
+        with pytest.raises(ValueError, match="no point with 2 finite numbers"):
+            cells.number(wrong)
+    for space in (spaces.Box(-1, 1, (5,)), spaces.Box(-np.inf, 1, (1,)), spaces.Discrete(3)):
+        with pytest.raises(Unsupported):
+            CellNumbering(space)
+
+
+def test_a_function_teaches_the_car_and_the_policy_is_kept(tmp_path: Path) -> None:
+    def by_energy(request: Any) -> int:
+        return energy_rule(request.environment.point)
+
+    taught = lab.teach("gym:MountainCar-v0", advisor=by_energy, episodes=4, gate="always", budget=400)
+    assert taught.document["helped_steps"] == 400
+    assert max(taught.session.steps[:3]) < 150
+    path = taught.keep(tmp_path)
+    assert path.is_file()
+    assert taught.q.shape == (4096, 3)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lab.learning.batch import run_sessions
 from lab.learning.physics import PHYSICS
-from lab.learning.physics.environment import PhysicsEnvironment, fitting
+from lab.learning.physics.environment import SOBER, PhysicsEnvironment, fitting
 from lab.learning.requests import AdviceRequest
 from lab.learning.session import run_session
 from lab.learning.settings import GateSettings, LearnerSettings
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 EPISODES, BUDGET = 300, 1000
 SOLVED_MEAN, SOLVED_OF = 110.0, 100  # steps, over so many episodes in a row: what Gymnasium calls solved
-SOBER = -50.0
 STUDENTS = {"hopeful": 0.0, "sober": SOBER}  # what they think of every move at first
 NOBODY, EXPERT_TAU = "nobody", 0.01
 GATE = GateSettings("always", window=5, first_episode=10, omega=30, spare_best=True, budget=BUDGET)

@@ -61,7 +61,7 @@ def test_the_study_has_all_rules_and_says_what_differs(tmp_path: Path, monkeypat
         (one["student"], one["rule"]): one["value"] for one in document["rows"] if one["measure"] == "helped_steps"
     }
     assert helped["sober", "nobody"] == 0.0
-    assert helped["sober", "early"] == 1000.0
+    assert 900.0 < helped["sober", "early"] <= 1000.0  # ten ways of its teacher
     assert any("differs from Torrey" in note for note in document["notes"])
 
 
