@@ -194,5 +194,6 @@ def _key(setting: Setting, problem: Problem, job: Job) -> str:
     """What names a setting's sessions among those that are kept."""
     how = setting.subject().settings
     region = None if setting.of.sight is None else setting.of.sight
-    whole = [__version__, problem.mdp.signature, region, setting.named, vars(how.learner), vars(how.gate)]
+    whole: list[Any] = [__version__, problem.mdp.signature, region, setting.named, vars(how.learner), vars(how.gate)]
+    whole += [one.said.tolist() for one in Advising.of([setting.advisor]).check_records(problem.mdp)]
     return sha256(json.dumps([*whole, job.sessions, job.seed], default=str).encode()).hexdigest()[:24]
