@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from lab.api.pictures import Page, Picture
     from lab.api.runs import RunResult, run
     from lab.api.scenes import show
-    from lab.api.studies import StudyResult, compare, study
+    from lab.api.studies import StudyResult, compare, study, tune
     from lab.errors import BadInput, LabError, WorkFailed
     from lab.learning.gates import Gate, Steps
     from lab.learning.problem import Problem
@@ -33,7 +33,7 @@ _FACE = {
     "lab.api.pictures": ("Page", "Picture"),
     "lab.api.runs": ("RunResult", "run"),
     "lab.api.scenes": ("show",),
-    "lab.api.studies": ("StudyResult", "compare", "study"),
+    "lab.api.studies": ("StudyResult", "compare", "study", "tune"),
     "lab.teaching.mentor": ("watch",),
     "lab.teaching.subjects": ("world",),
     "lab.errors": ("BadInput", "LabError", "WorkFailed"),
@@ -78,6 +78,7 @@ __all__ = [
     "show",
     "study",
     "teach",
+    "tune",
     "watch",
     "world",
 ]

@@ -53,6 +53,7 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
     "jinja2": {"lab.studies.report"},
     "fsspec": {"lab.toolbox.remote_place"},
     "s3fs": set(),  # fsspec's
+    "optuna": {"lab.studies.tuning_search"},
     "joblib": {"lab.studies.runner"},  # to work in several processes; its files are pickles, and nobody reads those
 } | {library: set() for library in ("random", "pickle", "dill", "cloudpickle", "shelve", "marshal")}
 NEVER = {  # room -> rooms that it never imports, whatever the layers say

@@ -1,4 +1,4 @@
-"""Who advises in a session: one advisor or several, simulated, recorded or people, and how they are brought together."""
+"""Who advises in a session: one advisor or several, simulated, recorded, learned or people, and how they are brought together."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,6 +9,7 @@ from lab.advice.advisors import PEOPLE, AdvisorName, make_advisor
 from lab.advice.entries import Read, read_journal
 from lab.advice.journal import Journal
 from lab.advice.panel import Panel, PanelSettings, members_of
+from lab.advice.policy_advisor import PolicyAdvisor
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput
 from lab.learning.environment import Environment
@@ -17,6 +18,7 @@ from lab.learning.selection import uniforms
 from lab.learning.session_events import Event
 from lab.learning.settings import LearnerSettings
 from lab.mdp import BoolArray, TabularMDP
+from lab.toolbox.registry import Toolbox
 
 EXPERT = AdvisorName.of("expert")
 
@@ -25,13 +27,15 @@ EXPERT = AdvisorName.of("expert")
 class Advising:
     """Who is asked in a session, and the people behind such names as "terminal".
 
-    panel: how several are asked, and whom to follow; region (S,): where anybody is heard.
+    panel: how several are asked, and whom to follow; region (S,): where anybody is heard;
+    toolbox: where policies that advise are, None: the user's own.
     """
 
     names: tuple[AdvisorName, ...] = (EXPERT,)
     people: Mapping[str, Ask] = field(default_factory=dict)
     panel: PanelSettings = field(default_factory=PanelSettings)
     region: BoolArray | None = None
+    toolbox: Toolbox | None = None
 
     @classmethod
     def of(
@@ -61,19 +65,19 @@ class Advising:
 
     @property
     def records(self) -> bool:
-        """Whether anybody speaks only where a record has something: such silence is not held against the advice."""
-        return any(name.folder is not None for name in self.names)
+        """Whether anybody speaks only where a record or a policy has something: such silence is not held against the advice."""
+        return any(name.folder is not None or name.policy for name in self.names)
 
     def cut_records(self) -> list[Read]:
         """The journals among the advisors whose last line was cut off. Raises BadInput for what is no journal."""
         folders = [name.folder for name in self.names if name.folder is not None]
         return [read for read in (read_journal(folder, "--advisor") for folder in folders) if read.cut]
 
-    def check_records(self, mdp: TabularMDP) -> None:
-        """Raises BadInput for a record that is not about this problem."""
-        for name in self.names:
-            if name.folder is not None:
-                make_advisor(name, TableLevel(mdp, 1.0, np.random.default_rng(0)))
+    def check_records(self, mdp: TabularMDP) -> list[PolicyAdvisor]:
+        """The policies that advise; BadInput for a record or a policy that is not about this problem."""
+        level = TableLevel(mdp, 1.0, np.random.default_rng(0), toolbox=self.toolbox)
+        known = [make_advisor(name, level) for name in self.names if name.folder is not None or name.policy]
+        return [one for one in known if isinstance(one, PolicyAdvisor)]
 
     def gather(
         self,
@@ -92,7 +96,7 @@ class Advising:
         streams = [rng] if len(self.names) == 1 else rng.spawn(len(self.names) + 1)
         made = [
             TableLevel(
-                mdp, learner.discount, stream, people, self.region, learner.episodes, environment.values
+                mdp, learner.discount, stream, people, self.region, learner.episodes, environment.values, self.toolbox
             ).advisor(name)
             for name, stream in zip(self.names, streams, strict=False)
         ]

@@ -1,4 +1,4 @@
-"""Who can be asked, by name: simulated advisors, a person at a terminal or a page, recorded advice, or nobody.
+"""Who can be asked, by name: simulated advisors, a person, recorded advice, a policy that was learned, or nobody.
 
 A name is read once, where it comes in, into an `AdvisorName`; a `Level` (a table's steps, the order of the transfers) makes of
 it who answers there. One row of ADVISORS serves both.
@@ -32,6 +32,9 @@ class Level(Protocol):
     def check(self, recorded: "Read") -> None:
         """BadInput when that is advice about something else."""
 
+    def learned(self, name: str) -> "Advisor":
+        """The policy of that name, or in that file; BadInput where there is none, and where it knows nothing of this."""
+
 
 @dataclass(frozen=True)
 class AdvisorName:
@@ -44,6 +47,7 @@ class AdvisorName:
     row: str
     taus: tuple[float, ...] = ()
     folder: Path | None = None
+    policy: str = ""
     itself: "Advisor | None" = None
 
     @classmethod
@@ -58,7 +62,7 @@ class AdvisorName:
 
     @classmethod
     def of(cls, text: str, where: str = "advisor") -> "AdvisorName":
-        """From "expert", "tau=0.2", "tau=1..0.01", "recorded:DIR" and so on; BadInput for what is none, `where` it was said."""
+        """From "expert", "tau=0.2", "tau=1..0.01", "recorded:DIR", "policy:NAME"; BadInput, with `where` it was said."""
         if text.startswith("recorded:"):
             folder = Path(text.removeprefix("recorded:"))
             if not folder.name:
@@ -66,6 +70,13 @@ class AdvisorName:
                     f"advisor '{text}' ({where}): it names no file: wanted recorded:DIR, the folder of a session"
                 )
             return cls(text, "recorded:DIR", folder=folder)
+        if text.startswith("policy:"):
+            policy = text.removeprefix("policy:")
+            if not policy.strip():
+                raise BadInput(
+                    f"advisor '{text}' ({where}): it names no policy: wanted policy:NAME; see lab toolbox list"
+                )
+            return cls(text, "policy:NAME", policy=policy)
         if not text.startswith("tau="):
             if text in ADVISORS:
                 return cls(text, text, (SKILL_TAUS[text],) if text in SKILL_TAUS else ())
@@ -137,6 +148,13 @@ def _recorded(name: AdvisorName, level: Level) -> "Advisor":
     return RecordedAdvisor(said)
 
 
+def _learned(name: AdvisorName, level: Level) -> "Advisor":
+    try:
+        return level.learned(name.policy)
+    except BadInput as error:
+        raise BadInput(f"advisor '{name}': {error}") from None
+
+
 PYTHON = "python"  # the row of an advisor that is in no table
 PEOPLE = {"terminal": "prompt", "web": "page"}
 SKILL_TAUS = {"expert": 0.01, "moderate": 0.1, "limited": 0.3, "novice": 1.0}
@@ -158,6 +176,7 @@ _SHIPPED: dict[str, AdvisorKind] = {
     "tau=X": AdvisorKind(_simulated),
     "tau=X..Y": AdvisorKind(_simulated, "changing over the episodes"),
     "recorded:DIR": AdvisorKind(_recorded, "a session's folder"),
+    "policy:NAME": AdvisorKind(_learned, "a policy in the toolbox, or its file"),
 }
 ADVISORS = Family("advisors", _SHIPPED, _adopted)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from lab.advice.advisors import recorded_fault
 from lab.advice.entries import Read
+from lab.errors import BadInput
 from lab.learning.requests import Advisor, Ask
 from lab.learning.selection import softmax
 from lab.learning.simulated_advice import tau_schedule
@@ -52,6 +53,10 @@ class OrderLevel:
         """BadInput for advice about another cell."""
         if recorded.session.signature != self.signature:
             raise recorded_fault(recorded, "order", self.signature)
+
+    def learned(self, name: str) -> Advisor:
+        """BadInput: policies in the toolbox are tables of steps."""
+        raise BadInput("a policy knows the steps of a sub-task, not the order: wanted another advisor")
 
 
 class OrderAdvisor:

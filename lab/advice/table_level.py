@@ -7,11 +7,13 @@ import numpy as np
 
 from lab.advice.advisors import AdvisorName, make_advisor, recorded_fault
 from lab.advice.entries import Read
+from lab.advice.policy_advisor import PolicyAdvisor, policy_of
 from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest, Advisor, Ask
 from lab.learning.selection import uniforms
 from lab.learning.simulated_advice import Advice, TableAdvisor, advice_chances, tau_schedule
 from lab.mdp import BoolArray, FloatArray, TabularMDP, optimal_values
+from lab.toolbox.registry import Toolbox
 
 
 @dataclass(frozen=True)
@@ -19,7 +21,7 @@ class TableLevel:
     """A problem with the learner's discount and episodes (the session's length), and whom it may ask.
 
     people: who can be asked, by name; region (S,): where anybody is heard; values: where the optimal action values come
-    from, by default the problem's table.
+    from, by default the problem's table; toolbox: where policies that advise are, None: the user's own.
     """
 
     mdp: TabularMDP
@@ -29,6 +31,7 @@ class TableLevel:
     region: BoolArray | None = None
     episodes: int = 1
     values: Callable[[float], FloatArray] | None = None
+    toolbox: Toolbox | None = None
 
     def simulated(self, taus: tuple[float, ...], sign: float) -> Advisor:
         """An advisor that knows the exact optimal values, or (sign -1) takes the worst for the best."""
@@ -43,6 +46,10 @@ class TableLevel:
         for state, action in recorded.said().items():
             if not (0 <= state < self.mdp.n_states and 0 <= action < self.mdp.n_actions):
                 raise BadInput(f"state {state}, action {action} do not exist")
+
+    def learned(self, name: str) -> Advisor:
+        """A policy that says what it would do, silent where it has never been."""
+        return PolicyAdvisor(policy_of(name, self.toolbox), self.mdp)
 
     def advisor(self, name: AdvisorName) -> Advisor | None:
         """`make_advisor`, heard in the region only."""

@@ -6,9 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Unpack
 
-from lab.advice.advising import Advising
 from lab.api.data_frames import data_frame
-from lab.api.options import Advisors, ToolboxOrPlace, several, toolbox_of
+from lab.api.options import Advisors, ToolboxOrPlace, advising_of, toolbox_of
 from lab.api.pictures import Picture
 from lab.api.settings import Settings
 from lab.errors import BadInput
@@ -139,6 +138,6 @@ def teach(
     with TemporaryDirectory() as nowhere:
         steps = StepRecord() if record else None
         tell = unheard if steps is None else steps.hear
-        teacher = Teacher(toolbox_of(toolbox, nowhere), Advising.of(several(advisor)), seed, tell)
+        teacher = Teacher(toolbox_of(toolbox, nowhere), advising_of(advisor, toolbox), seed, tell)
         learned, lesson = taught(subject, teacher)
     return LessonResult(learned, lesson, document_of(learned, lesson, teacher) | subject.facts(), subject, steps)

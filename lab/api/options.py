@@ -1,9 +1,11 @@
 """What the functions take beside their own arguments: options by name, advisors, toolboxes."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lab.advice.advising import Advising
 from lab.errors import unknown
 from lab.learning.requests import Advisor, Ask
 from lab.toolbox.registry import Toolbox
@@ -26,6 +28,12 @@ def several(advisors: Advisors) -> list[OneAdvisor]:
     if isinstance(advisors, Sequence) and not isinstance(advisors, str):
         return list(advisors)
     return ["none" if advisors is None else advisors]
+
+
+def advising_of(advisors: Advisors, toolbox: ToolboxOrPlace) -> Advising:
+    """Who advises; policies that do are in that toolbox, None: in the user's own."""
+    box = None if toolbox is None else toolbox_of(toolbox, "")
+    return replace(Advising.of(several(advisors)), toolbox=box)
 
 
 def toolbox_of(given: ToolboxOrPlace, nowhere: str) -> Toolbox:

@@ -7,9 +7,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
-from lab.advice.advising import Advising
 from lab.api.data_frames import data_frame
-from lab.api.options import Advisors, ToolboxOrPlace, checked, several, toolbox_of
+from lab.api.options import Advisors, ToolboxOrPlace, advising_of, checked, several, toolbox_of
 from lab.api.pictures import Page, Picture
 from lab.errors import BadInput
 from lab.files import check_out
@@ -114,7 +113,7 @@ def run(
     """
     given = checked(options, TaskOptions, "lab.run")
     loaded, advisors = load(str(task)), several(advisor)
-    advising = Advising.of(advisors)
+    advising = advising_of(advisors, toolbox)
     if out is not None and not all(isinstance(one, str) for one in advisors):
         raise BadInput(f"out '{out}' with the advisor {advising}: a journal can only name advisors that have a name")
     words = RunOptions(task=str(task), advisors=tuple(map(str, advising.names)), seed=seed, **given)

@@ -1,16 +1,19 @@
 """`lab.study` and `lab.compare`: many sessions, and what they come to."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lab.api.data_frames import data_frame
-from lab.api.options import Advisors, several
+from lab.api.options import Advisors, OneAdvisor, several
 from lab.api.pictures import Picture
+from lab.learning.tuned_ranges import USUAL
 from lab.studies import checked, study_of
 from lab.studies.compared import Compared, compared
 from lab.studies.findings import Findings, Row
 from lab.studies.runner import Job
+from lab.studies.tuning import Tuning, tuned
 from lab.teaching.subjects import Teachable
 
 if TYPE_CHECKING:
@@ -88,6 +91,28 @@ def compare(
     return StudyResult(
         f"Compared: {problem}" if isinstance(problem, str) else "Compared", compared(what, Job(sessions, seed, workers))
     )
+
+
+def tune(
+    problem: Teachable,
+    *,
+    advisor: OneAdvisor = "expert",
+    over: Sequence[str] = USUAL,
+    trials: int = 100,
+    sessions: int = 45,
+    seed: int = 0,
+    workers: int = 1,
+    **held: Any,
+) -> StudyResult:
+    """Settings tuned to a problem, and what that gains on unseen seeds, as `lab tune` does; nothing is written.
+
+    problem, advisor: as in `lab.teach`; over: the settings that are tuned; held: others, at a value, task and sight among them.
+    Raises BadInput for whatever does not fit, and where Optuna is not installed.
+    """
+    where = {name: held.pop(name) for name in ("task", "sight") if name in held}
+    what = Tuning(problem, advisor, held, tuple(over), trials, **where)
+    title = f"Tuned: {problem}" if isinstance(problem, str) else "Tuned"
+    return StudyResult(title, tuned(what, Job(sessions, seed, workers)))
 
 
 def _listed(value: Any) -> list[Any]:

@@ -24,6 +24,7 @@ from lab.cli import (
     toolbox,
     toolbox_archive,
     toolbox_evaluate,
+    tune,
     view,
 )
 from lab.cli.families import CommandOfFamilies
@@ -51,6 +52,7 @@ COMMANDS = {  # what is typed after `lab` -> the command
     "run": Command(run.run, "lab run toast --toasts 3"),
     "operate": Command(operate.operate, "lab operate toast --toasts 2"),
     "teach": Command(teach.teach, "lab teach insert --advisor terminal", "{words of teaching}"),
+    "tune": Command(tune.tune, "lab tune world-1 --advisor moderate --trials 100 --workers 2"),
     "replay": Command(replay.replay, "lab replay lesson"),
     "sequence": Command(
         sequence.sequence, "lab sequence toast --case II --toasts 4 --gantt order.svg", "{words of sequencing}"

@@ -52,13 +52,16 @@ def lesson_seat(
 
 def teacher_of(toolbox: str | None, options: "LessonOptions", seat: "LessonSeat") -> "Teacher":
     """The teacher that the options describe; raises BadInput for options and folders that cannot be."""
+    from dataclasses import replace
+
     from lab.teaching.teacher import Teacher
     from lab.toolbox.registry import Toolbox
 
-    advising = options.advising(seat.people())
+    box = Toolbox(toolbox)
+    advising = replace(options.advising(seat.people()), toolbox=box)
     for journal in advising.cut_records():
         _say_cut(journal)
-    teacher = Teacher(Toolbox(toolbox), advising, options.seed, seat.hear)
+    teacher = Teacher(box, advising, options.seed, seat.hear)
     teacher.toolbox.check()
     return teacher
 

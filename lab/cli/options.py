@@ -23,7 +23,8 @@ AdvisorNames = Annotated[
     list[str] | None,
     typer.Option(
         "--advisor",
-        help="Who advises: {advisors} (X..Y: changing over the episodes; DIR: a session's folder); "
+        help="Who advises: {advisors} (X..Y: changing over the episodes; DIR: a session's folder; "
+        "NAME: a policy in the toolbox, also of another world); "
         "several times for several advisors.",
         autocompletion=offers("advisors"),
         callback=from_files("advisors"),

@@ -28,6 +28,7 @@ from lab.teaching.events import (
     MoveTimed,
     OrderChosen,
     PhaseBegan,
+    PolicyAdvises,
     RecordSkipped,
     SequenceFound,
     SkillReady,
@@ -200,6 +201,8 @@ def run_text(event: Event) -> str:
             return f"skipped: {event.why}"
         case KeptBeside():
             return f"'{event.name}', version {event.version} is kept, but not put in use: {event.why}"
+        case PolicyAdvises():
+            return f"advisor {event.advisor}"
         case MoveRetried():
             return f"failed, trying again: {event.why}"
         case SkillReady():

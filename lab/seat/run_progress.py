@@ -20,6 +20,7 @@ from lab.teaching.events import (
     MoveTimed,
     OrderChosen,
     PhaseBegan,
+    PolicyAdvises,
     RecordSkipped,
     SequenceFound,
     SkillReady,
@@ -80,7 +81,7 @@ class RunProgress:
                 self._rejected[name] = rejected
             case PhaseBegan():
                 self._begin(run_text(event), event.parts)
-            case LessonContinued():
+            case LessonContinued() | PolicyAdvises():
                 self._say(run_text(event))
             case RecordSkipped() | MoveRetried() | KeptBeside():
                 self._say((f"  {run_text(event)}", "yellow"))

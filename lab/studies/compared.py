@@ -101,8 +101,8 @@ def compared(what: Compared, job: Job) -> Findings:
     settings = list(what.settings())
     for setting in settings:
         setting.subject()
-    problem = _prepared(what, job.seed)
-    keys = {_key(setting, problem, job): setting for setting in settings}
+    problem = prepared(what, job.seed)
+    keys = {key_of(setting, problem, job): setting for setting in settings}
     done: dict[str, Sessions] = {}
     for entry in job.kept():
         try:
@@ -114,7 +114,7 @@ def compared(what: Compared, job: Job) -> Findings:
     job.progress(len(done), len(keys))
     work = partial(sessions_of, sessions=job.sessions, seed=job.seed)
     for setting, found in job.computed(work, [keys[key] for key in left], 1):
-        key = _key(setting, problem, job)
+        key = key_of(setting, problem, job)
         done[key] = found
         job.keep({"key": key, **found.to_json()})
         job.progress(len(done), len(keys))
@@ -123,14 +123,15 @@ def compared(what: Compared, job: Job) -> Findings:
     return Findings(rows, in_short(results.values()), figures([*results.values()]), (MEASURES,))
 
 
-def sessions_of(setting: Setting, sessions: int, seed: int) -> Sessions:
-    """So many sessions of a setting: compiled where learner, gate and advisor are, else one by one."""
+def sessions_of(setting: Setting, sessions: int, seed: int, stream: int | None = None) -> Sessions:
+    """So many sessions of a setting: compiled where learner, gate and advisor are, else one by one; stream: other chances."""
     for kind, word in setting.of.files.values():
         take(FAMILIES[kind], word)
-    subject, problem = setting.subject(), _prepared(setting.of, seed)
+    subject, problem = setting.subject(), prepared(setting.of, seed)
     how, environment = subject.settings, problem.environment or TableEnvironment(problem.mdp)
     advising = replace(Advising.of([setting.advisor]), region=subject.region)
-    rng = np.random.default_rng([seed, crc32(problem.mdp.signature.encode())])
+    chances = [seed, crc32(problem.mdp.signature.encode())]
+    rng = np.random.default_rng(chances if stream is None else [*chances, stream])
     seeds = rng.integers(2**64, size=sessions, dtype=np.uint64)
     advisor = advising.gather(environment, how.learner, np.random.default_rng(0))
     at_once = problem.environment is None or isinstance(environment, PhysicsEnvironment)
@@ -185,16 +186,17 @@ def _surveyed(problem: str, task: str | None, sight: str | None, seed: int) -> P
     return subject_from(problem, task, sight).prepare(seed)
 
 
-def _prepared(what: Compared, seed: int) -> Problem:
+def prepared(what: Compared, seed: int) -> Problem:
     """The problem, surveyed once in this process where it has a name."""
     if isinstance(what.problem, str):
         return _surveyed(what.problem, what.task, what.sight, seed)
     return subject_from(what.problem, what.task, what.sight).prepare(seed)
 
 
-def _key(setting: Setting, problem: Problem, job: Job) -> str:
+def key_of(setting: Setting, problem: Problem, job: Job) -> str:
     """What names a setting's sessions among those that are kept."""
     how = setting.subject().settings
     region = None if setting.of.sight is None else setting.of.sight
-    whole = [__version__, problem.mdp.signature, region, setting.named, vars(how.learner), vars(how.gate)]
+    whole: list[Any] = [__version__, problem.mdp.signature, region, setting.named, vars(how.learner), vars(how.gate)]
+    whole += [one.said.tolist() for one in Advising.of([setting.advisor]).check_records(problem.mdp)]
     return sha256(json.dumps([*whole, job.sessions, job.seed], default=str).encode()).hexdigest()[:24]

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lab.advice.journal import Journal
+from lab.advice.policy_advisor import PolicyAdvisor
 from lab.learning import session_events as session
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Request
@@ -98,6 +99,13 @@ class KeptBeside:
     name: str
     version: int
     why: str
+
+
+@dataclass(frozen=True)
+class PolicyAdvises:
+    """A policy of the toolbox advises in the lesson that begins now."""
+
+    advisor: PolicyAdvisor
 
 
 @dataclass(frozen=True)
@@ -292,6 +300,7 @@ Event = (
     | PhaseBegan
     | RecordSkipped
     | KeptBeside
+    | PolicyAdvises
     | SkillReady
     | MoveTimed
     | SequencingBegan

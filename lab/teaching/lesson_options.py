@@ -49,9 +49,10 @@ def whole_path(name: str | None) -> str | None:
 
 
 def recorded_whole(advisor: str) -> str:
-    """An advisor's name; one that was recorded by the whole path of its folder."""
-    head, _, path = advisor.partition("recorded:")
-    return f"recorded:{Path(path).absolute()}" if path and not head else advisor
+    """An advisor's name; one that was recorded, or a policy's file, by its whole path."""
+    kind, _, path = advisor.partition(":")
+    is_path = path and (kind == "recorded" or (kind == "policy" and Path(path).is_file()))
+    return f"{kind}:{Path(path).absolute()}" if is_path else advisor
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from lab.errors import BadInput, WorkFailed, counted
 from lab.learning.problem import Problem
 from lab.learning.session import SessionResult
 from lab.mdp import TabularMDP
-from lab.teaching.events import KeptBeside, LessonContinued, Tell, unheard
+from lab.teaching.events import KeptBeside, LessonContinued, PolicyAdvises, Tell, unheard
 from lab.teaching.lesson_plan import Interrupted, Keep, Lesson, LessonPlan, Source, Trial
 from lab.teaching.lesson_sessions import fits, joined, learn
 from lab.toolbox.fitness import Fitness, best_fit, reference
@@ -134,7 +134,8 @@ class Teacher:
     def teach(self, plan: LessonPlan) -> Lesson:
         """Teach what is planned, and save the policy, solved or not. WorkFailed when several sessions find no way."""
         problem, unfinished = plan.problem, plan.unfinished
-        self.advising.check_records(problem.mdp)
+        for known in self.advising.check_records(problem.mdp):
+            self.tell(PolicyAdvises(known))
         journal = self.keep(plan)
         try:
             result = learn(plan, self.advising, self.seed, journal, self.tell)

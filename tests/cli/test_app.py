@@ -71,7 +71,7 @@ def test_the_version_is_told(lab: Lab) -> None:
 @pytest.mark.parametrize(
     ("typed", "completed"),
     [
-        ("t", ["teach", "toolbox", "task"]),
+        ("t", ["teach", "tune", "toolbox", "task"]),
         ("teach --gate c", ["ccrl", "combined", "cq"]),
         ("study run table-9.4", ["table-9.4"]),
     ],

@@ -1,0 +1,82 @@
+"""A policy in the toolbox as an advisor: what it would do itself, in the states that mean the same where it learned."""
+
+from pathlib import Path
+
+import numpy as np
+
+from lab.errors import BadInput, counted
+from lab.learning.requests import Request
+from lab.mdp import IntArray, TabularMDP
+from lab.toolbox.names import SUFFIX
+from lab.toolbox.policy import ON, Policy
+from lab.toolbox.registry import Toolbox
+
+SILENT = -1
+
+
+class PolicyAdvisor:
+    """Says what a policy would do, nothing in states it has never been in.
+
+    said (S,): the action in each state, SILENT where it knows none. known: how many states it can speak of, `of` all that go
+    on; here: it learned in exactly this problem.
+    """
+
+    def __init__(self, policy: Policy, mdp: TabularMDP):
+        self.name, self.here = policy.name, policy.signature == mdp.signature
+        self.said = advice_of(policy, mdp)
+        self.known, self.of = int((self.said != SILENT).sum()), int((~mdp.terminal).sum())
+
+    def advise(self, request: Request) -> int | None:
+        """The policy's greedy action."""
+        action = int(self.said[request.state])
+        return action if action in request.allowed else None
+
+    def __str__(self) -> str:
+        where = "this problem" if self.here else "another problem, its cells matched by their place"
+        return f"'{self.name}' knows {self.known} of {counted(self.of, 'state')}: it learned in {where}"
+
+
+def advice_of(policy: Policy, mdp: TabularMDP) -> IntArray:
+    """What a policy would do in each state of a problem, (S,), SILENT where it has never been.
+
+    In another problem than its own, cells of grids with as many axes are the same where their indices are, and actions where
+    their labels are. Raises BadInput where nothing is the same, or nothing of it was visited.
+    """
+    there = np.arange(mdp.n_states, dtype=np.int32) if policy.signature == mdp.signature else _places(policy, mdp)
+    been = policy.visits.max(axis=1) > 0
+    if policy.ends is not None:
+        been &= policy.ends == ON
+    labels = {label: action for action, label in enumerate(mdp.action_labels)}
+    named = np.array([labels.get(label, SILENT) for label in policy.action_labels], np.int32)
+    speaks = (there >= 0) & been[there] & ~mdp.terminal
+    said = np.where(speaks, named[policy.q.argmax(axis=1)][there], SILENT).astype(np.int32)
+    if not (said != SILENT).any():
+        raise BadInput("it has been in none of this problem's states")
+    return said
+
+
+def _places(policy: Policy, mdp: TabularMDP) -> IntArray:
+    """The policy's state for each state of a problem, (S,), -1 where it has none. BadInput for what cannot be matched."""
+    if not (policy.shape and mdp.shape) or mdp.coverage_shape:
+        raise BadInput("it learned in another problem, and only the cells of grids can be matched")
+    if len(policy.shape) != len(mdp.shape):
+        raise BadInput(f"it learned in a grid with {len(policy.shape)} axes, this one has {len(mdp.shape)}")
+    if not {*policy.action_labels} & {*mdp.action_labels}:
+        own, here = ", ".join(policy.action_labels), ", ".join(mdp.action_labels)
+        raise BadInput(f"it has none of this problem's actions: {own}; wanted {here}")
+    cells = np.indices(mdp.shape).reshape(len(mdp.shape), -1)
+    inside = (cells < np.array(policy.shape)[:, None]).all(axis=0)
+    there = np.full(mdp.n_states, -1, np.int32)
+    there[inside] = np.ravel_multi_index(tuple(cells[:, inside]), policy.shape)
+    return there
+
+
+def policy_of(name: str, toolbox: Toolbox | None) -> Policy:
+    """The policy in use under a name, or in a file. BadInput for what is neither."""
+    box = toolbox or Toolbox()
+    if name.endswith(SUFFIX) and Path(name).is_file():
+        return box.load(Path(name))
+    found = box.versions(name).in_use()
+    if found is None:
+        raise BadInput(f"nothing is in use under this name: it was removed (toolbox {box.address})")
+    return found.policy

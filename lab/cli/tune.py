@@ -1,0 +1,92 @@
+"""`lab tune`: settings of learner and gate tuned to a problem."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lab.cli.compare import listed
+from lab.cli.families import from_files, offers
+from lab.cli.options import Json, Seed
+from lab.cli.output import console, show
+
+
+def tune(
+    problem: Annotated[
+        str,
+        typer.Argument(
+            help="A world: its name, a .toml file, a .txt grid, random:SHAPE:DENSITY:SEED; gym:ID; or a sub-task of --task."
+        ),
+    ],
+    advisor: Annotated[
+        str,
+        typer.Option(
+            "--advisor",
+            help="Who advises: {advisors}.",
+            autocompletion=offers("advisors"),
+            callback=from_files("advisors"),
+        ),
+    ] = "expert",
+    learner: Annotated[
+        str | None,
+        typer.Option(
+            "--learner",
+            help="{learners}; default: the problem's.",
+            autocompletion=offers("learners"),
+            callback=from_files("learners"),
+        ),
+    ] = None,
+    gate: Annotated[
+        str | None,
+        typer.Option(
+            "--gate",
+            help="When it asks: {gates}; default: the problem's.",
+            autocompletion=offers("gates"),
+            callback=from_files("gates"),
+        ),
+    ] = None,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--over",
+            help="Settings that are tuned, with commas between; default: alpha, trace, exploration, beta, lambda_threshold, "
+            "omega.",
+        ),
+    ] = None,
+    trials: Annotated[int, typer.Option("--trials", min=1, max=100_000, help="Combinations that are tried.")] = 100,
+    sessions: Annotated[
+        int, typer.Option("--sessions", min=2, max=100_000, help="Of each trial that is not given up early.")
+    ] = 45,
+    task: Annotated[str | None, typer.Option("--task", help="The task that a sub-task is of; default: toast.")] = None,
+    sight: Annotated[
+        str | None, typer.Option("--sight", help="Where in a world the advisor sees the robot: full or limited.")
+    ] = None,
+    workers: Annotated[int, typer.Option("--workers", min=1, max=256, help="Processes; the result is the same.")] = 1,
+    seed: Seed = 0,
+    out: Annotated[Path, typer.Option("--out", help="Folder for report, rows, sessions and settings.toml.")] = Path(
+        "tuned"
+    ),
+    as_json: Json = False,
+) -> None:
+    """Tune settings to a problem with Optuna, and say what that gains over its own on seeds that no trial had.
+
+    What is made small: the mean steps of a session's episodes (the area under the learning curve), a failed one as the step
+    limit + 1; a session that is not solved in the end costs the step limit + 1 as a whole. The best settings are written as
+    settings.toml, to be pasted into the problem's file. What the folder already holds is not run again: the same command goes on
+    where it was broken off, or with more --trials.
+    """
+    from lab.learning.tuned_ranges import USUAL
+    from lab.studies import Study, carried_out
+    from lab.studies.runner import Job
+    from lab.studies.tuning import FILE, Tuning, tuned
+    from lab.view.progress import counting
+    from lab.view.summary import study_summary
+
+    held = {name: value for name, value in (("learner", learner), ("gate", gate)) if value is not None}
+    names = USUAL if over is None else [name.replace("-", "_") for name in listed("over", over)]
+    what = Tuning(problem, advisor, held, tuple(names), trials, task, sight)
+    study = Study(f"Tuned: {problem}", lambda job, reading: tuned(what, job), least=2)
+    with counting(console(), f"trials in {problem}") as progress:
+        document = carried_out(study, "tune", Job(sessions, seed, workers, progress=progress), out)
+    document["files"]["settings"] = str(out / FILE)
+    show(document, as_json, study_summary)
