@@ -19,6 +19,7 @@ from lab.sequencing.simulate.cell_arrays import most_moves
 from lab.sequencing.simulate.run import follow
 
 MOVES, ROUND = 12_000_000, 3_000  # of all sequences that annealing tries; how many it tries between two looks at Ctrl-C
+EACH = 500  # how often it tries each of a list's neighbours, on average: a short list takes far fewer moves
 TIME_LIMIT_S = 60.0
 WORKERS = 6  # threads of CP-SAT, also on two cores: they look in different ways
 ANNEALERS, ANNEALINGS = 2, 40  # threads beside CP-SAT, with seeds of their own; how often each begins at the most
@@ -142,7 +143,8 @@ def _anneal(shared: Shared, seed: int, again: int) -> None:
     if shared.over.is_set():
         return
     annealing = Annealing(shared.cell, shared.objective, seed, shared.sequence if again % 3 == 1 else ())
-    steps = max(ROUND, (MOVES << (again + 3) // 4) // most_moves(shared.cell))
+    size = most_moves(shared.cell)
+    steps = max(ROUND, min(MOVES // size, EACH * size**2) << (again + 3) // 4)
     for done in range(0, steps, ROUND):
         annealing.advance(ROUND, done / steps)
         if annealing.best and annealing.best_cost < shared.cost - SAME:
