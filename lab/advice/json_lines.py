@@ -12,6 +12,7 @@ from typing import Any, Self
 from lab.errors import BadInput, WorkFailed
 
 MAX_LINE_BYTES = 1 << 22
+_PLAINLY = {"predicate_failed": "it holds what cannot be printed"}  # for pydantic's words, by the kind of fault
 
 
 class EntryKinds:
@@ -42,7 +43,10 @@ class EntryKinds:
         try:
             found = _reader(model).validate_json(json.dumps(record))
         except ValidationError as error:
-            wrong = [f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors(include_url=False)]
+            wrong = [
+                f"{'.'.join(map(str, one['loc']))}: {_PLAINLY.get(one['type'], one['msg'])}"
+                for one in error.errors(include_url=False)
+            ]
             raise ValueError(f"{kind}: {'; '.join(wrong)}") from None
         return model(**{name: getattr(found, name) for name in found.__dataclass_fields__})
 

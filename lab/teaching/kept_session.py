@@ -233,24 +233,6 @@ def check_alone(given: Any, nothing: Any, folder: Path) -> None:
             raise BadInput(f"{option} beside --resume {folder}: it goes on as it was begun: leave it away")
 
 
-def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:
-    """The sessions in a toolbox, those changed last first: folder, problem, who advised, and whether it is over.
-
-    Those kept in a folder elsewhere are links there; of one that is gone nothing is said.
-    """
-    found = {path.resolve() for path in (toolbox.folder / SESSIONS).glob(f"*/{FILE}")}
-    rows = []
-    for path in sorted(found, key=lambda path: path.stat().st_mtime, reverse=True):
-        row = {"session": str(path.parent), "problem": "", "advisor": "", "state": "damaged"}
-        with suppress(BadInput):
-            read = read_journal(path, "toolbox")
-            state = "not over" if read.closed is None else "solved" if read.closed.solved else "over"
-            advisors = " + ".join(read.session.words.get("advisors") or [read.session.words.get("advisor", "")])
-            row |= {"problem": read.session.problem, "advisor": advisors, "state": state}
-        rows.append(row)
-    return rows
-
-
 def check_new(folder: Path) -> None:
     """Raises BadInput when a folder (--out) holds a session: what is kept in it would mean another lesson."""
     path = folder / FILE

@@ -292,8 +292,9 @@ BY_FIELD: dict[str, Any] = {
     **dict.fromkeys(("final_steps", "optimal_steps"), st.one_of(st.none(), numbers)),
     **dict.fromkeys(("mean_before", "trust"), st.floats(allow_nan=False, allow_infinity=False)),
     **dict.fromkeys(("guided", "reached", "left", "solved"), st.booleans()),
+    **dict.fromkeys(("by", "why", "advisor", "saved_as"), st.text(max_size=9)),
     **dict.fromkeys(
-        ("problem", "signature", "lab", "by", "why", "advisor", "saved_as", "continues", "command"), st.text(max_size=9)
+        ("problem", "signature", "lab", "continues", "command"), st.text(max_size=9).filter(str.isprintable)
     ),
 }
 
