@@ -31,6 +31,10 @@ class LabError(Exception):
         super().__init__(shown)
 
 
+class Notice(UserWarning):
+    """What goes on all the same, but should be known: a command says it in one line."""
+
+
 class BadInput(LabError):
     """The input is wrong: nothing was tried, nothing was written (exit 2)."""
 

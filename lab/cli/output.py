@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from lab.errors import LabError
+from lab.errors import LabError, Notice
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -29,8 +29,8 @@ def begin() -> None:
 
 
 def _warned(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
-    """A plug-in that is left out is said in one line; any other warning as Python says it."""
-    if category.__name__ == "PluginFault":
+    """What the lab itself gives notice of is said in one line; any other warning as Python says it."""
+    if issubclass(category, Notice):
         complain(str(message))
     else:
         sys.stderr.write(warnings.formatwarning(message, category, *where[:2]))
