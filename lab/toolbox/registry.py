@@ -235,7 +235,7 @@ class Toolbox:
         return self.folder / records.file_of(kind, key)
 
     def load_record(self, kind: str, key: str) -> dict[str, Any] | None:
-        """The record of that kind and key; None when there is none or its file is damaged (see `verify`)."""
+        """The record of that kind and key; None when there is none. Raises BadInput when its file is damaged or was edited."""
         return records.load(self.place, kind, key)
 
     def _content(self, file: str) -> bytes:

@@ -365,6 +365,7 @@ def test_damaged_policies_are_named_and_learned_again(
         lambda record: record | {"empty_s": [1, 2]},
         lambda record: record | {"empty_s": record["empty_s"] | {"plate > elsewhere": 5.0}},
         lambda record: record | {"process_s": record["process_s"] | {"elsewhere": 5.0}},
+        lambda record: record | {"process_s": {"butter_applier": 10**400}},
     ],
 )
 def test_damaged_durations_are_measured_again(
@@ -372,6 +373,7 @@ def test_damaged_durations_are_measured_again(
 ) -> None:
     (path,) = (toolbox.folder / "records" / "durations").glob("*.json")
     whole = json.loads(path.read_text(encoding="utf-8"))
+    del whole["hash"]  # as an older version wrote it
     path.write_text(json.dumps(whole | {"record": damage(whole["record"])}), encoding="utf-8")
     heard: list[Event] = []
     taught = teach_all(prepared, Teacher(toolbox, tell=heard.append))
@@ -383,6 +385,22 @@ def test_damaged_durations_are_measured_again(
     assert set(taught.durations.loaded_s.values()) == {5.0}
     teach_all(prepared, Teacher(toolbox))
     assert len(measured) == 1
+
+
+def test_edited_durations_are_measured_again_though_they_read_well(
+    prepared: Prepared, toolbox: Toolbox, measured: list[Prepared]
+) -> None:
+    (path,) = (toolbox.folder / "records" / "durations").glob("*.json")
+    whole = json.loads(path.read_text(encoding="utf-8"))
+    whole["record"]["process_s"]["butter_applier"] = 1.0
+    path.write_text(json.dumps(whole), encoding="utf-8")
+    heard: list[Event] = []
+    teach_all(prepared, Teacher(toolbox, tell=heard.append))
+    assert len(measured) == 1
+    assert skipped(heard) == [
+        f"durations measured earlier: record file {path}: it does not hold what was written: it was changed"
+    ]
+    assert all(sound for _, sound, _ in toolbox.verify())
 
 
 def test_only_one_skill_can_be_prepared() -> None:
