@@ -53,9 +53,14 @@ class SessionInFolder:
         return receipt_of(self.plan, self.journal, known_values(self.plan))
 
     def worth(self) -> dict[str, Any]:
-        """Where it is kept, and its receipt, which is written beside the journal; nothing where nothing is kept."""
+        """Where it is kept, and its receipt, which is written beside the journal; nothing where nothing is kept.
+
+        Raises BadInput when the journal is gone, or the receipt cannot be written.
+        """
         if self.folder is None or self.journal is None:
             return {}
+        if self.journal.path is not None and not self.journal.path.exists():
+            raise BadInput(f"journal '{self.journal.path}' is gone: its folder was removed or renamed meanwhile")
         made = self.receipt()
         write_whole(self.folder / "receipt.json", json.dumps(made.to_json(), indent=1, allow_nan=False) + "\n")
         return {"session": str(self.folder), "receipt": made.to_json() | {"lines": made.lines()}}

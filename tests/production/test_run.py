@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import lab.production.run
-from lab.errors import WorkFailed
+from lab.errors import BadInput, WorkFailed
 from lab.export.program import Program
 from lab.mdp import shortest_steps
 from lab.production.durations import Durations
@@ -476,18 +476,44 @@ def test_a_failed_run_says_so_and_leaves_no_old_chart(
     assert {"grasp at plate, starts vary", "insert at toaster"} < set(curves)
 
 
-@pytest.mark.parametrize("stop", [KeyboardInterrupt(), OSError(28, "No space left on device")])
-def test_nothing_is_half_written(
-    failed: Report,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    stop: BaseException,
-) -> None:
+def test_nothing_is_half_written(failed: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "out"
     out.mkdir()
     (out / "run.json").write_text("old")
-    drawn(monkeypatch, stop)
-    with pytest.raises((KeyboardInterrupt, WorkFailed)):
+    drawn(monkeypatch, KeyboardInterrupt())
+    with pytest.raises(KeyboardInterrupt):
+        write_files(failed, out)
+    assert {path.name: path.read_text() for path in out.iterdir()} == {"run.json": "old"}
+
+
+@pytest.mark.parametrize(
+    "why", [OSError(28, "No space left on device"), BadInput("picture 'x' cannot be written: full")]
+)
+def test_the_numbers_are_written_though_a_picture_cannot_be(
+    failed: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, why: Exception
+) -> None:
+    drawn(monkeypatch, why)
+    (tmp_path / "learning-curves.png").write_text("of a run before")
+    write_files(failed, tmp_path)
+    there = set(FILES) - {"gantt", "program", "trajectory", "learning_curves"}
+    assert sorted(failed.files) == sorted(there)
+    assert {path.name for path in tmp_path.iterdir()} >= {FILES[name] for name in there}
+    assert not (tmp_path / "learning-curves.png").exists()
+    assert json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))["files"] == failed.files
+    assert failed.lost == f"'learning-curves.png' is missing: {getattr(why, 'strerror', None) or why}"
+
+
+def test_without_room_for_the_numbers_nothing_is_written(
+    failed: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(rows: object) -> str:
+        raise OSError(28, "No space left on device")
+
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "run.json").write_text("old")
+    monkeypatch.setattr("lab.production.report.csv_of", full)
+    with pytest.raises(WorkFailed, match=r"\(--out\) cannot be written: No space left on device"):
         write_files(failed, out)
     assert {path.name: path.read_text() for path in out.iterdir()} == {"run.json": "old"}
 
