@@ -14,7 +14,7 @@ from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.fewer_moves import fewer_moves
 from lab.sequencing.methods.rules import first_come, work_left_s
 from lab.sequencing.methods.shared import Shared
-from lab.sequencing.search import SAME, Search, SequenceResult, only_one
+from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
 from lab.sequencing.simulate.cell_arrays import most_moves
 from lab.sequencing.simulate.run import follow
 
@@ -78,6 +78,8 @@ def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceR
     """The best order that any method finds within its time, one sequence; it draws nothing from `rng`."""
     search.check(cell)
     found = best_known(cell, search.objective, TIME_LIMIT_S, workers=WORKERS)
+    if not found.sequence and found.bound < inf:
+        raise not_in_time(cell, "any method", found.bound)
     return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))
 
 
