@@ -15,6 +15,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
+def escaped(text: str) -> str:
+    """As `printable`, of several lines: line breaks and tabs stay."""
+    return text if text.isprintable() else "".join(c if c in "\n\t" else printable(c) for c in text)
+
+
 class LabError(Exception):
     """Any failure the lab explains in one line; `exit_code` is what a command ends with.
 
