@@ -21,12 +21,11 @@ from lab.tasks.record import write_whole
 from lab.teaching.lesson_options import LessonOptions, SessionOptions
 from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.folder_place import FolderPlace
-from lab.toolbox.names import SUFFIX, default_address, slug
+from lab.toolbox.names import SESSIONS, SUFFIX, default_address, slug
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import encode
 from lab.toolbox.registry import Toolbox
 
-SESSIONS = "sessions"  # the folder in the toolbox
 _BEGUN = "begun"  # the folder in a session's folder for the policy that it went on from
 _MOST = 100_000  # sessions of one name
 MOST_VALUES = 3_000_000  # a larger table's optimal values take too long to know

@@ -7,8 +7,8 @@ from typing import Any
 from lab.advice.entries import FILE, read_journal
 from lab.errors import BadInput
 from lab.teaching.kept_order import OrderOptions
-from lab.teaching.kept_session import SESSIONS
 from lab.teaching.lesson_options import LessonOptions
+from lab.toolbox.names import SESSIONS
 from lab.toolbox.registry import Toolbox
 
 _OPTIONS = (LessonOptions, OrderOptions)

@@ -20,7 +20,7 @@ from lab.learning.requests import AdviceRequest, Ask
 from lab.learning.session_events import AdviceGiven
 from lab.tasks.task_file import load_world
 from lab.teaching.events import Event, LessonEvent, QuestionAnswered, unheard
-from lab.teaching.kept_session import SESSIONS, KeptSession, NewSession, check_new
+from lab.teaching.kept_session import KeptSession, NewSession, check_new
 from lab.teaching.lesson import replay, teach
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.lesson_plan import MAX_SESSIONS, Interrupted, LessonPlan
@@ -28,6 +28,7 @@ from lab.teaching.lesson_sessions import fits
 from lab.teaching.session_list import session_rows
 from lab.teaching.teacher import Teacher
 from lab.teaching.world_subject import WorldSubject
+from lab.toolbox.names import SESSIONS
 from lab.toolbox.registry import Toolbox
 
 MAZE = """

@@ -9,8 +9,9 @@ import pytest
 
 from lab.advice.entries import FILE, Session, line_of, read_journal
 from lab.errors import BadInput
-from lab.teaching.kept_session import SESSIONS, KeptSession
+from lab.teaching.kept_session import KeptSession
 from lab.teaching.session_list import session_rows
+from lab.toolbox.names import SESSIONS
 from lab.toolbox.registry import Toolbox
 
 HEAD = line_of(Session({"subtask": "maze.toml", "advisors": ["novice", "expert"], "seed": 3}, "maze", "0a", "0.1"))
