@@ -99,7 +99,7 @@ def read_session(folder: Path, where: str, kind: type[Options]) -> tuple[Read, O
 
 def kept_journal(read: Read, read_only: bool) -> Journal:
     """The journal of a kept session, which answers until it is used up."""
-    return Journal(None, read.effective(), read_only=True) if read_only else Journal.resume(read)
+    return Journal(None, read.effective(), True, read.path) if read_only else Journal.resume(read)
 
 
 def receipt_of(plan: LessonPlan, journal: Journal, values: FloatArray | None) -> Receipt:

@@ -18,7 +18,10 @@ def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:
     """The sessions in a toolbox, those changed last first: folder, problem, who advised, and whether it is over.
 
     Those kept in a folder elsewhere are links there; of one that is gone nothing is said. `why`: of a damaged one.
+    Raises BadInput for a toolbox that is a file.
     """
+    if toolbox.folder.exists() and not toolbox.folder.is_dir():
+        raise BadInput(f"toolbox {toolbox.folder}: it is a file, a folder is needed")
     changed: dict[Path, float] = {}
     for path in (toolbox.folder / SESSIONS).glob(f"*/{FILE}"):
         with suppress(OSError, RuntimeError):  # it is gone by now, or links lead round in a circle

@@ -58,3 +58,10 @@ def test_who_advised_by_a_damaged_record_is_refused_in_a_line(tmp_path: Path) ->
     bad = keep(tmp_path / "lesson", json.dumps(json.loads(HEAD) | {"problem": "a\nb"}))
     with pytest.raises(BadInput, match=r"^journal '.*' \(--advisor\): line 1: .*cannot be printed$"):
         read_journal(bad, "--advisor")
+
+
+def test_a_toolbox_that_is_a_file_holds_no_list(tmp_path: Path) -> None:
+    (tmp_path / "box").write_text("")
+    with pytest.raises(BadInput, match=r"box: it is a file, a folder is needed$"):
+        session_rows(Toolbox(tmp_path / "box"))
+    assert session_rows(Toolbox(tmp_path / "none")) == []
