@@ -15,6 +15,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
+def escaped(text: str) -> str:
+    """As `printable`, of several lines: line breaks and tabs stay."""
+    return text if text.isprintable() else "".join(c if c in "\n\t" else printable(c) for c in text)
+
+
 class LabError(Exception):
     """Any failure the lab explains in one line; `exit_code` is what a command ends with.
 
@@ -29,6 +34,10 @@ class LabError(Exception):
         if len(shown) > MOST_CHARACTERS:
             shown = f"{shown[:_END]} ... ({len(shown) - 2 * _END} more characters) ... {shown[-_END:]}"
         super().__init__(shown)
+
+
+class Notice(UserWarning):
+    """What goes on all the same, but should be known: a command says it in one line."""
 
 
 class BadInput(LabError):

@@ -41,6 +41,27 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
+LONGEST = (  # files of tests, the longest first: begun last, one would keep one worker busy while the other has nothing to do
+    "tests/production/test_run.py",
+    "tests/test_docs.py",
+    "tests/production/faults/test_runs_with_faults.py",
+    "tests/sequencing/methods/test_portfolio.py",
+    "tests/sequencing/test_sequencers.py",
+)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Files go to the workers in our order, not by how many tests they hold."""
+    if hasattr(config.option, "loadscopereorder"):
+        config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest files first, each one's tests together and in their order."""
+    place = {name: n for n, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))
+
+
 ROOT = Path(__file__).resolve().parent.parent
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (

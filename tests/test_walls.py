@@ -48,7 +48,7 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
         "lab.sequencing.cyclic.model",
     },
     "starlette": {"lab.view.server", "lab.view.server_page"},
-    "uvicorn": {"lab.view.server"},
+    "uvicorn": {"lab.view.server", "lab.view.server_limits"},
     "websockets": set(),  # uvicorn's
     "jinja2": {"lab.studies.report"},
     "fsspec": {"lab.toolbox.remote_place"},

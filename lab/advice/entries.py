@@ -5,7 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from errno import EINVAL
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from annotated_types import MaxLen, Predicate
 
 from lab.advice.json_lines import EntryKinds
 from lab.errors import BadInput
@@ -25,6 +27,7 @@ from lab.learning.session_events import (
 SCHEMA = 1
 FILE = "events.jsonl"
 MAX_LINE_BYTES = 1 << 20
+Name = Annotated[str, MaxLen(1000), Predicate(str.isprintable)]
 
 
 @dataclass(frozen=True)
@@ -37,13 +40,13 @@ class Session:
     """
 
     words: dict[str, Any]
-    problem: str
-    signature: str
-    lab: str
+    problem: Name
+    signature: Name
+    lab: Name
     learner: dict[str, Any] = field(default_factory=dict)
     gate: dict[str, Any] = field(default_factory=dict)
-    continues: str = ""
-    command: str = "teach"
+    continues: Name = ""
+    command: Name = "teach"
     schema: int = SCHEMA
 
 

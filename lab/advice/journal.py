@@ -28,12 +28,13 @@ class Journal:
     """A journal under way; without a path nothing is written, and answers can be taken back all the same.
 
     `folding`: the session is being run again, and what it tells was told before. `read_only`: a replay; when the
-    entries are used up, the session is stopped.
+    entries are used up, the session is stopped. found: where one was read that is not written.
     """
 
     path: Path | None = None
     entries: list[Entry] = field(default_factory=list)
     read_only: bool = False
+    found: Path | None = None
     _at: int = 0
     _file: AppendedFile | None = None
     _unsafe: bool = False  # a person has said something that the disk may not have
@@ -103,9 +104,14 @@ class Journal:
         self._at += 1
         return False
 
+    @property
+    def _which(self) -> str:
+        place = self.path or self.found
+        return "the session's journal" if place is None else f"journal '{place}'"
+
     def _differs(self, entry: Entry) -> WorkFailed:
         return WorkFailed(
-            f"journal '{self.path}': it cannot be run again: it says {line_of(self.entries[self._at])[:200]}, and now "
+            f"{self._which}: it cannot be run again: it says {line_of(self.entries[self._at])[:200]}, and now "
             f"comes {line_of(entry)[:200]}: another version of the lab made it, or what it was made with has changed"
         )
 
@@ -126,9 +132,7 @@ class Journal:
             known = before if isinstance(before, Answer) else Answer(by, 0, 0, 0, None)
             if known.action is not None and known.action not in request.allowed:
                 allowed = "allowed " + allowed_words(request)
-                raise BadInput(
-                    f"journal '{self.path}': {line_of(known)}: action {known.action}: {allowed}: it was edited"
-                )
+                raise BadInput(f"{self._which}: {line_of(known)}: action {known.action}: {allowed}: it was edited")
             self.tell(replace(known, by=by, episode=request.episode, step=request.step, state=request.state))
             return _said(known)
         given = self._asked(by, request, ask)

@@ -12,6 +12,7 @@ from typing import Any, Self
 from lab.errors import BadInput, WorkFailed
 
 MAX_LINE_BYTES = 1 << 22
+_PLAINLY = {"predicate_failed": "it holds what cannot be printed"}  # for pydantic's words, by the kind of fault
 
 
 class EntryKinds:
@@ -42,7 +43,10 @@ class EntryKinds:
         try:
             found = _reader(model).validate_json(json.dumps(record))
         except ValidationError as error:
-            wrong = [f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors(include_url=False)]
+            wrong = [
+                f"{'.'.join(map(str, one['loc']))}: {_PLAINLY.get(one['type'], one['msg'])}"
+                for one in error.errors(include_url=False)
+            ]
             raise ValueError(f"{kind}: {'; '.join(wrong)}") from None
         return model(**{name: getattr(found, name) for name in found.__dataclass_fields__})
 
@@ -65,9 +69,16 @@ class AppendedFile:
         self._file: int | None = os.open(path, flags | os.O_APPEND, 0o644)
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            there = os.stat(path)
         except BlockingIOError:
             self.close()
             raise BadInput(f"journal '{path}': another command is writing it: wait until that has ended") from None
+        except OSError:
+            self.close()
+            raise
+        if not os.path.samestat(os.fstat(self._file), there):
+            self.close()
+            raise BadInput(f"journal '{path}': another command has just put it aside and begun a new one")
 
     @classmethod
     def new(cls, path: Path) -> Self:
@@ -78,6 +89,11 @@ class AppendedFile:
     def again(cls, path: Path) -> Self:
         """A file that is there."""
         return cls(path, os.O_WRONLY)
+
+    def put_aside(self, to: Path) -> None:
+        """Give it another name, while nobody else can write it, and close it. Raises OSError."""
+        os.replace(self.path, to)
+        self.close()
 
     def cut(self, size: int) -> None:
         """Take away all but the first `size` bytes. Raises OSError."""

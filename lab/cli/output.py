@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from lab.errors import LabError
+from lab.errors import LabError, Notice, escaped
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -29,15 +29,19 @@ def begin() -> None:
 
 
 def _warned(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
-    """A plug-in that is left out is said in one line; any other warning as Python says it."""
-    if category.__name__ == "PluginFault":
+    """What the lab itself gives notice of is said in one line; any other warning as Python says it."""
+    if issubclass(category, Notice):
         complain(str(message))
     else:
-        sys.stderr.write(warnings.formatwarning(message, category, *where[:2]))
+        sys.stderr.write(escaped(warnings.formatwarning(message, category, *where[:2])))
 
 
 def write(text: str) -> None:
-    """Text to stdout as it is, at once."""
+    """Text to stdout, at once; what cannot be printed in it, such as an escape code in a file that is shown, as its escape."""
+    _print(escaped(text))
+
+
+def _print(text: str) -> None:
     print(text, end="", flush=True)
 
 
@@ -77,9 +81,9 @@ def silence() -> None:
 
 def console() -> "Console":
     """The terminal that stderr goes to."""
-    from rich.console import Console
+    from lab.view.escaping_console import EscapingConsole
 
-    return Console(stderr=True, highlight=False)
+    return EscapingConsole(stderr=True, highlight=False)
 
 
 def show(document: dict[str, Any], as_json: bool, render: Callable[[dict[str, Any]], "RenderableType"]) -> None:
@@ -87,10 +91,10 @@ def show(document: dict[str, Any], as_json: bool, render: Callable[[dict[str, An
     if as_json:
         write_json(document)
         return
-    from rich.console import Console
+    from lab.view.escaping_console import EscapingConsole
 
-    console = Console(highlight=False, width=None if sys.stdout.isatty() else _FILE_WIDTH)
+    console = EscapingConsole(highlight=False, width=None if sys.stdout.isatty() else _FILE_WIDTH)
     with console.capture() as shown:
         console.print(render(document), soft_wrap=not sys.stdout.isatty())
     text = "".join(f"{line.rstrip()}\n" for line in shown.get().splitlines())
-    write(text if console.encoding.lower().startswith("utf") else text.translate(_PLAIN))
+    _print(text if console.encoding.lower().startswith("utf") else text.translate(_PLAIN))

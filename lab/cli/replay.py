@@ -55,8 +55,9 @@ def replay(
     from lab.seat.terminal.replay_keys import replay_keys
     from lab.teaching.events import told_to
     from lab.teaching.kept_order import OrderSession, kept_order
-    from lab.teaching.kept_session import KeptSession, session_rows
+    from lab.teaching.kept_session import KeptSession
     from lab.teaching.lesson import replay as replay_session
+    from lab.teaching.session_list import session_rows
     from lab.teaching.step_record import StepRecord
     from lab.toolbox.registry import Toolbox
     from lab.view.summary import replay_summary, table_of

@@ -115,3 +115,5 @@ def run(
         raise KeyboardInterrupt(f"stopped by Ctrl-C; go on with: lab run --resume {quote(str(folder))}")
     if not report.success:
         end(report.outcome.failure or delivered_in_words(document["delivered"], document["parts"]), 1)
+    if report.lost:
+        end(report.lost, 1)

@@ -130,3 +130,5 @@ def teach(
             "try another advisor, more --episodes or another --learner",
             1,
         )
+    if "missing" in document:
+        end(f"'{document['saved_as']}' is kept, but {'; '.join(document['missing'])}", 1)

@@ -116,17 +116,24 @@ def _show_in_use(box: "Toolbox", name: str, version: "Version", as_json: bool) -
     show(document, as_json, lambda d: f"'{name}': version {d['version']} ({d['hash']}) is in use")
 
 
-def toolbox_verify(toolbox: ToolboxPlace = None, as_json: Json = False) -> None:
+def toolbox_verify(
+    repair: Annotated[
+        bool, typer.Option("--repair", help="Remove what commands that were killed have left: half-written files.")
+    ] = False,
+    toolbox: ToolboxPlace = None,
+    as_json: Json = False,
+) -> None:
     """Check every file: whole, finite, of the right shape; versions by their hash. Exit 1 when one is not."""
     from lab.toolbox.registry import Toolbox
     from lab.view.toolbox_summary import verify_summary
 
     box = Toolbox(toolbox)
+    removed = {"removed": box.repair()} if repair else {}
     rows: list[dict[str, Any]] = [
         {"file": box.where(path), "ok": ok, "reason": reason} for path, ok, reason in box.verify()
     ]
     damaged = [row for row in rows if not row["ok"]]
-    document = {"folder": box.address, "files": rows, "damaged": len(damaged)}
+    document = {"folder": box.address, "files": rows, "damaged": len(damaged)} | removed
     show(document, as_json, verify_summary)
     if damaged:
         are = "is" if len(rows) == 1 else "are"

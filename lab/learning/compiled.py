@@ -2,22 +2,26 @@
 
 numba's own cache knows changes of the function's file only, and writes beside it. Here a function's folder, in the
 user's cache, is named by a hash of its module and of all modules of the same package that are imported at the top of
-it, and of those. Where that folder cannot be made, nothing is kept and each run compiles anew.
+it, and of those. Where that folder cannot be made or written, nothing is kept, each run compiles anew, and says so.
 """
 
 import hashlib
 import os
-from collections.abc import Callable
-from contextlib import suppress
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from errno import EACCES
 from functools import cache
 from pathlib import Path
 from shutil import rmtree
 from types import FunctionType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
+from numba.core.caching import FunctionCache
 from platformdirs import user_cache_dir
 
+from lab.errors import Notice
 from lab.learning.sources import sources
 
 MOST_FOLDERS = 60  # of a few MB at the most each; a version of the lab has about ten
@@ -26,16 +30,54 @@ _CONFIG: Any = numba.config  # its types do not know what it holds
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
+class NotKept(Notice):
+    """Compiled functions cannot be kept, or what was kept cannot be read: each run compiles anew."""
+
+
+class _Kept(FunctionCache):
+    """A function's kept versions; one that cannot be read or written is one that is not there."""
+
+    @contextmanager
+    def _guard_against_spurious_io_errors(self) -> Iterator[None]:
+        """Around every reading and writing, in numba's own words."""
+        try:
+            yield
+        except Exception as error:  # a damaged file: pickle raises anything
+            _not_kept(Path(self.cache_path).parents[1], error)
+
+
 def compiled(function: Function, **options: Any) -> Function:
     """The function compiled, without the GIL, for each kind of arguments that it meets; options: those of `numba.njit`."""
     jit: Any = numba.njit  # its types do not know all options
-    folder = _made(cache_folder() / key(function.__module__))
-    before, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(folder or "")  # read when a function is decorated
+    jitted: Any = jit(nogil=True, **options)(function)
+    folder = cache_folder() / key(function.__module__)
+    before, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(folder)  # read when the cache is made
     try:
-        jitted: Function = jit(cache=folder is not None, nogil=True, **options)(function)
+        _make(folder)
+        jitted._cache = cast(Any, _Kept)(function)
+    except (OSError, RuntimeError) as error:  # numba's, of a folder in which no file can be made
+        _not_kept(folder.parent, error)
     finally:
         _CONFIG.CACHE_DIR = before
-    return jitted
+    made: Function = jitted
+    return made
+
+
+_said: set[Path] = set()
+
+
+def _not_kept(kept: Path, error: Exception) -> None:
+    """Says, once of each cache folder, that nothing is kept there."""
+    if kept in _said:
+        return
+    _said.add(kept)
+    why = getattr(error, "strerror", None) or " ".join(str(error).split())[:100] or type(error).__name__
+    warnings.warn(
+        f"what is compiled cannot be kept in '{kept}' ({why}): each run compiles anew, which takes seconds; "
+        "the variable NUMBA_CACHE_DIR names another folder",
+        NotKept,
+        stacklevel=2,
+    )
 
 
 def lean(function: Function, **options: Any) -> Function:
@@ -81,18 +123,18 @@ def key(module: str) -> str:
     return f"{module}-{digest.hexdigest()[:16]}"
 
 
-def _made(folder: Path) -> Path | None:
-    """The folder, made and marked as used now, once the oldest beyond MOST_FOLDERS are gone; None: it cannot be."""
+def _make(folder: Path) -> None:
+    """Makes the folder, or marks it as used now; the oldest beyond MOST_FOLDERS go. Raises OSError when it cannot be written."""
     try:
         if not folder.is_dir():
             folder.mkdir(parents=True)
             _clear(folder.parent)
         os.utime(folder)
     except FileExistsError:
-        pass  # by another process, just now
-    except OSError:
-        return None
-    return folder if os.access(folder, os.W_OK | os.X_OK) else None
+        if not folder.is_dir():  # it is not another process that has just made it
+            raise
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise PermissionError(EACCES, os.strerror(EACCES), str(folder))
 
 
 def _clear(parent: Path) -> None:

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from typing import Any, TypeVar
 
-from lab.errors import BadInput
+from lab.errors import BadInput, Notice
 from lab.plugins.sources import known_source
 
 GROUP = "teaching_lab"  # entry points of the family "gates" are in the group "teaching_lab.gates"
@@ -12,7 +12,7 @@ GROUP = "teaching_lab"  # entry points of the family "gates" are in the group "t
 Row = TypeVar("Row")
 
 
-class PluginFault(UserWarning):
+class PluginFault(Notice):
     """What is wrong with a member that another package adds; it is left out."""
 
 

@@ -5,7 +5,6 @@ import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import packages_distributions, version
-from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -117,8 +116,8 @@ def _times(record: Mapping[str, Any], table: str, wanted: set[str]) -> dict[str,
     for name, seconds in times.items():
         if name not in wanted:
             raise unknown("move or station", name, wanted, table)
-        if type(seconds) not in (int, float) or not isfinite(seconds) or not 0.0 <= seconds <= LONGEST_S:
-            raise BadInput(f"{table} '{name}': {seconds!r}: wanted 0 to {LONGEST_S:g} s")
+        if type(seconds) not in (int, float) or not 0.0 <= seconds <= LONGEST_S:
+            raise BadInput(f"{table} '{name}': {repr(seconds)[:40]}: wanted 0 to {LONGEST_S:g} s")
     if missing := sorted(wanted - times.keys()):
         raise BadInput(f"{table}: the time of '{missing[0]}' is missing")
     return {name: float(seconds) for name, seconds in times.items()}

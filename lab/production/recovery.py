@@ -51,6 +51,7 @@ class Recovery:
     _tries: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     _first: dict[str, str] = field(default_factory=dict)
     _looked_s: float = -LOOK_S
+    _right_s: float = -LOOK_S  # when all was seen last to be where it should be
 
     def find_again(self) -> bool:
         """Take parts up again that were given up because they could not be taken up, and now can; whether there are any."""
@@ -92,6 +93,8 @@ class Recovery:
         found = self._deviations()
         if found:
             raise Trouble(found[0].words, found[0].name, found[0].station, seen=True)
+        if not self.work.floor.world.dark:
+            self._right_s = now_s
 
     # ---- answers ---------------------------------------------------------------------------------------------------
 
@@ -202,7 +205,10 @@ class Recovery:
         self._tell_seen(seen, "leaves it")
 
     def _follow(self, part: int, seen: Deviation) -> None:
-        """A part that was moved is taken up where it stands; out of its machine before that was done, it is put back there."""
+        """A part that was moved is taken up where it stands; out of its machine before that was done, it is put back there.
+
+        Where the machine is done by now, and the part was not seen in it since, it is noted that nobody knows.
+        """
         assert seen.at is not None
         if other := too_near(self.work.floor.bench, seen.name):
             self._leave(part, replace(seen, words=f"{seen.words}, too near to {other} to be taken up"))
@@ -215,6 +221,8 @@ class Recovery:
         else:
             work.spot_of[seen.name] = seen.at
         if machine is not None:
+            if not unfinished and self._right_s < machine.until_s:
+                self._note(f"{seen.name} was taken out of '{machine.station}': whether it was done there was not seen")
             machine.clear()
         self._tell_seen(seen, answer)
 

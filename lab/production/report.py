@@ -3,13 +3,15 @@
 import json
 import os
 import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lab.errors import WorkFailed
+from lab.errors import LabError, WorkFailed
 from lab.export.program import PROGRAM, TRAJECTORY
-from lab.files import draft
+from lab.files import draft, write_whole
 from lab.production.cyclic_order import measured_period
 from lab.production.outcome import Outcome
 from lab.production.run_story import story_of
@@ -45,7 +47,10 @@ FILES = {
 
 @dataclass
 class Report:
-    """What a whole run came to; `began_s` is the clock's reading (`time.perf_counter`) when it began."""
+    """What a whole run came to; `began_s` is the clock's reading (`time.perf_counter`) when it began.
+
+    files: by name, those that are written; missing: why another one could not be.
+    """
 
     prepared: Prepared
     taught: Taught
@@ -56,6 +61,7 @@ class Report:
     began_s: float
     wall_s: float = 0.0
     files: dict[str, str] = field(default_factory=dict)
+    missing: dict[str, str] = field(default_factory=dict)
     receipts: dict[str, Any] | None = None
     cycle: "Cycle | None" = None
 
@@ -68,6 +74,11 @@ class Report:
     def gap(self) -> float:
         """How much longer the used sequence takes than the proven optimum (or the bound), as a fraction of it."""
         return self.proven.gap(self.sequenced.cost)
+
+    @property
+    def lost(self) -> str:
+        """What could not be written, in words; "" where nothing is missing."""
+        return "; ".join(f"'{FILES[name]}' is missing: {why}" for name, why in self.missing.items())
 
     def to_json(self) -> dict[str, Any]:
         """The document of `lab run --json`."""
@@ -114,30 +125,38 @@ class Report:
 def write_files(report: Report, out: Path) -> None:
     """Write what there is of `FILES` to `out`, all at once at the end: none is ever half written, none is left of a run before.
 
-    Sets `report.files`. WorkFailed when `out` cannot be written.
+    The numbers come first; a picture, the replay or the program may fail alone, as on a full disk. Sets `report.files`, and
+    `report.missing`. WorkFailed when the numbers cannot be written.
     """
-    report.files = {name: str(out / FILES[name]) for name in _names(report)}
+    report.files, report.missing = {}, {}
+    predicted = simulate(report.taught.cell, report.sequenced.sequence)
     try:
         out.mkdir(parents=True, exist_ok=True)
         with draft(out) as beside:
-            _draw_all(report, beside)
+            paths = {name: beside / file for name, file in FILES.items()}
+            written = _write_numbers(report, paths, predicted)
+            report.files = {name: str(out / FILES[name]) for name in written}
+            _write_json(paths["run"], _run_document(report))  # in case that there is no room for it any more
+            for names, write in _pictures(report, paths, predicted):
+                try:
+                    write()
+                except (OSError, LabError) as error:
+                    report.missing[names[0]] = getattr(error, "strerror", None) or str(error)
+                    for name in names:
+                        paths[name].unlink(missing_ok=True)
+                else:
+                    written += names
+            report.files = {name: str(out / file) for name, file in FILES.items() if name in written}
+            report.wall_s = time.perf_counter() - report.began_s
+            with suppress(OSError):
+                write_whole(paths["run"], _json(_run_document(report)))
             for name, file in FILES.items():
                 if name in report.files:
-                    os.replace(beside / file, out / file)
+                    os.replace(paths[name], out / file)
                 else:
                     (out / file).unlink(missing_ok=True)
     except OSError as error:
         raise WorkFailed(f"output folder '{out}' (--out) cannot be written: {error.strerror or error}") from error
-
-
-def _names(report: Report) -> list[str]:
-    """The files that this run can have: a Gantt chart needs a move, the camera's pictures need a skill that took one."""
-    missing = set() if report.outcome.schedule.robot else {"gantt"}
-    if _photographed(report.prepared) is None:
-        missing |= {"value_map", "overhead"}
-    if report.outcome.program is None:
-        missing |= {"program", "trajectory"}
-    return [name for name in FILES if name not in missing]
 
 
 def _photographed(prepared: Prepared) -> Skill | None:
@@ -145,37 +164,45 @@ def _photographed(prepared: Prepared) -> Skill | None:
     return next((skill for skill in prepared.skillset.skills.values() if skill.photo() is not None), None)
 
 
-def _draw_all(report: Report, folder: Path) -> None:
-    """The pictures, the replay and the two JSON files."""
+def _write_numbers(report: Report, paths: dict[str, Path], predicted: Schedule) -> list[str]:
+    """The order and the schedules; the names of these files, and of the run's own. Raises OSError."""
+    cell = report.taught.cell
+    _write_json(paths["sequence"], _sequence_document(report, predicted))
+    rows = rows_of(predicted, cell, "planned") + rows_of(report.outcome.schedule, cell, "measured")
+    paths["schedule_table"].write_text(csv_of(rows), encoding="utf-8")
+    _write_json(paths["schedule"], {"schedule": rows})
+    return ["sequence", "schedule_table", "schedule", "run"]
+
+
+def _pictures(
+    report: Report, paths: dict[str, Path], predicted: Schedule
+) -> Iterator[tuple[tuple[str, ...], Callable[[], object]]]:
+    """What else this run can have, and what writes it: a chart needs a move, the camera's pictures a skill that took one."""
     from lab.view.gantt import gantt
     from lab.view.meshcat import replay_html
     from lab.view.plots import learning_curves, values_seen
     from lab.vision import write_picture
 
-    prepared, taught = report.prepared, report.taught
-    paths = {name: folder / file for name, file in FILES.items()}
-    predicted = simulate(taught.cell, report.sequenced.sequence)
-    if "gantt" in report.files:
-        gantt(report.outcome.schedule, paths["gantt"], predicted=predicted)
-    learning_curves(_curves(prepared, taught.lessons), paths["learning_curves"])
+    prepared, taught, outcome = report.prepared, report.taught, report.outcome
+    program = outcome.program
+    if program is not None:
+        yield ("program", "trajectory"), lambda: program.save(paths["program"].parent)
+    if outcome.schedule.robot:
+        yield ("gantt",), lambda: gantt(outcome.schedule, paths["gantt"], predicted=predicted)
+    yield ("learning_curves",), lambda: learning_curves(_curves(prepared, taught.lessons), paths["learning_curves"])
     skill = _photographed(prepared)
     photo = None if skill is None else skill.photo()
     if skill is not None and photo is not None:
-        values_seen(
-            taught.lessons[skill.name].policy.q, skill.problem.mdp, photo.picture, photo.seen, paths["value_map"]
-        )
-        write_picture(paths["overhead"], photo.picture)
+        q = taught.lessons[skill.name].policy.q
+        yield ("value_map",), lambda: values_seen(q, skill.problem.mdp, photo.picture, photo.seen, paths["value_map"])
+        yield ("overhead",), lambda: write_picture(paths["overhead"], photo.picture)
     title = f"{prepared.task.title or prepared.task.name}: {prepared.words}"
-    story = story_of(report.outcome, predicted)
-    replay_html(report.recording, paths["replay"], title=title, story=story)
-    _write_json(paths["sequence"], _sequence_document(report, predicted))
-    rows = rows_of(predicted, taught.cell, "planned") + rows_of(report.outcome.schedule, taught.cell, "measured")
-    paths["schedule_table"].write_text(csv_of(rows), encoding="utf-8")
-    _write_json(paths["schedule"], {"schedule": rows})
-    if report.outcome.program is not None:
-        report.outcome.program.save(folder)
-    report.wall_s = time.perf_counter() - report.began_s
-    _write_json(paths["run"], report.to_json() | {"schedule": report.outcome.schedule.to_json()})
+    story = story_of(outcome, predicted)
+    yield ("replay",), lambda: replay_html(report.recording, paths["replay"], title=title, story=story)
+
+
+def _run_document(report: Report) -> dict[str, Any]:
+    return report.to_json() | {"schedule": report.outcome.schedule.to_json()}
 
 
 def _curves(prepared: Prepared, lessons: dict[str, Lesson]) -> dict[str, Policy]:
@@ -202,5 +229,9 @@ def _sequence_document(report: Report, predicted: Schedule) -> dict[str, Any]:
     }
 
 
+def _json(document: dict[str, Any]) -> bytes:
+    return (json.dumps(document, indent=1, allow_nan=False) + "\n").encode()
+
+
 def _write_json(path: Path, document: dict[str, Any]) -> None:
-    path.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    path.write_bytes(_json(document))

@@ -7,7 +7,6 @@ what was written. Skills that were learned before are taken from the run's folde
 """
 
 import json
-import os
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -159,12 +158,12 @@ class RunJournal:
 
     @classmethod
     def begin(cls, folder: Path, head: RunBegan) -> "RunJournal":
-        """A new journal in a folder, which is made; one that is there is put aside. BadInput when it cannot be written."""
+        """A new journal in a folder, which is made; one that is there, and not being written, is put aside. BadInput."""
         path = folder / FILE
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if path.exists():
-                os.replace(path, path.with_name("run-before.jsonl"))
+                AppendedFile.again(path).put_aside(path.with_name("run-before.jsonl"))
             path.with_name(KNOWN).unlink(missing_ok=True)
             journal = cls(path, head, file=AppendedFile.new(path))
         except OSError as error:

@@ -7,6 +7,7 @@ from math import hypot
 from lab.production.durations import TimedMove
 from lab.production.floor import Floor
 from lab.production.machine import Machine
+from lab.production.perception import moved_unseen
 from lab.production.standing import free_spot, station_near
 from lab.production.trouble import Trouble
 from lab.sequencing.cell.cell import Cell
@@ -304,6 +305,8 @@ class Transfers:
     def _take_up(self, name: str, way: Carried, spot: Spot) -> None:
         """Take a part up: by the way of the station that it stands near to, or of its own where it stands astray."""
         bench, skillset, body = self.floor.bench, self.floor.skillset, self.floor.scene.body_of(name, way.kind)
+        if moved_unseen(self.floor, name, self.spot_of.get(name)):
+            raise Trouble(f"{name} is not where it was, and the camera sees nothing", name, way.origin)
         near = station_near(bench, body, way, skillset)
         if near != way.origin:
             self.over_to(near)
@@ -336,10 +339,8 @@ class Transfers:
         if begin is None or self._under_way is None or self._under_way.smooth:
             return
         if hypot(tool.x - begin.x, tool.y - begin.y, tool.z - begin.z) > BEGINS_M:
-            why = self.floor.follow(
-                by_free_cells(self.floor.bench, skill.surveys, begin, skill.kind if skill.carries else "")
-            )
-            if why:
+            way = by_free_cells(self.floor.bench, skill.surveys, begin, skill.kind if skill.carries else "")
+            if why := self.floor.follow(way):
                 raise Trouble(why, name, where, held=self.floor.was_held)
 
     def _do(self, skill: Skill, name: str, where: str) -> None:

@@ -159,6 +159,15 @@ class Log:
         return self.best, self.best_cost, tuple(self.costs)
 
 
+def not_in_time(cell: Cell, who: str, bound: float) -> WorkFailed:
+    """The error of a search that was cut off before it had any sequence: there may be one."""
+    least = f"; none costs less than {bound:.1f}" if 0.0 < bound < inf else ""
+    return WorkFailed(
+        f"no sequence for {counted(cell.parts, 'part')} was found in time by {who}, which does not show that there is none"
+        f"{least}: try another method (--method)"
+    )
+
+
 def only_one(
     cell: Cell, search: Search, sequence: tuple[int, ...], cost: float, complete: bool = True
 ) -> SequenceResult:

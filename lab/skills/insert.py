@@ -168,23 +168,34 @@ class Insert(Skill):
             yield from by_free_cells(bench, self.surveys, start, self.kind)
 
     def _same_picture(self, bench: Bench) -> None:
-        """A new snapshot must show the obstacles and the machine where they were learned around, and no others."""
+        """A new snapshot must show the obstacles and the machine where they were learned around, and no others.
+
+        A marker that is where it was belongs to nothing else: what is gone has not moved to another thing's place.
+        """
         view = self.seen.view
-        now, _ = find_markers(self.grid.camera().picture(bench.scene.world), view)
+        now = [*find_markers(self.grid.camera().picture(bench.scene.world), view)[0]]
+        missing = []
         for before in (marker for marker in self.seen.markers if marker.kind != "gripper"):
+            near = min((m for m in now if m.kind == before.kind), key=lambda m: _far(m, before), default=None)
+            if near is None or _far(near, before) > SEEN_WITHIN_M:
+                missing.append(before)
+            else:
+                now.remove(near)
+        for before in missing:
             what = self.station if before.kind == "toaster" else before.kind
             x, y = before.world_m
-            moved = min((hypot(m.world_m[0] - x, m.world_m[1] - y) for m in now if m.kind == before.kind), default=None)
+            moved = min((_far(m, before) for m in now if m.kind == before.kind), default=None)
             if moved is None:
-                raise SkillFailed(f"the camera does not see the {what} that '{self.name}' was learned with")
-            if moved > SEEN_WITHIN_M:
                 raise SkillFailed(
-                    f"the camera sees the {what} at ({x:.3f}, {y:.3f}) m moved by {moved:.3f} m "
-                    f"since '{self.name}' was learned"
+                    f"the camera does not see the {what} at ({x:.3f}, {y:.3f}) m that '{self.name}' was learned with"
                 )
-        count, known = (sum(m.kind == "obstacle" and view.holds(m.cell) for m in ms) for ms in (now, self.seen.markers))
-        if count > known:
-            raise SkillFailed(f"the camera sees {count} obstacles, '{self.name}' was learned with {known}")
+            raise SkillFailed(
+                f"the camera sees the {what} at ({x:.3f}, {y:.3f}) m moved by {moved:.3f} m "
+                f"since '{self.name}' was learned"
+            )
+        if new := sum(m.kind == "obstacle" and view.holds(m.cell) for m in now):
+            known = sum(m.kind == "obstacle" and view.holds(m.cell) for m in self.seen.markers)
+            raise SkillFailed(f"the camera sees {known + new} obstacles, '{self.name}' was learned with {known}")
 
     def _corrected(self, bench: Bench, pose: ToolPose) -> Iterator[None]:
         """Move the tool by what the camera sees it off its cell, and see that it is there then; kept for all that comes."""
@@ -208,3 +219,8 @@ class Insert(Skill):
         self.deviations_m.append(hypot(*self._deviation))
         if self.deviations_m[-1] > (SEEN_WITHIN_M if bench.sight is None else STRAYED_M):
             raise SkillFailed(f"the camera sees the gripper {self.deviations_m[-1]:.3f} m off its cell")
+
+
+def _far(one: Marker, other: Marker) -> float:
+    """How far one marker lies from another [m]."""
+    return hypot(one.world_m[0] - other.world_m[0], one.world_m[1] - other.world_m[1])

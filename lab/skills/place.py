@@ -70,7 +70,10 @@ class Place(AroundPart):
 
 
 def release_pose(bench: Bench, body: str, spot: Spot) -> ToolPose:
-    """Where the tool lets go so that the part, as it hangs in the fingers, stands on the spot."""
+    """Where the tool lets go so that the part, as it hangs in the fingers, stands on the spot. SkillFailed when it hangs there
+    no more."""
+    if not bench.holds(body):
+        raise SkillFailed(f"{body} is not in the gripper any more")
     tool, wanted = bench.scene.robot.tool(), bench.scene.kind_of[body].held_at(spot)
     hangs = bench.part_pose(body, tool.yaw)
     c, s = np.cos(tool.yaw), np.sin(tool.yaw)

@@ -32,7 +32,7 @@ class RobotSettings(Record):
     start: Name
     speed_m_s: Annotated[float, Field(ge=0.01, le=1.5)] = 0.5
     acceleration_m_s2: Annotated[float, Field(ge=0.01, le=10)] = 2.0
-    grip_force_n: Annotated[float, Field(gt=0, le=100)] = 25.0  # from about 150 N on it squeezes slices out
+    grip_force_n: Annotated[float, Field(gt=0, le=100)] = 25.0  # for what mass: `sim.scene.scene_check`
     force_limit_n: Annotated[float, Field(ge=10, le=5000)] | None = None
 
     @property

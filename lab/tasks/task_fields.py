@@ -1,8 +1,9 @@
 """What task files are made of: parts and their routes, stations, camera, workspace, processes, obstacles."""
 
+from math import prod
 from typing import Annotated, Literal, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from lab.tasks.part_fields import PartFields
 from lab.tasks.record import Count, Learned, Name, Record, as_tuple
@@ -20,6 +21,9 @@ Shade = Annotated[float, Field(ge=0, le=1)]
 Color = Annotated[tuple[Shade, Shade, Shade], BeforeValidator(as_tuple)]
 
 MAX_PARTS = 50  # of a run in physics
+MOST_CELLS = (
+    100_000  # of the workspace: each is surveyed for every way, which takes seconds and a quarter of a gigabyte
+)
 MOST_THINGS = 200  # stations, stages or obstacles: on one table is no room for more
 
 
@@ -29,6 +33,13 @@ class Workspace(Record):
     lower_m: XYZ
     cell_m: Sizes
     shape: Annotated[tuple[Count, Count, Count], BeforeValidator(as_tuple)]
+
+    @field_validator("shape")
+    @classmethod
+    def _can_be_surveyed(cls, shape: tuple[int, int, int]) -> tuple[int, int, int]:
+        if prod(shape) > MOST_CELLS:
+            raise ValueError(f"{prod(shape)} cells: up to {MOST_CELLS} can be surveyed: wanted larger cells, or fewer")
+        return shape
 
 
 class CameraSettings(Record):

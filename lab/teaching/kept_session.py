@@ -21,12 +21,11 @@ from lab.tasks.record import write_whole
 from lab.teaching.lesson_options import LessonOptions, SessionOptions
 from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.folder_place import FolderPlace
-from lab.toolbox.names import SUFFIX, default_address, slug
+from lab.toolbox.names import SESSIONS, SUFFIX, default_address, slug
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import encode
 from lab.toolbox.registry import Toolbox
 
-SESSIONS = "sessions"  # the folder in the toolbox
 _BEGUN = "begun"  # the folder in a session's folder for the policy that it went on from
 _MOST = 100_000  # sessions of one name
 MOST_VALUES = 3_000_000  # a larger table's optimal values take too long to know
@@ -53,9 +52,14 @@ class SessionInFolder:
         return receipt_of(self.plan, self.journal, known_values(self.plan))
 
     def worth(self) -> dict[str, Any]:
-        """Where it is kept, and its receipt, which is written beside the journal; nothing where nothing is kept."""
+        """Where it is kept, and its receipt, which is written beside the journal; nothing where nothing is kept.
+
+        Raises BadInput when the journal is gone, or the receipt cannot be written.
+        """
         if self.folder is None or self.journal is None:
             return {}
+        if self.journal.path is not None and not self.journal.path.exists():
+            raise BadInput(f"journal '{self.journal.path}' is gone: its folder was removed or renamed meanwhile")
         made = self.receipt()
         write_whole(self.folder / "receipt.json", json.dumps(made.to_json(), indent=1, allow_nan=False) + "\n")
         return {"session": str(self.folder), "receipt": made.to_json() | {"lines": made.lines()}}
@@ -95,7 +99,7 @@ def read_session(folder: Path, where: str, kind: type[Options]) -> tuple[Read, O
 
 def kept_journal(read: Read, read_only: bool) -> Journal:
     """The journal of a kept session, which answers until it is used up."""
-    return Journal(None, read.effective(), read_only=True) if read_only else Journal.resume(read)
+    return Journal(None, read.effective(), True, read.path) if read_only else Journal.resume(read)
 
 
 def receipt_of(plan: LessonPlan, journal: Journal, values: FloatArray | None) -> Receipt:
@@ -231,24 +235,6 @@ def check_alone(given: Any, nothing: Any, folder: Path) -> None:
         if value != getattr(nothing, name):
             option = given.typed.get(name, f"--{name}")
             raise BadInput(f"{option} beside --resume {folder}: it goes on as it was begun: leave it away")
-
-
-def session_rows(toolbox: Toolbox) -> list[dict[str, Any]]:
-    """The sessions in a toolbox, those changed last first: folder, problem, who advised, and whether it is over.
-
-    Those kept in a folder elsewhere are links there; of one that is gone nothing is said.
-    """
-    found = {path.resolve() for path in (toolbox.folder / SESSIONS).glob(f"*/{FILE}")}
-    rows = []
-    for path in sorted(found, key=lambda path: path.stat().st_mtime, reverse=True):
-        row = {"session": str(path.parent), "problem": "", "advisor": "", "state": "damaged"}
-        with suppress(BadInput):
-            read = read_journal(path, "toolbox")
-            state = "not over" if read.closed is None else "solved" if read.closed.solved else "over"
-            advisors = " + ".join(read.session.words.get("advisors") or [read.session.words.get("advisor", "")])
-            row |= {"problem": read.session.problem, "advisor": advisors, "state": state}
-        rows.append(row)
-    return rows
 
 
 def check_new(folder: Path) -> None:

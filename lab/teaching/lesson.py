@@ -1,12 +1,13 @@
 """One lesson of one session in a subject, with its journal, its receipt and its pictures; and one shown again."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
 
 from lab.advice.advisors import PEOPLE
-from lab.errors import BadInput
+from lab.errors import BadInput, LabError
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.mdp import BoolArray
@@ -73,7 +74,10 @@ def teach(
             raise
         what = str(stopped) or "stopped by Ctrl-C; the journal has all that was said"
         raise Interrupted(f"{what}{session.resume_command(teacher.toolbox)}") from None
-    return document | session.worth()
+    try:
+        return document | session.worth()
+    except BadInput as error:  # the policy is kept by now
+        return document | {"missing": [*document.get("missing", []), str(error)]}
 
 
 def one_lesson(
@@ -82,14 +86,21 @@ def one_lesson(
     """One session in a subject; the policy is kept. Returns the document of `lab teach --json` without a receipt.
 
     It goes on from an unfinished policy of the same problem, if there is one. A skill that is tried in physics counts as
-    solved when that succeeds, too; `failure` says why it did not. sessions: those of the run that the lesson belongs to.
+    solved when that succeeds, too; `failure` says why it did not; `missing`, why a picture could not be drawn.
+    sessions: those of the run that the lesson belongs to.
     BadInput when the policy called `name` is of another problem.
     """
     problem, lesson = taught(subject, teacher, name, sessions)
     document = document_of(problem, lesson, teacher) | subject.facts()
-    if out is not None:
-        document["files"] = _draw_curve(problem.name, lesson.policy, out) | subject.draw(lesson.policy, out)
-    return document
+    if out is None:
+        return document
+    missing = []
+    for draw in (partial(_draw_curve, problem.name), subject.draw):
+        try:
+            document["files"] |= draw(lesson.policy, out)
+        except (OSError, LabError) as error:  # the policy is kept by now
+            missing.append(str(error))
+    return document | ({"missing": missing} if missing else {})
 
 
 def taught(subject: Subject, teacher: Teacher, name: str | None = None, sessions: int = 1) -> tuple[Problem, Lesson]:

@@ -38,8 +38,8 @@ class SessionOptions:
         try:
             return TypeAdapter(cls).validate_python(record)
         except ValidationError as error:
-            why = " ".join(str(error).split())[:160]
-            raise BadInput(f"{where}: its options are none of lab {cls.command}: {why}") from None
+            wrong = [f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors(include_url=False)]
+            raise BadInput(f"{where}: its options are none of lab {cls.command}: {'; '.join(wrong)[:160]}") from None
 
 
 def whole_path(name: str | None) -> str | None:

@@ -11,7 +11,7 @@ from lab.errors import BadInput, WorkFailed, counted
 from lab.learning.problem import Problem
 from lab.learning.session import SessionResult
 from lab.mdp import TabularMDP
-from lab.teaching.events import KeptBeside, LessonContinued, PolicyAdvises, Tell, unheard
+from lab.teaching.events import KeptBeside, LessonContinued, PolicyAdvises, RecordSkipped, Tell, unheard
 from lab.teaching.lesson_plan import Interrupted, Keep, Lesson, LessonPlan, Source, Trial
 from lab.teaching.lesson_sessions import fits, joined, learn
 from lab.toolbox.fitness import Fitness, best_fit, reference
@@ -80,13 +80,19 @@ class Teacher:
 
     def _candidates(self, known: KnownPolicies, problem: Problem) -> Iterator[Policy]:
         """As `candidates`, but the one that was used for this problem before comes first: the next run does the same."""
-        record = self.toolbox.load_record(_REUSED, _record_key(problem)) or {}
-        return candidates(known, problem, first=str(record.get("policy")).rpartition("@")[0])
+        record = None
+        try:
+            record = self.toolbox.load_record(_REUSED, _record_key(problem))
+        except BadInput as error:  # then any order will do
+            self.tell(RecordSkipped(str(error)))
+        return candidates(known, problem, first=str((record or {}).get("policy")).rpartition("@")[0])
 
     def _remember(self, problem: Problem, record: dict[str, str]) -> None:
         """Note what is used for a problem, where that is news."""
-        if self.toolbox.load_record(_REUSED, _record_key(problem)) != record:
-            self.toolbox.save_record(_REUSED, _record_key(problem), record)
+        with suppress(BadInput):  # a damaged note is written anew
+            if self.toolbox.load_record(_REUSED, _record_key(problem)) == record:
+                return
+        self.toolbox.save_record(_REUSED, _record_key(problem), record)
 
     def unfinished(self, problem: Problem, name: str | None = None) -> Policy | None:
         """The unsolved policy to go on from: the one it would replace, the best one, or the one beside a solved one."""

@@ -3,19 +3,22 @@
 import errno
 import fcntl
 import os
+import re
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from lab import files
 from lab.errors import BadInput, WorkFailed
+from lab.toolbox.names import SESSIONS
 from lab.toolbox.place import FileState, read_file
 
 _NOT_WRITABLE = {
     *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP),
     *(errno.ENOTDIR, errno.EEXIST, errno.EISDIR, errno.ENAMETOOLONG),
 }
+_DRAFT = re.compile(r"\..+\.[0-9a-f]{8}\.tmp")  # what `files.write_whole` writes first
 _FRESH_NS = 50_000_000  # a file changed so lately may change again without its times telling
 
 
@@ -107,6 +110,18 @@ class FolderPlace:
     def sweep(self, under: str) -> None:
         for left in (self.folder / under).glob(".*.tmp"):
             left.unlink(missing_ok=True)
+
+    def tidy(self, older_s: float) -> list[str]:
+        """Half-written files, and folders of sessions that nothing was written into."""
+        gone, until_s = [], time.time() - older_s
+        for left in (*self.folder.glob("**/.*.tmp"), *self.folder.glob(f"{SESSIONS}/*")):
+            is_draft = _DRAFT.fullmatch(left.name) is not None and not left.is_dir()
+            with suppress(OSError):  # another command has removed it; a folder with something in it stays
+                if left.is_symlink() or left.stat().st_mtime > until_s or not (is_draft or left.is_dir()):
+                    continue
+                (left.unlink if is_draft else left.rmdir)()
+                gone.append(str(left))
+        return gone
 
     def append(self, name: str, line: bytes) -> None:
         path = self.folder / name

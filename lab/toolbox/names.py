@@ -9,6 +9,7 @@ FORMAT = "teaching-lab-policy-1"
 SUFFIX = ".safetensors"
 MAX_SLUG_LENGTH = 60
 HASH_DIGITS = 12
+SESSIONS = "sessions"  # the folder for the journals of lessons, on this machine
 VERSIONS, LOG, TRASH = "versions", "log", "trash"  # the folders in a toolbox
 _ADDRESS = re.compile(r"[a-z][a-z0-9+.-]*://")
 

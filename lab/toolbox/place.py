@@ -64,6 +64,9 @@ class Place(Protocol):
     def sweep(self, under: str) -> None:
         """Deletes what writers that were killed left half written in a folder, for who holds its lock."""
 
+    def tidy(self, older_s: float) -> list[str]:
+        """Removes what commands that were killed have left in a folder of this machine, so many seconds old; what it was."""
+
     def append(self, name: str, line: bytes) -> None:
         """Adds a line to a log."""
 

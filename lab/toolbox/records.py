@@ -5,7 +5,7 @@ from typing import Any
 
 from lab.errors import BadInput
 from lab.toolbox import strict_json
-from lab.toolbox.names import slug
+from lab.toolbox.names import hash_of, slug
 from lab.toolbox.place import Place
 
 FOLDER = "records"
@@ -20,18 +20,20 @@ def file_of(kind: str, key: str) -> str:
 def save(place: Place, kind: str, key: str, record: dict[str, Any]) -> None:
     """Writes a record. Raises BadInput for what JSON cannot hold."""
     try:
-        text = json.dumps({"kind": kind, "key": key, "record": record}, indent=1, allow_nan=False)
+        whole = {"kind": kind, "key": key, "hash": _hash(record), "record": record}
+        text = json.dumps(whole, indent=1, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise BadInput(f"record '{key}' ({kind}): {error}") from error
     place.write(file_of(kind, key), text.encode())
 
 
 def load(place: Place, kind: str, key: str) -> dict[str, Any] | None:
-    """The record of that kind and key; None when there is none or its file is damaged."""
-    try:
-        whole = _read(place, file_of(kind, key))
-    except BadInput:
+    """The record of that kind and key; None when there is none. Raises BadInput when its file is damaged or was edited."""
+    file = file_of(kind, key)
+    folder, _, name = file.rpartition("/")
+    if name not in place.names(folder):
         return None
+    whole = _read(place, file)
     record: dict[str, Any] = whole["record"]
     return record if (whole["kind"], whole["key"]) == (kind, key) else None
 
@@ -58,4 +60,11 @@ def _read(place: Place, file: str) -> dict[str, Any]:
         raise BadInput(f"record file {place.where(file)}: {error}") from error
     if not isinstance(whole, dict) or not isinstance(whole.get("record"), dict) or not {"kind", "key"} <= whole.keys():
         raise BadInput(f"record file {place.where(file)}: it must hold kind, key and record")
+    if whole.get("hash", known := _hash(whole["record"])) != known:  # an older version of the lab wrote none
+        raise BadInput(f"record file {place.where(file)}: it does not hold what was written: it was changed")
     return whole
+
+
+def _hash(record: dict[str, Any]) -> str:
+    """The hash of a record, however its file is laid out."""
+    return hash_of(json.dumps(record, sort_keys=True).encode())

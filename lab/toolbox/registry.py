@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 Rows = list[Row]
 Words = list[str]
 Report = list[tuple[Path, bool, str]]  # path, whether it is sound, what is wrong
+LEFT_S = 600.0  # so old is what a command must have left: none that is alive takes so long to write a file
 _NOT_LISTED = ("action_labels", "shape")
 _MOST_NAMED = 12  # policies that an error lists; of more, only the nearest
 _NEAREST = 5
@@ -39,6 +40,7 @@ class Toolbox:
         self.address = self.place.address
         self._root = self.place.where("x")[:-1]
         self._index = Index(self.place)
+        self._tidied = False
 
     def check(self) -> None:
         """Raises unless policies can be saved here; makes nothing."""
@@ -53,6 +55,9 @@ class Toolbox:
 
         WorkFailed when a remote toolbox cannot be reached; then it is kept in the local folder, and the error says where.
         """
+        if not self._tidied:
+            self._tidied = True
+            self.place.tidy(LEFT_S)
         try:
             return self._of(slug(policy.name)).put(policy)
         except WorkFailed as error:
@@ -229,13 +234,17 @@ class Toolbox:
         checked = records.faults(self.place).items()
         return report + [(self.folder / file, not reason, reason) for file, reason in checked]
 
+    def repair(self) -> Words:
+        """Removes what commands that were killed have left, and no command can still be at work on; the files and folders."""
+        return self.place.tidy(LEFT_S)
+
     def save_record(self, kind: str, key: str, record: dict[str, Any]) -> Path:
         """Keeps a JSON record, such as the measured duration of a transfer, under its kind and key."""
         records.save(self.place, kind, key, record)
         return self.folder / records.file_of(kind, key)
 
     def load_record(self, kind: str, key: str) -> dict[str, Any] | None:
-        """The record of that kind and key; None when there is none or its file is damaged (see `verify`)."""
+        """The record of that kind and key; None when there is none. Raises BadInput when its file is damaged or was edited."""
         return records.load(self.place, kind, key)
 
     def _content(self, file: str) -> bytes:

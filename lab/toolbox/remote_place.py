@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from lab.errors import BadInput, WorkFailed
 from lab.files import write_whole
+from lab.toolbox.folder_place import FolderPlace
 from lab.toolbox.names import hash_of, slug
 from lab.toolbox.place import MAX_FILE_BYTES, FileState
 
@@ -165,6 +166,10 @@ class RemotePlace:
 
     def sweep(self, under: str) -> None:
         """Nothing is ever half written there."""
+
+    def tidy(self, older_s: float) -> list[str]:
+        """Nothing is ever left there; sessions are in the local folder."""
+        return FolderPlace(self.folder).tidy(older_s)
 
     def append(self, name: str, line: bytes) -> None:
         now = datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")

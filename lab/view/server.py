@@ -25,6 +25,7 @@ from uvicorn import Config
 from uvicorn import Server as Uvicorn
 
 from lab.errors import BadInput, WorkFailed
+from lab.view.server_limits import BACKLOG, LimitedConnection, LimitedSocket, quiet_when_full
 from lab.view.server_page import PAUSE_S, News, Page, Panel
 
 ADDRESS = "127.0.0.1"
@@ -111,6 +112,7 @@ class Server:
 
     async def _serve(self) -> None:
         self._loop, self._stopped = asyncio.get_running_loop(), asyncio.Event()
+        self._loop.set_exception_handler(quiet_when_full)
         server = Uvicorn(self._config())
         serving = asyncio.create_task(server.serve(sockets=[self._socket]))
         polling = asyncio.create_task(self._poll())
@@ -132,8 +134,9 @@ class Server:
         return Config(
             self._application(),
             loop="asyncio",
-            http="h11",
-            ws="websockets-sansio",
+            http=LimitedConnection,
+            ws=LimitedSocket,
+            backlog=BACKLOG,
             ws_max_size=MAX_MESSAGE,
             ws_per_message_deflate=False,
             lifespan="off",

@@ -100,8 +100,9 @@ def _minute(time: str) -> str:
 def verify_summary(report: Mapping[str, Any]) -> RenderableType:
     """What `lab toolbox verify` shows, from its JSON document: the damaged files, and how many are sound."""
     files, damaged = report["files"], [row for row in report["files"] if not row["ok"]]
+    left = [Text(f"removed {name}, which was left half written") for name in report.get("removed", ())]
     if not files:
-        return Text(f"nothing in {report['folder']}")
+        return Group(*left, Text(f"nothing in {report['folder']}"))
     are = "is" if len(files) == 1 else "are"
     lines = [Text(f"{len(files) - len(damaged)} of {counted(len(files), 'file')} in {report['folder']} {are} sound")]
-    return Group(*lines, *(Text(row["reason"], "red") for row in damaged))
+    return Group(*left, *lines, *(Text(row["reason"], "red") for row in damaged))

@@ -5,11 +5,13 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from lab.advice.entries import FILE, Session, line_of
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
 
@@ -45,3 +47,36 @@ def test_json_is_one_line_and_finite(lab: Lab) -> None:
     ran = lab("task", "show", "toast", "--json")
     assert ran.out.count("\n") == 1
     json.loads(ran.out, parse_constant=lambda text: pytest.fail(text))
+
+
+HOSTILE = "\x1b[31mred\x1b]0;title\x07"
+
+
+@pytest.mark.parametrize("words", ["toolbox list", "toolbox show {name}", "toolbox log {name}", "replay"])
+def test_no_escape_code_of_a_file_reaches_the_terminal(
+    lab: Lab, folder: Path, policy: MakePolicy, monkeypatch: pytest.MonkeyPatch, words: str
+) -> None:
+    """A policy's sub-task and task, and the words of a journal, with colours on as on a terminal."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    hostile = replace(policy("grasp"), subtask=f"grasp {HOSTILE}", task=HOSTILE)
+    box = Toolbox(folder / "toolbox")
+    box.save(hostile)
+    keep(folder / "toolbox" / "sessions" / "maze-1", HOSTILE)
+    ran = lab(*words.format(name="grasp").split())
+    assert ran.code == 0
+    for code in ("\x1b[31m", "\x1b]", "\x07"):
+        assert code not in ran.out + ran.err
+    assert r"\x1b[31mred" in ran.out or words.startswith("toolbox log")
+
+
+def keep(folder: Path, advisor: str) -> None:
+    """The journal of a session that has only begun."""
+    folder.mkdir(parents=True)
+    head = Session({"subtask": "maze.toml", "advisors": [advisor]}, "maze", "0a", "0.1")
+    (folder / FILE).write_text(line_of(head) + "\n", encoding="utf-8")
+
+
+def test_a_file_that_is_shown_is_shown_as_text(lab: Lab, folder: Path) -> None:
+    (folder / "world.txt").write_text("S.\x1b[2J\n.G\n")
+    ran = lab("task", "show", "world.txt")
+    assert "\x1b" not in ran.out + ran.err

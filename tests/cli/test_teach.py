@@ -70,3 +70,12 @@ def test_bad_words_about_sessions(lab: Lab, folder: Path, words: str, reason: st
 def test_a_gymnasium_environment_is_taught(lab: Lab, folder: Path) -> None:
     ran = lab("teach", "gym:FrozenLake-v1?is_slippery=false", "--advisor", "expert", "--json")
     assert (ran.code, ran.json["solved"], ran.json["final_steps"]) == (0, True, 6)
+
+
+def test_a_picture_that_cannot_be_drawn_loses_nothing_else(lab: Lab, folder: Path) -> None:
+    """The document is there, the policy is kept, and the command fails: something that was asked for is missing."""
+    (folder / "lesson" / "learning-curve.png").mkdir(parents=True)
+    ran = lab("teach", "world-1", "--out", "lesson", "--json")
+    assert (ran.code, ran.json["solved"]) == (1, True)
+    assert "is kept, but picture 'lesson/learning-curve.png': it is a folder" in ran.err.splitlines()[-1]
+    assert lab("toolbox", "list", "--json").json["policies"]

@@ -3,6 +3,7 @@
 import importlib
 import os
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ def kitchen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.syspath_prepend(str(folder.parent))
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "kept"))
+    monkeypatch.setattr(compiled, "_said", set())
     yield folder
     _forget()
 
@@ -78,10 +80,33 @@ def test_nothing_is_written_beside_the_sources(kitchen: Path) -> None:
     assert list(compiled.cache_folder().glob("kitchen.kernel-*/*/*.nbc"))
 
 
-def test_where_nothing_can_be_kept_it_still_runs(kitchen: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(kitchen / "recipe.py"))  # a file
-    assert started().doubled(3) == 6
+@pytest.mark.parametrize("what", ["a file", "nothing can be written", "no file can be made"])
+def test_where_nothing_can_be_kept_it_still_runs_and_says_so_once(
+    kitchen: Path, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    """Also where the folder can be made, but numba can make no file in it, nor beside the sources, nor at home."""
+    place = kitchen / "recipe.py" if what == "a file" else kitchen / what
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(place))
+    if what == "nothing can be written":
+        monkeypatch.setattr(os, "access", lambda *_: False)
+    if what == "no file can be made":
+        monkeypatch.setattr(tempfile, "TemporaryFile", lambda *_, **__: full())
+    with pytest.warns(compiled.NotKept, match=f"cannot be kept in '{place}/teaching-lab' .*NUMBA_CACHE_DIR"):
+        assert started().doubled(3) == 6
+    assert started().doubled(3) == 6  # nothing is said any more, or this test fails
     assert loaded(started().doubled) == 0
+
+
+def full() -> None:
+    raise OSError(28, "No space left on device")
+
+
+def test_what_was_kept_and_is_damaged_is_compiled_anew(kitchen: Path) -> None:
+    started().doubled(3)
+    for path in compiled.cache_folder().rglob("*.nb?"):
+        path.write_bytes(path.read_bytes()[:40])
+    with pytest.warns(compiled.NotKept, match="each run compiles anew"):
+        assert started().doubled(3) == 6
 
 
 def test_what_was_not_used_for_longest_goes(kitchen: Path, monkeypatch: pytest.MonkeyPatch) -> None:

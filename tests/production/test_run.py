@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import lab.production.run
-from lab.errors import WorkFailed
+from lab.errors import BadInput, WorkFailed
 from lab.export.program import Program
 from lab.mdp import shortest_steps
 from lab.production.durations import Durations
@@ -365,6 +365,7 @@ def test_damaged_policies_are_named_and_learned_again(
         lambda record: record | {"empty_s": [1, 2]},
         lambda record: record | {"empty_s": record["empty_s"] | {"plate > elsewhere": 5.0}},
         lambda record: record | {"process_s": record["process_s"] | {"elsewhere": 5.0}},
+        lambda record: record | {"process_s": {"butter_applier": 10**400}},
     ],
 )
 def test_damaged_durations_are_measured_again(
@@ -372,6 +373,7 @@ def test_damaged_durations_are_measured_again(
 ) -> None:
     (path,) = (toolbox.folder / "records" / "durations").glob("*.json")
     whole = json.loads(path.read_text(encoding="utf-8"))
+    del whole["hash"]  # as an older version wrote it
     path.write_text(json.dumps(whole | {"record": damage(whole["record"])}), encoding="utf-8")
     heard: list[Event] = []
     taught = teach_all(prepared, Teacher(toolbox, tell=heard.append))
@@ -383,6 +385,22 @@ def test_damaged_durations_are_measured_again(
     assert set(taught.durations.loaded_s.values()) == {5.0}
     teach_all(prepared, Teacher(toolbox))
     assert len(measured) == 1
+
+
+def test_edited_durations_are_measured_again_though_they_read_well(
+    prepared: Prepared, toolbox: Toolbox, measured: list[Prepared]
+) -> None:
+    (path,) = (toolbox.folder / "records" / "durations").glob("*.json")
+    whole = json.loads(path.read_text(encoding="utf-8"))
+    whole["record"]["process_s"]["butter_applier"] = 1.0
+    path.write_text(json.dumps(whole), encoding="utf-8")
+    heard: list[Event] = []
+    teach_all(prepared, Teacher(toolbox, tell=heard.append))
+    assert len(measured) == 1
+    assert skipped(heard) == [
+        f"durations measured earlier: record file {path}: it does not hold what was written: it was changed"
+    ]
+    assert all(sound for _, sound, _ in toolbox.verify())
 
 
 def test_only_one_skill_can_be_prepared() -> None:
@@ -458,18 +476,44 @@ def test_a_failed_run_says_so_and_leaves_no_old_chart(
     assert {"grasp at plate, starts vary", "insert at toaster"} < set(curves)
 
 
-@pytest.mark.parametrize("stop", [KeyboardInterrupt(), OSError(28, "No space left on device")])
-def test_nothing_is_half_written(
-    failed: Report,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    stop: BaseException,
-) -> None:
+def test_nothing_is_half_written(failed: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "out"
     out.mkdir()
     (out / "run.json").write_text("old")
-    drawn(monkeypatch, stop)
-    with pytest.raises((KeyboardInterrupt, WorkFailed)):
+    drawn(monkeypatch, KeyboardInterrupt())
+    with pytest.raises(KeyboardInterrupt):
+        write_files(failed, out)
+    assert {path.name: path.read_text() for path in out.iterdir()} == {"run.json": "old"}
+
+
+@pytest.mark.parametrize(
+    "why", [OSError(28, "No space left on device"), BadInput("picture 'x' cannot be written: full")]
+)
+def test_the_numbers_are_written_though_a_picture_cannot_be(
+    failed: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, why: Exception
+) -> None:
+    drawn(monkeypatch, why)
+    (tmp_path / "learning-curves.png").write_text("of a run before")
+    write_files(failed, tmp_path)
+    there = set(FILES) - {"gantt", "program", "trajectory", "learning_curves"}
+    assert sorted(failed.files) == sorted(there)
+    assert {path.name for path in tmp_path.iterdir()} >= {FILES[name] for name in there}
+    assert not (tmp_path / "learning-curves.png").exists()
+    assert json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))["files"] == failed.files
+    assert failed.lost == f"'learning-curves.png' is missing: {getattr(why, 'strerror', None) or why}"
+
+
+def test_without_room_for_the_numbers_nothing_is_written(
+    failed: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(rows: object) -> str:
+        raise OSError(28, "No space left on device")
+
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "run.json").write_text("old")
+    monkeypatch.setattr("lab.production.report.csv_of", full)
+    with pytest.raises(WorkFailed, match=r"\(--out\) cannot be written: No space left on device"):
         write_files(failed, out)
     assert {path.name: path.read_text() for path in out.iterdir()} == {"run.json": "old"}
 

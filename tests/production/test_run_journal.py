@@ -1,6 +1,8 @@
 """A run's journal: what is written is read again, damage is told with its line, and a run does again what it did."""
 
+import fcntl
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -93,10 +95,31 @@ def test_a_run_that_is_over_is_not_gone_on_with(journal: RunJournal, tmp_path: P
 
 def test_one_command_at_a_time_writes_it(tmp_path: Path) -> None:
     one = RunJournal.begin(tmp_path, HEAD)
-    with pytest.raises(BadInput, match="another command is writing it"):
-        RunJournal.resume(tmp_path)
+    whole = (tmp_path / FILE).read_bytes()
+    for writes in (RunJournal.resume, partial(RunJournal.begin, head=HEAD)):
+        with pytest.raises(BadInput, match="another command is writing it"):
+            writes(tmp_path)
+    assert (tmp_path / FILE).read_bytes() == whole
+    assert not (tmp_path / "run-before.jsonl").exists()
     one.close()
     RunJournal.resume(tmp_path).close()
+
+
+def test_a_journal_that_is_put_aside_while_it_is_opened_is_not_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between its opening and its lock another command has begun a new run in the folder."""
+    RunJournal.begin(tmp_path, HEAD).close()
+    lock = fcntl.flock
+
+    def overtaken(file: int, how: int) -> None:
+        monkeypatch.setattr(fcntl, "flock", lock)
+        RunJournal.begin(tmp_path, HEAD).close()
+        lock(file, how)
+
+    monkeypatch.setattr(fcntl, "flock", overtaken)
+    with pytest.raises(BadInput, match="another command has just put it aside and begun a new one"):
+        RunJournal.resume(tmp_path)
 
 
 def test_a_new_run_puts_the_journal_before_aside(journal: RunJournal, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """What every registered sequencer must do."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -21,14 +21,6 @@ CellMaker = Callable[..., Cell]
 NAMES = sorted(SEQUENCERS)
 TIMED = [name for name in NAMES if name != "earliest-due"]
 EXACT = ("exact", "cp-sat")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _portfolio_anneals_for_a_moment() -> Iterator[None]:
-    """These cells are so small that its twelve million moves, seconds for each cell, find nothing that the first do not."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("lab.sequencing.methods.portfolio.MOVES", 60_000)
-        yield
 
 
 def found(name: str, cell: Cell, seed: int, objective: str = "makespan") -> SequenceResult:

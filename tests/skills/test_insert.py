@@ -1,5 +1,6 @@
 """Insert: the camera's grid, the way through it, the slice in the slot; and what the camera notices."""
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -141,7 +142,42 @@ def test_a_marker_that_is_hidden_is_a_reason(surveys: Surveys, stage: Stage, opt
     bench = stage(insert)
     bench.scene.world.put("toaster marker", (0.0, 0.0, -1.0))
     assert run(insert, bench, policy) is Status.FAILURE
-    assert insert.reason == "the camera does not see the toaster that 'insert at toaster' was learned with"
+    assert re.fullmatch(
+        r"the camera does not see the toaster at \(.*\) m that 'insert at toaster' was learned with", insert.reason
+    )
+
+
+@pytest.mark.parametrize("number", [0, 2])
+def test_a_cube_that_was_taken_away_has_not_moved_to_another_ones_place(
+    number: int, surveys: Surveys, layout: Layout, stage: Stage, optimal: PolicyOf, run: Run
+) -> None:
+    """The next one stands where it stood before, decimetres away."""
+    insert = Insert(surveys.task, "slice", "toaster")
+    policy = optimal(insert.setup(surveys))
+    bench = stage(insert, layout=moved(layout, number, 5.0, 0.0))
+    assert run(insert, bench, policy) is Status.FAILURE
+    x, y = layout.obstacles[number]
+    said = re.fullmatch(r"the camera does not see the obstacle at \((.*), (.*)\) m that 'insert .*", insert.reason)
+    assert said, insert.reason
+    assert (float(said[1]), float(said[2])) == pytest.approx((x, y), abs=0.01)
+
+
+def test_what_is_lost_on_the_way_is_said_and_no_way_is_looked_for(
+    surveys: Surveys, stage: Stage, optimal: PolicyOf
+) -> None:
+    """The fingers open over the grid: the slice falls, and where it lies now says nothing about where the tool has to go."""
+    insert = Insert(surveys.task, "slice", "toaster")
+    policy = optimal(insert.setup(surveys))
+    bench = stage(insert)
+    insert.start(bench, policy)
+    while insert.step() is Status.RUNNING and not insert.deviations_m:
+        bench.scene.world.step()
+    bench.scene.robot.lose()
+    status = insert.step()
+    while status is Status.RUNNING:
+        bench.scene.world.step()
+        status = insert.step()
+    assert (status, insert.reason) == (Status.FAILURE, "slice 1 is not in the gripper any more")
 
 
 def test_a_cube_that_came_along_is_noticed(

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from lab.errors import BadInput
 from lab.files import tasks_folder
 from lab.tasks.task import Task
-from lab.tasks.task_fields import MOST_THINGS
+from lab.tasks.task_fields import MOST_THINGS, Workspace
 from lab.tasks.task_file import load
 from lab.tasks.toml_text import explain
 
@@ -234,3 +234,11 @@ def test_more_things_than_a_table_holds_are_refused(refused: Refused) -> None:
     assert re.match(r"line \d+: obstacles: ", said)
     assert "at most 200 items" in said
     assert len(said) < 400
+
+
+def test_a_workspace_that_no_machine_surveys_in_time_is_refused() -> None:
+    """100 x 100 x 10 cells are as many as can be."""
+    place = {"lower_m": [0.0, 0.0, 0.0], "cell_m": [0.01, 0.01, 0.01]}
+    assert Workspace.model_validate(place | {"shape": [100, 100, 10]}).shape == (100, 100, 10)
+    with pytest.raises(ValidationError, match="110000 cells: up to 100000 can be surveyed: wanted larger cells"):
+        Workspace.model_validate(place | {"shape": [100, 100, 11]})

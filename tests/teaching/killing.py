@@ -11,11 +11,12 @@ import numpy as np
 
 from lab.advice.entries import FILE, read_journal
 from lab.learning.requests import AdviceRequest
-from lab.teaching.kept_session import SESSIONS, KeptSession
+from lab.teaching.kept_session import KeptSession
 from lab.teaching.lesson import teach
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.teacher import Teacher
 from lab.teaching.world_subject import WorldSubject
+from lab.toolbox.names import SESSIONS
 from lab.toolbox.registry import Toolbox
 
 

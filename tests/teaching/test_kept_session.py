@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from shutil import rmtree
 from typing import Any
 
 import pytest
@@ -19,13 +20,15 @@ from lab.learning.requests import AdviceRequest, Ask
 from lab.learning.session_events import AdviceGiven
 from lab.tasks.task_file import load_world
 from lab.teaching.events import Event, LessonEvent, QuestionAnswered, unheard
-from lab.teaching.kept_session import SESSIONS, KeptSession, NewSession, check_new, session_rows
+from lab.teaching.kept_session import KeptSession, NewSession, check_new
 from lab.teaching.lesson import replay, teach
 from lab.teaching.lesson_options import LessonOptions
 from lab.teaching.lesson_plan import MAX_SESSIONS, Interrupted, LessonPlan
 from lab.teaching.lesson_sessions import fits
+from lab.teaching.session_list import session_rows
 from lab.teaching.teacher import Teacher
 from lab.teaching.world_subject import WorldSubject
+from lab.toolbox.names import SESSIONS
 from lab.toolbox.registry import Toolbox
 
 MAZE = """
@@ -178,6 +181,25 @@ def test_a_session_without_a_folder_is_kept_in_the_toolbox(tmp_path: Path, maze:
     assert {(row["problem"], row["advisor"]) for row in rows} == {("maze", "novice")}
     (tmp_path / "toolbox" / SESSIONS / "maze-1" / FILE).write_text("nonsense\n")
     assert sorted(row["state"] for row in session_rows(Toolbox(tmp_path / "toolbox")))[0] == "damaged"
+
+
+def test_what_cannot_be_written_after_the_work_is_said_beside_it(tmp_path: Path, maze: Path) -> None:
+    """A folder stands where the picture goes; then all is removed while the lesson is held: the policy is kept each time."""
+    (tmp_path / "lesson" / "learning-curve.png").mkdir(parents=True)
+    document = taught(options(maze, "novice", episodes=12), teacher(tmp_path, person, "novice"), tmp_path / "lesson")
+    assert document["files"].keys() == {"value_map"}
+    assert [why.partition("learning-curve.png")[0] for why in document["missing"]] == [f"picture '{tmp_path}/lesson/"]
+    assert (tmp_path / "lesson" / "receipt.json").is_file()
+
+    def remove(request: AdviceRequest) -> int:
+        rmtree(tmp_path / "gone", ignore_errors=True)
+        return person(request)
+
+    document = taught(options(maze), teacher(tmp_path, remove), tmp_path / "gone")
+    assert document["missing"] == [
+        f"journal '{tmp_path}/gone/{FILE}' is gone: its folder was removed or renamed meanwhile"
+    ]
+    assert document["saved_as"] in [row["name"] for row in Toolbox(tmp_path / "toolbox").list()]
 
 
 def test_a_folder_that_holds_a_session(tmp_path: Path, maze: Path) -> None:

@@ -90,3 +90,33 @@ def test_names_never_lead_out(place: FolderPlace, name: str) -> None:
     for use in (lambda: place.read(name), lambda: place.write(name, b""), lambda: place.append(name, b"")):
         with pytest.raises(BadInput, match="it leads out of the toolbox"):
             use()
+
+
+def test_what_killed_commands_left_goes(tmp_path: Path, make_policy: MakePolicy) -> None:
+    """With the next policy that is kept, or when it is asked for; never what may still be at work."""
+    box = Toolbox(tmp_path / "box")
+    box.save(make_policy())
+    sound = {path for path in box.folder.rglob("*") if path.is_file()}
+    drafts = [box.folder / place / ".insert.0a1b2c3d.tmp" for place in (".", "records/durations", "versions/grasp")]
+    folders = [box.folder / "sessions" / name for name in ("maze-1", "maze-2", "maze-3")]
+    own = box.folder / ".mine.tmp"  # not of our making
+    for path in (*drafts, own, folders[2] / "events.jsonl"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"half")
+    for folder in folders[:2]:
+        folder.mkdir()
+    fresh = (drafts[1], folders[1])
+    for path in {*drafts, own, *folders} - {*fresh}:
+        os.utime(path, (0, 0))
+    assert box.repair() == [str(path) for path in (drafts[0], drafts[2], folders[0])]
+    assert {path for path in box.folder.rglob("*") if path.is_file()} == {
+        *sound,
+        own,
+        drafts[1],
+        folders[2] / "events.jsonl",
+    }
+    for path in fresh:
+        os.utime(path, (0, 0))
+    Toolbox(box.folder).save(make_policy(name="grasp"))
+    assert not any(path.exists() for path in fresh)
+    assert box.repair() == []

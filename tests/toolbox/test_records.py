@@ -1,5 +1,6 @@
 """Measured records in a toolbox."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -28,8 +29,24 @@ def test_records(toolbox: Toolbox) -> None:
         b'{"kind": 1, "key": 2, "record": {"a": NaN}}',
     ):
         path.write_bytes(damaged)
-        assert toolbox.load_record("transfer", "1 -> 3") is None
+        with pytest.raises(BadInput, match=r"^record file .*transfer"):
+            toolbox.load_record("transfer", "1 -> 3")
         assert {where: ok for where, ok, _ in toolbox.verify()}[path] is False
     for bad in ({"x": float("nan")}, {"x": object()}):
         with pytest.raises(BadInput, match="record '1 -> 3'"):
             toolbox.save_record("transfer", "1 -> 3", bad)
+
+
+def test_an_edited_record_is_known_as_such(toolbox: Toolbox) -> None:
+    """However well it reads; one that is only laid out anew is sound, and so is one of an older version, without a hash."""
+    path = toolbox.save_record("transfer", "1 -> 3", {"plate > oven": 4.25, "oven > plate": 3.0})
+    whole = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps(whole | {"record": dict(reversed(whole["record"].items()))}), encoding="utf-8")
+    assert toolbox.load_record("transfer", "1 -> 3") == whole["record"]
+    path.write_text(json.dumps({name: whole[name] for name in ("kind", "key", "record")}), encoding="utf-8")
+    assert toolbox.load_record("transfer", "1 -> 3") == whole["record"]
+    path.write_text(json.dumps(whole | {"record": whole["record"] | {"moon > plate": 4.0}}), encoding="utf-8")
+    ((_, sound, why),) = toolbox.verify()
+    assert (sound, why) == (False, f"record file {path}: it does not hold what was written: it was changed")
+    with pytest.raises(BadInput, match=r"it was changed$"):
+        toolbox.load_record("transfer", "1 -> 3")

@@ -6,7 +6,6 @@ from io import StringIO
 from threading import Thread
 from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.text import Text
 
 from lab.errors import printable
@@ -15,6 +14,7 @@ from lab.production.operation.commands import COMMANDS, help_lines
 from lab.production.operation.desk import Desk
 from lab.seat.terminal.console_view import plain_lines, view
 from lab.seat.terminal.screen import folded
+from lab.view.escaping_console import EscapingConsole
 
 if TYPE_CHECKING:
     from prompt_toolkit.application import Application
@@ -225,7 +225,7 @@ class OperatorConsole:
 def _ansi(lines: list[Text], width: int) -> str:
     """Lines with their colours as escape codes."""
     out = StringIO()
-    console = Console(file=out, force_terminal=True, color_system="standard", width=width, legacy_windows=False)
+    console = EscapingConsole(file=out, force_terminal=True, color_system="standard", width=width, legacy_windows=False)
     for number, line in enumerate(lines):
         line.truncate(width)
         console.print(line, end="\n" if number < len(lines) - 1 else "", no_wrap=True, overflow="crop", crop=True)

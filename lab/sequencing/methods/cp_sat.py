@@ -19,7 +19,7 @@ from lab.sequencing.methods.cp_sat_tasks import possible_tasks
 from lab.sequencing.methods.cp_sat_transport import TransportModel
 from lab.sequencing.methods.rules import first_come
 from lab.sequencing.methods.shared import Shared
-from lab.sequencing.search import SAME, Search, SequenceResult, only_one
+from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
 from lab.sequencing.simulate.run import Run, follow
 
 TIME_LIMIT_S = 60.0
@@ -197,9 +197,14 @@ def _result(
 
 
 def cp_sat_sequencer(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceResult:
-    """CP-SAT as a sequencer: one sequence, found by the mean times within TIME_LIMIT_S; it draws nothing from `rng`."""
+    """CP-SAT as a sequencer: one sequence, found by the mean times within TIME_LIMIT_S; it draws nothing from `rng`.
+
+    Raises WorkFailed where it proves that there is none, and where it finds none in time.
+    """
     search.check(cell)
-    found = cp_sat(cell, search.objective)
+    found = cp_sat(cell, search.objective, TIME_LIMIT_S)
+    if found.status == "unknown":
+        raise not_in_time(cell, f"CP-SAT ({found.wall_s:.0f} s)", found.bound)
     return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))
 
 

@@ -20,6 +20,7 @@ from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
 from lab.sequencing.simulate.run import simulate
 
 MAX_EXPANDED = 300_000
+MOST_KEPT = 20_000_000  # numbers in all states that were reached, half a gigabyte; only large cells come near
 
 
 @dataclass(frozen=True)
@@ -47,17 +48,17 @@ class Optimum:
 
 
 class _Search:
-    """The states that are queued and those that were reached; `expanded`: how many were opened."""
+    """The states that are queued and those that were reached; `expanded`: how many were opened; `kept`: numbers in all."""
 
     def __init__(self, cell: Cell) -> None:
         self.merged = MergedCell(cell)
         self._least = LowerBound(self.merged)
         # What the clock brings is no wait: it comes anyway.
         self._waits = len(self.merged.slots) + self.merged.one_by_one
-        self.expanded = self.bound = self._serial = 0
+        self.expanded = self.bound = self._serial = self.kept = 0
         self._fronts: dict[tuple[int, int] | MergedKey, list[tuple[int, ...]]] = {}
         self._heap: list[tuple[int, int, MergedState]] = []
-        self._greedy = False
+        self._greedy, self.most_kept = False, MOST_KEPT
         self._reach(self.merged.start())
 
     @property
@@ -66,7 +67,8 @@ class _Search:
         return not self._heap
 
     def run(self, most: int) -> MergedState | None:
-        """The first complete state; None: when `most` states were opened in all, or all there are, there was none."""
+        """The first complete state; None: when `most` states were opened in all, or all that there are or is room for, there was
+        none."""
         while self._heap:
             bound, serial, state = heapq.heappop(self._heap)
             if self._times(state) not in self._fronts[self._group(state)]:
@@ -74,7 +76,7 @@ class _Search:
             self.bound = max(self.bound, bound)
             if self.merged.done(state):
                 return state
-            if self.expanded >= most:
+            if self.expanded >= most or self.kept >= self.most_kept:
                 heapq.heappush(self._heap, (bound, serial, state))
                 return None
             self.expanded += 1
@@ -84,7 +86,7 @@ class _Search:
 
     def hasten(self) -> None:
         """From now on open what has the least left to do first: any end will do."""
-        self._greedy = True
+        self._greedy, self.most_kept = True, 2 * self.most_kept
         self._heap = [(self._least.left(state), serial, state) for _, serial, state in self._heap]
         heapq.heapify(self._heap)
 
@@ -102,6 +104,7 @@ class _Search:
             return
         front[:] = [other for other in front if not all(map(le, times, other))]
         front.append(times)
+        self.kept += len(times) + len(state.waits)
         # Of equally promising states the newest comes first, hence the falling serial number.
         self._serial -= 1
         heapq.heappush(self._heap, (left if self._greedy else state.now + left, self._serial, state))
@@ -128,9 +131,9 @@ def optimum(cell: Cell, max_expanded: int = MAX_EXPANDED) -> Optimum:
     waited on purpose before it brings a part might do better; that is not looked for.
 
     States are opened in the order of time so far + a bound on what is still to do, so the first complete one is
-    optimal; a deadlock leads nowhere. After `max_expanded` states it gives up and opens as many again, nearest to the end
-    first, for the sequence it returns: `proven` False, and the bound reached so far. WorkFailed where no sequence comes to
-    its end, or none was found.
+    optimal; a deadlock leads nowhere. After `max_expanded` states, or once those that were reached hold MOST_KEPT numbers, it
+    gives up and opens as many again, nearest to the end first, for the sequence it returns: `proven` False, and the bound
+    reached so far. WorkFailed where no sequence comes to its end, or none was found.
     Source: uniform-cost search (Dijkstra 1959) with an admissible bound (A*, Hart et al. 1968); the pruning of later
     states that are otherwise alike is the thesis's branch and bound, App. IV.
     """

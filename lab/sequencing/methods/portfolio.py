@@ -14,11 +14,12 @@ from lab.sequencing.methods.exact import optimum
 from lab.sequencing.methods.fewer_moves import fewer_moves
 from lab.sequencing.methods.rules import first_come, work_left_s
 from lab.sequencing.methods.shared import Shared
-from lab.sequencing.search import SAME, Search, SequenceResult, only_one
+from lab.sequencing.search import SAME, Search, SequenceResult, not_in_time, only_one
 from lab.sequencing.simulate.cell_arrays import most_moves
 from lab.sequencing.simulate.run import follow
 
 MOVES, ROUND = 12_000_000, 3_000  # of all sequences that annealing tries; how many it tries between two looks at Ctrl-C
+EACH = 500  # how often it tries each of a list's neighbours, on average: a short list takes far fewer moves
 TIME_LIMIT_S = 60.0
 WORKERS = 6  # threads of CP-SAT, also on two cores: they look in different ways
 ANNEALERS, ANNEALINGS = 2, 40  # threads beside CP-SAT, with seeds of their own; how often each begins at the most
@@ -77,6 +78,8 @@ def portfolio(cell: Cell, search: Search, rng: np.random.Generator) -> SequenceR
     """The best order that any method finds within its time, one sequence; it draws nothing from `rng`."""
     search.check(cell)
     found = best_known(cell, search.objective, TIME_LIMIT_S, workers=WORKERS)
+    if not found.sequence and found.bound < inf:
+        raise not_in_time(cell, "any method", found.bound)
     return only_one(cell, search, found.sequence, found.cost, bool(found.sequence))
 
 
@@ -142,7 +145,8 @@ def _anneal(shared: Shared, seed: int, again: int) -> None:
     if shared.over.is_set():
         return
     annealing = Annealing(shared.cell, shared.objective, seed, shared.sequence if again % 3 == 1 else ())
-    steps = max(ROUND, (MOVES << (again + 3) // 4) // most_moves(shared.cell))
+    size = most_moves(shared.cell)
+    steps = max(ROUND, min(MOVES // size, EACH * size**2) << (again + 3) // 4)
     for done in range(0, steps, ROUND):
         annealing.advance(ROUND, done / steps)
         if annealing.best and annealing.best_cost < shared.cost - SAME:

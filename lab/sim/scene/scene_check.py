@@ -1,7 +1,7 @@
 """What is wrong with a task's cell before anything is surveyed in it: reach, heights, and stations in each other's way."""
 
 from itertools import combinations
-from math import hypot, sin
+from math import hypot, inf, sin
 
 from lab.errors import BadInput
 from lab.sim import models
@@ -19,6 +19,11 @@ from lab.tasks.task_fields import CameraGrid, Station
 ACROSS = 0.3  # sine of the angle at most between the fingers and the way in
 OVER_M = 0.01  # [m] between a carried part and what stands below its way
 INTO_M = 0.005  # [m] the same above a machine that it is let down into
+HOLDS = (
+    8.0  # times its weight friction has to hold; measured: with less, parts tilt or slip between the fingers on the way
+)
+SQUEEZES_N_KG = 3000.0  # newtons of grip for each kilogram; measured: from 3,800 on slices are thrown out of them
+GRAVITY_M_S2 = 9.81
 
 
 def places_of(task: Task) -> Places:
@@ -31,6 +36,8 @@ def check_scene(task: Task) -> None:
     arm, places = arm_of(task.robot, task.folder), places_of(task)
     low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
     _check_lowest(places, low)
+    for kind in places.kinds.values():
+        _check_held(kind, task.robot.grip_force_n)
     for station in task.stations:
         station_bodies.check(station, task.folder)
         if station.grid is not None:
@@ -59,6 +66,17 @@ def _check_lowest(places: Places, low: float) -> None:
                 f"workspace.lower_m: the lowest tool height {low:.3f} m would sweep a carried {kind.name} through what "
                 f"stands at '{where}': at least {standing[where] + OVER_M + kind.grip.up_m:.3f} needed"
             )
+
+
+def _check_held(kind: Kind, force_n: float) -> None:
+    """BadInput when the fingers press too weakly for what they carry, or so strongly that it is squeezed out of them."""
+    mass_kg, friction = sum(one.part.mass_kg for one in kind.stack()), kind.part.friction
+    what = f"robot.grip_force_n = {force_n:g}: {kind.name} of {mass_kg:g} kg, friction {friction:g},"
+    least = HOLDS * mass_kg * GRAVITY_M_S2 / (2 * friction) if friction else inf
+    if force_n < least:
+        raise BadInput(f"{what} would slip or tilt between the fingers: at least {least:.3g} N needed")
+    if force_n > (most := SQUEEZES_N_KG * mass_kg):
+        raise BadInput(f"{what} would be squeezed out of the fingers: at most {most:.3g} N allowed")
 
 
 def _check_seen(task: Task, station: Station, grid: CameraGrid) -> None:

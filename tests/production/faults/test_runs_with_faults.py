@@ -65,3 +65,17 @@ def test_what_cannot_be_made_is_left_and_said(
     assert outcome.delivered == delivered
     assert said in outcome.failure
     assert outcome.verdict(NAMES).came == "stopped"
+
+
+def test_what_nobody_saw_is_said(run_with: Any) -> None:
+    """While the camera is covered a slice is taken out of the toaster, too soon: it is not found blindly, and not passed off."""
+    outcome = run_with(
+        {"what": "camera blind", "at_s": 20, "seconds": 60},
+        {"what": "part moved", "when": "in machine", "by_m": [0.0, -0.2], "at_s": 40},
+    )
+    assert [one.undone for one in outcome.happened] == [False, True]
+    assert any(why.endswith("is not where it was, and the camera sees nothing") for why in outcome.retries)
+    assert any(
+        why.endswith("was taken out of 'toaster': whether it was done there was not seen") for why in outcome.retries
+    )
+    assert outcome.verdict(NAMES).unexplained == ()

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lab.errors import BadInput
+from lab.errors import BadInput, WorkFailed
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, WITH_DUE_TIMES, cost
 from lab.sequencing.cell.stations import Arrivals, Product, Stage, Station, one_robot
@@ -230,3 +230,13 @@ def test_model_times_are_those_of_the_simulation(
     makespan_s = simulate(cell, first_come(cell)).makespan_s
     assert moves[-1].drop / times.per_s == pytest.approx(makespan_s, abs=1e-3)
     assert moves[-1].drop <= longest(cell, times, ways)
+
+
+def test_what_is_not_found_in_time_is_no_deadlock(toast_cell: CellMaker, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nobody knows an order to begin with, and a hundredth of a second is too short to find one."""
+    monkeypatch.setattr("lab.sequencing.methods.cp_sat.first_come", lambda cell: ())
+    monkeypatch.setattr("lab.sequencing.methods.cp_sat.TIME_LIMIT_S", 0.01)
+    with pytest.raises(
+        WorkFailed, match=r"^no sequence for 12 parts was found in time by CP-SAT \(0 s\), which does not"
+    ):
+        cp_sat_sequencer(toast_cell("III", 12), Search(20), np.random.default_rng(0))

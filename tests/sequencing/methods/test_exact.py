@@ -161,6 +161,17 @@ def test_giving_up_says_what_is_proven(toast_cell: CellMaker) -> None:
     assert simulate(cell, best.sequence).makespan_s == best.cost
 
 
+def test_it_gives_up_before_all_memory_is_taken(toast_cell: CellMaker, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As after so many states; what is kept of each counts, not how many there are."""
+    cell = toast_cell("I", 4)
+    monkeypatch.setattr("lab.sequencing.methods.exact.MOST_KEPT", 100)
+    best = optimum(cell)
+    assert not best.proven
+    assert 0 < best.expanded <= 100
+    assert 0 < best.bound_s <= 663 <= best.cost
+    assert simulate(cell, best.sequence).makespan_s == best.cost
+
+
 def test_giving_up_at_once_still_finds_a_way_out_of_deadlocks() -> None:
     cell = crossing_cell("PNPN")
     best = optimum(cell, max_expanded=1)

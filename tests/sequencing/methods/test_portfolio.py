@@ -14,6 +14,7 @@ from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.objectives import OBJECTIVES, cost
 from lab.sequencing.cell.stations import Robot
 from lab.sequencing.methods import portfolio as tried
+from lab.sequencing.methods.anneal import Annealing
 from lab.sequencing.methods.cp_sat import beside, fits
 from lab.sequencing.methods.portfolio import BestKnown, best_known
 from lab.sequencing.methods.shared import Shared
@@ -82,7 +83,7 @@ def test_one_robot_that_does_all(
     """Pallets, arrivals, routes to choose from, and what is not the makespan."""
     cell = data.draw(cells(max_machines=1, max_parts=2, many=True))
     costs = [cost(run, objective) for run in ends(Run(cell))]
-    found = best_known(cell, objective, 10.0, workers=2)
+    found = best_known(cell, objective, 3.0, workers=2)
     if costs:
         assert found.bound - 1e-4 <= min(costs) <= found.cost + SAME  # times are rounded to a millionth
 
@@ -118,6 +119,21 @@ def test_ctrl_c_is_heard_while_cp_sat_looks(job_shop: CellMaker, workers: int) -
     assert threading.active_count() <= before  # nobody goes on in the background
 
 
+def test_a_small_cell_is_annealed_for_a_moment(job_shop: CellMaker, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two parts into M1 and out again: 4 moves, 16 neighbours, each 500 times, not the three million of a large cell."""
+    rounds, advance = list[int](), Annealing.advance
+
+    def counted(self: Annealing, steps: int, done: float) -> tuple[int, ...]:
+        rounds.append(steps)
+        return advance(self, steps, done)
+
+    monkeypatch.setattr(tried, "MOVES", 12_000_000)
+    monkeypatch.setattr(Annealing, "advance", counted)
+    found = best_known.__wrapped__(job_shop([[(1, 10.0)], [(1, 4.0)]], NEAR, 2))
+    assert (found.cost, found.proven) == (15.0, True)
+    assert 8_000 <= sum(rounds) < 8_000 + tried.ROUND
+
+
 def test_what_one_finds_the_other_goes_on_from(ex11: Callable[[int], Cell]) -> None:
     """Given the best order by another method, CP-SAT proves it, and does not claim it."""
     cell = ex11(2)
@@ -136,7 +152,7 @@ def test_too_large_for_a_model_there_is_a_bound_still(job_shop: CellMaker, objec
     fast = (Robot("fast", "LU", 2.0), Robot("slow", "LU", 1.0))
     cell = job_shop(jobs, travel_s, robots=fast, due_s=(1.0,) * 70)
     assert not fits(cell)
-    found = best_known(cell, objective, 10.0, workers=2)
+    found = best_known(cell, objective, 3.0, workers=2)
     assert found.sequence
     assert 0 < found.bound <= found.cost
 
