@@ -114,6 +114,11 @@ class TabularMDP:
         """The number of actions A."""
         return int(self.successor.shape[1])
 
+    @property
+    def cells(self) -> tuple[int, ...]:
+        """The grid whose cells the states are, as far as tile coding goes by it; () when they are no grid."""
+        return self.shape
+
     @cached_property
     def signature(self) -> str:
         """The first 16 hex digits of a SHA-256 over all that defines the problem: equal problems, equal signatures."""
@@ -287,13 +292,13 @@ def coverage(shape: Sequence[int], rewards: Rewards | None = None, start: Sequen
     return TabularMDP(successor, reward, goals, goals, first, COVERAGE_LABELS, (), shape)
 
 
-def optimal_values(mdp: TabularMDP, discount: float) -> FloatArray:
-    """The optimal action values by value iteration; (S, A) float64, 0 in terminal states.
+def optimal_values(mdp: TabularMDP, discount: float, guess: FloatArray | None = None) -> FloatArray:
+    """The optimal action values by value iteration, from a guess (S, A); (S, A) float64, 0 in terminal states.
 
     Raises WorkFailed when the values do not settle (a discount of 1 where some states never end).
     """
     onward = discount * ~mdp.terminal[mdp.successor]
-    q: FloatArray = np.where(mdp.terminal[:, None], 0.0, mdp.reward)
+    q: FloatArray = np.where(mdp.terminal[:, None], 0.0, mdp.reward) if guess is None else guess
     for _ in range(MAX_SWEEPS):
         values = q.max(axis=1)
         updated: FloatArray = mdp.reward + onward * values[mdp.successor]

@@ -17,35 +17,40 @@ PROBED = 0.1  # the share of the questions that a dropped advisor is still asked
 ASKED = ("together", "in-turn")
 
 
-def majority(trusts: Sequence[float]) -> float:
+def majority(trusts: Sequence[float], chance: float) -> float:
     """As many points as advisors say so."""
     return float(len(trusts))
 
 
-def best_trusted(trusts: Sequence[float]) -> float:
+def best_trusted(trusts: Sequence[float], chance: float) -> float:
     """The trust in the best of those who say so."""
     return max(trusts)
 
 
-def trust_weighted(trusts: Sequence[float]) -> float:
-    """The log odds of all who say so, added up; one that is trusted less than evenly counts against it.
+def trust_weighted(trusts: Sequence[float], chance: float) -> float:
+    """The log odds of all who say so against those of chance, added up; one that is trusted less than chance counts against it.
 
-    Source: Nitzan and Paroush, Int. Econ. Rev. 23 (1982), 289-297: the best weights of independent voters.
+    Source: Nitzan and Paroush, Int. Econ. Rev. 23 (1982), 289-297, for two choices; between several, a voter who is right in
+    fewer than half of the cases still tells much, if guessing would be right in fewer.
     """
-    return fsum(log(one / (1.0 - one)) for one in trusts)
+    return fsum(log(one / (1.0 - one)) - log(chance / (1.0 - chance)) for one in trusts)
 
 
-Decide = Callable[[Sequence[float]], float]  # what an action is worth, from the trusts in those who said it
+Decide = Callable[
+    [Sequence[float], float], float
+]  # an action's worth: from trusts in those who said it, and guessing's
 DECISIONS: dict[str, Decide] = {"majority": majority, "best-trusted": best_trusted, "trust-weighted": trust_weighted}
 
 
-def decided(votes: Mapping[str, int], trusts: Mapping[str, float], own: int, decide: Decide) -> int:
-    """The action that is followed; ties: what the most trusted one says, the learner's own choice, the lowest index."""
+def decided(votes: Mapping[str, int], trusts: Mapping[str, float], own: int, decide: Decide, among: int = 2) -> int:
+    """The action that is followed, of so many; ties: what the most trusted one says, the learner's own, the lowest index."""
     by_action: dict[int, list[float]] = {}
     for name, action in votes.items():
         by_action.setdefault(action, []).append(trusts[name])
+    chance = 1.0 / max(2, among)
     return max(
-        by_action, key=lambda action: (decide(by_action[action]), max(by_action[action]), action == own, -action)
+        by_action,
+        key=lambda action: (decide(by_action[action], chance), max(by_action[action]), action == own, -action),
     )
 
 
@@ -167,7 +172,7 @@ class Panel:
         trusts = {
             name: member.trust_in(request.state, self._ways) for name, member in self._members.items() if name in votes
         }
-        action = decided(votes, trusts, request.own, self._decide)
+        action = decided(votes, trusts, request.own, self._decide, len(request.allowed))
         if len({*votes.values()}) > 1:
             self._tell(
                 AdvisorsDisagreed(request.episode, request.step, request.state, tuple(votes.items()), followed=action)

@@ -44,7 +44,20 @@ def study_run(
         float | None,
         typer.Option("--seconds", min=0.1, help="transport: for each method on each instance; default: 10."),
     ] = None,
-    methods: Annotated[str | None, typer.Option("--methods", help="transport: some only, with commas between.")] = None,
+    methods: Annotated[
+        str | None,
+        typer.Option("--methods", help="transport, advicebench: some methods or rules only, with commas between."),
+    ] = None,
+    problem: Annotated[
+        list[str] | None,
+        typer.Option("--problem", help="advicebench: one of its own problems, a world's file or gym:ID instead."),
+    ] = None,
+    advisors: Annotated[
+        str | None,
+        typer.Option(
+            "--advisors", help="advicebench: some only, or others, such as recorded:DIR, with commas between."
+        ),
+    ] = None,
     instances: Annotated[
         list[Path] | None, typer.Option("--instances", help="transport: files or folders of your own instead.")
     ] = None,
@@ -66,7 +79,9 @@ def study_run(
     asked = {
         "advisor_table": advisor_table,
         "seconds": seconds,
-        "methods": None if methods is None else [name.strip() for name in methods.split(",")],
+        "methods": _listed(methods),
+        "problem": problem or None,
+        "advisors": _listed(advisors),
         "instances": instances or None,
         "verify": verify or None,
     }
@@ -75,3 +90,7 @@ def study_run(
         job = Job(sessions or study_of(name).sessions, seed, workers, dask, progress=progress)
         document = run_study(name, job, out or Path(f"{name}-study"), reading)
     show(document, as_json, study_summary)
+
+
+def _listed(names: str | None) -> list[str] | None:
+    return None if names is None else [name.strip() for name in names.split(",")]

@@ -18,6 +18,17 @@ from lab.mdp import FloatArray, TabularMDP
 MOST_STEPS = 10_000  # of an episode that is judged
 EPISODES_JUDGED = 200  # where no model says how good a policy is
 ALONE = LearnerSettings(learner="q", alpha=0.1, selection="epsilon-greedy", beta=0.3, episodes=5000)
+ON_TILES = LearnerSettings(
+    "sarsa-lambda",
+    alpha=0.5,
+    trace=0.9,
+    replacing=True,
+    tilings=8,
+    selection="epsilon-greedy",
+    exploration=0.1,
+    beta=0.1,
+    episodes=300,
+)
 NEAR = 0.01  # of the best return, and at least so much: as good as the best
 
 
@@ -99,7 +110,8 @@ class GymEnvironment:
         return self._known[discount]
 
     def _learned_alone(self, discount: float) -> FloatArray:
-        learner = replace(ALONE, discount=discount, max_steps=self.max_steps)
+        learner = replace(ON_TILES if self.mdp.cells and not self.mdp.shape else ALONE, discount=discount)
+        learner = replace(learner, max_steps=self.max_steps)
         alone, rng = _Unjudged(self.live.again()), np.random.default_rng(0)
         result = run_session(alone, learner, GateSettings(gate="never"), None, rng)
         if result.interrupted:

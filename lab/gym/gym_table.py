@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from lab.gym.numbered_environment import NumberedEnvironment
+from lab.gym.space_numbering import CellNumbering
 from lab.gym.transition_model import TransitionModel
 from lab.mdp import FloatArray, TabularMDP
 
@@ -43,11 +44,17 @@ class GymTable(TabularMDP):
     """What is known of an environment's steps: the likeliest state entered and the mean reward, or nothing at all.
 
     environment: its id and keywords, so that two of which nothing is known are two problems. digits: the names and sizes
-    of what the number of a state is made of.
+    of what the number of a state is made of. box: the cells along the axes of a continuous space.
     """
 
     environment: str = ""
     digits: Digits = ()
+    box: tuple[int, ...] = ()
+
+    @property
+    def cells(self) -> tuple[int, ...]:
+        """Those of a box, or of a grid."""
+        return self.box or self.shape
 
     @cached_property
     def signature(self) -> str:
@@ -106,6 +113,7 @@ def table_of(live: NumberedEnvironment, model: TransitionModel | None) -> GymTab
     """The environment's states and actions by name, with its likeliest steps where there is a model."""
     states, actions = live.states.count, live.actions.count
     names: dict[str, Any] = {"action_labels": _labels(live), "environment": str(live.name), "digits": _digits(live)}
+    names["box"] = live.states.sizes if isinstance(live.states, CellNumbering) else ()
     if model is None:
         stays = np.repeat(np.arange(states)[:, None], actions, axis=1)
         no = np.zeros(states, bool)

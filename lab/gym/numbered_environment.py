@@ -4,9 +4,11 @@ from copy import deepcopy
 from math import isfinite
 from typing import Any, NamedTuple, Self
 
+from gymnasium import spaces
+
 from lab.errors import BadInput, WorkFailed
 from lab.gym.environment_name import GymName, make, quiet, said
-from lab.gym.space_numbering import SUPPORTED, Numbering, Unsupported
+from lab.gym.space_numbering import MOST_AXES, SUPPORTED, CellNumbering, Numbering, Unsupported
 
 MAX_ENTRIES = 1_000_000  # states x actions
 
@@ -32,7 +34,9 @@ class NumberedEnvironment:
     def __init__(self, name: GymName, where: str):
         self.name, self._where, self.which = name, where, f"environment '{name}' ({where})"
         self._env = make(name, where)
-        self.states = self._numbered("observation", self._env.observation_space)
+        self.states: Numbering | CellNumbering = self._cells() or self._numbered(
+            "observation", self._env.observation_space
+        )
         self.actions = self._numbered("action", self._env.action_space)
         if self.states.count * self.actions.count > MAX_ENTRIES:
             size = f"{self.states.count} states x {self.actions.count} actions"
@@ -73,6 +77,17 @@ class NumberedEnvironment:
             return Numbering(space)
         except Unsupported:
             raise BadInput(f"{self.which}: its {kind} space is {space}: supported are {SUPPORTED}") from None
+
+    def _cells(self) -> CellNumbering | None:
+        """Those of a box; None for another space. Raises BadInput for a box that has too many axes, or no bounds."""
+        space = self._env.observation_space
+        if not isinstance(space, spaces.Box):
+            return None
+        try:
+            return CellNumbering(space)
+        except Unsupported:
+            wanted = f"wanted 1 to {MOST_AXES} axes with finite bounds"
+            raise BadInput(f"{self.which}: its observation space is {' '.join(str(space).split())}: {wanted}") from None
 
     def _failed(self, what: str, why: str) -> WorkFailed:
         return WorkFailed(f"{self.which}: {what}: {why}")

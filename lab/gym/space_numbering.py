@@ -7,7 +7,10 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from lab.learning.tiles import Bounds
+
 SUPPORTED = "Discrete, MultiDiscrete, MultiBinary, and Tuple or Dict of these"
+MOST_AXES, CELLS = 4, {1: 64, 2: 64, 3: 32, 4: 24}  # of a box, along each axis
 
 Digit = tuple[int, int]  # how many values it has, and the first of them
 
@@ -43,6 +46,35 @@ class Numbering:
         """The value with a number."""
         digits = np.unravel_index(number, self.sizes) if self.sizes else ()
         return _built(self._space, iter([int(d) + first for d, first in zip(digits, self._firsts, strict=True)]))
+
+
+class CellNumbering:
+    """The cells of a box with one axis, or of up to four, between its bounds: as `Numbering`.
+
+    Raises Unsupported for another space, for more axes, and for bounds that are not finite.
+    """
+
+    def __init__(self, space: spaces.Space[Any]):
+        if not isinstance(space, spaces.Box) or len(space.shape) != 1 or not 1 <= space.shape[0] <= MOST_AXES:
+            raise Unsupported
+        if not (np.isfinite(space.low).all() and np.isfinite(space.high).all() and (space.low < space.high).all()):
+            raise Unsupported
+        axes = space.shape[0]
+        self.sizes = (CELLS[axes],) * axes
+        self.count = prod(self.sizes)
+        self._bounds = Bounds(tuple(space.low.tolist()), tuple(space.high.tolist()), self.sizes)
+        self._type = space.dtype
+
+    def number(self, value: Any) -> int:
+        """The number of the cell that a point lies in; raises ValueError for what is no point."""
+        point = np.asarray(value, np.float64)
+        if point.shape != (len(self.sizes),) or not np.isfinite(point).all():
+            raise ValueError(f"{value!r} is no point with {len(self.sizes)} finite numbers")
+        return self._bounds.number(point.tolist())
+
+    def value(self, number: int) -> Any:
+        """The middle of a cell."""
+        return np.array(self._bounds.centre(number), self._type)
 
 
 def _digits(space: spaces.Space[Any]) -> Iterator[Digit]:

@@ -11,18 +11,26 @@ from numpy.typing import NDArray
 from lab.errors import BadInput
 from lab.learning import selection, splitmix
 from lab.learning.advice_memory import Memory, places
+from lab.learning.chance_table import ChanceTable
+from lab.learning.environment import Environment, TableEnvironment
 from lab.learning.gates import GATES
-from lab.learning.gates.gate_rules import ASKS_WHERE_TABLES_DIFFER
-from lab.learning.kernels import records
+from lab.learning.gates.gate_rules import ASKS_WHERE_TABLES_DIFFER, WEIGHS_NOTHING
+from lab.learning.gates.heard import Heard
+from lab.learning.kernels import linear_loop, records
 from lab.learning.kernels.records import LANES
 from lab.learning.kernels.session_loop import run
+from lab.learning.physics.cells import CellTable
 from lab.learning.selection import SELECTIONS
 from lab.learning.session import check_members, run_session
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.learning.simulated_advice import Advice, TableAdvisor
-from lab.learning.updates import UPDATES
+from lab.learning.simulated_advice import SPEAKS_ALWAYS, SPEAKS_AS_EXPECTED, Advice, TableAdvisor
+from lab.learning.tiles import TileCoding
+from lab.learning.updates import LINEAR, UPDATES
+from lab.learning.updates.linear import TileSarsa
 from lab.learning.updates.update import STATE_VALUES
 from lab.mdp import FloatArray, TabularMDP
+
+CHOICES = {"softmax": linear_loop.SOFTMAX, "epsilon-greedy": linear_loop.EPSILON_GREEDY, "greedy": linear_loop.GREEDY}
 
 
 class Batch(NamedTuple):
@@ -44,7 +52,7 @@ class Batch(NamedTuple):
 
 
 def run_sessions(
-    mdp: TabularMDP,
+    problem: TabularMDP | Environment,
     learner: LearnerSettings,
     gate: GateSettings,
     advice: Advice | None,
@@ -54,25 +62,39 @@ def run_sessions(
 ) -> Batch:
     """Learns a table in each of N sessions, seeds (N,) uint64; advice None: nobody to ask.
 
+    problem: a table, or the environment whose steps are made; compiled are a table's own, those of a
+    `ChanceTable` and those of `physics`.
+
     The same tables, step counts, requests, helped steps and misleads as `run_session` with draws `splitmix.stream(seed)` and
     a `TableAdvisor` on the same draws. Raises BadInput for an unknown learner, selection or gate, or advice of another
     shape.
     """
     check_members(learner, gate)
+    place = TableEnvironment(problem) if isinstance(problem, TabularMDP) else problem
+    mdp = place.mdp
     if advice is not None and advice.thresholds.shape[1:] != mdp.successor.shape:
         raise BadInput(f"advice of shape {advice.thresholds.shape}: the problem has {mdp.successor.shape}")
-    if not is_compiled(mdp, learner, gate):
-        return _one_by_one(mdp, learner, gate, advice, seeds, keep_tables)
-    found = _sessions(mdp, learner, seeds, keep_tables)
+    steps_known = isinstance(place, TableEnvironment) or isinstance(mdp, CellTable)
+    by_chance_on_tiles = isinstance(place, ChanceTable) and learner.tilings > 1
+    if by_chance_on_tiles or not (steps_known and is_compiled(mdp, learner, gate, advice)):
+        return _one_by_one(place, learner, gate, advice, seeds, keep_tables)
     asking = _asking(gate, advice is not None, learner.max_steps)
-    learning, problem = _learning(mdp, learner), _problem(mdp, learner)
+    learning, arrays = _learning(mdp, learner), _problem(mdp, learner)
     said = (np.zeros((1, 1, mdp.n_actions)), np.zeros(mdp.n_states, np.bool_))
     if advice is not None:
         said = advice.thresholds, advice.region
+    if learner.tilings > 1:
+        found = _sessions(learner, seeds, TileCoding(mdp.cells, learner.tilings).count * mdp.n_actions, keep_tables)
+        lanes = _lanes(mdp.n_actions, learner.episodes, 0, 0)
+        learning = learning._replace(actions=np.zeros(mdp.n_actions))  # of any length: compiled once for all
+        return _on_tiles(mdp, learner, records.Work(arrays, learning, asking, *said, found, lanes))
+    size = mdp.n_states * (1 if _is_afterstate(learner) else mdp.n_actions)
+    found = _sessions(learner, seeds, size, keep_tables)
     ensemble = gate.ensemble if asking.gate.asks == ASKS_WHERE_TABLES_DIFFER else 0
     lanes = _lanes(mdp.n_actions, learner.episodes, found.kept.shape[1], ensemble)
     memories = _memories(mdp.n_states, mdp.n_actions, learning.max_moves) if gate.memory else None
-    run(records.Work(problem, learning, asking, *said, found, lanes), memories)
+    hearing, walks = _hearing(mdp, asking, advice), _walks(mdp, asking, learning, learner.episodes)
+    run(records.Work(arrays, learning, asking, *said, found, lanes), memories, hearing, _chances(place), walks)
     return _batch(found.steps, found.guided, found.counts, _action_values(mdp, learning, found.kept))
 
 
@@ -80,16 +102,61 @@ def _batch(steps: NDArray[np.int32], guided: NDArray[np.bool_], counts: NDArray[
     return Batch(steps, guided, **{name: counts[name] for name in records.COUNTS.names or ()}, q=q)
 
 
-def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings) -> bool:
-    """Whether the kernel knows this learner, its selection, and this gate by all of its settings."""
+def is_compiled(mdp: TabularMDP, learner: LearnerSettings, gate: GateSettings, advice: Advice | None = None) -> bool:
+    """Whether a kernel knows this learner, its selection, this gate by all of its settings, and when the advisor speaks."""
     rules = GATES[gate.gate].compiled
-    if UPDATES[learner.learner].compiled is None or SELECTIONS[learner.selection].compiled is None or rules is None:
+    if rules is None:
         return False
-    return not rules.judges or len(mdp.starts) < 2  # it judges by the plain counts alone
+    if learner.tilings > 1:
+        known = learner.learner in LINEAR and learner.selection in CHOICES and not gate.memory
+        plain = rules.weighs == WEIGHS_NOTHING and (advice is None or _speaks_at_once(advice))
+        simple = rules.asks != ASKS_WHERE_TABLES_DIFFER and (not rules.judges or len(mdp.starts) < 2)
+        return known and plain and simple
+    if isinstance(mdp, CellTable) or learner.start_value:
+        return False  # its steps are made by the kernel of tiles alone
+    return UPDATES[learner.learner].compiled is not None and SELECTIONS[learner.selection].compiled is not None
+
+
+def _speaks_at_once(advice: Advice) -> bool:
+    return not advice.late and advice.speaks == SPEAKS_ALWAYS
+
+
+def _hearing(mdp: TabularMDP, asking: records.Asking, advice: Advice | None) -> records.Hearing | None:
+    """What gates that weigh and advisors that hold back need, None where neither does."""
+    weighs = asking.gate.weighs != WEIGHS_NOTHING
+    if advice is None or (not weighs and _speaks_at_once(advice)):
+        return None
+    states, actions = mdp.successor.shape if weighs else (1, 1)
+    sizes = (states, states * actions, states * actions, states * actions, states, states)  # as the fields of Heard
+    cells = (np.zeros((LANES, size), np.int32) for size in sizes)
+    told = Heard._make((*cells, np.zeros((LANES, 2 * states)), np.zeros(LANES, records.HEARD_NOW)))
+    chose = np.zeros((LANES, mdp.n_states if advice.speaks == SPEAKS_AS_EXPECTED else 0), np.int32)
+    return records.Hearing(
+        heard=told,
+        values=np.zeros((LANES, mdp.n_actions)),
+        u=np.zeros(LANES),
+        before=np.zeros(LANES, np.int64),
+        chose=chose,
+        late=advice.late,
+        speaks=advice.speaks,
+        several=float(bool(mdp.starts)),
+    )
+
+
+def _walks(mdp: TabularMDP, asking: records.Asking, learning: records.Learning, episodes: int) -> records.Walks | None:
+    """What gates that judge need where episodes begin in different states."""
+    if not asking.gate.judges or len(mdp.starts) < 2:
+        return None
+    walk, begun = np.zeros((LANES, learning.max_moves), np.int32), np.zeros((LANES, episodes), np.int32)
+    return records.Walks(np.full((LANES, mdp.n_states), np.inf), walk, begun)
+
+
+def _chances(place: Environment) -> records.Chances | None:
+    return records.Chances(place.below, place.entered, place.reward) if isinstance(place, ChanceTable) else None
 
 
 def _one_by_one(
-    mdp: TabularMDP,
+    place: Environment,
     learner: LearnerSettings,
     gate: GateSettings,
     advice: Advice | None,
@@ -98,12 +165,12 @@ def _one_by_one(
 ) -> Batch:
     """The same sessions, each with the draws that it would have in the kernel."""
     steps, counts = np.zeros((len(seeds), learner.episodes), np.int32), np.zeros(len(seeds), records.COUNTS)
-    q = np.zeros((len(seeds) if keep_tables else 0, *mdp.successor.shape))
+    q = np.zeros((len(seeds) if keep_tables else 0, *place.mdp.successor.shape))
     found = _batch(steps, np.zeros(steps.shape, np.bool_), counts, q)
     for n, seed in enumerate(seeds):
         draw = splitmix.stream(int(seed))
         advisor = None if advice is None else TableAdvisor(advice, draw)
-        one = run_session(mdp, learner, gate, advisor, draw)
+        one = run_session(place, learner, gate, advisor, draw)
         if one.interrupted:
             raise KeyboardInterrupt
         found.steps[n], found.guided[n], found.moves[n] = one.steps, one.guided, one.visits.sum()
@@ -114,8 +181,54 @@ def _one_by_one(
     return found
 
 
-def _sessions(mdp: TabularMDP, learner: LearnerSettings, seeds: NDArray[np.uint64], keep: bool) -> records.Sessions:
-    shape, size = (len(seeds), learner.episodes), mdp.n_states * (1 if _is_afterstate(learner) else mdp.n_actions)
+def _on_tiles(mdp: TabularMDP, learner: LearnerSettings, work: records.Work) -> Batch:
+    """The sessions of a learner whose values are sums of weights of tiles."""
+    coding, rule = TileCoding(mdp.cells, learner.tilings), LINEAR[learner.learner]
+    size, episodes = coding.count * mdp.n_actions, range(1, learner.episodes + 1)
+    linear = linear_loop.Linear(
+        active=coding.active,
+        weights=np.zeros(size),
+        listed=np.zeros(size, np.int64),
+        strength=np.zeros(size),
+        place=np.full(size, -1, np.int64),
+        traces=np.zeros(1, np.int64),
+        values=np.zeros(mdp.n_actions),
+        warm=np.array([selection.temperature(n, learner.beta, learner.exploration) for n in episodes]),
+        start=learner.start_value / learner.tilings,
+        alpha=learner.alpha / learner.tilings,
+        decay=learner.discount * learner.trace if rule.decays else 0.0,
+        growing=not learner.replacing,
+        on_policy=issubclass(rule, TileSarsa),
+        lookahead=rule.lookahead,
+        selection=CHOICES[learner.selection],
+    )
+    linear_loop.run(work, linear, _world(mdp))
+    found, tables = work.sessions, work.sessions.kept.reshape(-1, coding.count, mdp.n_actions)
+    q = np.array([coding.values(weights) for weights in tables]).reshape(-1, *mdp.successor.shape)
+    return _batch(found.steps, found.guided, found.counts, q)
+
+
+def _world(mdp: TabularMDP) -> linear_loop.World:
+    if not isinstance(mdp, CellTable):
+        none, cells = np.zeros(1), np.ones(1, np.int64)
+        return linear_loop.World(linear_loop.TABLE, none, none, none, cells, 0.0, 0.0, False)
+    physics, bounds = mdp.physics, mdp.physics.bounds
+    ends, cells = (np.array(bounds.low), np.array(bounds.high)), np.array(bounds.shape)
+    rewards = physics.reward, physics.last_reward
+    return linear_loop.World(physics.number, np.zeros(len(cells)), *ends, cells, *rewards, physics.falls)
+
+
+def play(mdp: CellTable, policy: NDArray[np.int64], drawn: FloatArray, most: int) -> NDArray[np.int64]:
+    """The moves (N,) of a policy (S,) from starts made of uniform numbers (N, D), at most so many; negative: it goes on."""
+    starts, moves = drawn.copy(), np.zeros(len(drawn), np.int64)
+    for start in starts:
+        mdp.physics.begin(start)
+    linear_loop.play(_world(mdp), policy, starts, most, moves)
+    return moves
+
+
+def _sessions(learner: LearnerSettings, seeds: NDArray[np.uint64], size: int, keep: bool) -> records.Sessions:
+    shape = (len(seeds), learner.episodes)
     warm = [selection.temperature(n, learner.beta, learner.exploration) for n in range(1, learner.episodes + 1)]
     return records.Sessions(
         seeds=np.asarray(seeds, np.uint64),
@@ -154,7 +267,7 @@ def _memories(states: int, actions: int, moves: int) -> Memory:
 
 
 def _is_afterstate(learner: LearnerSettings) -> bool:
-    return bool(UPDATES[learner.learner].compiled == STATE_VALUES)
+    return bool(UPDATES[learner.learner].compiled == STATE_VALUES) and learner.tilings == 1
 
 
 def _problem(mdp: TabularMDP, learner: LearnerSettings) -> records.ProblemArrays:

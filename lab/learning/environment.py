@@ -9,8 +9,10 @@ import numpy as np
 
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
-from lab.learning.values import greedy_moves
+from lab.learning.values import greedy_moves, values_of_ways
 from lab.mdp import FloatArray, TabularMDP, greedy_path, optimal_values, shortest_steps
+
+LARGE = 100_000  # states: sweeps through as many take long
 
 
 class Step(NamedTuple):
@@ -79,8 +81,9 @@ class TableEnvironment:
         return ""
 
     def values(self, discount: float) -> FloatArray:
-        """By value iteration."""
-        return optimal_values(self.mdp, discount)
+        """By value iteration; a large table's begins with the ways to the goal."""
+        guess = values_of_ways(self.mdp, discount) if self.mdp.n_states > LARGE and discount < 1.0 else None
+        return optimal_values(self.mdp, discount, guess)
 
     def judge(self, q: FloatArray, learner: LearnerSettings) -> Judged:
         """Solved: the greedy path from the start is a shortest one, or, with several starts, each one's reaches the goal."""

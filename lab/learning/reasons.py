@@ -90,3 +90,25 @@ class Both(Reason):
 
     def __str__(self) -> str:
         return f"{self.first}, and {self.second}"
+
+
+@dataclass(frozen=True, slots=True)
+class ToldSeldom(Reason):
+    """So many answers were given in this state before."""
+
+    answers: int
+
+    def __str__(self) -> str:
+        return f"it was told {self.answers} times here"
+
+
+@dataclass(frozen=True, slots=True)
+class Trusted(Reason):
+    """Advised episodes did better than going alone; rate: how many of the recent ones reached the goal."""
+
+    rate: float
+
+    def __str__(self) -> str:
+        return (
+            f"it knows nothing to hold on to here, and {self.rate:.0%} of the recent advised episodes reached the goal"
+        )

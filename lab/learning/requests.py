@@ -80,6 +80,12 @@ class AdviceRequest(Request):
         """The environment's own drawing of the state, "" where the problem's grid is all there is."""
         return "" if self.environment is None else self.environment.picture(self.state)
 
+    @property
+    def shapes(self) -> list[dict[str, Any]]:
+        """The state as shapes, where the environment draws some: see `lab.learning.physics.pictures.shapes`."""
+        found: list[dict[str, Any]] = getattr(self.environment, "shapes", lambda state: [])(self.state)
+        return found
+
 
 @dataclass(frozen=True)
 class Walked:

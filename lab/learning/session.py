@@ -10,6 +10,7 @@ from lab.errors import BadInput, unknown
 from lab.learning.advice_memory import Recall
 from lab.learning.environment import Environment, TableEnvironment, check_solvable
 from lab.learning.gates import GATES, Surroundings, improvement
+from lab.learning.physics.cells import CellTable
 from lab.learning.requests import AdviceRequest, Advisor, AdvisorLeft, Standing, Walked, allowed_words
 from lab.learning.selection import COLDEST, SELECTIONS, Draw, temperature, uniforms
 from lab.learning.session_events import (
@@ -22,7 +23,7 @@ from lab.learning.session_events import (
     Improvement,
 )
 from lab.learning.settings import GateSettings, LearnerSettings
-from lab.learning.updates import UPDATES, Update
+from lab.learning.updates import LINEAR, UPDATES, Update, update_of
 from lab.mdp import BoolArray, FloatArray, TabularMDP
 from lab.plugins.code_file import from_file
 
@@ -81,6 +82,11 @@ def check_members(
     ):
         if name not in table:
             raise from_file(kind, name, source) or unknown(kind, name, table, source)
+    if learner.tilings > 1 and learner.learner not in LINEAR:
+        known = ", ".join(LINEAR)
+        raise BadInput(
+            f"learner '{learner.learner}' ({where[0]}) with tilings = {learner.tilings}: allowed are {known}"
+        )
 
 
 class Session:
@@ -112,13 +118,17 @@ class Session:
         self.advisor, self.advised = advisor, advisor is not None
         self.tell: OnEvent = lambda event: None
         mdp = self.mdp
-        self.update = UPDATES[learner.learner].make(_start_values(mdp, q0).tolist(), learner, mdp)
+        self.update = update_of(learner, mdp, _start_values(mdp, q0, learner))
         self.q = self.update.q
         self.visits: list[list[int]] = [[0] * mdp.n_actions for _ in range(mdp.n_states)]
         self.actions = range(mdp.n_actions)
+        self.lasts = isinstance(mdp, CellTable) and mdp.physics.falls
         self.choose, self.draw = SELECTIONS[learner.selection].make, draw
-        several_starts = bool(mdp.starts) or not isinstance(environment, TableEnvironment)
-        around = Surroundings(draw, self._others, several_starts)
+        several_starts = bool(mdp.starts) or not (
+            isinstance(environment, TableEnvironment) or isinstance(mdp, CellTable)
+        )
+        size = mdp.n_states, mdp.n_actions
+        around = Surroundings(draw, self._others, several_starts, self.update.gauge, size, learner)
         make = GATES[gate.gate if self.advised else "never"].make
         self.gate = make(gate, learner.episodes, learner.max_steps, around)
         self.max_moves = learner.max_steps - learner.count_start
@@ -155,8 +165,7 @@ class Session:
 
     def _others(self, tables: int) -> list[Update]:
         """Learners like this one whose start values are drawn within +-0.5."""
-        make, (states, actions) = UPDATES[self.settings.learner].make, self.mdp.successor.shape
-        others = [make([[0.0] * actions for _ in range(states)], self.settings, self.mdp) for _ in range(tables)]
+        others = [update_of(self.settings, self.mdp, np.zeros(self.mdp.successor.shape)) for _ in range(tables)]
         for other in others:
             other.scatter(self.draw)
         return others
@@ -208,7 +217,10 @@ class Session:
         return sum(before) / len(before) if before else float(self.settings.max_steps + 1)
 
     def _walk(self, choose: Callable[[int, int], int]) -> int | None:
-        """Goes from the start until a terminal state or the step limit and learns; the moves to the goal, None if not reached."""
+        """Goes from the start until a terminal state or the step limit and learns; the moves to the goal, None if not reached.
+
+        Where an episode is the better the longer it lasts, the moves that it was too short, and one.
+        """
         act, draw, discount, visits = self.environment.step, self.draw, self.settings.discount, self.visits
         learn, lookahead, watch = self.update.learn, self.update.lookahead, self.gate.saw if self.gate.watches else None
         recall = self.recall
@@ -235,9 +247,9 @@ class Session:
             if watch is not None:
                 watch(state, action, reward, discount_t, entered, following)
             if over:
-                return step if reached else None
+                return self.max_moves - step + 2 if self.lasts else step if reached else None
             if last:
-                return None
+                return 1 if self.lasts else None
             state, action = entered, following if lookahead else choose(entered, step + 1)
         return None
 
@@ -250,17 +262,17 @@ class Session:
 
     def _advised_choice(self, state: int, step: int) -> int:
         """What the advisor says, where the gate asks, else the learner's own."""
-        own, recall = self._own_choice(state, step), self.recall
+        own, recall, gate = self._own_choice(state, step), self.recall, self.gate
         advisor = self.advisor if self.helped_steps + self.helped_now < self.gate_settings.budget else None
-        if advisor is None or (recall is not None and not recall.trusts):
+        if (advisor is None and not gate.weighs) or (recall is not None and not recall.trusts):
             return own
-        action = self._asks(advisor, state, step, own) if self.gate.asks(state, self.update.gauge(state)) else None
-        if action is None:
-            return own
-        self.helped_now += 1
-        if recall is not None:
-            recall.asked()
-        return action
+        wanted = gate.asks(state, self.update.gauge(state))
+        said = None if advisor is None or not wanted else self._asks(advisor, state, step, own)
+        if said is not None:
+            self.helped_now += 1
+            if recall is not None:
+                recall.asked()
+        return gate.takes(state, own, said)
 
     def _asks(self, advisor: Advisor, state: int, step: int, own: int) -> int | None:
         """The advisor's action, None when nothing is said."""
@@ -300,7 +312,7 @@ class Session:
 
     def result(self, interrupted: bool) -> SessionResult:
         """What was learned so far; an unfinished episode counts in q and visits only."""
-        q = np.array(list(self.q), np.float64)
+        q = self.update.table()
         finished = len(self.guided)
         final_steps, optimal_steps, solved = self.environment.judge(q, self.settings)
         return SessionResult(
@@ -319,11 +331,10 @@ class Session:
         )
 
 
-def _start_values(mdp: TabularMDP, q0: FloatArray | None) -> FloatArray:
-    if q0 is None:
-        return np.zeros(mdp.successor.shape)
-    start = np.array(q0, np.float64)
+def _start_values(mdp: TabularMDP, q0: FloatArray | None, learner: LearnerSettings) -> FloatArray:
+    start = np.full(mdp.successor.shape, learner.start_value) if q0 is None else np.array(q0, np.float64)
     if start.shape != mdp.successor.shape or not np.isfinite(start).all():
         raise BadInput(f"start values: shape {start.shape}, allowed {mdp.successor.shape} with finite values")
-    start[mdp.terminal] = 0.0
+    if learner.tilings == 1:  # on tiles, what is worth nothing would take from what lies beside it
+        start[mdp.terminal] = 0.0
     return start

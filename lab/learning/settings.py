@@ -4,12 +4,12 @@ from dataclasses import asdict, dataclass, fields
 from functools import cache
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
-from annotated_types import DocInfo, Ge, Gt, Le, doc
+from annotated_types import DocInfo, Ge, Gt, Le, Lt, doc
 
 from lab.errors import BadInput
 
 COMPARE_WINDOWS = ("ccrl", "combined")
-WORDS = {"gt": "above", "ge": "at least", "le": "at most"}
+WORDS = {"gt": "above", "ge": "at least", "le": "at most", "lt": "below"}
 
 
 @cache
@@ -57,6 +57,20 @@ class LearnerSettings:
     discount: Annotated[float, Gt(0), Le(1), doc("gamma: what the next step counts for, compared with this one")] = 0.99
     trace: Annotated[float, Ge(0), Le(1), doc("lambda, of the learners with traces")] = 0.5
     replacing: Annotated[bool, doc("a trace is set to 1 on each visit instead of growing by 1")] = False
+    tilings: Annotated[
+        int,
+        Ge(1),
+        Le(64),
+        doc("tile coding: values are sums over so many shifted grids of tiles, each so many cells wide; 1: a table"),
+    ] = 1
+    start_value: Annotated[
+        float,
+        Ge(-1_000_000),
+        Le(1_000_000),
+        doc(
+            "what every move is thought to be worth at first: above the truth it tries all out, below it keeps to what it knows"
+        ),
+    ] = 0.0
     planning: Annotated[int, Ge(0), Le(1000), doc("earlier moves that dyna-q learns from again after each one")] = 5
     selection: Annotated[str, doc("how it chooses its actions")] = "softmax"
     exploration: Annotated[float, Gt(0), Le(1_000_000), doc("temperature, or epsilon, of the first episode")] = 1.0
@@ -90,6 +104,10 @@ class GateSettings:
     ] = 1.0
     spread: Annotated[float, Ge(0), Le(1_000_000), doc("deviation of its tables that lets uncertainty ask")] = 0.1
     rate: Annotated[float, Ge(0), Le(1), doc("share of the steps that random asks about")] = 0.1
+    fading: Annotated[
+        float, Ge(0), Le(1), doc("by what fading multiplies the share of the steps that it asks about, each episode")
+    ] = 0.97
+    consistency: Annotated[float, Gt(0.5), Lt(1), doc("how often shaping takes an answer to be right")] = 0.9
     enough_steps: Annotated[float, Gt(0), Le(1_000_000), doc("mean step count that satisfies cq")] = 50.0
     ensemble: Annotated[int, Ge(2), Le(100), doc("tables of uncertainty")] = 5
     budget: Annotated[int, Ge(0), Le(1_000_000_000), doc("helped steps that any gate may use in a session")] = (

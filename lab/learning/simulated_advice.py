@@ -10,17 +10,23 @@ from lab.learning.requests import AdviceRequest
 from lab.learning.selection import Draw
 from lab.mdp import BoolArray, FloatArray
 
+# when an advisor speaks: always, where the learner would choose otherwise, or where it chose otherwise when last here
+SPEAKS_ALWAYS, SPEAKS_TO_CORRECT, SPEAKS_AS_EXPECTED = range(3)
+
 
 @dataclass(frozen=True, eq=False)
 class Advice:
     """What a simulated advisor would say: the same for the interactive session and the compiled kernel.
 
     thresholds (T, S, A) float64: the cumulated chances of the actions in each state, in episode n those of row
-    min(n, T) - 1; region (S,) bool: where the advisor sees the robot. Source: thesis section 9.2, limited view 9.7.
+    min(n, T) - 1; region (S,) bool: where the advisor sees the robot; late: it answers the question before; speaks: of
+    SPEAKS_ALWAYS and so on. Source: thesis section 9.2, limited view 9.7; Torrey and Taylor 2013 for when it speaks.
     """
 
     thresholds: FloatArray
     region: BoolArray
+    late: bool = False
+    speaks: int = SPEAKS_ALWAYS
 
     @classmethod
     def of(cls, chances: FloatArray, region: BoolArray | None = None) -> "Advice":
@@ -66,11 +72,23 @@ class TableAdvisor:
         self._region: list[bool] = advice.region.tolist()
         self._last = len(advice.thresholds) - 1
         self._thresholds = advice.thresholds
+        self._before: int | None = None  # the state of the question before
+        self._chose: dict[int, int] = {}  # what the learner would have chosen in a state when it last asked there
 
     def advise(self, request: AdviceRequest) -> int | None:
-        """One draw for the state asked about."""
-        if not self._region[request.state]:
+        """One draw for the state asked about, or the one before."""
+        state: int | None = request.state
+        if self.advice.late:
+            state, self._before = self._before, state
+        if state is None or not self._region[state]:
             return None
-        row: list[float] = self._thresholds[min(request.episode - 1, self._last), request.state].tolist()
+        row: list[float] = self._thresholds[min(request.episode - 1, self._last), state].tolist()
         mark = self._draw() * row[-1]
-        return sum(below <= mark for below in row[:-1])
+        action = sum(below <= mark for below in row[:-1])
+        expected: int | None = None
+        if self.advice.speaks == SPEAKS_TO_CORRECT:
+            expected = request.own
+        elif self.advice.speaks == SPEAKS_AS_EXPECTED:
+            expected = self._chose.get(request.state)
+            self._chose[request.state] = request.own
+        return None if action == expected else action

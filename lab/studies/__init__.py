@@ -76,6 +76,18 @@ def _advice_worth(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return advice_worth(job, reading)
 
 
+def _advice_bench(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.advice_bench.advice_bench import advice_bench
+
+    return advice_bench(job, reading)
+
+
+def _whom_to_believe(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.whom_to_believe import whom_to_believe
+
+    return whom_to_believe(job, reading)
+
+
 def _advisors(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.several_advisors import advisors
 
@@ -136,10 +148,22 @@ def _reacting(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     return reacting(job, reading)
 
 
+def _mountain_car(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.mountain_car import mountain_car
+
+    return mountain_car(job, reading)
+
+
 def _sequencing_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
     from lab.studies.ours.sequencing_speed import sequencing_speed
 
     return sequencing_speed(job, reading)
+
+
+def _tiles_speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
+    from lab.studies.ours.tiles_speed import tiles_speed
+
+    return tiles_speed(job, reading)
 
 
 def _speed(job: "Job", reading: Mapping[str, Any]) -> "Findings":
@@ -179,7 +203,23 @@ _SHIPPED: dict[str, Study] = {
     ),
     "advice-budget": Study("Success against helped steps: every gate with and without memory", _advice_budget, ADVISED),
     "advice-worth": Study("What an advisor's help is worth over nobody's, for every skill of toast", _advice_worth),
+    "advicebench": Study(
+        "AdviceBench: rules of when to ask, whatever the advisor, the budget and the problem",
+        _advice_bench,
+        ("methods", "problem", "advisors"),
+        sessions=100,
+        least=2,
+    ),
+    "whom-to-believe": Study(
+        "Whom to believe: is a panel of seven ranked rightly, and are three limited advisors better than nobody?",
+        _whom_to_believe,
+        sessions=100,
+        least=2,
+    ),
     "advisors": Study("Several advisors at once, beside the best and the worst of them alone", _advisors, ADVISED),
+    "mountain-car": Study(
+        "Mountain Car: when a teacher should speak, at equal budgets", _mountain_car, sessions=30, least=2
+    ),
     "table-7.4": Study("Table 7.4: sequencing case I by session length", _chapter_7("best_results", "I")),
     "table-7.5": Study("Table 7.5: sequencing case II by session length", _chapter_7("best_results", "II")),
     "table-7.6": Study("Table 7.6: sequencing case III by session length", _chapter_7("best_results", "III")),
@@ -216,6 +256,9 @@ _SHIPPED: dict[str, Study] = {
         ("seconds", "methods", "instances", "verify"),
         sessions=1,
         least=1,
+    ),
+    "tiles-speed": Study(
+        "Speed on tiles: steps of Mountain Car a second, beside Gymnasium's loop", _tiles_speed, sessions=50, least=1
     ),
     "speed": Study("Speed: environment steps a second on one core, beside rivals", _speed),
 }

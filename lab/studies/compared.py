@@ -19,6 +19,7 @@ from lab.errors import BadInput
 from lab.learning.batch import run_sessions
 from lab.learning.environment import Environment, TableEnvironment
 from lab.learning.gates import GATES
+from lab.learning.physics.environment import PhysicsEnvironment
 from lab.learning.problem import Problem
 from lab.learning.requests import Advisor, Ask
 from lab.learning.session import run_session
@@ -132,9 +133,10 @@ def sessions_of(setting: Setting, sessions: int, seed: int) -> Sessions:
     rng = np.random.default_rng([seed, crc32(problem.mdp.signature.encode())])
     seeds = rng.integers(2**64, size=sessions, dtype=np.uint64)
     advisor = advising.gather(environment, how.learner, np.random.default_rng(0))
-    if problem.environment is None and (advisor is None or isinstance(advisor, TableAdvisor)):
+    at_once = problem.environment is None or isinstance(environment, PhysicsEnvironment)
+    if at_once and (advisor is None or isinstance(advisor, TableAdvisor)):
         advice = None if advisor is None else advisor.advice
-        batch = run_sessions(problem.mdp, how.learner, how.gate, advice, seeds, keep_tables=True)
+        batch = run_sessions(environment, how.learner, how.gate, advice, seeds, keep_tables=True)
         rejected, steps, q = batch.rejected_at_episode > 0, batch.steps, batch.q
         counts: tuple[NDArray[np.int64], ...] = (batch.helped_steps, batch.requests, batch.misleads)
     else:

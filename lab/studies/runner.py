@@ -8,6 +8,7 @@ import json
 import os
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from hashlib import sha256
@@ -71,6 +72,9 @@ class Job:
         else:
             from joblib import Parallel, delayed
 
+            # a process that has grown is replaced, and nothing is lost
+            warnings.filterwarnings("ignore", "A worker stopped while some jobs were given", UserWarning)
+
             ending: dict[str, Any] = {"initializer": _end_with_parent, "initargs": (os.getpid(),)}
             # few items are long ones: each is shared out alone
             batch = min(most, max(1, len(items) // (4 * self.workers)))
@@ -111,7 +115,8 @@ def seeds_of(setting: Any, sessions: int, seed: int) -> NDArray[np.uint64]:
 
 def said(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """What seeds and stored results go by: a switch that was added later counts only where it is on."""
-    return {name: value for name, value in pairs if name not in ("memory", "wrong") or value}
+    off = {"memory": False, "wrong": False, "tilings": 1, "start_value": 0.0}
+    return {name: value for name, value in pairs if name not in off or value != off[name]}
 
 
 def _end_with_parent(parent: int) -> None:

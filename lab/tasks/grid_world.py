@@ -14,9 +14,10 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from lab.errors import BadInput, counted
 from lab.mdp import BoolArray, NoPath, TabularMDP, grid, shortest_steps
-from lab.tasks.record import Count, Learned, Name, Record, as_tuple, read_text, write_whole
+from lab.tasks.record import Learned, Name, Record, as_tuple, read_text, walking, write_whole
 
-MAX_AXIS = 100  # cells; with 3 axes at most a million
+MAX_AXIS = {2: 1200, 3: 112}  # cells by the number of axes: in all about 1.4 million
+_ALLOWED = " or ".join(f"{axes} axes of 1 to {most} cells" for axes, most in MAX_AXIS.items())
 MAX_DENSITY = 0.6
 RANDOM = "random:"
 ACTIONS = {  # of worlds with 2 and 3 axes, as `lab.mdp.grid` orders them: -axis 0, +axis 0, -axis 1, ...
@@ -29,13 +30,16 @@ away from you and z up.
 """
 _TRIES = 10  # at scattering obstacles that leave a way
 _ALONE: dict[str, Any] = {"learner": "afterstate", "beta": 1.0, "episodes": 500}
+_FAR = 300  # moves: nobody finds a goal as far away by chance, and with the usual discount it is worth nothing
+_SHOWN: dict[str, Any] = {"learner": "monte-carlo", "alpha": 1.0, "beta": 3.0, "episodes": 60}
 _ROOM = 4  # an episode of a drawn world may take so many times the shortest way
 _WANTED = "wanted random:SHAPE:DENSITY:SEED, such as random:10x10x10:0.06:7"
 
 Ints = NDArray[np.int_]
 Coordinates = tuple[int, ...]
 GridCell = Annotated[Coordinates, BeforeValidator(as_tuple)]
-GridShape = Annotated[tuple[Count, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=3)]
+Length = Annotated[int, Field(ge=1, le=max(MAX_AXIS.values()))]
+GridShape = Annotated[tuple[Length, ...], BeforeValidator(as_tuple), Field(min_length=2, max_length=3)]
 
 
 class AdvisorView(Record):
@@ -63,6 +67,8 @@ class GridWorld(Learned):
 
     @model_validator(mode="after")
     def _cells_fit(self) -> Self:
+        if max(self.shape) > MAX_AXIS[len(self.shape)]:
+            raise ValueError(f"shape {_words(self.shape)}: allowed are {_ALLOWED}")
         for what, cell in self._cells():
             _require_inside(what, cell, self.shape)
         closed = set[Coordinates]()
@@ -169,8 +175,8 @@ def _marked(cells: Sequence[Coordinates], shape: Coordinates) -> BoolArray:
 
 
 def _check_shape(shape: Coordinates, where: str) -> None:
-    if not (2 <= len(shape) <= 3 and all(1 <= n <= MAX_AXIS for n in shape)):
-        raise BadInput(f"{where}: shape {_words(shape)}: allowed are 2 or 3 axes of 1 to {MAX_AXIS} cells")
+    if not all(1 <= n <= MAX_AXIS.get(len(shape), 0) for n in shape):
+        raise BadInput(f"{where}: shape {_words(shape)}: allowed are {_ALLOWED}")
 
 
 def _words(shape: Coordinates) -> str:
@@ -180,7 +186,7 @@ def _words(shape: Coordinates) -> str:
 def parse_shape(text: str, where: str) -> Coordinates:
     """The numbers of "10x10x10"; raises BadInput for what is no shape of a world."""
     if not re.fullmatch(r"[0-9]{1,9}(x[0-9]{1,9})*", text):
-        raise BadInput(f"{where}: shape '{text}': wanted 2 or 3 axes of 1 to {MAX_AXIS} cells, such as 10x10x10")
+        raise BadInput(f"{where}: shape '{text}': wanted {_ALLOWED}, such as 10x10x10")
     shape = tuple(map(int, text.split("x")))
     _check_shape(shape, where)
     return shape
@@ -302,9 +308,19 @@ def _staircase(start: Ints, goal: Ints, rng: np.random.Generator) -> Ints:
 
 
 def _fitted(world: GridWorld) -> GridWorld:
-    """The world with a learner that mostly finds a way alone."""
+    """The world with a learner that mostly finds a way alone, or, where that is far, learns the one that it is shown."""
     moves, learner = shortest_steps(world.mdp()), world.learner
-    learner = replace(learner, **_ALONE, max_steps=max(learner.max_steps, _ROOM * moves))
+    room = max(learner.max_steps, _ROOM * moves)
+    if moves > _FAR:
+        learner = replace(learner, **_SHOWN, discount=1.0 - 1.0 / (10.0 * moves), max_steps=room)
+        lost = round(walking(world.rewards.step, learner), 6)
+        learner, collision = (
+            replace(learner, start_value=lost),
+            lost - world.rewards.goal,
+        )  # what is not shown is not tried
+        gate, rewards = replace(world.gate, window=2, first_episode=4), replace(world.rewards, collision=collision)
+        return world.model_copy(update={"learner": learner, "gate": gate, "rewards": rewards})
+    learner = replace(learner, **_ALONE, max_steps=room)
     return world.model_copy(update={"learner": learner})
 
 

@@ -80,8 +80,15 @@ def test_whose_word_counts(trusts: tuple[float, float, float], expected: dict[st
     assert {name: decided(VOTES, known, 0, decide) for name, decide in DECISIONS.items()} == expected
 
 
+def test_between_four_actions_those_who_are_right_in_less_than_half_of_the_cases_still_tell_much() -> None:
+    known = {"a": 0.45, "b": 0.45, "c": 0.6}  # log odds over those of 1/4: 0.90 + 0.90 against 1.50
+    decide = DECISIONS["trust-weighted"]
+    assert decided(VOTES, known, 0, decide, among=4) == 1
+    assert decided(VOTES, known, 0, decide, among=2) == 2  # -0.20 - 0.20 against 0.41
+
+
 @pytest.mark.parametrize("decide", DECISIONS.values(), ids=[*DECISIONS])
-def test_ties(decide: Callable[[Sequence[float]], float]) -> None:
+def test_ties(decide: Callable[[Sequence[float], float], float]) -> None:
     votes = {"a": 3, "b": 2}
     assert decided(votes, {"a": 0.6, "b": 0.7}, 3, decide) == 2  # the more trusted one
     assert decided(votes, {"a": 0.6, "b": 0.6}, 3, decide) == 3  # the learner's own choice

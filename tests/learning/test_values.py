@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.learning.values import fewest_moves, greedy_moves, known_values
-from lab.mdp import NoPath, greedy_path, grid, optimal_values, shortest_steps
+from lab.learning.environment import TableEnvironment
+from lab.learning.values import fewest_moves, greedy_moves, known_values, values_of_ways
+from lab.mdp import NoPath, Rewards, greedy_path, grid, optimal_values, shortest_steps
 
 CORRIDOR = grid((1, 4), np.zeros((1, 4), bool), (0, 1), (0, 3))  # its moves: up and down stay, left, right
 LEFT, RIGHT = 2, 3
@@ -50,3 +51,21 @@ def test_all_states_are_as_each_alone(blocked: set[tuple[int, int]], random: Any
     every = np.broadcast_to(~mdp.terminal[:, None], (12, 4))
     best = known_values(mdp, every, np.zeros((12, 4)), 0.9)
     np.testing.assert_allclose(best, optimal_values(mdp, 0.9), atol=1e-6)
+
+
+@given(st.integers(0, 10_000), st.floats(0.0, 0.5), st.sampled_from([0.5, 0.9, 0.99]))
+def test_ways_are_a_guess_from_which_the_values_settle_alike(seed: int, density: float, discount: float) -> None:
+    rng = np.random.default_rng(seed)
+    wall = rng.random((7, 6)) < density
+    wall[0, 0] = wall[0, 1] = False
+    mdp = grid((7, 6), wall, (0, 0), (0, 1), Rewards(collision=-1000.0))
+    exact, guess = optimal_values(mdp, discount), values_of_ways(mdp, discount)
+    np.testing.assert_allclose(optimal_values(mdp, discount, guess), exact, atol=1e-9)
+    there = np.isfinite(fewest_moves(mdp))
+    best = guess[there].max(axis=1), exact[there].max(axis=1)
+    np.testing.assert_allclose(*best, atol=1e-9)  # with crashes that dear, the shortest ways are the best
+
+
+def test_a_large_table_is_known_at_once() -> None:
+    place = TableEnvironment(grid((400, 400), np.zeros((400, 400), bool), (0, 0), (399, 399)))
+    assert place.values(0.99)[0].max() == pytest.approx(-0.1 * (1 - 0.99**797) / 0.01 + 0.99**797 * 1.5, rel=1e-9)

@@ -160,8 +160,8 @@ def test_a_text_grid_is_a_world(tmp_path: Path, refusal: Refusal) -> None:
         ("shape = [10, 10, 10]", "shape = [10, 10, 10, 10]", "at most 3 items after validation, not 4 (got [10,"),
         (
             "shape = [10, 10, 10]",
-            "shape = [10, 10, 101]",
-            "shape.2: Input should be less than or equal to 100 (got 101)",
+            "shape = [10, 10, 113]",
+            "shape 10x10x113: allowed are 2 axes of 1 to 1200 cells or 3 axes of 1 to 112 cells",
         ),
         ("shape = [10, 10, 10]", "shape = [10, 10, 0]", "shape.2: Input should be greater than or equal to 1 (got 0)"),
         ("shape = [10, 10, 10]", "shape = [10, 10]", "start (0, 7, 1) has 3 coordinates: 2 are wanted"),

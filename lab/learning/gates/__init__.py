@@ -9,6 +9,7 @@ from lab.learning.gates.gate import Gate, GateClass, Never, Surroundings
 from lab.learning.gates.gate_rules import CompiledGate, Steps, improvement
 from lab.learning.gates.per_step import Importance, Introspection, Random
 from lab.learning.gates.uncertainty import Uncertainty, deviation
+from lab.learning.gates.weighing import Fading, Novelty, Reliability, Shaping, Trust, TwoLevels
 from lab.learning.members import Member
 from lab.plugins.family import Family, first_line, takes, wanted
 
@@ -21,6 +22,10 @@ def _adopted(name: str, thing: Any) -> Member[GateClass]:
     if not (isinstance(thing, type) and issubclass(thing, Gate) and takes(thing, *GATE_TAKES)):
         raise wanted(thing, f"a subclass of lab.Gate that is made with {', '.join(GATE_TAKES)}")
     return Member(thing, first_line(thing))
+
+
+def _weighing(how: int) -> CompiledGate:
+    return CompiledGate(rules.OPENS_ALWAYS, rules.ASKS_ALWAYS, weighs=how)
 
 
 _SHIPPED: dict[str, Member[GateClass]] = {
@@ -59,6 +64,31 @@ _SHIPPED: dict[str, Member[GateClass]] = {
         Uncertainty,
         "several tables learn side by side, and it asks where they disagree",
         CompiledGate(rules.OPENS_FROM_X, rules.ASKS_WHERE_TABLES_DIFFER),
+    ),
+    "novelty": Member(Novelty, "asks in every state until it has been answered there", _weighing(rules.WEIGHS_NOVELTY)),
+    "fading": Member(
+        Fading, "asks about a share of the steps that fades with the episodes", _weighing(rules.WEIGHS_FADING)
+    ),
+    "shaping": Member(
+        Shaping,
+        "policy shaping: asks about every step, and multiplies what was said with its own chances",
+        _weighing(rules.WEIGHS_SHAPING),
+    ),
+    "reliability": Member(
+        Reliability,
+        "asks once a state, while it explores, and follows an advisor whose answers its own values bear out (CLUE)",
+        _weighing(rules.WEIGHS_RELIABILITY),
+    ),
+    "two-levels": Member(
+        TwoLevels,
+        "learns in every state whether asking or going on alone is worth more",
+        _weighing(rules.WEIGHS_WORTH),
+    ),
+    "trust": Member(
+        Trust,
+        "remembers what it is told, follows it while episodes with advice do better than those without, and drops what "
+        "leads round",
+        _weighing(rules.WEIGHS_TRUST),
     ),
 }
 GATES = Family("gates", _SHIPPED, _adopted)

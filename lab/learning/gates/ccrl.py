@@ -39,7 +39,7 @@ class Ccrl(Gate):
 
     def begins(self, state: int) -> None:
         """Another walk begins."""
-        self._start, self._walk = state, [] if self.watches else [state]
+        self._start, self._walk = (state, []) if self.watches else (0, [0])
 
     def saw(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
         """The walk goes on."""

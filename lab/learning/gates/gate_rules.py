@@ -8,17 +8,19 @@ from lab.learning.session_events import Improvement
 Steps = Sequence[float]  # whole numbers, unless the high level compares makespans
 
 OPENS_NEVER, OPENS_ALWAYS, OPENS_FROM_X, OPENS_WHILE_SLOW, OPENS_WHILE_LONG = range(5)
+WEIGHS_NOTHING, WEIGHS_NOVELTY, WEIGHS_FADING, WEIGHS_SHAPING, WEIGHS_RELIABILITY, WEIGHS_WORTH, WEIGHS_TRUST = range(7)
 ASKS_ALWAYS, ASKS_WHERE_ALIKE, ASKS_WHERE_APART, ASKS_BY_CHANCE, ASKS_WHERE_TABLES_DIFFER = range(5)
 
 
 class CompiledGate(NamedTuple):
     """A gate by the rules that the kernel knows: which episodes it opens (OPENS_...), which steps of these it asks about
-    (ASKS_...), and whether it judges episodes as CCRL does.
+    (ASKS_...), whether it judges episodes as CCRL does, and how it weighs what it is told (WEIGHS_...).
     """
 
     opens: int
     asks: int
     judges: bool = False
+    weighs: int = WEIGHS_NOTHING
 
 
 def window_mean(steps: Steps, end: int, window: int) -> float:

@@ -7,6 +7,8 @@ import numpy as np
 from lab.learning import advice_memory as memory
 from lab.learning.compiled import inlined, inner
 from lab.learning.gates import gate_rules as rules
+from lab.learning.gates.heard import NOTHING
+from lab.learning.kernels.hearing import answered, takes, wants
 from lab.learning.kernels.learners import draw, gauge
 
 _window_mean: Any = inner(rules.window_mean)
@@ -42,21 +44,62 @@ def opens(asking: Any, lane: Any, steps: Any, max_steps: int, rejected: bool) ->
 
 @inner
 def judge(asking: Any, lane: Any, steps: Any, count: Any) -> None:
-    """`Ccrl.judges`: whether the episode that is over was misled; steps (E,) are those of its session."""
+    """`Ccrl.judges` where all episodes begin in one state; steps (E,) are those of the lane's session."""
     episode, window = lane.episode, asking.window
-    if count.rejected_at_episode > 0 or episode <= window or not (asking.judge_unhelped or lane.helped > 0):
+    if not _judged(asking, lane, count):
         return
     result = steps[episode - 1]
     if _misled(result, _window_mean(steps, episode - 1, window)):
-        if asking.spare_best and result <= asking.max_steps:
-            best = True  # all episodes begin in one state: the fewest known steps are those of the best of them
+        best = bool(
+            asking.spare_best and result <= asking.max_steps
+        )  # the fewest known steps: those of the best episode
+        if best:
             for i in range(episode - 1):
                 best = best and result <= steps[i]
-            if best:
-                return
-        count.misleads += 1
-        if count.misleads > asking.omega:
-            count.rejected_at_episode = episode
+        if not best:
+            _misleads(asking, episode, count)
+
+
+@inner
+def knows(lane: Any, steps: Any, walked: int, fewest: Any, walk: Any, max_steps: int) -> None:
+    """`Ccrl._knows`: how far the goal was from the states of the walk that is over."""
+    result = steps[lane.episode - 1]
+    left = float(result - walked) if result <= max_steps else np.inf
+    for i in range(walked - 1, -1, -1):
+        left = min(left + 1.0, fewest[walk[i]])
+        fewest[walk[i]] = left
+
+
+@inner
+def judge_moved(asking: Any, lane: Any, steps: Any, count: Any, fewest: Any, begun: Any) -> None:
+    """`Ccrl.judges` where episodes begin in different states: the counts before as if they had begun where it did."""
+    episode, window = lane.episode, asking.window
+    if not _judged(asking, lane, count):
+        return
+    result, now = steps[episode - 1], begun[episode - 1]
+    here, total = fewest[now], 0.0
+    for i in range(episode - 1 - window, episode - 1):
+        value = float(steps[i])
+        if begun[i] != now and here < np.inf and steps[i] <= asking.max_steps:
+            value += here - fewest[begun[i]]
+        total += value
+    best = asking.spare_best and result <= min(here, asking.max_steps)
+    if result >= total / window and not best:
+        _misleads(asking, episode, count)
+
+
+@inlined
+def _judged(asking: Any, lane: Any, count: Any) -> bool:
+    """Whether the episode that is over is held against those before it."""
+    may = asking.judge_unhelped or lane.helped > 0
+    return bool(may and count.rejected_at_episode == 0 and lane.episode > asking.window)
+
+
+@inlined
+def _misleads(asking: Any, episode: int, count: Any) -> None:
+    count.misleads += 1
+    if count.misleads > asking.omega:
+        count.rejected_at_episode = episode
 
 
 @inlined
@@ -105,7 +148,7 @@ def advised(work: Any, j: int, state: Any) -> Any:
 
 
 @inlined
-def decided(work: Any, memories: Any, j: int) -> Any:
+def decided(work: Any, memories: Any, hearing: Any, j: int) -> Any:
     """The action of lane j's next step and where it comes from: its own, of the way that it practises, or advised."""
     lanes, state = work.lanes, work.lanes.states[j]
     action, source = np.uint64(lanes.chosen[j]), np.int64(memory.OWN)
@@ -115,9 +158,24 @@ def decided(work: Any, memories: Any, j: int) -> Any:
             action, source = np.uint64(memories.way[j, state]), np.int64(memory.PRACTISED)
     if lanes.is_open[j]:
         lane = lanes.lane[j]
-        if lane.helped < lane.left and asks(work, j, state):
-            lane.asked = 1
-            if work.region[state]:
-                lane.helped += 1
-                action, source = advised(work, j, state), np.int64(memory.ASKED)
+        if hearing is None:
+            if lane.helped < lane.left and asks(work, j, state):
+                lane.asked = 1
+                if work.region[state]:
+                    lane.helped += 1
+                    action, source = advised(work, j, state), np.int64(memory.ASKED)
+        else:
+            weighs, said = work.asking.gate.weighs != rules.WEIGHS_NOTHING, NOTHING
+            may = lane.helped < lane.left
+            wanted = wants(work, hearing, j, state) if weighs else may and asks(work, j, state)
+            if wanted and may:
+                lane.asked = 1
+                said = answered(work, hearing, j, state, action)
+                if said != NOTHING:
+                    lane.helped += 1
+                    source = np.int64(memory.ASKED)
+            if weighs:
+                action = takes(work, hearing, j, state, action, said)
+            elif said != NOTHING:
+                action = np.uint64(said)
     return action, source

@@ -32,12 +32,10 @@ def gauge(work: Any, table: Any, state: int, action: int) -> float:
 
 
 @inlined
-def learn(work: Any, table: Any, state: Any, action: Any) -> None:
-    """`Update.learn` of one step in a flat table."""
+def learn(work: Any, table: Any, state: Any, at: Any, entered: Any, reward: float) -> None:
+    """`Update.learn` of one step in a flat table; at: state * A + action."""
     problem, learning = work.problem, work.learning
     width = np.uint64(len(learning.actions))
-    at = state * width + action
-    entered = np.uint64(problem.successor[at])
     over = problem.ends[entered]
     if learning.afterstate:
         target = _afterstate_value(problem.step_reward, learning.discount, table[entered])
@@ -48,7 +46,7 @@ def learn(work: Any, table: Any, state: Any, action: Any) -> None:
         best = table[entered * width]
         for a in range(1, len(learning.actions)):
             best = max(best, table[entered * width + np.uint64(a)])
-        target = problem.reward[at] + (0.0 if over else learning.discount) * best
+        target = reward + (0.0 if over else learning.discount) * best
         table[at] = _towards(table[at], target, learning.alpha)
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from lab.learning.advice_memory import Now
 from lab.learning.gates.gate_rules import CompiledGate
+from lab.learning.gates.heard import Heard, HeardNow
 from lab.mdp import FloatArray
 
 LANES = 24
@@ -25,7 +26,9 @@ class ProblemArrays(NamedTuple):
 
 
 class Learning(NamedTuple):
-    """The learner's settings, see `LearnerSettings`; actions: a tuple of A numbers, whose length the compiler knows."""
+    """The learner's settings, see `LearnerSettings`; actions: a tuple of A numbers, whose length the compiler knows, or an
+    array of them.
+    """
 
     afterstate: bool
     alpha: float
@@ -33,7 +36,7 @@ class Learning(NamedTuple):
     max_moves: int
     max_steps: int
     count_start: bool
-    actions: tuple[int, ...]
+    actions: tuple[int, ...] | FloatArray
 
 
 class Asking(NamedTuple):
@@ -47,6 +50,8 @@ class Asking(NamedTuple):
     psi: float
     spread: float
     rate: float
+    fading: float
+    consistency: float
     enough_steps: float
     budget: int
     judge_unhelped: bool
@@ -63,6 +68,7 @@ COUNTS = np.dtype(
     [(name, np.int64) for name in ("requests", "helped_steps", "misleads", "rejected_at_episode", "moves")]
 )
 NOW = np.dtype([(field.name, np.int64) for field in fields(Now)])
+HEARD_NOW = np.dtype([(field.name, np.float64) for field in fields(HeardNow)])
 
 
 class Sessions(NamedTuple):
@@ -113,3 +119,41 @@ class Work(NamedTuple):
     region: NDArray[np.bool_]
     sessions: Sessions
     lanes: Lanes
+
+
+class Hearing(NamedTuple):
+    """What gates that weigh what they are told keep, and advisors that are late or hold back; see `heard`, `Advice`.
+
+    heard: a `Heard` with arrays (LANES, ...), `now` (LANES,) is of HEARD_NOW; values (LANES, A): of the state under way;
+    u (LANES,): the uniform number of the step; before (LANES,): the state of the question before, -1: none; chose
+    (LANES, S): what the learner would have chosen when it last asked there, -1: it did not.
+    """
+
+    heard: Heard
+    values: FloatArray
+    u: FloatArray
+    before: NDArray[np.int64]
+    chose: NDArray[np.int32]
+    late: bool
+    speaks: int
+    several: float
+
+
+class Chances(NamedTuple):
+    """The outcomes of the moves of a problem that is left to chance; (S * A, K) each: cumulated chance, state entered, reward."""
+
+    below: FloatArray
+    entered: NDArray[np.int32]
+    reward: FloatArray
+
+
+class Walks(NamedTuple):
+    """What gates that judge know where episodes begin in different states, as `gates.Ccrl` does.
+
+    fewest (LANES, S): the known steps to the goal, inf where none are; walk (LANES, moves): the states that the episode left;
+    begun (LANES, E): where each episode began.
+    """
+
+    fewest: FloatArray
+    walk: NDArray[np.int32]
+    begun: NDArray[np.int32]

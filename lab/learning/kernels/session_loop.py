@@ -13,7 +13,8 @@ import numpy as np
 from lab.learning import advice_memory as memory
 from lab.learning import selection
 from lab.learning.compiled import inlined, inner, lean
-from lab.learning.kernels.asking import decided, judge, opens
+from lab.learning.kernels import hearing as hears
+from lab.learning.kernels.asking import decided, judge, judge_moved, knows, opens
 from lab.learning.kernels.learners import choose, draw, learn
 from lab.learning.kernels.records import LANES
 
@@ -35,7 +36,7 @@ def _of_lane(m: Any, j: int) -> Any:
 
 
 @inlined
-def _begin_session(work: Any, j: int, n: int) -> None:
+def _begin_session(work: Any, hearing: Any, walks: Any, j: int, n: int) -> None:
     """Clears lane j for session n."""
     lanes = work.lanes
     lane = lanes.lane[j]
@@ -46,10 +47,15 @@ def _begin_session(work: Any, j: int, n: int) -> None:
     for k in range(lanes.others.shape[1]):
         for i in range(lanes.others.shape[2]):
             lanes.others[j, k, i] = draw(lanes.rng, j) - 0.5
+    if hearing is not None:
+        hears.hears_nothing_yet(work, hearing, j)
+    if walks is not None:
+        for state in range(walks.fewest.shape[1]):
+            walks.fewest[j, state] = np.inf
 
 
 @inlined
-def _begin_episode(work: Any, memories: Any, j: int) -> None:
+def _begin_episode(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -> None:
     """The next episode of lane j's session: whether it may ask, how warm it is, where it starts."""
     lanes, sessions, asking, starts = work.lanes, work.sessions, work.asking, work.problem.starts
     lane = lanes.lane[j]
@@ -66,6 +72,10 @@ def _begin_episode(work: Any, memories: Any, j: int) -> None:
     lanes.is_open[j] = lane.is_open
     if len(starts) > 1:
         lanes.states[j] = starts[int(draw(lanes.rng, j) * len(starts))]
+    if walks is not None:
+        walks.begun[j, lane.episode - 1] = lanes.states[j]
+    if hearing is not None:
+        hears.begins(work, hearing, j)
     if memories is not None:
         mine, state = _of_lane(memories, j), np.int64(lanes.states[j])
         if _starts(mine, state):
@@ -73,7 +83,7 @@ def _begin_episode(work: Any, memories: Any, j: int) -> None:
 
 
 @inlined
-def _begin(work: Any, memories: Any, started: int) -> int:
+def _begin(work: Any, memories: Any, hearing: Any, walks: Any, started: int) -> int:
     """Begins an episode in each lane whose last one is over, and the next session where its last one is; how many began."""
     lanes, seeds = work.lanes, work.sessions.seeds
     for j in range(LANES):
@@ -83,40 +93,50 @@ def _begin(work: Any, memories: Any, started: int) -> int:
             if lane.episode == len(work.sessions.per_tau):
                 lane.session = -1  # a lane without a session walks on, and nobody looks
                 if started < len(seeds):
-                    _begin_session(work, j, started)
+                    _begin_session(work, hearing, walks, j, started)
                     if memories is not None:
                         _clear(_of_lane(memories, j))
                     started += 1
             if lane.session >= 0:
-                _begin_episode(work, memories, j)
+                _begin_episode(work, memories, hearing, walks, j)
     return started
 
 
 @inlined
-def _step(work: Any, memories: Any, j: int) -> bool:
+def _step(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any, j: int) -> bool:
     """Makes and learns one step of lane j; whether its episode is over."""
     lanes, problem, learning = work.lanes, work.problem, work.learning
     state = lanes.states[j]
-    action, source = decided(work, memories, j)
+    action, source = decided(work, memories, hearing, j)
     number = state * np.uint64(len(learning.actions)) + action
-    entered = np.uint64(problem.successor[number])
+    if chances is None:
+        entered, reward = np.uint64(problem.successor[number]), problem.reward[number]
+    else:
+        u, k = draw(lanes.rng, j), 0
+        while u >= chances.below[number, k]:
+            k += 1
+        entered, reward = np.uint64(chances.entered[number, k]), chances.reward[number, k]
     ends = problem.ends[entered]
-    learn(work, lanes.tables[j], state, action)
+    learn(work, lanes.tables[j], state, number, entered, reward)
     for k in range(lanes.others.shape[1]):
         if draw(lanes.rng, j) < 0.5:
-            learn(work, lanes.others[j, k], state, action)
+            learn(work, lanes.others[j, k], state, number, entered, reward)
     if memories is not None and lanes.lane[j].session >= 0:
         mine = _of_lane(memories, j)
         _moved(mine, _Move(np.int64(number), source, np.int64(entered), ends != 0, ends == 1))
         if mine.now.trust < 0:
             lanes.is_open[j] = False
+    if hearing is not None and lanes.lane[j].session >= 0:
+        hears.saw(work, hearing, j, state, number, entered, reward, ends != 0)
+    if walks is not None:
+        walks.walk[j, lanes.moves[j]] = state
     lanes.states[j] = entered
     lanes.moves[j] += 1
     return bool(ends != 0 or lanes.moves[j] == learning.max_moves)
 
 
 @inlined
-def _end(work: Any, memories: Any, j: int) -> int:
+def _end(work: Any, memories: Any, hearing: Any, walks: Any, j: int) -> int:
     """Books the episode of lane j that is over; 1 if its session is over, too."""
     lanes, sessions, learning = work.lanes, work.sessions, work.learning
     lane, moves, won = lanes.lane[j], lanes.moves[j], work.problem.ends[lanes.states[j]] == 1
@@ -129,8 +149,14 @@ def _end(work: Any, memories: Any, j: int) -> int:
     count.requests += lane.asked
     count.helped_steps += lane.helped
     count.moves += moves
-    if lane.is_open and work.asking.gate.judges:
+    if walks is not None:
+        knows(lane, sessions.steps[n], moves, walks.fewest[j], walks.walk[j], learning.max_steps)
+        if lane.is_open:
+            judge_moved(work.asking, lane, sessions.steps[n], count, walks.fewest[j], walks.begun[j])
+    elif lane.is_open and work.asking.gate.judges:
         judge(work.asking, lane, sessions.steps[n], count)
+    if hearing is not None:
+        hears.ended(work, hearing, j, sessions.steps[n, episode - 1], won, work.problem.ends[lanes.states[j]] != 0)
     if memories is not None:
         went = moves if won else learning.max_moves + 1
         _ended(_of_lane(memories, j), went, won, lane.helped)
@@ -144,16 +170,20 @@ def _end(work: Any, memories: Any, j: int) -> int:
 
 
 @lean
-def run(work: Any, memories: Any) -> None:
-    """All sessions: each lane takes the next one when its own is over. memories None: nothing is remembered."""
+def run(work: Any, memories: Any, hearing: Any, chances: Any, walks: Any) -> None:
+    """All sessions: each lane takes the next one when its own is over.
+
+    memories None: nothing is remembered; hearing None: the gate weighs nothing, and the advisor speaks at once when asked;
+    chances None: every move is certain; walks None: no gate judges, or all episodes begin in one state.
+    """
     started = over = 0
     fresh = True
     while over < len(work.sessions.seeds):
         if fresh:
-            started = _begin(work, memories, started)
+            started = _begin(work, memories, hearing, walks, started)
             fresh = False
         choose(work)
         for j in range(LANES):
-            if _step(work, memories, j):
+            if _step(work, memories, hearing, chances, walks, j):
                 fresh = True
-                over += _end(work, memories, j)
+                over += _end(work, memories, hearing, walks, j)

@@ -7,14 +7,15 @@ from lab.learning.members import Member
 from lab.learning.settings import LearnerSettings
 from lab.learning.updates.afterstate import Afterstate
 from lab.learning.updates.episode_returns import MonteCarlo
+from lab.learning.updates.linear import LINEAR
 from lab.learning.updates.one_step import QLearning, Sarsa
 from lab.learning.updates.planning import DynaQ
 from lab.learning.updates.traces import SarsaLambda, WatkinsQLambda
 from lab.learning.updates.update import ACTION_VALUES, STATE_VALUES, Row, Table, Update
-from lab.mdp import TabularMDP
+from lab.mdp import FloatArray, TabularMDP
 from lab.plugins.family import Family, first_line, takes, wanted
 
-__all__ = ["UPDATES", "Row", "Table", "Update"]
+__all__ = ["LINEAR", "UPDATES", "Row", "Table", "Update", "update_of"]
 
 Learner = Callable[[list[Row], LearnerSettings, TabularMDP], Update]
 
@@ -41,3 +42,10 @@ _SHIPPED: dict[str, Member[Learner]] = {
     ),
 }
 UPDATES = Family("learners", _SHIPPED, _adopted)
+
+
+def update_of(settings: LearnerSettings, mdp: TabularMDP, q: FloatArray) -> Update:
+    """The learner that the settings name, on a table or on tiles; it begins with the values q (S, A)."""
+    if settings.tilings > 1:
+        return LINEAR[settings.learner](q, settings, mdp)
+    return UPDATES[settings.learner].make(q.tolist(), settings, mdp)

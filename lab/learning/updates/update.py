@@ -5,9 +5,11 @@ A table is a list of rows, one list of action values per state: in plain Python 
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from lab.learning.selection import Draw
 from lab.learning.settings import LearnerSettings
-from lab.mdp import TabularMDP
+from lab.mdp import FloatArray, TabularMDP
 
 Row = list[float]
 Table = Sequence[Row]
@@ -43,6 +45,10 @@ class Update:
     def gauge(self, state: int) -> Row:
         """The values whose width says how sure the learner is in a state (what introspection looks at)."""
         return self.q[state]
+
+    def table(self) -> FloatArray:
+        """The action values of all states, (S, A)."""
+        return np.array(list(self.q), np.float64)
 
     def scatter(self, draw: Draw) -> None:
         """Sets every value that it keeps to one drawn within +-0.5."""

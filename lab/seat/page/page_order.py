@@ -23,6 +23,7 @@ def order_of(request: SequenceRequest) -> Json:
         "moves": [_allowed(move_of(request, decision)) for decision in request.allowed],
         "would": f"Alone it would move {own.name} from {own.origin} to {own.target}.",
         "picture": [],
+        "shapes": [],
     }
 
 

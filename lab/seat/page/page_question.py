@@ -49,6 +49,7 @@ def step_of(request: AdviceRequest, known: StateWords | None = None) -> Json:
         "temperature": request.temperature,
         "selection": request.selection,
         "picture": picture_of(request.picture),
+        "shapes": request.shapes,
     }
 
 

@@ -138,9 +138,24 @@ const seatMap = (() => {
     if (direction >= 0) told.go(direction);
   }
 
+  // A world without a grid, as lines, areas and discs
+  function drawn(shapes) {
+    const made = shapes.map((shape) => {
+      const name = shape.disc ? "circle" : shape.area ? "polygon" : "polyline";
+      const part = document.createElementNS("http://www.w3.org/2000/svg", name);
+      const [x, y, r] = shape.disc || [];
+      const at = shape.disc ? { cx: x, cy: y, r } : { points: (shape.area || shape.line).map((point) => point.join()).join(" ") };
+      for (const [key, value] of Object.entries({ ...at, class: `${shape.kind}${shape.line ? " line" : ""}` })) part.setAttribute(key, value);
+      return part;
+    });
+    el("shapes").toggleAttribute("hidden", !made.length);
+    el("shapes").replaceChildren(...made);
+  }
+
   function picture(shown) {
     if (!shown) return; // the last drawing stays
-    el("picture").hidden = !shown.picture.length;
+    drawn(shown.shapes);
+    el("picture").hidden = !shown.picture.length || shown.shapes.length > 0;
     const lines = shown.picture.flatMap((line) => [...line.map(([text, kind]) => seatStatus.make("span", text, kind)), "\n"]);
     el("picture").replaceChildren(...lines);
   }

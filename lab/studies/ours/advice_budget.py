@@ -25,7 +25,7 @@ VIEWS: tuple[Literal["full", "limited"], ...] = ("full", "limited")
 WRONG, NOBODY = "wrong", "nobody"
 ADVISORS = (*SKILL_TAUS, WRONG)
 CCRL = ("ccrl",)
-ASKING = tuple(gate for gate in GATES if gate != "never")
+ASKING = tuple(gate for gate, one in GATES.items() if gate != "never" and not (one.compiled and one.compiled.weighs))
 AGAINST = {False: "alone", True: "alone, with memory"}
 TARGETS = {"expert": (99.0, 24.0), "moderate": (98.0, 60.0), "limited": (85.0, 150.0), "novice": (63.0, 10.0)}
 MOST_BELOW = -2.0  # points of success that an advisor may cost against learning alone: the target

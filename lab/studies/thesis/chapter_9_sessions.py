@@ -59,7 +59,8 @@ class AdviceSetting:
     def key(self, sessions: int, seed: int) -> str:
         """What names this setting's results among all that are stored."""
         place = world(self.world).model_dump(mode="json")
-        del place["gate"]["spare_best"]  # no result depends on it: see `gate_of`
+        for name in ("spare_best", "fading", "consistency"):
+            del place["gate"][name]  # no result depends on it: see `gate_of`
         learned = (LEARNED_EPISODES, LEARNED_BETA, LEARNED_SEED)
         whole = [FORMAT, asdict(self, dict_factory=said), sessions, seed, place, *learned]
         return sha256(json.dumps(whole).encode()).hexdigest()[:24]

@@ -10,6 +10,8 @@ import numpy as np
 
 from lab.advice.entries import Entry
 from lab.advice.receipt import receipt
+from lab.learning.physics import PHYSICS
+from lab.learning.physics.environment import PhysicsEnvironment
 from lab.learning.reasons import Reason, TooSlow
 from lab.learning.requests import AdviceRequest
 from lab.learning.session_events import AdviceGiven, AdviceRequested, EpisodeEnded, Improvement
@@ -106,6 +108,35 @@ def test_an_environments_own_drawing_is_shown_as_text(tab: "Page", page: SeatPag
     assert tab.is_hidden("#map")
     tab.keyboard.press("2")
     assert asked.result(20) == 1
+
+
+def test_the_car_is_drawn_on_its_hill(tab: "Page", page: SeatPage, until: Until) -> None:
+    place = PhysicsEnvironment(PHYSICS["MountainCar-v0"])
+    place.point = [-0.7, 0.03]
+    state, mdp = place.physics.bounds.number(place.point), place.mdp
+    asked = ask(
+        page,
+        AdviceRequest(
+            mdp=mdp,
+            q=[[0.0] * 3] * mdp.n_states,
+            state=state,
+            episode=1,
+            step=1,
+            own=0,
+            environment=place,
+            allowed=range(3),
+        ),
+    )
+    until(tab, "!document.getElementById('shapes').hasAttribute('hidden')")
+    assert tab.is_hidden("#picture")
+    assert tab.locator("#shapes circle.body").count() == 2
+    hill, car = (tab.locator(f"#shapes {part}").first.bounding_box() for part in (".ground", "polygon.body"))
+    assert hill is not None
+    assert car is not None
+    assert hill["width"] > 400.0
+    assert hill["x"] < car["x"] < hill["x"] + 0.5 * hill["width"]  # in the left half
+    tab.keyboard.press("3")
+    assert asked.result(20) == 2
 
 
 def test_the_order_is_advised(tab: "Page", page: SeatPage, until: Until) -> None:

@@ -1,0 +1,295 @@
+"""The compiled sessions whose values are sums of weights of tiles: on a table's steps, or on a world's physics.
+
+One session after the other, for its weights stay in the cache; each equals that of `session.run_session` with the same
+uniform numbers. The gates and the advisor are those of `asking`, of which this is lane 0.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.learning import selection, tiles
+from lab.learning.compiled import inlined, inner, lean
+from lab.learning.kernels.asking import decided, judge, opens
+from lab.learning.kernels.learners import draw
+from lab.learning.physics import ACROBOT, MOUNTAIN_CAR, acrobot, cart_pole, mountain_car
+from lab.learning.tiles import TileArray
+from lab.learning.updates.linear import FAINT
+from lab.mdp import FloatArray
+
+TABLE = 0  # a world without physics, beside the numbers in `physics`
+SOFTMAX, EPSILON_GREEDY, GREEDY = range(3)
+
+_exp_of: Any = inlined(selection.exp_of)
+_cell_along: Any = inlined(tiles.cell_along)
+_begins: Any = [inner(world.begin) for world in (mountain_car, acrobot, cart_pole)]
+_steps: Any = [inner(world.step) for world in (mountain_car, acrobot, cart_pole)]
+_begin_car, _begin_acrobot, _begin_pole = _begins
+_step_car, _step_acrobot, _step_pole = _steps
+
+
+class World(NamedTuple):
+    """Where steps are made: a world's number, its point x (D,), its cells, and its rewards; falls: see `Physics`."""
+
+    number: int
+    x: FloatArray
+    low: FloatArray
+    high: FloatArray
+    cells: NDArray[np.int64]
+    reward: float
+    last_reward: float
+    falls: bool
+
+
+class Linear(NamedTuple):
+    """The learner on tiles: weights (tiles * A,), active (S, T), and the traces.
+
+    listed, strength (tiles * A,): which weights have a trace, and how strong; place: where each stands there, -1: nowhere;
+    traces (1,): how many; start: each weight at first; values (A,): room for those of a state; warm (E,): temperature or
+    epsilon.
+    """
+
+    active: TileArray
+    weights: FloatArray
+    listed: NDArray[np.int64]
+    strength: FloatArray
+    place: NDArray[np.int64]
+    traces: NDArray[np.int64]
+    values: FloatArray
+    warm: FloatArray
+    start: float
+    alpha: float
+    decay: float
+    growing: bool
+    on_policy: bool
+    lookahead: bool
+    selection: int
+
+
+@inlined
+def _number(world: Any) -> int:
+    """`Bounds.number` of the point."""
+    number = 0
+    for axis in range(len(world.cells)):
+        cells = world.cells[axis]
+        number = number * cells + _cell_along(world.x[axis], world.low[axis], world.high[axis], cells)
+    return number
+
+
+@inlined
+def _start(work: Any, world: Any) -> int:
+    """`Environment.reset`."""
+    rng, starts = work.lanes.rng, work.problem.starts
+    if world.number == TABLE:
+        return int(starts[int(draw(rng, 0) * len(starts))] if len(starts) > 1 else starts[0])
+    for i in range(len(world.x)):
+        world.x[i] = draw(rng, 0)
+    if world.number == MOUNTAIN_CAR:
+        _begin_car(world.x)
+    elif world.number == ACROBOT:
+        _begin_acrobot(world.x)
+    else:
+        _begin_pole(world.x)
+    return int(_number(world))
+
+
+@inlined
+def _moved(world: Any, action: int) -> bool:
+    """`Physics.step`."""
+    if world.number == MOUNTAIN_CAR:
+        return bool(_step_car(world.x, action))
+    if world.number == ACROBOT:
+        return bool(_step_acrobot(world.x, action))
+    return bool(_step_pole(world.x, action))
+
+
+@inlined
+def _value(linear: Any, state: int, action: int) -> float:
+    actions, total = len(linear.values), 0.0
+    for t in range(linear.active.shape[1]):
+        total += linear.weights[linear.active[state, t] * actions + action]
+    return total
+
+
+@inlined
+def _look(linear: Any, state: int) -> float:
+    """Sums up the values of a state; the best of them."""
+    best = -np.inf
+    for action in range(len(linear.values)):
+        linear.values[action] = _value(linear, state, action)
+        best = max(best, linear.values[action])
+    return best
+
+
+@inlined
+def _greedy(values: Any, best: float, u: float) -> int:
+    """`selection.choose_greedy`."""
+    ties = 0
+    for action in range(len(values)):
+        ties += values[action] == best
+    left = min(int(u * ties), ties - 1)
+    for action in range(len(values)):
+        if values[action] == best:
+            if left == 0:
+                return action
+            left -= 1
+    return 0
+
+
+@inlined
+def _choose(work: Any, linear: Any, state: int) -> None:
+    """The learner's own choice in a state, into lane 0."""
+    lanes, values, actions = work.lanes, linear.values, len(linear.values)
+    warm = linear.warm[lanes.lane[0].episode - 1]
+    best, low = _look(linear, state), np.inf
+    for action in range(actions):
+        low = min(low, values[action])
+    lanes.states[0], lanes.widths[0] = state, best - low
+    u = draw(lanes.rng, 0)
+    chosen = 0
+    if linear.selection == SOFTMAX:
+        per_tau, total = 1.0 / max(selection.COLDEST, warm), 0.0
+        for action in range(actions):
+            total += _exp_of((values[action] - best) * per_tau)
+            values[action] = total
+        mark = u * total * selection.BELOW_ONE
+        for action in range(actions - 1):
+            chosen += values[action] <= mark
+    elif linear.selection == GREEDY:
+        chosen = _greedy(values, best, u)
+    elif u >= warm:
+        chosen = _greedy(values, best, (u - warm) / (1.0 - warm))
+    else:
+        chosen = min(int(u / warm * actions), actions - 1)
+    lanes.chosen[0] = chosen
+
+
+@inlined
+def _learn(linear: Any, state: int, action: int, reward: float, discount: float, entered: int, following: int) -> None:
+    """`updates.linear.OnTiles.learn` of one step; discount 0: the episode is over."""
+    actions, follow = len(linear.values), discount > 0.0
+    best = _look(linear, entered)
+    after = linear.values[following] if linear.on_policy else best
+    follow = follow and (linear.on_policy or linear.values[following] == best)
+    error = reward + discount * after - _value(linear, state, action)
+    count = linear.traces[0]
+    for t in range(linear.active.shape[1]):
+        weight = linear.active[state, t] * actions + action
+        at = linear.place[weight]
+        if at < 0:
+            linear.place[weight], linear.listed[count], linear.strength[count] = count, weight, 1.0
+            count += 1
+        elif linear.growing:
+            linear.strength[at] += 1.0
+        else:
+            linear.strength[at] = 1.0
+    step, kept = linear.alpha * error, 0
+    for i in range(count):
+        weight, strength = linear.listed[i], linear.strength[i]
+        linear.weights[weight] += step * strength
+        strength *= linear.decay
+        if follow and strength > FAINT:
+            linear.listed[kept], linear.strength[kept], linear.place[weight] = weight, strength, kept
+            kept += 1
+        else:
+            linear.place[weight] = -1
+    linear.traces[0] = kept
+
+
+@inlined
+def _begin_session(work: Any, linear: Any, n: int) -> None:
+    lanes = work.lanes
+    lane = lanes.lane[0]
+    lane.session, lane.episode, lanes.rng[0] = n, 0, work.sessions.seeds[n]
+    lane.last_result, lane.equal_results, lane.converged = 0, 0, 0
+    for i in range(len(linear.weights)):
+        linear.weights[i] = linear.start
+
+
+@inlined
+def _begin_episode(work: Any, linear: Any) -> None:
+    """Whether the next episode may ask; the traces of the last one are forgotten."""
+    lanes, sessions, asking = work.lanes, work.sessions, work.asking
+    lane = lanes.lane[0]
+    count = sessions.counts[lane.session]
+    lane.episode, lane.asked, lane.helped = lane.episode + 1, 0, 0
+    lane.left = asking.budget - count.helped_steps
+    steps = sessions.steps[lane.session]
+    lane.is_open = opens(asking, lane, steps, work.learning.max_steps, count.rejected_at_episode > 0)
+    lanes.is_open[0] = lane.is_open
+    for i in range(linear.traces[0]):
+        linear.place[linear.listed[i]] = -1
+    linear.traces[0] = 0
+
+
+@inlined
+def _episode(work: Any, linear: Any, world: Any) -> None:
+    """`Session._walk`, and what is booked of it."""
+    lanes, learning, problem, sessions = work.lanes, work.learning, work.problem, work.sessions
+    lane = lanes.lane[0]
+    state: Any = _start(work, world)
+    _choose(work, linear, state)
+    action: Any = np.int64(decided(work, None, None, 0)[0])
+    moves, over, won = 0, False, False
+    entered: Any = 0
+    following: Any = np.int64(0)
+    while not over and moves < learning.max_moves:
+        moves += 1
+        if world.number == TABLE:
+            at = state * len(linear.values) + action
+            entered, reward = np.int64(problem.successor[at]), problem.reward[at]
+            over, won = problem.ends[entered] != 0, problem.ends[entered] == 1
+        else:
+            over = _moved(world, action)
+            entered, reward = _number(world), world.last_reward if over else world.reward
+            won = over and not world.falls
+        last = moves == learning.max_moves
+        if linear.lookahead and not over:
+            _choose(work, linear, entered)
+            following = np.int64(lanes.chosen[0]) if last else np.int64(decided(work, None, None, 0)[0])
+        _learn(linear, state, action, reward, 0.0 if over else learning.discount, entered, following)
+        if not linear.lookahead and not over and not last:
+            _choose(work, linear, entered)
+            following = np.int64(decided(work, None, None, 0)[0])
+        state, action = entered, following
+    n, count = lane.session, sessions.counts[lane.session]
+    if world.falls:
+        sessions.steps[n, lane.episode - 1] = (learning.max_moves - moves + 2 if over else 1) + learning.count_start
+    else:
+        sessions.steps[n, lane.episode - 1] = moves + learning.count_start if won else learning.max_steps + 1
+    sessions.guided[n, lane.episode - 1] = lane.helped > 0
+    count.requests += lane.asked
+    count.helped_steps += lane.helped
+    count.moves += moves
+    if lane.is_open and work.asking.gate.judges:
+        judge(work.asking, lane, sessions.steps[n], count)
+
+
+@lean
+def run(work: Any, linear: Any, world: Any) -> None:
+    """All sessions, one after the other."""
+    for n in range(len(work.sessions.seeds)):
+        _begin_session(work, linear, n)
+        for _ in range(len(linear.warm)):
+            _begin_episode(work, linear)
+            _episode(work, linear, world)
+        if len(work.sessions.kept):
+            for i in range(len(linear.weights)):
+                work.sessions.kept[n, i] = linear.weights[i]
+
+
+@lean
+def play(world: Any, policy: Any, starts: Any, most: int, moves: Any) -> None:
+    """The moves (N,) of a policy (S,) from each start (N, D), which is turned into the point where it ends.
+
+    Negative: they did not end the episode.
+    """
+    for n in range(len(starts)):
+        for i in range(len(world.x)):
+            world.x[i] = starts[n, i]
+        over, made = False, 0
+        while not over and made < most:
+            made += 1
+            over = _moved(world, policy[_number(world)])
+        moves[n] = made if over else -made

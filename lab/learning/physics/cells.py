@@ -1,0 +1,47 @@
+"""The cells of a world of continuous states, as the states of a problem."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+
+import numpy as np
+
+from lab.learning.physics import PHYSICS, Physics
+from lab.mdp import TabularMDP
+
+
+@dataclass(frozen=True, eq=False)
+class CellTable(TabularMDP):
+    """The cells of a world of continuous states; where its steps lead, only the world itself knows."""
+
+    world: str = ""
+
+    @classmethod
+    def of(cls, physics: Physics) -> "CellTable":
+        """Every move stays where it is, nothing ends; the start is the middle of where episodes begin."""
+        states, actions = int(np.prod(physics.bounds.shape)), len(physics.actions)
+        stays = np.repeat(np.arange(states, dtype=np.int32)[:, None], actions, axis=1)
+        no, middle = np.zeros(states, bool), [0.5] * len(physics.axes)
+        physics.begin(middle)
+        start = physics.bounds.number(middle)
+        return cls(stays, np.zeros(stays.shape), no, no, start, physics.actions, world=physics.name)
+
+    @property
+    def physics(self) -> Physics:
+        """The world itself."""
+        return PHYSICS[self.world]
+
+    @property
+    def cells(self) -> tuple[int, ...]:
+        """Those of the world's bounds."""
+        return self.physics.bounds.shape
+
+    @cached_property
+    def signature(self) -> str:
+        """As `TabularMDP.signature`, the world and its cells included."""
+        return sha256(f"{self.world} {self.physics.bounds} {super().signature}".encode()).hexdigest()[:16]
+
+    def state_label(self, state: int) -> str:
+        """The middle of a cell in words, such as "position -0.51, speed +0.003"."""
+        named = zip(self.physics.axes, self.physics.bounds.centre(state), strict=True)
+        return ", ".join(f"{axis} {value:+.3f}" for axis, value in named)

@@ -1,0 +1,130 @@
+"""Tile coding: values that neighbouring states share, for spaces too large for a table, and the cells that it tells apart.
+
+A tiling is a grid of tiles, each `tilings` cells wide along each axis; there are `tilings` of them, each shifted by a few
+cells against the one before. A state's value is the sum of its tiles' weights, one of each tiling. As all borders of tiles
+are borders of cells, a cell's number says all that tile coding can know of a state: for a continuous space, too, the state
+of the learner is a number, and what is asked, remembered and kept goes by it. One tiling is a table of the cells.
+The functions are written in the Python that numba compiles, too.
+Source: Sutton and Barto 2018, section 9.5.4.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import prod
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.errors import BadInput
+
+TileArray = NDArray[np.int32]
+Cell = TypeVar("Cell", int, TileArray)
+
+
+def cell_along(value: float, low: float, high: float, cells: int) -> int:
+    """The cell, 0 to cells - 1, of a value along an axis; what lies outside the bounds belongs to the last cell there."""
+    return int(min(max((value - low) / (high - low) * cells, 0.0), cells - 1.0))
+
+
+def shift(tiling: int, axis: int, tilings: int) -> int:
+    """By how many cells a tiling is shifted along an axis: by 1, 3, 5, ... more than the tiling before it.
+
+    Source: Miller and Glanz 1996; Sutton and Barto 2018, section 9.5.4.
+    """
+    return tiling * (2 * axis + 1) % tilings
+
+
+def tile_along(cell: Cell, shifted: int, tilings: int) -> Cell:
+    """The tile of a cell, or of each of several, along an axis of a shifted tiling."""
+    return (cell + shifted) // tilings
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """The cells of a continuous space: along each axis equally wide ones between low and high; numbered in C order."""
+
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    shape: tuple[int, ...]
+
+    def number(self, point: Sequence[float]) -> int:
+        """The number of the cell that a point lies in."""
+        number = 0
+        for axis, cells in enumerate(self.shape):
+            number = number * cells + cell_along(point[axis], self.low[axis], self.high[axis], cells)
+        return number
+
+    def centre(self, number: int) -> tuple[float, ...]:
+        """The middle of a cell."""
+        cells = np.unravel_index(number, self.shape)
+        ends = zip(cells, self.low, self.high, self.shape, strict=True)
+        return tuple(low + (int(cell) + 0.5) * (high - low) / count for cell, low, high, count in ends)
+
+
+@dataclass(frozen=True)
+class TileCoding:
+    """The tiles of a grid of cells; they are numbered tiling after tiling. Raises BadInput where there is no grid."""
+
+    shape: tuple[int, ...]
+    tilings: int
+
+    def __post_init__(self) -> None:
+        if not self.shape:
+            raise BadInput(f"tilings = {self.tilings}: the problem's states are no grid: allowed is 1, a table")
+
+    @cached_property
+    def per_tiling(self) -> tuple[int, ...]:
+        """How many tiles a tiling has along each axis: a shifted one needs one more than cover the grid."""
+        return tuple((cells - 1 + self.tilings - 1) // self.tilings + 1 for cells in self.shape)
+
+    @cached_property
+    def count(self) -> int:
+        """How many tiles there are."""
+        return self.tilings * prod(self.per_tiling)
+
+    def tiles_of(self, state: int) -> list[int]:
+        """The tiles of a cell, one of each tiling."""
+        cells = [int(cell) for cell in np.unravel_index(state, self.shape)]
+        found = []
+        for tiling in range(self.tilings):
+            number = tiling
+            for axis, cell in enumerate(cells):
+                shifted = shift(tiling, axis, self.tilings)
+                number = number * self.per_tiling[axis] + tile_along(cell, shifted, self.tilings)
+            found.append(number)
+        return found
+
+    @cached_property
+    def active(self) -> TileArray:
+        """`tiles_of` all cells; (S, tilings) int32."""
+        cells = np.indices(self.shape, np.int32).reshape(len(self.shape), -1)
+        found = np.empty((cells.shape[1], self.tilings), np.int32)
+        for tiling in range(self.tilings):
+            number = np.full(cells.shape[1], tiling, np.int32)
+            for axis, cell in enumerate(cells):
+                number = number * self.per_tiling[axis] + tile_along(
+                    cell, shift(tiling, axis, self.tilings), self.tilings
+                )
+            found[:, tiling] = number
+        return found
+
+    def values(self, weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The action values (S, A) of all cells, of weights (count, A): summed tiling after tiling."""
+        total = np.zeros((len(self.active), weights.shape[1]))
+        for tiling in range(self.tilings):
+            total += weights[self.active[:, tiling]]
+        return total
+
+    def weights(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Weights (count, A) whose values come nearest to given ones (S, A): exactly where tile coding has made these."""
+        if (values == values[0, 0]).all():
+            return np.full((self.count, values.shape[1]), values[0, 0] / self.tilings)
+        from scipy.sparse import csr_matrix
+        from scipy.sparse.linalg import lsqr
+
+        rows = np.arange(0, self.active.size + 1, self.tilings)
+        shape = (len(self.active), self.count)
+        matrix = csr_matrix((np.ones(self.active.size), self.active.ravel(), rows), shape=shape)
+        return np.stack([lsqr(matrix, column, atol=1e-13, btol=1e-13)[0] for column in values.T], axis=1)

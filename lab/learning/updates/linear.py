@@ -1,0 +1,146 @@
+"""Learners whose values are sums of weights of tiles: Q-learning and SARSA, with replacing or accumulating traces.
+
+The step size is shared out among the tilings. Source: Sutton and Barto 2018, section 12.7 and example 10.1.
+"""
+
+from collections.abc import Sequence
+from typing import overload
+
+import numpy as np
+
+from lab.learning.selection import Draw
+from lab.learning.settings import LearnerSettings
+from lab.learning.tiles import TileCoding
+from lab.learning.updates.one_step import q_target, sarsa_target
+from lab.learning.updates.traces import is_greedy
+from lab.learning.updates.update import Row, Update
+from lab.mdp import FloatArray, TabularMDP
+
+FAINT = 0.01  # an eligibility below this is dropped: the traces of thousands of tiles are not worth their time
+
+
+class TileRows(Sequence[Row]):
+    """Action values that are summed up on lookup; weights (tiles * A,) is flat, a tile's actions side by side."""
+
+    def __init__(self, coding: TileCoding, actions: int, weights: Row):
+        self.coding, self.weights, self._actions = coding, weights, actions
+        self._states = int(np.prod(coding.shape))
+        self._places: dict[int, list[int]] = {}  # of the states that were looked up
+
+    def __len__(self) -> int:
+        return self._states
+
+    def places(self, state: int) -> list[int]:
+        """Where the weights of a state's tiles begin."""
+        found = self._places.get(state)
+        if found is None:
+            found = self._places[state] = [tile * self._actions for tile in self.coding.tiles_of(state)]
+        return found
+
+    @overload
+    def __getitem__(self, state: int) -> Row: ...
+    @overload
+    def __getitem__(self, state: slice) -> list[Row]: ...
+    def __getitem__(self, state: int | slice) -> Row | list[Row]:
+        if isinstance(state, slice):
+            return [self[s] for s in range(*state.indices(len(self)))]
+        weights, row = self.weights, []
+        for action in range(self._actions):
+            total = 0.0  # one after the other, as the kernel adds them: newer Pythons' sum rounds otherwise
+            for place in self.places(state):
+                total += weights[place + action]
+            row.append(total)
+        return row
+
+
+class OnTiles(Update):
+    """What all of them do: an error moves the weights that led to it, each by its eligibility.
+
+    Source: Sutton and Barto 2018, section 12.7 (binary features, replacing or accumulating traces).
+    """
+
+    decays = False
+
+    def __init__(self, q: FloatArray, settings: LearnerSettings, mdp: TabularMDP):
+        coding = TileCoding(mdp.cells, settings.tilings)
+        self._rows = TileRows(coding, mdp.n_actions, coding.weights(q).ravel().tolist())
+        self.q = self._rows
+        self._alpha = settings.alpha / settings.tilings
+        self._decay = settings.discount * settings.trace if self.decays else 0.0
+        self._growing = not settings.replacing
+        self._traces: dict[int, float] = {}
+
+    def begin(self) -> None:
+        """Forgets the traces of the last episode."""
+        self._traces.clear()
+
+    def table(self) -> FloatArray:
+        """The values of all cells."""
+        rows = self._rows
+        return rows.coding.values(np.array(rows.weights).reshape(rows.coding.count, -1))
+
+    def scatter(self, draw: Draw) -> None:
+        """Every weight: a state's values lie within +-0.5, as in a table."""
+        weights, tilings = self._rows.weights, self._rows.coding.tilings
+        weights[:] = [(draw() - 0.5) / tilings for _ in weights]
+
+    def _spread(self, s_tm1: int, a_tm1: int, error: float, follow: bool) -> None:
+        """Moves every weight that led here by its eligibility; then lets the traces fade, or cuts them."""
+        weights, traces, decay = self._rows.weights, self._traces, self._decay
+        for place in self._rows.places(s_tm1):
+            traces[place + a_tm1] = traces.get(place + a_tm1, 0.0) + 1.0 if self._growing else 1.0
+        step = self._alpha * error
+        for place, eligibility in traces.items():
+            weights[place] += step * eligibility
+        if follow and decay > 0.0:
+            self._traces = {
+                place: eligibility * decay for place, eligibility in traces.items() if eligibility * decay > FAINT
+            }
+        else:
+            traces.clear()
+
+
+class TileQLearning(OnTiles):
+    """Q-learning, one step at a time."""
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """One update of the tiles of s."""
+        error = q_target(r_t, discount_t, self.q[s_t]) - self.q[s_tm1][a_tm1]
+        self._spread(s_tm1, a_tm1, error, False)
+
+
+class TileSarsa(OnTiles):
+    """SARSA, one step at a time."""
+
+    lookahead = True
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """One update of the tiles of s."""
+        error = sarsa_target(r_t, discount_t, self.q[s_t], a_t) - self.q[s_tm1][a_tm1]
+        self._spread(s_tm1, a_tm1, error, discount_t > 0.0)
+
+
+class TileQLambda(OnTiles):
+    """Watkins's Q(lambda): traces are cut when the next action is not greedy."""
+
+    lookahead = chained = decays = True
+
+    def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
+        """One update of every tile that led here."""
+        q_t = self.q[s_t]
+        error = q_target(r_t, discount_t, q_t) - self.q[s_tm1][a_tm1]
+        self._spread(s_tm1, a_tm1, error, discount_t > 0.0 and is_greedy(q_t, a_t))
+
+
+class TileSarsaLambda(TileSarsa):
+    """SARSA(lambda): traces follow whatever is done."""
+
+    chained = decays = True
+
+
+LINEAR: dict[str, type[OnTiles]] = {  # by the learner of a table
+    "q": TileQLearning,
+    "sarsa": TileSarsa,
+    "q-lambda": TileQLambda,
+    "sarsa-lambda": TileSarsaLambda,
+}

@@ -1,0 +1,125 @@
+"""Problems of the field rebuilt as tables: MiniGrid's empty, door-key and lava layouts, and the order of toasts."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lab.mdp import Rewards, TabularMDP
+
+AHEAD = ((0, 1), (1, 0), (0, -1), (-1, 0))  # right, down, left, up: row and column
+LEFT, RIGHT, FORWARD, PICK_UP, TOGGLE = range(5)
+TURNS = ("left", "right", "forward", "pick up", "toggle")
+EMPTY_ROWS = ("S.....", "......", "......", "......", "......", ".....G")
+DOOR_KEY_ROWS = ("S.#.", "..#.", "k.D.", "..#G")
+FAR_DOOR_ROWS = ("S..#..", "...#..", "..k#..", "...D..", "...#..", "...#.G")
+FOUR_ROOMS_ROWS = ("S..#....", "...#....", "........", "...#....", "#.####.#", "...#....", "........", "...#...G")
+CROSSING_ROWS = ("S.~....", "..~....", "....~..", "..~.~..", "..~.~..", "..~.~..", "..~.~.G")
+LAVA_ROWS = ("S..~...", "...~...", "...~...", "...~...", ".......", "...~...", "...~..G")
+WON, LOST = "won", "lost"
+ENDS = {"G": WON, "~": LOST}
+
+Leads = Callable[
+    [Any, int], Any
+]  # from a state, whatever can be in a dictionary, to another; WON and LOST end an episode
+
+
+class At(NamedTuple):
+    """Where an agent of MiniGrid is: row, column, which of AHEAD it faces, whether it has the key and the door is open."""
+
+    row: int
+    column: int
+    facing: int = 0
+    has_key: bool = False
+    is_open: bool = False
+
+
+def explored(start: Any, actions: Sequence[str], leads: Leads) -> TabularMDP:
+    """The states that can be reached from one, by number in the order found, as a decision problem with the lab's rewards."""
+    rewards, queue = Rewards(), [start]
+    found: dict[Any, int] = {start: 0}
+    rows: list[list[int]] = []
+    for state in queue:
+        ends = state in (WON, LOST)
+        row = []
+        for action in range(len(actions)):
+            entered = state if ends else leads(state, action)
+            if entered not in found:
+                found[entered] = len(found)
+                queue.append(entered)
+            row.append(found[entered])
+        rows.append(row)
+    successor = np.array(rows, np.int32)
+    goal, lost = (np.array([state == end for state in found]) for end in (WON, LOST))
+    reward = np.where(goal[successor], rewards.goal, np.where(lost[successor], rewards.collision, rewards.step))
+    reward[goal | lost] = 0.0
+    return TabularMDP(successor, reward, goal | lost, goal, 0, tuple(actions))
+
+
+def minigrid(rows: Sequence[str]) -> TabularMDP:
+    """A layout with walls around: S start (facing right), G goal, # wall, ~ lava, k key, D locked door.
+
+    Actions turn left and right and go forward, with a door also pick up and toggle; one that does nothing stays. Lava ends
+    the episode. A key in the way blocks it until it is picked up; the door opens by toggling it from the front with the key.
+    Source: Chevalier-Boisvert et al. 2023, its rules; rewards are the lab's, as MiniGrid's depend on the time.
+    """
+    cells = {(r, c): mark for r, row in enumerate(rows) for c, mark in enumerate(row)}
+    (start,) = (cell for cell, mark in cells.items() if mark == "S")
+    doors = "D" in cells.values()
+
+    def leads(at: At, action: int) -> At | str:
+        if action in (LEFT, RIGHT):
+            return at._replace(facing=(at.facing + (1 if action == RIGHT else -1)) % len(AHEAD))
+        down, right = AHEAD[at.facing]
+        ahead = at.row + down, at.column + right
+        mark = cells.get(ahead, "#")
+        if action == PICK_UP:
+            return at._replace(has_key=at.has_key or mark == "k")
+        if action == TOGGLE:
+            return at._replace(is_open=at.is_open or (mark == "D" and at.has_key))
+        if mark in ENDS:
+            return ENDS[mark]
+        shut = mark == "#" or (mark == "k" and not at.has_key) or (mark == "D" and not at.is_open)
+        return at if shut else at._replace(row=ahead[0], column=ahead[1])
+
+    return explored(At(*start), TURNS if doors else TURNS[:3], leads)
+
+
+TOASTS, TOASTING, BUTTERING, SLOTS = 3, 4, 2, 2  # times in steps of 10 s
+BREAD, IN_TOASTER, TOASTED, IN_APPLIER, BUTTERED, DONE = range(6)
+
+
+Toasts = tuple[tuple[int, int], ...]  # of each toast its stage, and how long it still stays there
+
+
+def toast_order() -> TabularMDP:
+    """In which order the robot moves three toasts: a step is 10 s, a move takes one, and the least steps are the makespan.
+
+    Each toast is bread, in the toaster (two slots, 40 s), toasted, under the butter applier (one, 20 s), buttered, done. An
+    action moves one toast on, or waits; a move that cannot be made is a wait. All else about the cell is left out.
+    """
+
+    def leads(toasts: Toasts, action: int) -> Toasts | str:
+        moved = None
+        if action < TOASTS:
+            stage, _ = toasts[action]
+            room = sum(one[0] in (IN_TOASTER, TOASTED) for one in toasts) < SLOTS
+            free = all(one[0] not in (IN_APPLIER, BUTTERED) for one in toasts)
+            if stage == BREAD and room:
+                moved = (IN_TOASTER, TOASTING)
+            elif stage == TOASTED and free:
+                moved = (IN_APPLIER, BUTTERING)
+            elif stage == BUTTERED:
+                moved = (DONE, 0)
+        after = []
+        for number, (stage, left) in enumerate(toasts):
+            if number == action and moved is not None:
+                after.append(moved)
+            elif stage in (IN_TOASTER, IN_APPLIER):
+                after.append((stage, left - 1) if left > 1 else (stage + 1, 0))
+            else:
+                after.append((stage, left))
+        return WON if all(stage == DONE for stage, _ in after) else tuple(after)
+
+    moves = tuple(f"move toast {number + 1}" for number in range(TOASTS))
+    return explored(((BREAD, 0),) * TOASTS, (*moves, "wait"), leads)

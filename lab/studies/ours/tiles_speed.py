@@ -1,0 +1,80 @@
+"""How fast sessions on tiles are in Mountain Car: compiled, readable, and through Gymnasium's own loop."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from lab.gym import parse_name
+from lab.gym.gym_environment import GymEnvironment
+from lab.gym.numbered_environment import NumberedEnvironment
+from lab.learning.batch import run_sessions
+from lab.learning.environment import Environment
+from lab.learning.physics import PHYSICS
+from lab.learning.physics.environment import PhysicsEnvironment, fitting
+from lab.learning.session import Session
+from lab.learning.settings import GateSettings
+from lab.learning.splitmix import stream
+from lab.studies.findings import Findings, Row, median_row
+from lab.studies.runner import Job
+
+NAME, EPISODES, READABLE_EPISODES, REPEATS = "MountainCar-v0", 500, 60, 5
+NOBODY = GateSettings("never")
+ABOUT = (
+    "Steps of MountainCar-v0 a second, one process on one core, median of five runs; compile time is not counted. The learner is "
+    f"SARSA(lambda) with replacing traces on eight tilings: {EPISODES} episodes a session in the kernel, "
+    f"{READABLE_EPISODES} in the readable one, on the lab's own physics and on Gymnasium's. 'gymnasium alone' learns nothing: "
+    "it moves by chance."
+)
+
+
+def tiles_speed(job: Job, reading: Mapping[str, Any]) -> Findings:
+    """Thousand steps a second, median of five runs; the reading changes nothing here."""
+    car = PhysicsEnvironment(PHYSICS[NAME])
+    learner = replace(fitting(car.physics), episodes=EPISODES)
+    short = replace(learner, episodes=READABLE_EPISODES)
+    seeds = np.arange(job.seed, job.seed + job.sessions, dtype=np.uint64)
+
+    def readable(place: Environment) -> int:
+        session = Session(place, short, NOBODY, None, stream(job.seed))
+        for episode in range(1, READABLE_EPISODES + 1):
+            session.play(episode)
+        return sum(map(sum, session.visits))
+
+    theirs = GymEnvironment(NumberedEnvironment(parse_name(f"gym:{NAME}", "study"), "study"))
+    runs: dict[str, Callable[[], int]] = {
+        "kernel": lambda: int(run_sessions(car, learner, NOBODY, None, seeds).moves.sum()),
+        "session": lambda: readable(car),
+        "session through gymnasium": lambda: readable(theirs),
+        "gymnasium alone": lambda: _by_chance(job.seed),
+    }
+    rows = job.in_turn([lambda name=name, run=run: _row(name, run) for name, run in runs.items()])  # type: ignore[misc]
+    rates = {one["name"]: one["value"] for one in rows}
+    summary: Row = {f"kernel to {name}": round(rates["kernel"] / rates[name], 1) for name in rates if name != "kernel"}
+    return Findings(rows, summary, {}, (ABOUT,))
+
+
+def _by_chance(seed: int) -> int:
+    """The steps of READABLE_EPISODES episodes."""
+    env, made, draw = gymnasium.make(NAME), 0, stream(seed)
+    for episode in range(READABLE_EPISODES):
+        env.reset(seed=seed + episode)
+        for _ in range(PHYSICS[NAME].limit):
+            *_, over, late, _ = env.step(int(draw() * 3))
+            made += 1
+            if over or late:
+                break
+    return made
+
+
+def _row(name: str, run: Callable[[], int]) -> Row:
+    run()  # compiles
+    rates = []
+    for _ in range(REPEATS):
+        began = time.perf_counter()
+        moves = run()
+        rates.append(moves / (time.perf_counter() - began) / 1e3)
+    return median_row({"name": name, "world": NAME}, "speed_thousand steps per s", rates)

@@ -1,0 +1,89 @@
+"""Moves left to chance, advisors that are late or hold back: compiled sessions equal the interactive ones."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lab.errors import BadInput
+from lab.learning.batch import run_sessions
+from lab.learning.chance_table import ChanceTable, Outcome
+from lab.learning.gates import GATES
+from lab.learning.requests import AdviceRequest
+from lab.learning.session import run_session
+from lab.learning.settings import GateSettings, LearnerSettings
+from lab.learning.simulated_advice import (
+    SPEAKS_ALWAYS,
+    SPEAKS_AS_EXPECTED,
+    SPEAKS_TO_CORRECT,
+    Advice,
+    TableAdvisor,
+    advice_chances,
+)
+from lab.learning.splitmix import stream
+from lab.mdp import TabularMDP, grid, optimal_values
+
+LEARNER = LearnerSettings("q", alpha=0.5, episodes=25, max_steps=30)
+EAGER = GateSettings(first_episode=4, window=2, omega=1, psi=0.4, spread=0.2, rate=0.3, enough_steps=9.0, budget=50)
+
+
+def slippery() -> ChanceTable:
+    """A board of 4 x 4 with an obstacle; a move goes as meant with chance 0.8, else as the next action would."""
+    blocked = np.zeros((4, 4), bool)
+    blocked[1, 1] = True
+    mdp = grid((4, 4), blocked, (0, 0), (3, 3))
+    outcomes: list[list[Outcome]] = []
+    for state in range(mdp.n_states):
+        for action in range(mdp.n_actions):
+            both = (action, 0.8), ((action + 1) % mdp.n_actions, 0.2)
+            outcomes.append([(p, int(mdp.successor[state, a]), float(mdp.reward[state, a])) for a, p in both])
+    return ChanceTable(mdp, outcomes, optimal_values(mdp, 0.99))
+
+
+def advice(mdp: TabularMDP) -> Advice:
+    return Advice.of(advice_chances(optimal_values(mdp, 0.99), 0.3), np.arange(mdp.n_states) != 2)
+
+
+@pytest.mark.parametrize("gate", GATES)
+@pytest.mark.parametrize("speaks", [SPEAKS_ALWAYS, SPEAKS_TO_CORRECT, SPEAKS_AS_EXPECTED])
+def test_compiled_sessions_are_the_same(gate: str, speaks: int) -> None:
+    table, how = slippery(), replace(EAGER, gate=gate)
+    who = replace(advice(table.mdp), late=speaks == SPEAKS_TO_CORRECT, speaks=speaks)
+    seeds = np.arange(40, 70, dtype=np.uint64)
+    batch = run_sessions(table, LEARNER, how, who, seeds, keep_tables=True)
+    for n in (0, 5, 29):
+        draw = stream(int(seeds[n]))
+        one = run_session(table, LEARNER, how, TableAdvisor(who, draw), draw)
+        np.testing.assert_array_equal(batch.steps[n], one.steps)
+        np.testing.assert_array_equal(batch.q[n], one.q)
+        assert (batch.requests[n], batch.helped_steps[n]) == (one.requests, one.helped_steps)
+
+
+def test_outcomes_come_as_often_as_they_should() -> None:
+    table, draw = slippery(), stream(3)
+    entered = [table.step(0, 1, draw).state for _ in range(2000)]  # down, else left, where it stays
+    assert {*entered} == {0, 4}
+    assert 0.77 < np.mean(np.array(entered) == 4) < 0.83
+
+
+def test_chances_must_sum_to_one() -> None:
+    mdp = grid((1, 2), np.zeros((1, 2), bool), (0, 0), (0, 1))
+    outcomes: list[list[Outcome]] = [[(0.5, 0, 0.0)]] * (mdp.n_states * mdp.n_actions)
+    with pytest.raises(BadInput, match=r"outcomes of move 0: their chances sum to 0\.5: wanted 1"):
+        ChanceTable(mdp, outcomes, np.zeros((2, 4)))
+
+
+def request(mdp: TabularMDP, state: int, own: int) -> AdviceRequest:
+    return AdviceRequest(episode=1, step=1, state=state, own=own, allowed=range(4), mdp=mdp, q=[])
+
+
+def test_advisors_that_are_late_or_hold_back() -> None:
+    mdp = grid((1, 4), np.zeros((1, 4), bool), (0, 0), (0, 3))
+    right = 3
+    sure = Advice.of(np.tile(np.eye(4)[right], (4, 1)), np.array([True, True, False, True]))
+    late = TableAdvisor(replace(sure, late=True), stream(0))
+    assert [late.advise(request(mdp, state, 0)) for state in (0, 1, 2, 1)] == [None, right, right, None]
+    correcting = TableAdvisor(replace(sure, speaks=SPEAKS_TO_CORRECT), stream(0))
+    assert [correcting.advise(request(mdp, 0, own)) for own in (0, right)] == [right, None]
+    expecting = TableAdvisor(replace(sure, speaks=SPEAKS_AS_EXPECTED), stream(0))
+    assert [expecting.advise(request(mdp, 0, own)) for own in (right, 0, 0)] == [right, None, right]

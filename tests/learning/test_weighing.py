@@ -1,0 +1,170 @@
+"""Gates that weigh what they are told: their rules on cases that can be redone by hand."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lab.learning.gates import GATES, Surroundings, earned_trust, heard
+from lab.learning.gates.weighing import Weighing
+from lab.learning.selection import exp_of
+from lab.learning.settings import GateSettings, LearnerSettings
+
+LEFT, RIGHT, STAY = range(3)
+EPISODES, LIMIT = 10, 20
+
+
+def gate(name: str, u: float = 0.5, values: Callable[[int], list[float]] = lambda state: [0.0] * 3) -> Weighing:
+    """A gate in a problem of 4 states and 3 actions, whose uniform numbers are all u."""
+    around = Surroundings(lambda: u, lambda count: [], False, values, (4, 3), LearnerSettings(alpha=0.5))
+    made = GATES[name].make(GateSettings(name), EPISODES, LIMIT, around)
+    assert isinstance(made, Weighing)
+    made.opens(1, [])
+    return made
+
+
+def test_novelty_asks_until_it_is_answered() -> None:
+    one = gate("novelty")
+    assert one.asks(2, [])
+    assert one.takes(2, LEFT, None) == LEFT  # silence is no answer
+    assert one.asks(2, [])
+    assert one.takes(2, LEFT, RIGHT) == RIGHT
+    assert not one.asks(2, [])
+    assert one.asks(1, [])
+    assert str(one.why) == "it was told 0 times here"
+
+
+def test_fading_asks_about_fewer_steps_each_episode() -> None:
+    one = gate("fading", u=0.95)  # its share is 0.97 ** (n - 1)
+    asked = []
+    for episode in (1, 2, 3):
+        one.opens(episode, [])
+        asked.append(one.asks(0, []))
+    assert asked == [True, True, False]
+
+
+def test_shaping_multiplies_what_was_said_with_the_own_chances() -> None:
+    told = heard.blank(1, 3)
+    for action in (RIGHT, RIGHT, STAY):
+        heard.hear(told, 0, action)
+    values, odds = [1.0, 0.0, 0.0], 3.0  # weights 1, e**-1 * 9, e**-1 * 3
+    weights = np.array([1.0, 9.0 * exp_of(-1.0), 3.0 * exp_of(-1.0)])
+    ends = np.cumsum(weights) / weights.sum()
+    drawn = [heard.shaped(told, 0, values, 1.0, odds, u) for u in (0.0, ends[0] + 0.01, ends[1] - 0.01, ends[1] + 0.01)]
+    assert drawn == [LEFT, RIGHT, RIGHT, STAY]
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=6), st.floats(0.0, 1.0, exclude_max=True))
+def test_shaping_draws_an_action_whatever_the_values(values: list[float], u: float) -> None:
+    told = heard.blank(1, len(values))
+    assert 0 <= heard.shaped(told, 0, values, 1e3, 99.0, u) < len(values)
+
+
+def test_reliability_follows_what_its_values_bear_out() -> None:
+    table = {0: [0.0, 1.0, 0.0], 1: [2.0, 1.0, 0.0]}
+    one = gate("reliability", u=0.0, values=lambda state: table[state])
+    assert one.asks(0, [])
+    assert one.takes(0, LEFT, RIGHT) == RIGHT  # trust 1/2 at first, above guessing's 1/3
+    one.saw(0, RIGHT, 0.0, 1.0, 1, 0)  # its values say so, too: 2 of 3
+    assert (one.heard.now.right, one.heard.now.wrong) == (2.0, 1.0)
+    assert not one.asks(0, [])  # once a state
+    for _ in range(5):
+        one.takes(1, STAY, STAY)
+        one.saw(1, STAY, 0.0, 1.0, 0, 0)  # LEFT is worth more
+    assert (one.heard.now.right, one.heard.now.wrong) == (2.0, 6.0)
+    assert one.takes(0, LEFT, None) == LEFT  # 1/4, less than what the other two actions share
+    late = gate("reliability", u=0.5)
+    late.opens(6, [])  # explores with chance 1 - 5/8
+    assert not late.asks(0, [])
+
+
+def test_two_levels_learn_what_asking_is_worth() -> None:
+    one = gate("two-levels")
+    assert one.asks(0, [])  # both are worth nothing yet
+    one.takes(0, LEFT, RIGHT)
+    one.saw(0, RIGHT, -1.0, 0.0, 1, 0)
+    assert list(one.heard.worth[:2]) == [0.0, -0.5]  # alpha 0.5
+    assert not one.asks(0, [])
+    one.takes(0, LEFT, None)
+    one.saw(0, LEFT, -2.0, 0.0, 1, 0)
+    assert list(one.heard.worth[:2]) == [-1.0, -0.5]
+    assert one.asks(0, [])
+    assert not gate("two-levels", u=0.01).asks(0, [])  # one step in twenty tries the other
+
+
+def walk(one: Weighing, moves: list[tuple[int, int | None, int, int]], reached: bool, over: bool = False) -> list[int]:
+    """An episode: in each state what is own, said, and where the move leads; the actions that were taken."""
+    one.begins(moves[0][0])
+    taken = []
+    for number, (state, said, own, entered) in enumerate(moves, start=1):
+        asked = one.asks(state, [])
+        taken.append(one.takes(state, own, said if asked else None))
+        ends = (reached or over) and number == len(moves)
+        one.saw(state, taken[-1], 0.0, 0.0 if ends else 1.0, entered, 0)
+    one.judges([len(moves) if reached else LIMIT + 1], True)
+    return taken
+
+
+def test_trust_remembers_and_asks_no_more_where_it_is_sure() -> None:
+    one = gate("trust")
+    way: list[tuple[int, int | None, int, int]] = [(0, RIGHT, LEFT, 1), (1, RIGHT, LEFT, 2), (2, RIGHT, LEFT, 3)]
+    assert walk(one, way, True) == [RIGHT] * 3
+    assert one.heard.now.rate == 1.0
+    assert one.asks(0, [])  # one answer alone leads by no more than the root of one
+    one.takes(0, LEFT, RIGHT)
+    assert not one.asks(0, [])  # two alike do
+    assert one.takes(0, LEFT, None) == RIGHT  # and it is followed without asking
+
+
+def test_trust_drops_what_leads_round() -> None:
+    one = gate("trust")
+    walk(one, [(0, RIGHT, LEFT, 1), (1, LEFT, RIGHT, 0), (0, RIGHT, LEFT, 1)], False)
+    assert np.flatnonzero(one.heard.blamed).tolist() == [RIGHT]  # back in 0 by advised moves alone
+    assert earned_trust.favourite(one.heard, 0) == heard.NOTHING
+    own = gate("trust")
+    walk(own, [(0, RIGHT, LEFT, 1), (1, None, LEFT, 0), (0, RIGHT, LEFT, 1)], False)
+    assert not any(own.heard.blamed)  # the learner itself had a hand in it
+
+
+def test_trust_drops_what_ends_in_failure_but_not_where_moves_are_left_to_chance() -> None:
+    one = gate("trust")
+    walk(one, [(0, RIGHT, LEFT, 3)], False, over=True)
+    assert np.flatnonzero(one.heard.blamed).tolist() == [RIGHT]
+    chance = gate("trust")
+    walk(chance, [(0, RIGHT, LEFT, 1), (1, None, LEFT, 0), (0, RIGHT, LEFT, 2)], False)  # right led to 1, and to 2
+    assert chance.heard.now.uncertain == 1.0
+    walk(chance, [(0, RIGHT, LEFT, 3)], False, over=True)
+    assert not any(chance.heard.blamed)
+
+
+def test_trust_goes_alone_once_its_own_way_is_as_short() -> None:
+    values = {0: [0.0, 1.0, 0.0], 1: [0.0, 1.0, 0.0]}
+    one = gate("trust", u=0.0, values=lambda state: values[state])
+    walk(one, [(0, RIGHT, LEFT, 1), (1, RIGHT, LEFT, 2)], True)
+    assert earned_trust.rehearsed(one.heard, 0) == 2  # its values say right twice, and that was walked
+    one.begins(0)
+    assert one.heard.now.advised == 0.0
+    assert not one.asks(0, [])
+    values[1] = [2.0, 1.0, 0.0]  # left in 1, where nobody went
+    one.saw(1, LEFT, 0.0, 1.0, 1, 0)
+    assert earned_trust.rehearsed(one.heard, 0) == heard.NOTHING
+    one.begins(0)
+    assert one.heard.now.advised == 1.0
+
+
+@pytest.mark.parametrize(("u", "advised"), [(0.03, 1.0), (0.04, 0.0)])
+def test_trust_seldom_tries_again_what_never_worked(u: float, advised: float) -> None:
+    one = gate("trust", u=u)
+    walk(one, [(0, RIGHT, LEFT, 3)], False, over=True)
+    one.begins(0)  # once in 2**5
+    assert one.heard.now.advised == advised
+
+
+def test_trust_says_why_it_asks() -> None:
+    one = gate("trust")
+    walk(one, [(0, RIGHT, LEFT, 1), (1, RIGHT, LEFT, 3)], True)
+    one.begins(0)
+    one.asks(2, [])
+    assert "100% of the recent advised episodes reached the goal" in str(one.why)
