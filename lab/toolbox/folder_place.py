@@ -114,7 +114,10 @@ class FolderPlace:
     def tidy(self, older_s: float) -> list[str]:
         """Half-written files, and folders of sessions that nothing was written into."""
         gone, until_s = [], time.time() - older_s
-        for left in (*self.folder.glob("**/.*.tmp"), *self.folder.glob(f"{SESSIONS}/*")):
+        found = list[Path]()
+        with suppress(OSError):  # a folder that is taken away meanwhile
+            found = [*self.folder.glob("**/.*.tmp"), *self.folder.glob(f"{SESSIONS}/*")]
+        for left in found:
             is_draft = _DRAFT.fullmatch(left.name) is not None and not left.is_dir()
             with suppress(OSError):  # another command has removed it; a folder with something in it stays
                 if left.is_symlink() or left.stat().st_mtime > until_s or not (is_draft or left.is_dir()):
