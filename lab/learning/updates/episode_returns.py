@@ -8,7 +8,8 @@ from lab.mdp import TabularMDP
 class MonteCarlo(OnTable):
     """First-visit Monte Carlo with a constant step: Q(s,a) += alpha (G - Q(s,a)) when the episode is over.
 
-    A broken-off episode counts as if the start value came after it: nothing, where that is 0. Source: Sutton and Barto 1998, section 5.4.
+    A broken-off episode counts as if the start value came after it: nothing, where that is 0.
+    Source: Sutton and Barto 1998, section 5.4.
     """
 
     chained = True
