@@ -119,3 +119,12 @@ def test_start_values_hold_wherever_nothing_was_learned() -> None:
         assert q[0].min() < -3.0  # a step costs
     both(CAR, replace(SHORT, start_value=-50.0, episodes=4), GateSettings("never"), None)
     assert not is_compiled(mdp, settings, EAGER)
+
+
+def test_what_comes_after_a_broken_off_episode_is_thought_to_be_worth_the_start_value() -> None:
+    """Two steps of -0.1 in a corridor that is longer: -0.1 - 0.1 - 5, by hand, without discount."""
+    mdp = grid((1, 9), np.zeros((1, 9), bool), (0, 4), (0, 8))
+    for start, worth in ((0.0, -0.2), (-5.0, -5.2)):
+        learner = LearnerSettings("monte-carlo", alpha=1.0, discount=1.0, start_value=start, episodes=1, max_steps=2)
+        q = run_session(mdp, learner, GateSettings("never"), None, stream(1)).q
+        assert worth in np.round(q[4], 9)

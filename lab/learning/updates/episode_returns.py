@@ -8,7 +8,8 @@ from lab.mdp import TabularMDP
 class MonteCarlo(OnTable):
     """First-visit Monte Carlo with a constant step: Q(s,a) += alpha (G - Q(s,a)) when the episode is over.
 
-    A broken-off episode counts as if nothing came after it. Source: Sutton and Barto 1998, section 5.4.
+    A broken-off episode counts as if the start value came after it: nothing, where that is 0.
+    Source: Sutton and Barto 1998, section 5.4.
     """
 
     chained = True
@@ -16,6 +17,7 @@ class MonteCarlo(OnTable):
     def __init__(self, q: list[Row], settings: LearnerSettings, mdp: TabularMDP):
         super().__init__(q, settings, mdp)
         self._episode: list[tuple[int, int, float]] = []
+        self._after = 0.0
 
     def begin(self) -> None:
         """Forgets the last episode."""
@@ -23,11 +25,12 @@ class MonteCarlo(OnTable):
 
     def learn(self, s_tm1: int, a_tm1: int, r_t: float, discount_t: float, s_t: int, a_t: int) -> None:
         """Remembers the step."""
+        self._after = self._settings.start_value if discount_t else 0.0
         self._episode.append((s_tm1, a_tm1, r_t))
 
     def end(self) -> None:
         """Learns from the returns that followed the first visits."""
-        outcome, returns = 0.0, dict[tuple[int, int], float]()
+        outcome, returns = self._after, dict[tuple[int, int], float]()
         for state, action, reward in reversed(self._episode):
             outcome = reward + self._settings.discount * outcome
             returns[state, action] = outcome  # the last one written is that of the first visit
