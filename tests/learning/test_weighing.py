@@ -108,7 +108,7 @@ def walk(one: Weighing, moves: list[tuple[int, int | None, int, int]], reached: 
 
 
 def test_trust_remembers_and_asks_no_more_where_it_is_sure() -> None:
-    one = gate("trust")
+    one = gate("earned-trust")
     way: list[tuple[int, int | None, int, int]] = [(0, RIGHT, LEFT, 1), (1, RIGHT, LEFT, 2), (2, RIGHT, LEFT, 3)]
     assert walk(one, way, True) == [RIGHT] * 3
     assert one.heard.now.rate == 1.0
@@ -119,20 +119,20 @@ def test_trust_remembers_and_asks_no_more_where_it_is_sure() -> None:
 
 
 def test_trust_drops_what_leads_round() -> None:
-    one = gate("trust")
+    one = gate("earned-trust")
     walk(one, [(0, RIGHT, LEFT, 1), (1, LEFT, RIGHT, 0), (0, RIGHT, LEFT, 1)], False)
     assert np.flatnonzero(one.heard.blamed).tolist() == [RIGHT]  # back in 0 by advised moves alone
     assert earned_trust.favourite(one.heard, 0) == heard.NOTHING
-    own = gate("trust")
+    own = gate("earned-trust")
     walk(own, [(0, RIGHT, LEFT, 1), (1, None, LEFT, 0), (0, RIGHT, LEFT, 1)], False)
     assert not any(own.heard.blamed)  # the learner itself had a hand in it
 
 
 def test_trust_drops_what_ends_in_failure_but_not_where_moves_are_left_to_chance() -> None:
-    one = gate("trust")
+    one = gate("earned-trust")
     walk(one, [(0, RIGHT, LEFT, 3)], False, over=True)
     assert np.flatnonzero(one.heard.blamed).tolist() == [RIGHT]
-    chance = gate("trust")
+    chance = gate("earned-trust")
     walk(chance, [(0, RIGHT, LEFT, 1), (1, None, LEFT, 0), (0, RIGHT, LEFT, 2)], False)  # right led to 1, and to 2
     assert chance.heard.now.uncertain == 1.0
     walk(chance, [(0, RIGHT, LEFT, 3)], False, over=True)
@@ -141,7 +141,7 @@ def test_trust_drops_what_ends_in_failure_but_not_where_moves_are_left_to_chance
 
 def test_trust_goes_alone_once_its_own_way_is_as_short() -> None:
     values = {0: [0.0, 1.0, 0.0], 1: [0.0, 1.0, 0.0]}
-    one = gate("trust", u=0.0, values=lambda state: values[state])
+    one = gate("earned-trust", u=0.0, values=lambda state: values[state])
     walk(one, [(0, RIGHT, LEFT, 1), (1, RIGHT, LEFT, 2)], True)
     assert earned_trust.rehearsed(one.heard, 0) == 2  # its values say right twice, and that was walked
     one.begins(0)
@@ -156,14 +156,14 @@ def test_trust_goes_alone_once_its_own_way_is_as_short() -> None:
 
 @pytest.mark.parametrize(("u", "advised"), [(0.03, 1.0), (0.04, 0.0)])
 def test_trust_seldom_tries_again_what_never_worked(u: float, advised: float) -> None:
-    one = gate("trust", u=u)
+    one = gate("earned-trust", u=u)
     walk(one, [(0, RIGHT, LEFT, 3)], False, over=True)
     one.begins(0)  # once in 2**5
     assert one.heard.now.advised == advised
 
 
 def test_trust_says_why_it_asks() -> None:
-    one = gate("trust")
+    one = gate("earned-trust")
     walk(one, [(0, RIGHT, LEFT, 1), (1, RIGHT, LEFT, 3)], True)
     one.begins(0)
     one.asks(2, [])

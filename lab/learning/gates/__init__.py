@@ -84,7 +84,7 @@ _SHIPPED: dict[str, Member[GateClass]] = {
         "learns in every state whether asking or going on alone is worth more",
         _weighing(rules.WEIGHS_WORTH),
     ),
-    "trust": Member(
+    "earned-trust": Member(
         Trust,
         "remembers what it is told, follows it while episodes with advice do better than those without, and drops what "
         "leads round",

@@ -1,4 +1,4 @@
-"""The rule of the gate "trust": follow advice while it does better than going alone, remember it, drop what leads round.
+"""The rule of the gate "earned-trust": follow advice while it does better than going alone, remember it, drop what leads round.
 
 1. Answers are counted, state by state, and the one that was given most often is followed, also without asking. The learner asks
    while none leads clearly: by SURE times the root of how many there were, ANSWERS at the most.

@@ -1,4 +1,4 @@
-"""Gates that keep what they are told and weigh it: the field's rules, and the lab's own, "trust"."""
+"""Gates that keep what they are told and weigh it: the field's rules, and the lab's own, "earned-trust"."""
 
 from lab.learning.gates import earned_trust, heard
 from lab.learning.gates.gate import Gate, Surroundings, Values

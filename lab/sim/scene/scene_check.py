@@ -1,7 +1,7 @@
 """What is wrong with a task's cell before anything is surveyed in it: reach, heights, and stations in each other's way."""
 
 from itertools import combinations
-from math import hypot, inf, sin
+from math import hypot, sin
 
 from lab.errors import BadInput
 from lab.sim import models
@@ -72,7 +72,9 @@ def _check_held(kind: Kind, force_n: float) -> None:
     """BadInput when the fingers press too weakly for what they carry, or so strongly that it is squeezed out of them."""
     mass_kg, friction = sum(one.part.mass_kg for one in kind.stack()), kind.part.friction
     what = f"robot.grip_force_n = {force_n:g}: {kind.name} of {mass_kg:g} kg, friction {friction:g},"
-    least = HOLDS * mass_kg * GRAVITY_M_S2 / (2 * friction) if friction else inf
+    if not friction:
+        raise BadInput(f"{what} would slip from between the fingers, however strongly they press")
+    least = HOLDS * mass_kg * GRAVITY_M_S2 / (2 * friction)
     if force_n < least:
         raise BadInput(f"{what} would slip or tilt between the fingers: at least {least:.3g} N needed")
     if force_n > (most := SQUEEZES_N_KG * mass_kg):

@@ -24,7 +24,8 @@ from lab.studies.runner import Job, seeds_of
 PROBLEMS = ("world-1", "world-2", "insert", "transfer")
 RELIABILITIES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)  # CLUE's full panel
 RANKED, LIMITED = "ranked", "limited"
-GATES = ("always", "ccrl", "trust")
+EARNED = "earned-trust"
+GATES = ("always", "ccrl", EARNED)
 BEST_IN_A_STATE = 1e-9  # values that differ by less are equally good
 MEASURES = (
     "Ranked: seven advisors whose answers are right (among the best actions) in 0 to 100 % of the cases, else wrong, all asked "
@@ -115,14 +116,14 @@ def whom_to_believe(job: Job, reading: Mapping[str, Any]) -> Findings:
         f"{gate}, {'one' if members == 1 else 'three'}": [
             _row(rows, name, LIMITED, gate, members=members, decide="trust-weighted") for name in PROBLEMS
         ]
-        for gate in ("always", "trust")
+        for gate in ("always", EARNED)
         for members in (1, 3)
     }
     says: Row = {
         "ranking of seven right, asked always [%]": ", ".join(f"{one['problem']} {one['value']:.0f}" for one in right),
-        "three limited over nobody, gate trust [points]": ", ".join(
+        "three limited over nobody, gate earned-trust [points]": ", ".join(
             f"{one['problem']} {one['value']:+.1f} ({one['ci95'][0]:+.1f} to {one['ci95'][1]:+.1f})"
-            for one in gains["trust, three"]
+            for one in gains[f"{EARNED}, three"]
         ),
     }
     pictures = {"Points of limited advisors": bars(PROBLEMS, _lifted(gains, rows), "points", label="")}

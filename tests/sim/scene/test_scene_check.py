@@ -141,7 +141,7 @@ def test_a_machines_body_must_not_stand_on_another_stations_spots(fms: Task, mov
         (0.04, 0.8, 100.0, None),
         (0.02, 1.0, 100.0, "would be squeezed out of the fingers: at most 60 N allowed"),
         (1.0, 0.8, 25.0, "would slip or tilt between the fingers: at least 49 N needed"),
-        (0.04, 0.0, 25.0, "would slip or tilt between the fingers: at least inf N needed"),
+        (0.04, 0.0, 25.0, "would slip from between the fingers, however strongly they press"),
     ],
 )
 def test_what_the_fingers_cannot_hold_is_refused(

@@ -90,17 +90,17 @@ def test_every_rule_runs_and_nobody_is_the_same_whatever_the_advisor() -> None:
     assert all(one.points.shape == (3,) and one.answers.max() <= 100 for key, one in found.items() if key[1] == "100")
     nobody = tried(Case("empty", None), 3, 0)["nobody", "any"]
     assert found["always", "any"].points == pytest.approx([100.0] * 3, abs=0.5)
-    assert found["trust", "any"].points.mean() > nobody.points.mean()
+    assert found["earned-trust", "any"].points.mean() > nobody.points.mean()
 
 
 def test_a_small_bench_goes_on_where_it_stopped_and_says_the_same(tmp_path: Path) -> None:
-    reading = {"problem": ["empty"], "methods": ["always", "trust"], "advisors": ["expert", "contrary"]}
+    reading = {"problem": ["empty"], "methods": ["always", "earned-trust"], "advisors": ["expert", "contrary"]}
     job = Job(sessions=3, folder=tmp_path)
     found = advice_bench(job, reading)
     assert len(found.rows) == 1 + 2 * 2 * 2
     harm = [one for one in found.rows if (one["rule"], one["advisor"], one["budget"]) == ("always", "contrary", "any")]
     assert harm[0]["value"] < -80.0
-    assert "rank 1" in found.summary["'trust'"]
+    assert "rank 1" in found.summary["'earned-trust'"]
     lines = (tmp_path / "sessions.jsonl").read_text().splitlines()
     assert [json.loads(line)["case"][1] for line in lines] == [None, "expert", "contrary"]
     (tmp_path / "sessions.jsonl").write_text("\n".join([*lines[:2], "cut"]))
@@ -122,7 +122,9 @@ def test_what_cannot_be_benched_is_refused() -> None:
 def test_a_file_of_ones_own_and_any_advisor_that_always_answers_alike(tmp_path: Path) -> None:
     maze = tmp_path / "maze.txt"
     maze.write_text("S..\n.#.\n..G\n")
-    found = advice_bench(Job(sessions=3), {"problem": [str(maze)], "methods": ["trust"], "advisors": ["tau=0.05"]})
+    found = advice_bench(
+        Job(sessions=3), {"problem": [str(maze)], "methods": ["earned-trust"], "advisors": ["tau=0.05"]}
+    )
     assert found.rows[-1]["value"] > 0.0
     place = problem(str(maze))
     assert advice_of("tau=0.05", place).thresholds.shape == (1, *place.mdp.successor.shape)

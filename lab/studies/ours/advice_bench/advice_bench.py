@@ -35,9 +35,9 @@ RULES_NOTE = (
     "that the literature gives for deep learners are their idea in a table."
 )
 CHOSEN = (
-    "Chosen on the problems that are not held out: the constants of 'trust' (with seed 0, so that its figures there flatter "
-    "it), the rivals' settings (the best mean gain of three to six values each, with seed 7), and the learner's settings, so "
-    "that nobody learns best. Held out, nothing was chosen on them: " + ", ".join(HELD_OUT) + "."
+    "Chosen on the problems that are not held out: the constants of 'earned-trust' (with seed 0, so that its figures there "
+    "flatter it), the rivals' settings (the best mean gain of three to six values each, with seed 7), and the learner's "
+    "settings, so that nobody learns best. Held out, nothing was chosen on them: " + ", ".join(HELD_OUT) + "."
 )
 RANKED = (
     "Ranks: of the points in each cell (problem, advisor, budget), ties shared, averaged within each problem, then over "

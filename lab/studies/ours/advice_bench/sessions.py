@@ -18,7 +18,7 @@ BUDGETS = {"100": 100, "any": GateSettings.budget}  # answers of a session
 CHANCE_TIMES = 4  # as many sessions where moves are left to chance: their points vary more
 LAST = 0.1  # the share of the episodes that shows what was learned
 BINS = 40  # of a learning curve
-NOBODY, OURS = "nobody", "trust"
+NOBODY, OURS = "nobody", "earned-trust"
 
 
 class Rule(NamedTuple):
