@@ -66,7 +66,7 @@ class Advising:
     @property
     def records(self) -> bool:
         """Whether anybody speaks only where a record or a policy has something: such silence is not held against the advice."""
-        return any(name.folder is not None or name.policy for name in self.names)
+        return any(name.folder or name.policy or name.answers for name in self.names)
 
     def cut_records(self) -> list[Read]:
         """The journals among the advisors whose last line was cut off. Raises BadInput for what is no journal."""
@@ -76,7 +76,7 @@ class Advising:
     def check_records(self, mdp: TabularMDP) -> list[PolicyAdvisor]:
         """The policies that advise; BadInput for a record or a policy that is not about this problem."""
         level = TableLevel(mdp, 1.0, np.random.default_rng(0), toolbox=self.toolbox)
-        known = [make_advisor(name, level) for name in self.names if name.folder is not None or name.policy]
+        known = [make_advisor(name, level) for name in self.names if name.folder or name.policy or name.answers]
         return [one for one in known if isinstance(one, PolicyAdvisor)]
 
     def gather(

@@ -35,6 +35,9 @@ class Level(Protocol):
     def learned(self, name: str) -> "Advisor":
         """The policy of that name, or in that file; BadInput where there is none, and where it knows nothing of this."""
 
+    def answered(self, path: Path) -> "Mapping[int, int]":
+        """What a file of answers says in each state; BadInput where it is about something else."""
+
 
 @dataclass(frozen=True)
 class AdvisorName:
@@ -48,6 +51,7 @@ class AdvisorName:
     taus: tuple[float, ...] = ()
     folder: Path | None = None
     policy: str = ""
+    answers: Path | None = None
     itself: "Advisor | None" = None
 
     @classmethod
@@ -62,7 +66,7 @@ class AdvisorName:
 
     @classmethod
     def of(cls, text: str, where: str = "advisor") -> "AdvisorName":
-        """From "expert", "tau=0.2", "tau=1..0.01", "recorded:DIR", "policy:NAME"; BadInput, with `where` it was said."""
+        """From "expert", "tau=0.2", "recorded:DIR", "answers:FILE", "policy:NAME"...; BadInput, with `where` it was said."""
         if text.startswith("recorded:"):
             folder = Path(text.removeprefix("recorded:"))
             if not folder.name:
@@ -77,6 +81,13 @@ class AdvisorName:
                     f"advisor '{text}' ({where}): it names no policy: wanted policy:NAME; see lab toolbox list"
                 )
             return cls(text, "policy:NAME", policy=policy)
+        if text.startswith("answers:"):
+            path = Path(text.removeprefix("answers:"))
+            if not path.name:
+                raise BadInput(
+                    f"advisor '{text}' ({where}): it names no file: wanted answers:FILE, see docs/teaching.md"
+                )
+            return cls(text, "answers:FILE", answers=path)
         if not text.startswith("tau="):
             if text in ADVISORS:
                 return cls(text, text, (SKILL_TAUS[text],) if text in SKILL_TAUS else ())
@@ -148,6 +159,14 @@ def _recorded(name: AdvisorName, level: Level) -> "Advisor":
     return RecordedAdvisor(said)
 
 
+def _answers(name: AdvisorName, level: Level) -> "Advisor":
+    assert name.answers is not None
+    try:
+        return RecordedAdvisor(level.answered(name.answers))
+    except BadInput as error:
+        raise BadInput(f"advisor '{name}': {error}") from None
+
+
 def _learned(name: AdvisorName, level: Level) -> "Advisor":
     try:
         return level.learned(name.policy)
@@ -176,6 +195,7 @@ _SHIPPED: dict[str, AdvisorKind] = {
     "tau=X": AdvisorKind(_simulated),
     "tau=X..Y": AdvisorKind(_simulated, "changing over the episodes"),
     "recorded:DIR": AdvisorKind(_recorded, "a session's folder"),
+    "answers:FILE": AdvisorKind(_answers, 'answers kept as JSON, {"state": "action"}'),
     "policy:NAME": AdvisorKind(_learned, "a policy in the toolbox, or its file"),
 }
 ADVISORS = Family("advisors", _SHIPPED, _adopted)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
+from pathlib import Path
 
 import numpy as np
 
@@ -53,6 +54,10 @@ class OrderLevel:
         """BadInput for advice about another cell."""
         if recorded.session.signature != self.signature:
             raise recorded_fault(recorded, "order", self.signature)
+
+    def answered(self, path: Path) -> Mapping[int, int]:
+        """BadInput: such files are about the states of a table."""
+        raise BadInput("a file of answers is about the steps of a sub-task, not the order: wanted another advisor")
 
     def learned(self, name: str) -> Advisor:
         """BadInput: policies in the toolbox are tables of steps."""

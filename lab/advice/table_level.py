@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from lab.advice.advisors import AdvisorName, make_advisor, recorded_fault
+from lab.advice.answers_file import answers_of
 from lab.advice.entries import Read
 from lab.advice.policy_advisor import PolicyAdvisor, policy_of
 from lab.errors import BadInput
@@ -46,6 +48,10 @@ class TableLevel:
         for state, action in recorded.said().items():
             if not (0 <= state < self.mdp.n_states and 0 <= action < self.mdp.n_actions):
                 raise BadInput(f"state {state}, action {action} do not exist")
+
+    def answered(self, path: Path) -> Mapping[int, int]:
+        """As `answers_of`."""
+        return answers_of(path, self.mdp)
 
     def learned(self, name: str) -> Advisor:
         """A policy that says what it would do, silent where it has never been."""

@@ -115,7 +115,7 @@ def say_read(kept: "KeptSession | OrderSession", where: str) -> None:
         named = list(parse_name(str(named[0]), where).options.values())
     files = [word for word in named if isinstance(word, str) and is_path(word) and Path(word).is_file()]
     advisors = [AdvisorName.of(name) for name in options.advisors]
-    files += [str(name.folder) for name in advisors if name.folder is not None]
+    files += [str(one) for name in advisors for one in (name.folder, name.answers) if one is not None]
     here = kept.read.path.parent.resolve()
     if outside := [name for name in files if not Path(name).resolve().is_relative_to(here)]:
         complain(f"journal '{kept.read.path}' names, outside its folder, what is read now: {', '.join(outside)}")

@@ -24,7 +24,7 @@ AdvisorNames = Annotated[
     typer.Option(
         "--advisor",
         help="Who advises: {advisors} (X..Y: changing over the episodes; DIR: a session's folder; "
-        "NAME: a policy in the toolbox, also of another world); "
+        "FILE: answers as JSON; NAME: a policy in the toolbox, also of another world); "
         "several times for several advisors.",
         autocompletion=offers("advisors"),
         callback=from_files("advisors"),

@@ -1,0 +1,39 @@
+"""Answers kept as a file: what somebody, a language model for instance, said of states, by their names or numbers."""
+
+from pathlib import Path
+
+from lab.errors import BadInput, unknown
+from lab.mdp import TabularMDP
+from lab.toolbox.strict_json import loads
+
+MOST_BYTES = 10_000_000
+
+
+def answers_of(path: Path, mdp: TabularMDP) -> dict[int, int]:
+    """The action said in each state of a problem, from a JSON object {"state": "action"}; both as labels or as numbers.
+
+    Raises BadInput for a file that cannot be read, is too large or no such object, and for states or actions that there are not.
+    """
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise BadInput(f"'{path}' has more than {MOST_BYTES} bytes")
+        said = loads(path.read_bytes())
+    except OSError as error:
+        raise BadInput(f"'{path}' cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError):
+        raise BadInput(f"'{path}' is no JSON: wanted an object of states and actions") from None
+    if not isinstance(said, dict) or not said:
+        raise BadInput(f'\'{path}\': wanted an object of states and actions, such as {{"(0, 1)": "right"}}')
+    states = {mdp.state_label(state): state for state in range(mdp.n_states)}
+    actions = {label: action for action, label in enumerate(mdp.action_labels)}
+    numbers = {str(action): action for action in actions.values()}
+    found = {}
+    for name, what in said.items():
+        state = int(name) if name.isascii() and name.isdigit() and int(name) < mdp.n_states else states.get(name)
+        if state is None:
+            raise unknown("state", name, states, str(path))
+        word = str(what)
+        if word not in actions and word not in numbers:
+            raise unknown("action", word, actions, f"{path}, state {name}")
+        found[state] = actions[word] if word in actions else numbers[word]
+    return found
