@@ -67,27 +67,12 @@ class AdvisorName:
     @classmethod
     def of(cls, text: str, where: str = "advisor") -> "AdvisorName":
         """From "expert", "tau=0.2", "recorded:DIR", "answers:FILE", "policy:NAME"...; BadInput, with `where` it was said."""
-        if text.startswith("recorded:"):
-            folder = Path(text.removeprefix("recorded:"))
-            if not folder.name:
-                raise BadInput(
-                    f"advisor '{text}' ({where}): it names no file: wanted recorded:DIR, the folder of a session"
-                )
-            return cls(text, "recorded:DIR", folder=folder)
-        if text.startswith("policy:"):
-            policy = text.removeprefix("policy:")
-            if not policy.strip():
-                raise BadInput(
-                    f"advisor '{text}' ({where}): it names no policy: wanted policy:NAME; see lab toolbox list"
-                )
-            return cls(text, "policy:NAME", policy=policy)
-        if text.startswith("answers:"):
-            path = Path(text.removeprefix("answers:"))
-            if not path.name:
-                raise BadInput(
-                    f"advisor '{text}' ({where}): it names no file: wanted answers:FILE, see docs/teaching.md"
-                )
-            return cls(text, "answers:FILE", answers=path)
+        kind, colon, rest = text.partition(":")
+        if colon and kind in PREFIXED:
+            row, field, make, wanted = PREFIXED[kind]
+            if not Path(rest).name.strip():
+                raise BadInput(f"advisor '{text}' ({where}): it names {wanted}")
+            return cls(text, row, **{field: make(rest)})
         if not text.startswith("tau="):
             if text in ADVISORS:
                 return cls(text, text, (SKILL_TAUS[text],) if text in SKILL_TAUS else ())
@@ -174,6 +159,12 @@ def _learned(name: AdvisorName, level: Level) -> "Advisor":
         raise BadInput(f"advisor '{name}': {error}") from None
 
 
+# what is told by a prefix: its row, the field of AdvisorName, what that is made by, and what is said where it is missing
+PREFIXED: dict[str, tuple[str, str, Callable[[str], Any], str]] = {
+    "recorded": ("recorded:DIR", "folder", Path, "no file: wanted recorded:DIR, the folder of a session"),
+    "answers": ("answers:FILE", "answers", Path, "no file: wanted answers:FILE, see docs/teaching.md"),
+    "policy": ("policy:NAME", "policy", str, "no policy: wanted policy:NAME; see lab toolbox list"),
+}
 PYTHON = "python"  # the row of an advisor that is in no table
 PEOPLE = {"terminal": "prompt", "web": "page"}
 SKILL_TAUS = {"expert": 0.01, "moderate": 0.1, "limited": 0.3, "novice": 1.0}
