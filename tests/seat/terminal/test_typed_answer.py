@@ -151,3 +151,12 @@ def test_counts_repeat_the_next_move(parts: list[tuple[int, str]]) -> None:
     assert counted == understand(f"path {letters_only}", board())
     assert isinstance(counted, tuple)
     assert len(counted) == sum(count for count, _ in parts)
+
+
+def test_arrows_lead_left_and_right_where_the_states_are_no_grid() -> None:
+    over = np.array([False, True])
+    car = TabularMDP(
+        np.array([[0, 0, 1], [1, 1, 1]], np.int32), np.zeros((2, 3)), over, over, 0, ("left", "coast", "right")
+    )
+    assert [understand(word, car) for word in ("←", "→", "c", "\x1b[C")] == [0, 2, 1, 2]
+    assert understand("↑", car) == "'↑' is no path: '↑' is no move; letters: l left, c coast, r right"
