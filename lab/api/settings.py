@@ -34,6 +34,8 @@ class Settings(TypedDict, total=False):
     psi: float
     spread: float
     rate: float
+    fading: float
+    consistency: float
     enough_steps: float
     ensemble: int
     budget: int
