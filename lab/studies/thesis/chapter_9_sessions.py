@@ -61,6 +61,9 @@ class AdviceSetting:
         place = world(self.world).model_dump(mode="json")
         for name in ("spare_best", "fading", "consistency"):
             del place["gate"][name]  # no result depends on it: see `gate_of`
+        for name, off in (("tilings", 1), ("start_value", 0.0)):
+            if place["learner"][name] == off:
+                del place["learner"][name]
         learned = (LEARNED_EPISODES, LEARNED_BETA, LEARNED_SEED)
         whole = [FORMAT, asdict(self, dict_factory=said), sessions, seed, place, *learned]
         return sha256(json.dumps(whole).encode()).hexdigest()[:24]

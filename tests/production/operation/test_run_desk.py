@@ -107,7 +107,7 @@ def test_a_protective_stop_waits_for_who_attends_and_is_done_again_without_them(
     assert [[held.why for held in one.stops] for one in noted] == [["it presses"], []]
     operation.close()
 
-    again = made()
+    again = made(folder="again")
     again.open()
     floor = again.scene.floor
     floor.controls.attended = False
