@@ -101,7 +101,10 @@ ADVISORS, LEARNERS, GATES = (
         ),
         ("teach random:3x3", "world 'random:3x3': wanted random:SHAPE:DENSITY:SEED, such as random:10x10x10:0.06:7"),
         ("teach random:3x3:0.9:1", "random world 3x3: density 0.9: allowed are 0 to 0.6"),
-        ("task random 10 --out w.toml", "SHAPE: shape 10: allowed are 2 axes of 1 to 1200 cells or 3 axes of 1 to 112 cells"),
+        (
+            "task random 10 --out w.toml",
+            "SHAPE: shape 10: allowed are 2 axes of 1 to 1200 cells or 3 axes of 1 to 112 cells",
+        ),
         ("task random 10x10 --density nan --out w.toml", "random world 10x10: density nan: allowed are 0 to 0.6"),
         ("task random 10x10 --out w.txt", "task file 'w.txt' (--out): its name must end in .toml"),
         ("task random 10x10 --out no/w.toml", "no/w.toml: cannot be written: No such file or directory"),
