@@ -73,12 +73,9 @@ def direction_of(mdp: TabularMDP, action: int) -> int | None:
 
 
 def points_by_name(mdp: TabularMDP) -> bool:
-    """Whether the actions are called after the four directions of a picture, or of the sky, in whatever order.
-
-    Where the states are no grid, left and right are enough.
-    """
-    known, axes = {NAMES.get(label.lower()) for label in mdp.action_labels}, len(mdp.coverage_shape or mdp.shape)
-    return axes <= 2 and known >= ({2, 3} if not axes else {0, 1, 2, 3})
+    """Whether the actions are called after the four directions of a picture, or of the sky, in whatever order."""
+    known = {NAMES.get(label.lower()) for label in mdp.action_labels}
+    return len(mdp.coverage_shape or mdp.shape) <= 2 and known >= {0, 1, 2, 3}
 
 
 def nearest_goal(mdp: TabularMDP, cell: tuple[int, ...]) -> tuple[int, ...] | None:

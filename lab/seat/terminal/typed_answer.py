@@ -4,7 +4,7 @@ import re
 from difflib import get_close_matches
 
 from lab.mdp import TabularMDP
-from lab.seat.grid_text import ARROWS, ASCII_ARROWS, DIRECTIONS, direction_of
+from lab.seat.grid_text import ARROWS, ASCII_ARROWS, DIRECTIONS, NAMES, direction_of
 
 Understood = int | tuple[int, ...] | str
 COMMANDS = {  # what is typed -> what it is called, what it does; "path" begins with the word and goes on
@@ -59,7 +59,8 @@ def _move(word: str, mdp: TabularMDP) -> tuple[int | None, list[int]]:
     begun = [action for action, label in enumerate(labels) if label.startswith(word)]
     if len(begun) == 1:
         return begun[0], []
-    pointing = {direction_of(mdp, action): action for action in range(mdp.n_actions)}
+    pointing = {NAMES.get(label): action for action, label in enumerate(labels)}
+    pointing |= {direction_of(mdp, action): action for action in range(mdp.n_actions)}
     for direction, name in enumerate(DIRECTIONS):
         meant = name.startswith(word) or word in (ARROWS[direction], ASCII_ARROWS[direction])
         if meant and direction in pointing:
