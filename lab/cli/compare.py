@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from lab.cli.families import from_files, offers
-from lab.cli.options import Json, Seed
+from lab.cli.options import Json, ProblemName, Seed, SightInWorld, TaskOfSkill
 from lab.cli.output import console, show
 from lab.errors import BadInput
 from lab.learning.settings import SETTINGS
@@ -40,12 +40,7 @@ def _with_settings(function: Callable[..., None]) -> Callable[..., None]:
 
 @_with_settings
 def study_compare(
-    problem: Annotated[
-        str,
-        typer.Argument(
-            help="A world: its name, a .toml file, a .txt grid, random:SHAPE:DENSITY:SEED; gym:ID; or a sub-task of --task."
-        ),
-    ],
+    problem: ProblemName,
     *,
     advisor: Annotated[
         str,
@@ -55,10 +50,8 @@ def study_compare(
             callback=from_files("advisors"),
         ),
     ] = "expert",
-    task: Annotated[str | None, typer.Option("--task", help="The task that a sub-task is of; default: toast.")] = None,
-    sight: Annotated[
-        str | None, typer.Option("--sight", help="Where in a world the advisor sees the robot: full or limited.")
-    ] = None,
+    task: TaskOfSkill = None,
+    sight: SightInWorld = None,
     sessions: Annotated[int, typer.Option("--sessions", min=2, max=1_000_000, help="Of each setting.")] = 100,
     workers: Annotated[int, typer.Option("--workers", min=1, max=256, help="Processes; the rows are the same.")] = 1,
     dask: Annotated[str | None, typer.Option("--dask", help="The address of a Dask scheduler to work on.")] = None,

@@ -19,6 +19,34 @@ ToolboxPlace = Annotated[
         help="Where policies are kept: a folder, or an address such as s3://bucket/lab; default: your data folder.",
     ),
 ]
+LearnerName = Annotated[
+    str | None,
+    typer.Option(
+        "--learner",
+        help="{learners}; default: the problem's.",
+        autocompletion=offers("learners"),
+        callback=from_files("learners"),
+    ),
+]
+GateName = Annotated[
+    str | None,
+    typer.Option(
+        "--gate",
+        help="When it asks: {gates}, or one of your own, ./mine.py:MyGate, whose code runs; default: the problem's.",
+        autocompletion=offers("gates"),
+        callback=from_files("gates"),
+    ),
+]
+ProblemName = Annotated[
+    str,
+    typer.Argument(
+        help="A world: its name, a .toml file, a .txt grid, random:SHAPE:DENSITY:SEED; gym:ID; or a sub-task of --task."
+    ),
+]
+TaskOfSkill = Annotated[str | None, typer.Option("--task", help="The task that a sub-task is of; default: toast.")]
+SightInWorld = Annotated[
+    str | None, typer.Option("--sight", help="Where in a world the advisor sees the robot: full or limited.")
+]
 AdvisorNames = Annotated[
     list[str] | None,
     typer.Option(

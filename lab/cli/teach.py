@@ -5,14 +5,16 @@ from typing import Annotated
 
 import typer
 
-from lab.cli.families import from_files, offers
+from lab.cli.families import offers
 from lab.cli.lessons import lesson_seat, say_read, teacher_of
 from lab.cli.options import (
     MAX_EPISODES,
     AdvisorNames,
     Asked,
     Decide,
+    GateName,
     Json,
+    LearnerName,
     Plain,
     Port,
     Seed,
@@ -37,24 +39,8 @@ def teach(
     task: Annotated[
         str | None, typer.Option("--task", help="A task that ships, or a .toml file; default: toast. None for a world.")
     ] = None,
-    learner: Annotated[
-        str | None,
-        typer.Option(
-            "--learner",
-            help="{learners}; default: the task's.",
-            autocompletion=offers("learners"),
-            callback=from_files("learners"),
-        ),
-    ] = None,
-    gate: Annotated[
-        str | None,
-        typer.Option(
-            "--gate",
-            help="When it asks: {gates}, or one of your own, ./mine.py:MyGate, whose code runs; default: the task's.",
-            autocompletion=offers("gates"),
-            callback=from_files("gates"),
-        ),
-    ] = None,
+    learner: LearnerName = None,
+    gate: GateName = None,
     memory: Annotated[
         bool | None,
         typer.Option(

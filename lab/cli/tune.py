@@ -7,17 +7,12 @@ import typer
 
 from lab.cli.compare import listed
 from lab.cli.families import from_files, offers
-from lab.cli.options import Json, Seed
+from lab.cli.options import GateName, Json, LearnerName, ProblemName, Seed, SightInWorld, TaskOfSkill
 from lab.cli.output import console, show
 
 
 def tune(
-    problem: Annotated[
-        str,
-        typer.Argument(
-            help="A world: its name, a .toml file, a .txt grid, random:SHAPE:DENSITY:SEED; gym:ID; or a sub-task of --task."
-        ),
-    ],
+    problem: ProblemName,
     advisor: Annotated[
         str,
         typer.Option(
@@ -27,24 +22,8 @@ def tune(
             callback=from_files("advisors"),
         ),
     ] = "expert",
-    learner: Annotated[
-        str | None,
-        typer.Option(
-            "--learner",
-            help="{learners}; default: the problem's.",
-            autocompletion=offers("learners"),
-            callback=from_files("learners"),
-        ),
-    ] = None,
-    gate: Annotated[
-        str | None,
-        typer.Option(
-            "--gate",
-            help="When it asks: {gates}; default: the problem's.",
-            autocompletion=offers("gates"),
-            callback=from_files("gates"),
-        ),
-    ] = None,
+    learner: LearnerName = None,
+    gate: GateName = None,
     over: Annotated[
         str | None,
         typer.Option(
@@ -57,10 +36,8 @@ def tune(
     sessions: Annotated[
         int, typer.Option("--sessions", min=2, max=100_000, help="Of each trial that is not given up early.")
     ] = 45,
-    task: Annotated[str | None, typer.Option("--task", help="The task that a sub-task is of; default: toast.")] = None,
-    sight: Annotated[
-        str | None, typer.Option("--sight", help="Where in a world the advisor sees the robot: full or limited.")
-    ] = None,
+    task: TaskOfSkill = None,
+    sight: SightInWorld = None,
     workers: Annotated[int, typer.Option("--workers", min=1, max=256, help="Processes; the result is the same.")] = 1,
     seed: Seed = 0,
     out: Annotated[Path, typer.Option("--out", help="Folder for report, rows, sessions and settings.toml.")] = Path(

@@ -30,6 +30,8 @@ RANGES: dict[str, Range] = {
     "psi": Span(0.01, 10.0, log=True),
     "spread": Span(0.01, 1.0, log=True),
     "rate": Span(0.01, 1.0, log=True),
+    "fading": Span(0.8, 0.999),
+    "consistency": Span(0.55, 0.95),
     "enough_steps": Span(5.0, 200.0, log=True),
     "ensemble": Span(2, 10),
     "judge_unhelped": (False, True),

@@ -35,6 +35,15 @@ def test_every_range_lies_in_what_is_allowed_and_holds_the_default() -> None:
         else:
             assert not allowed or default in allowed, name
     assert {*USUAL} <= {*RANGES}
+    given = {
+        "budget",
+        "episodes",
+        "max_steps",
+        "count_start",
+        "tilings",
+        "start_value",
+    }  # of the problem, not of its learner
+    assert {*SETTINGS} - {*RANGES} == given
 
 
 def test_an_unsolved_session_costs_the_limit_as_a_whole() -> None:
