@@ -1,0 +1,36 @@
+"""What a part of the harness is: numbered attempts to break the lab, each with an outcome."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one attempt ended.
+
+    group: the row of the scoreboard that counts it; case: what was done, so that a reader can do it again; broke: what went
+    wrong, empty if the lab held; tries: how many things were tried in it; figures: anything measured.
+    """
+
+    group: str
+    case: str
+    broke: str = ""
+    tries: int = 1
+    figures: dict[str, float] | None = None
+
+
+@dataclass(frozen=True)
+class Part:
+    """One way of breaking the lab.
+
+    what: told in the help; target: what should hold; count: how many attempts a long run makes; prepare(room, seed): makes
+    what all attempts start from in an empty folder, once; attempt(number, seed, room): tries once, alike for the same number and
+    seed, in folders of its own under `room`, and leaves nothing running. `count` None: all that `prepare` says there are.
+    """
+
+    what: str
+    target: str
+    count: int | None
+    prepare: Callable[[Path, int], int | None]
+    attempt: Callable[[int, int, Path], Outcome]
