@@ -8,20 +8,27 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from page_attacks import PART as REQUESTS
 from parts import Part
 from rich.console import Console
 from rich.progress import Progress
 from scoreboard import line, show, written
 
-PARTS: dict[str, Part] = {}
+PARTS: dict[str, Part] = {"requests": REQUESTS}
 
 
 def main(
-    parts: Annotated[list[str] | None, typer.Argument(help=f"which: {', '.join(PARTS)}; all of them if none is named")] = None,
-    count: Annotated[int | None, typer.Option(min=1, help="attempts of each part; else as many as a long run makes")] = None,
+    parts: Annotated[
+        list[str] | None, typer.Argument(help=f"which: {', '.join(PARTS)}; all of them if none is named")
+    ] = None,
+    count: Annotated[
+        int | None, typer.Option(min=1, help="attempts of each part; else as many as a long run makes")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0)] = 0,
     workers: Annotated[int, typer.Option(min=1)] = 2,
-    out: Annotated[Path, typer.Option(help="what was tried, a file a part; gone on with if it is there")] = Path("lab-dev-out"),
+    out: Annotated[Path, typer.Option(help="what was tried, a file a part; gone on with if it is there")] = Path(
+        "lab-dev-out"
+    ),
 ) -> None:
     """Tries to break the lab and prints what held."""
     console = Console(width=160)
@@ -45,7 +52,11 @@ def attempts(name: str, part: Part, count: int | None, seed: int, workers: int, 
     wanted = range(min(count or most, there_are or count or most))
     file = out / f"{name}.jsonl"
     todo = [number for number in wanted if number not in written(file)]
-    with Progress(console=console) as progress, ThreadPoolExecutor(workers) as pool, file.open("a", encoding="utf-8") as lines:
+    with (
+        Progress(console=console) as progress,
+        ThreadPoolExecutor(workers) as pool,
+        file.open("a", encoding="utf-8") as lines,
+    ):
         bar = progress.add_task(name, total=len(wanted), completed=len(wanted) - len(todo))
         running = {pool.submit(part.attempt, number, seed, room): number for number in todo}
         try:

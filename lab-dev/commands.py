@@ -9,9 +9,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Timer
+from typing import IO
 
 LAB = (sys.executable, "-c", "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()")
 LINE_CHARACTERS = 300
@@ -47,7 +49,14 @@ class Ended:
 def environment(home: Path, **more: str) -> dict[str, str]:
     """This process's environment with a home and a toolbox of their own under `home`."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("LAB_", "XDG_"))}
-    return {**kept, "HOME": str(home), "LAB_TOOLBOX": str(home / "toolbox"), "PYTHONUNBUFFERED": "1", "COLUMNS": "120", **more}
+    return {
+        **kept,
+        "HOME": str(home),
+        "LAB_TOOLBOX": str(home / "toolbox"),
+        "PYTHONUNBUFFERED": "1",
+        "COLUMNS": "120",
+        **more,
+    }
 
 
 def lab(
@@ -69,7 +78,12 @@ def lab(
             cwd=cwd, env=dict(env), stdin=told, stdout=out, stderr=err, start_new_session=True, preexec_fn=before,
         )  # fmt: skip
         late: list[bool] = []
-        timer = Timer(timeout_s, lambda: (late.append(True), kill_session(child.pid)))
+
+        def stop() -> None:
+            late.append(True)
+            kill_session(child.pid)
+
+        timer = Timer(timeout_s, stop)
         timer.start()
         try:
             _, status, used = os.wait4(child.pid, 0)
@@ -77,19 +91,19 @@ def lab(
             timer.cancel()
             kill_session(child.pid)
         child.returncode = os.waitstatus_to_exitcode(status)
-        texts = []
-        for file in (out, err):
-            file.seek(0)
-            texts.append(file.read().decode(errors="replace"))
-        return Ended(child.returncode, *texts, time.monotonic() - begun, used.ru_maxrss * 1024, bool(late))
+        took_s = time.monotonic() - begun
+        return Ended(child.returncode, _text(out), _text(err), took_s, used.ru_maxrss * 1024, bool(late))
+
+
+def _text(file: IO[bytes]) -> str:
+    file.seek(0)
+    return file.read().decode(errors="replace")
 
 
 def kill_session(leader: int) -> None:
     """Kills whatever is left of the session that `leader` began."""
-    try:
+    with suppress(ProcessLookupError, PermissionError):
         os.killpg(leader, signal.SIGKILL)
-    except (ProcessLookupError, PermissionError):
-        pass
 
 
 def limit(kind: int, value: int) -> Callable[[], None]:

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from parts import Outcome, Part
 from rich.console import Console
@@ -20,7 +21,8 @@ def written(file: Path) -> dict[int, Outcome]:
             row = json.loads(line)
         except json.JSONDecodeError:
             continue
-        found[row.pop("number")] = Outcome(**row)
+        number = row.pop("number")
+        found[number] = Outcome(**row)
     return found
 
 
@@ -29,7 +31,7 @@ def line(number: int, outcome: Outcome) -> str:
     return json.dumps({"number": number, **asdict(outcome)}) + "\n"
 
 
-def rows(outcomes: Iterable[Outcome]) -> Iterator[dict[str, object]]:
+def rows(outcomes: Iterable[Outcome]) -> Iterator[dict[str, Any]]:
     """A row for each group: tries, how many held, what broke, the most of each figure."""
     groups: dict[str, list[Outcome]] = {}
     for outcome in outcomes:
@@ -57,8 +59,15 @@ def show(parts: dict[str, Part], folder: Path, console: Console) -> bool:
             table.add_row("" if n else name, row["group"], str(row["tries"]), str(row["broke"]), most)
             broken += [f"{name}: {one['case']}: {one['broke']}" for one in row["broken"]]
         if counted:
-            total, lost = (sum(int(row[key]) for row in counted) for key in ("tries", "broke"))
-            table.add_row("", f"[bold]all[/] (target: {part.target})", f"[bold]{total}[/]", f"[bold]{lost}[/]", "", end_section=True)
+            total, lost = (sum(row[key] for row in counted) for key in ("tries", "broke"))
+            table.add_row(
+                "",
+                f"[bold]all[/] (target: {part.target})",
+                f"[bold]{total}[/]",
+                f"[bold]{lost}[/]",
+                "",
+                end_section=True,
+            )
     console.print(table)
     for text in broken[:SHOWN]:
         console.print(text, markup=False, highlight=False)
