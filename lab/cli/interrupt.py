@@ -10,27 +10,38 @@ if TYPE_CHECKING:
     from sys import UnraisableHookArgs
     from types import FrameType
 
-AGAIN_S = 0.002  # between two looks whether an import is over
+AGAIN_S = 0.002  # between two looks whether it can be raised
+LOOKS = 500  # at a library that is busy, before it is raised there all the same
+OWN = __file__.removesuffix("cli/interrupt.py")
 
 
 @contextmanager
 def ctrl_c_is_heard() -> Iterator[None]:
-    """Raises KeyboardInterrupt on Ctrl-C, but not while a library is being imported: there it may be dropped unseen.
+    """Raises KeyboardInterrupt on Ctrl-C, but not where a library may drop it unseen, or is in the midst of taking a lock.
 
-    It is raised as soon as that import is over, and again when Python has ignored it (in a callback).
+    It is raised where the lab's own code runs, or where nothing has moved since the last look, as in a wait; in a library
+    that is busy for a second, or when it is pressed once more, there. Never while something is being imported. It is raised
+    again when Python has ignored it (in a callback).
     """
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:  # somebody else's, or not wanted
         yield
         return
     main_frame = sys._getframe(2)
+    looks, looked_at = 0, (0, 0)
 
     def stop(number: int, frame: "FrameType | None") -> None:
-        while frame is not None and frame is not main_frame:
-            if frame.f_code.co_filename.startswith("<frozen importlib"):
-                signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
-                return
-            frame = frame.f_back
-        raise KeyboardInterrupt
+        nonlocal looks, looked_at
+        if frame is None:
+            raise KeyboardInterrupt
+        here = (id(frame), frame.f_lasti)
+        impatient = looks > LOOKS or (number == signal.SIGINT and looks > 0)
+        if not _imports(frame, main_frame) and (
+            frame.f_code.co_filename.startswith(OWN) or here == looked_at or impatient
+        ):
+            looks, looked_at = 0, (0, 0)
+            raise KeyboardInterrupt
+        looks, looked_at = looks + 1, here
+        signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
 
     def ignored(what: "UnraisableHookArgs") -> None:
         if issubclass(what.exc_type, KeyboardInterrupt):
@@ -50,3 +61,12 @@ def ctrl_c_is_heard() -> Iterator[None]:
         sys.unraisablehook = told
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _imports(frame: "FrameType | None", last: "FrameType") -> bool:
+    """Whether something is being imported between a frame and one of those that called it."""
+    while frame is not None and frame is not last:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False

@@ -24,6 +24,14 @@ class Presses:
         os.kill(os.getpid(), signal.SIGINT)
 
 
+def drops():
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        sum(range(1000))
+    except BaseException:
+        pass
+
+
 {on_import}
 
 
@@ -44,19 +52,17 @@ class Door(gymnasium.Env):
 
 gymnasium.register("LabTestCtrlC-v0", Door)
 """
-DROPPED = """
-try:
-    os.kill(os.getpid(), signal.SIGINT)
-except BaseException:
-    pass
-"""
 
 
-@pytest.mark.parametrize(("on_import", "on_step"), [(DROPPED, "pass"), ("", "Presses()")], ids=["import", "callback"])
+@pytest.mark.parametrize(
+    ("on_import", "on_step"),
+    [("drops()", "pass"), ("", "Presses()"), ("", "drops()")],
+    ids=["import", "callback", "call"],
+)
 def test_ctrl_c_that_a_library_drops_is_heard_all_the_same(
     lab: Lab, folder: Path, on_import: str, on_step: str
 ) -> None:
-    """While it is imported, where it catches everything; and in a callback, whose errors Python ignores."""
+    """Where it catches everything, while it is imported and later; and in a callback, whose errors Python ignores."""
     import gymnasium
 
     text = CTRL_C.format(on_import=on_import, on_step=on_step)
@@ -70,6 +76,36 @@ def test_ctrl_c_that_a_library_drops_is_heard_all_the_same(
         sys.modules.pop("lab_test_ctrl_c", None)
     assert (ran.code, ran.out) == (130, "")
     assert ran.err.startswith("lab: stopped by Ctrl-C")
+
+
+HANGS = """
+import os, signal, sys, threading
+
+from lab.cli.interrupt import ctrl_c_is_heard
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def main():
+    with ctrl_c_is_heard():
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            {hangs}
+        except KeyboardInterrupt:
+            print("heard")
+
+
+main()
+"""
+
+
+@pytest.mark.parametrize("hangs", ["threading.Event().wait()", "while True: pass"])
+def test_ctrl_c_is_heard_where_nothing_of_the_lab_runs_any_more(root: Path, hangs: str) -> None:
+    env = {**os.environ, "PYTHONPATH": str(root)}
+    ran = subprocess.run(
+        [sys.executable, "-c", HANGS.format(hangs=hangs)], env=env, capture_output=True, text=True, timeout=60
+    )
+    assert (ran.stdout, ran.stderr) == ("heard\n", "")
 
 
 EARLY = """
