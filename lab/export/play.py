@@ -14,6 +14,7 @@ from lab.export.timed import TimedPoints
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import NAME, YAW_ARM, Robot
+from lab.sim.parts.holding import USUAL_N
 from lab.sim.world import TIME_STEP, World
 from lab.tasks.robot_fields import RobotSettings
 
@@ -118,7 +119,7 @@ def run_off(program: Program) -> float:
 def play(commands: Sequence[Command], arm: Arm, settings: RobotSettings) -> list[Array]:
     """Where the tool was on each `Path` (n, 7), see `Program.seen`, a row a physics step, when the arm alone does it all."""
     with World() as world:
-        robot = Robot(world, arm, settings.speed_m_s, settings.acceleration_m_s2, settings.grip_force_n)
+        robot = Robot(world, arm, settings.speed_m_s, settings.acceleration_m_s2, settings.grip_force_n or USUAL_N)
         ways: list[Array] = []
         stood = False
         for command in commands:
@@ -172,7 +173,7 @@ def play_timed(played: TimedPoints, arm: Arm, settings: RobotSettings, at_s: Arr
     joints = np.array([point.joints for point in played.points])
     wanted = np.rint(at_s / TIME_STEP).astype(int)
     with World() as world:
-        robot = Robot(world, arm, settings.speed_m_s, settings.acceleration_m_s2, settings.grip_force_n)
+        robot = Robot(world, arm, settings.speed_m_s, settings.acceleration_m_s2, settings.grip_force_n or USUAL_N)
         robot.hold(joints[0])
         seen: dict[int, Array] = {}
         rests = _rests(times, joints)

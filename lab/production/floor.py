@@ -162,7 +162,7 @@ class Floor:
         assert held is not None
         why = f"{held.kind} stop: {held.why}"
         self.scene.robot.brake()
-        before = self.world.iterations(BRAKE_ITERATIONS)
+        before = self.world.at_least(BRAKE_ITERATIONS)
         try:
             while self._stopped():
                 self._tell_held()
@@ -211,7 +211,7 @@ class Floor:
         robot = self.scene.robot
         self._trail.append(self.world.joints(NAME, robot.arm.joints))
         body, force_n = self.world.pressed(NAME)
-        limit_n = self.scene.task.robot.stops_at_n + self.pressing_n
+        limit_n = self.scene.stops_at_n + self.pressing_n
         return f"the arm presses on '{body}' with {force_n:.0f} N, allowed are {limit_n:g}" if force_n > limit_n else ""
 
     def _back_off(self) -> None:

@@ -70,6 +70,10 @@ class World:
         self._call("setPhysicsEngineParameter", numSolverIterations=count)
         return before
 
+    def at_least(self, iterations: int) -> int:
+        """Solve in so many iterations, or in more if that was asked for already; returns how many it were before."""
+        return self.iterations(max(iterations, self._iterations))
+
     def _call(self, name: str, *args: Any, **kwargs: Any) -> Any:
         return getattr(self._p, name)(*args, physicsClientId=self._client, **kwargs)
 

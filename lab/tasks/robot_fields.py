@@ -9,6 +9,7 @@ from lab.errors import unknown
 from lab.tasks.record import Name, Record, as_tuple
 
 MODELS = ("up6", "panda", "iiwa", "xarm6")  # the arms that ship, by name: rows of `lab.sim.arms.arm_models.ARMS`
+STRONGEST_N = 200.0  # of a grip
 Part = Annotated[str, Field(min_length=1, max_length=100)]
 
 
@@ -18,8 +19,9 @@ class RobotSettings(Record):
     model: a name of MODELS, or the path of a URDF beside the task file; that one also needs tool_link, whose z axis points
     out of the gripper and along whose y axis its fingers close, fingers, the joints that move them, and tip_m, how far the
     finger tips are out along z [m]. nearest_m [m]: nearer to its own axis than this the tool never goes. opening_m [m]:
-    between the open fingers, by default all that the gripper has. base_up_m: its foot above the table [m]. force_limit_n:
-    a protective stop holds the arm that presses on something harder [N] (see `stops_at_n`).
+    between the open fingers, by default all that the gripper has. base_up_m: its foot above the table [m]. grip_force_n: of
+    each finger [N], by default chosen from the masses and frictions of what it carries. force_limit_n: a protective stop
+    holds the arm that presses on something harder [N], by default 150 or six times the grip force.
     """
 
     model: str = "up6"
@@ -32,13 +34,8 @@ class RobotSettings(Record):
     start: Name
     speed_m_s: Annotated[float, Field(ge=0.01, le=1.5)] = 0.5
     acceleration_m_s2: Annotated[float, Field(ge=0.01, le=10)] = 2.0
-    grip_force_n: Annotated[float, Field(gt=0, le=100)] = 25.0  # for what mass: `sim.scene.scene_check`
+    grip_force_n: Annotated[float, Field(gt=0, le=STRONGEST_N)] | None = None
     force_limit_n: Annotated[float, Field(ge=10, le=5000)] | None = None
-
-    @property
-    def stops_at_n(self) -> float:
-        """The force on the arm [N] above which a protective stop holds it: closing fingers reach four times their own."""
-        return self.force_limit_n or max(150.0, 6.0 * self.grip_force_n)
 
     @property
     def is_file(self) -> bool:

@@ -154,7 +154,7 @@ class ByHand:
     def _careful(self) -> Iterator[None]:
         """What the arm presses on already, where a protective stop held it, is no new one: it may be jogged away."""
         _, now_n = self.floor.world.pressed(NAME)
-        self.floor.pressing_n = now_n if now_n > self.floor.scene.task.robot.stops_at_n else 0.0
+        self.floor.pressing_n = now_n if now_n > self.floor.scene.stops_at_n else 0.0
         try:
             yield
         finally:

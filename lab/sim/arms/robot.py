@@ -155,7 +155,7 @@ class Robot:
         for follower, leader in fingers.leaders.items():
             world.gear(NAME, leader, follower, fingers.ratio(follower))
         if len(fingers.joints) > 2:
-            world.iterations(_LINKAGE_ITERATIONS)
+            world.at_least(_LINKAGE_ITERATIONS)
         self._free = [joint for joint in fingers.joints if joint not in fingers.driven]
         self.closed = False
         self.listener: MotionListener | None = None

@@ -8,6 +8,7 @@ from lab.sim.arms.arm_models import arm_of
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import Robot
 from lab.sim.frames import Rgba, Vector
+from lab.sim.parts.holding import holding
 from lab.sim.parts.kinds import Kind, Spot, beside, comes_as, kinds_of
 from lab.sim.scene import station_bodies
 from lab.sim.scene.places import Layout, Places
@@ -19,6 +20,7 @@ TABLE, MARKER = "table", " marker"  # the body that all stands on; how the names
 TABLE_RGBA = (0.86, 0.85, 0.83, 1.0)
 TABLE_M, TABLE_MIDDLE_M = (2.2, 2.9, 0.04), (0.35, 0.0, -0.02)
 MARKER_ABOVE = 0.002  # [m] a marker's centre above what it lies on
+STOPS_AT_N, STOPS_AT_GRIPS = 150.0, 6.0  # a protective stop, at least; closing fingers reach four times their own force
 ABOVE_FOOT_M = 0.0005  # [m] a part is put so high above its spot
 
 
@@ -34,7 +36,11 @@ class Scene:
         self.places = Places(task, self.kinds)
         world.box(TABLE, TABLE_M, TABLE_MIDDLE_M, TABLE_RGBA)
         robot = task.robot
-        self.robot = Robot(world, arm, robot.speed_m_s, robot.acceleration_m_s2, robot.grip_force_n)
+        held = holding(robot, self.kinds.values())
+        self.robot = Robot(world, arm, robot.speed_m_s, robot.acceleration_m_s2, held.force_n)
+        if held.iterations is not None:
+            world.at_least(held.iterations)
+        self.stops_at_n = robot.force_limit_n or max(STOPS_AT_N, STOPS_AT_GRIPS * held.force_n)
         for station in task.stations:
             self._build_station(station)
         for obstacle, place in zip(task.obstacles, layout.obstacles, strict=True):

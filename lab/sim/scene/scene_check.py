@@ -11,6 +11,7 @@ from lab.sim.arms.kinematics import ToolPose
 from lab.sim.camera import Camera
 from lab.sim.parts.kinds import Kind, Spot, comes_as, kinds_of
 from lab.sim.scene import station_bodies
+from lab.sim.scene.hold_trial import check_held
 from lab.sim.scene.places import Places, Rectangle
 from lab.sim.scene.scene import in_grid, marker_of
 from lab.tasks.task import Task
@@ -19,11 +20,6 @@ from lab.tasks.task_fields import CameraGrid, Station
 ACROSS = 0.3  # sine of the angle at most between the fingers and the way in
 OVER_M = 0.01  # [m] between a carried part and what stands below its way
 INTO_M = 0.005  # [m] the same above a machine that it is let down into
-HOLDS = (
-    8.0  # times its weight friction has to hold; measured: with less, parts tilt or slip between the fingers on the way
-)
-SQUEEZES_N_KG = 3000.0  # newtons of grip for each kilogram; measured: from 3,800 on slices are thrown out of them
-GRAVITY_M_S2 = 9.81
 
 
 def places_of(task: Task) -> Places:
@@ -36,8 +32,7 @@ def check_scene(task: Task) -> None:
     arm, places = arm_of(task.robot, task.folder), places_of(task)
     low = task.workspace.lower_m[2] + task.workspace.cell_m[2] / 2
     _check_lowest(places, low)
-    for kind in places.kinds.values():
-        _check_held(kind, task.robot.grip_force_n)
+    check_held(task.robot, arm, list(places.kinds.values()))
     for station in task.stations:
         station_bodies.check(station, task.folder)
         if station.grid is not None:
@@ -66,19 +61,6 @@ def _check_lowest(places: Places, low: float) -> None:
                 f"workspace.lower_m: the lowest tool height {low:.3f} m would sweep a carried {kind.name} through what "
                 f"stands at '{where}': at least {standing[where] + OVER_M + kind.grip.up_m:.3f} needed"
             )
-
-
-def _check_held(kind: Kind, force_n: float) -> None:
-    """BadInput when the fingers press too weakly for what they carry, or so strongly that it is squeezed out of them."""
-    mass_kg, friction = sum(one.part.mass_kg for one in kind.stack()), kind.part.friction
-    what = f"robot.grip_force_n = {force_n:g}: {kind.name} of {mass_kg:g} kg, friction {friction:g},"
-    if not friction:
-        raise BadInput(f"{what} would slip from between the fingers, however strongly they press")
-    least = HOLDS * mass_kg * GRAVITY_M_S2 / (2 * friction)
-    if force_n < least:
-        raise BadInput(f"{what} would slip or tilt between the fingers: at least {least:.3g} N needed")
-    if force_n > (most := SQUEEZES_N_KG * mass_kg):
-        raise BadInput(f"{what} would be squeezed out of the fingers: at most {most:.3g} N allowed")
 
 
 def _check_seen(task: Task, station: Station, grid: CameraGrid) -> None:

@@ -133,27 +133,9 @@ def test_a_machines_body_must_not_stand_on_another_stations_spots(fms: Task, mov
                 check_apart(beside, 3)
 
 
-@pytest.mark.parametrize(
-    ("mass_kg", "friction", "force_n", "wrong"),
-    [
-        (0.04, 0.8, 2.0, None),  # 8.2 times its weight
-        (0.04, 0.8, 1.9, "would slip or tilt between the fingers: at least 1.96 N needed"),
-        (0.04, 0.8, 100.0, None),
-        (0.02, 1.0, 100.0, "would be squeezed out of the fingers: at most 60 N allowed"),
-        (1.0, 0.8, 25.0, "would slip or tilt between the fingers: at least 49 N needed"),
-        (0.04, 0.0, 25.0, "would slip from between the fingers, however strongly they press"),
-    ],
-)
-def test_what_the_fingers_cannot_hold_is_refused(
-    task: Task, mass_kg: float, friction: float, force_n: float, wrong: str | None
-) -> None:
-    """8 x 0.04 kg x 9.81 m/s2 / (2 x 0.8) = 1.96 N; 3000 N/kg x 0.02 kg = 60 N."""
-    parts = tuple(one.model_copy(update={"mass_kg": mass_kg, "friction": friction}) for one in task.parts)
-    robot = task.robot.model_copy(update={"grip_force_n": force_n})
-    changed = task.changed(parts=parts, robot=robot)
-    if wrong is None:
-        check_scene(changed)
-        return
-    said = rf"^robot.grip_force_n = {force_n:g}: slice of {mass_kg:g} kg, friction {friction:g}, {wrong}$"
-    with pytest.raises(BadInput, match=said):
-        check_scene(changed)
+def test_what_the_fingers_cannot_hold_is_refused(task: Task) -> None:
+    heavy = tuple(one.model_copy(update={"mass_kg": 2.0}) for one in task.parts)
+    given = task.robot.model_copy(update={"grip_force_n": 10.0})
+    with pytest.raises(BadInput, match=r"^robot.grip_force_n = 10: slice of 2 kg, friction 0.8, would slip"):
+        check_scene(task.changed(parts=heavy, robot=given))
+    check_scene(task.changed(parts=heavy, robot=task.robot.model_copy(update={"grip_force_n": None})))

@@ -1,0 +1,88 @@
+"""How firmly a gripper holds parts by friction, and how finely physics must be solved so that they do not creep.
+
+Two fingers that press with F hold by friction 2 mu F against the weight and what lifting adds, m (g + a).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from lab.errors import BadInput
+from lab.sim.parts.kinds import Kind
+from lab.tasks.robot_fields import STRONGEST_N, RobotSettings
+
+GRAVITY_M_S2 = 9.81
+SLOW = 0.6  # of the robot's speed and acceleration, as skills rise with a part
+MARGIN = 2.5  # times what friction needs a force is chosen; measured: with that parts hold that hit nothing
+USUAL_N = 25.0  # chosen where friction needs less, unless a part is lighter than this is gentle to
+GENTLE_N_KG = 1000.0  # newtons of grip for each kilogram that physics holds still in a usual step
+GENTLE_N, LIGHT_KG = (
+    50.0,
+    0.35,
+)  # a stronger grip, or a heavier part, tilts and creeps, as forces are not found in so few
+FINE_ITERATIONS = 500  # of the solver, where they must be; measured: nearly all hold, and with 60 a 1 kg box tilts
+ROUGH = 0.5  # friction from which on what holds by the numbers has always held
+
+
+@dataclass(frozen=True)
+class Load:
+    """A part in the gripper, or a pallet with what stands on it: its mass, and the friction where the fingers touch it."""
+
+    name: str
+    mass_kg: float
+    friction: float
+
+    @classmethod
+    def of(cls, kind: Kind) -> "Load":
+        """What is held when a kind is carried."""
+        return cls(kind.name, sum(one.part.mass_kg for one in kind.stack()), kind.part.friction)
+
+    def needs_n(self, acceleration_m_s2: float) -> float:
+        """The least force [N] of each finger that friction needs to lift it."""
+        return self.mass_kg * (GRAVITY_M_S2 + SLOW * acceleration_m_s2) / (2 * self.friction)
+
+    def is_usual(self, force_n: float, acceleration_m_s2: float) -> bool:
+        """Whether it is so far from what may go wrong that physics need not be fine, and nobody has to try it."""
+        strong = force_n >= MARGIN * self.needs_n(acceleration_m_s2)
+        gentle = self.mass_kg <= LIGHT_KG and force_n <= min(GENTLE_N, GENTLE_N_KG * self.mass_kg)
+        return strong and gentle and self.friction >= ROUGH
+
+
+@dataclass(frozen=True)
+class Holding:
+    """The force of each finger [N], and in how many iterations of the solver (None: its usual ones) it holds the parts."""
+
+    force_n: float
+    iterations: int | None = None
+
+
+def holding(robot: RobotSettings, kinds: Iterable[Kind]) -> Holding:
+    """How a robot holds all that it may have to carry: with the force that its task gives, or one chosen for its parts.
+
+    Raises BadInput where friction cannot hold a part, with the force that it needs.
+    """
+    loads = [Load.of(kind) for kind in kinds]
+    if given := robot.grip_force_n:
+        force_n, says = given, f"robot.grip_force_n = {given:g}"
+    else:
+        force_n = min(_chosen_n(loads, robot.acceleration_m_s2), STRONGEST_N)
+        says = f"robot.grip_force_n: the strongest there is, {force_n:g} N, does not do"
+    for load in loads:
+        what = f"{says}: {load.name} of {load.mass_kg:g} kg, friction {load.friction:g},"
+        if not load.friction:
+            raise BadInput(f"{what} would slip from between the fingers, however strongly they press")
+        needed_n = load.needs_n(robot.acceleration_m_s2)
+        if force_n < needed_n:
+            raise BadInput(
+                f"{what} would slip from between the fingers: friction needs {needed_n:.3g} N to lift it with "
+                f"acceleration_m_s2 = {robot.acceleration_m_s2:g}, allowed are up to {STRONGEST_N:g}"
+            )
+    usual = all(load.is_usual(force_n, robot.acceleration_m_s2) for load in loads)
+    return Holding(force_n, None if usual else FINE_ITERATIONS)
+
+
+def _chosen_n(loads: Iterable[Load], acceleration_m_s2: float) -> float:
+    """As firmly as friction needs with a margin, otherwise as usual, and gentler with what is light."""
+    known = [load for load in loads if load.friction]
+    needed = max((load.needs_n(acceleration_m_s2) for load in known), default=0.0)
+    lightest = min((load.mass_kg for load in known), default=1.0)
+    return max(MARGIN * needed, min(USUAL_N, GENTLE_N_KG * lightest))

@@ -1,0 +1,171 @@
+"""Whether the fingers hold what they carry, tried in physics before any work: taken up, swung, turned, set down."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from math import hypot, pi
+from typing import NamedTuple
+
+from lab.errors import BadInput, WorkFailed
+from lab.sim.arms.arm import Arm
+from lab.sim.arms.kinematics import ToolPose
+from lab.sim.arms.robot import Robot
+from lab.sim.parts.holding import SLOW, Holding, Load, holding
+from lab.sim.parts.kinds import Kind, Spot
+from lab.sim.world import World
+from lab.tasks.robot_fields import RobotSettings
+
+LIFT_M, SWING_M, TURN_RAD = 0.1, 0.25, pi / 4
+OUT = (0.5, 0.62, 0.75, 0.4, 0.9, 0.3)  # [m] ahead of the arm, the first that it reaches all over
+OFF = (0.002, 0.002, 0.04)  # [m], [rad] the part stands off where the fingers expect it: parts do, after some transfers
+FOOT_M = 0.1  # [m] the part's foot above the table
+SLIPPED_M, TILTED = 0.012, 0.96  # of what the fingers hold: off where they took it; cosine of its turn towards its side
+SETTLE_STEPS, HELD_STEPS = 60, 240  # of physics, before and after; that it hangs in the air
+BLOCK, RGBA = "block", (0.8, 0.8, 0.8, 1.0)
+ABOVE_M = 0.0005  # [m] between what stands on one another, at first
+
+
+def check_held(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind]) -> None:
+    """BadInput where friction cannot hold a part, or where a part is lost in a trial; only what is unusual is tried."""
+    held = holding(robot, kinds)
+    for kind in kinds:
+        if robot.is_file or not Load.of(kind).is_usual(held.force_n, robot.acceleration_m_s2):
+            went = tried(arm, kind, held, robot.speed_m_s, robot.acceleration_m_s2)
+            if went:
+                raise BadInput(_refusal(robot, kind, held, went))
+
+
+def _refusal(robot: RobotSettings, kind: Kind, held: Holding, went: str) -> str:
+    load = Load.of(kind)
+    hint = "another friction, mass_kg or acceleration_m_s2 may do"
+    if robot.grip_force_n is not None:
+        hint = f"without grip_force_n a force is chosen, or {hint}"
+    return (
+        f"robot.grip_force_n = {held.force_n:.3g}: {load.name} of {load.mass_kg:g} kg, friction {load.friction:g}, does not hold "
+        f"in a trial of taking it up, swinging it and setting it down: {went}; {hint}"
+    )
+
+
+class _Trial(NamedTuple):
+    arm: Arm
+    kind: Kind
+    held: Holding
+    speed_m_s: float
+    acceleration_m_s2: float
+
+
+def tried(arm: Arm, kind: Kind, held: Holding, speed_m_s: float, acceleration_m_s2: float) -> str:
+    """What went wrong with one part in a world of its own, "" for nothing, or where the arm has no room for the trial."""
+    return _tried(_Trial(arm, kind, held, speed_m_s, acceleration_m_s2))
+
+
+@cache
+def _tried(trial: _Trial) -> str:
+    place = _place(trial)
+    if place is None:
+        return ""
+    with World() as world:
+        robot = Robot(world, trial.arm, trial.speed_m_s, trial.acceleration_m_s2, trial.held.force_n)
+        if trial.held.iterations is not None:
+            world.at_least(trial.held.iterations)
+        bodies = _built(world, trial.kind, place)
+        hand = _Hand(world, robot, trial.kind, bodies[0])
+        robot.stand(_way(trial, place)[0])
+        for _ in range(SETTLE_STEPS):
+            world.step()
+        try:
+            for _ in _motion(hand, _way(trial, place)):
+                world.step()
+        except WorkFailed as error:
+            return str(error)
+        return _ended(world, trial.kind, bodies, place)
+
+
+def _place(trial: _Trial) -> Spot | None:
+    """Where the part stands: ahead of the arm, where it reaches all of the way."""
+    for out in OUT:
+        spot = Spot(out, 0.0, FOOT_M, 0.0)
+        if all(trial.arm.inverse(pose) is not None for pose in _way(trial, spot)):
+            return spot
+    return None
+
+
+def _way(trial: _Trial, spot: Spot) -> list[ToolPose]:
+    """The tool poses: at the part, above it, swung to both sides and turned, above it again."""
+    at = trial.kind.held_at(spot)
+    up = at.shifted(dz=LIFT_M)
+    return [at, up, up.shifted(dy=SWING_M), up.shifted(dy=-SWING_M, dyaw=TURN_RAD), up]
+
+
+def _built(world: World, kind: Kind, spot: Spot) -> list[str]:
+    """The part on a block as large as its foot, and what rides on it; their names from the foot upwards."""
+    along, across = (2 * half for half in kind.footprint_m())
+    world.box(BLOCK, (along, across, spot.z), (spot.x, spot.y, spot.z / 2), RGBA)
+    names, foot_m = [], spot.z + ABOVE_M
+    for own in kind.stack():
+        names.append(own.name)
+        at = (spot.x + OFF[0], spot.y + OFF[1], foot_m + own.shape.foot_m)
+        world.part(own.name, own.shape, own.part.mass_kg, own.part.friction, at, spot.yaw + OFF[2])
+        foot_m += own.height_m + ABOVE_M
+    return names
+
+
+@dataclass
+class _Hand:
+    """The fingers and the part between them."""
+
+    world: World
+    robot: Robot
+    kind: Kind
+    body: str
+    low_m: float = 0.0  # of the part's middle under the tool when it was taken
+
+    def took(self) -> None:
+        self.low_m = self._low_m()
+
+    def check(self, doing: str) -> None:
+        """WorkFailed when the part is no longer where the fingers took it."""
+        tool = self.robot.tool()
+        position, (x, y, *_) = self.world.pose(self.body)
+        spot = self.kind.foot_at(tool)
+        off = hypot(float(position[0]) - spot.x, float(position[1]) - spot.y, self._low_m() - self.low_m)
+        if not self.robot.touches(self.body):
+            raise WorkFailed(f"it is lost while {doing}")
+        if off > SLIPPED_M:
+            raise WorkFailed(f"it slips by {1000 * off:.0f} mm while {doing}")
+        if 1.0 - 2.0 * float(x * x + y * y) < TILTED:
+            raise WorkFailed(f"it tilts while {doing}")
+
+    def _low_m(self) -> float:
+        return self.robot.tool().z - float(self.world.pose(self.body)[0][2])
+
+
+def _motion(hand: _Hand, way: Sequence[ToolPose]) -> Iterator[None]:
+    at, up, *swung = way
+    robot = hand.robot
+    yield from robot.grip()
+    hand.took()
+    yield from robot.follow([up], slow=SLOW)
+    hand.check("it is lifted")
+    for pose in swung:
+        yield from robot.follow([pose])
+        hand.check("it is swung")
+    yield from robot.rest(HELD_STEPS)
+    hand.check("it hangs")
+    yield from robot.follow([at], slow=SLOW)
+    yield from robot.release()
+    yield from robot.follow([up], slow=SLOW)
+    yield from robot.rest(SETTLE_STEPS)
+
+
+def _ended(world: World, kind: Kind, bodies: Sequence[str], spot: Spot) -> str:
+    """What is wrong with how the part stands where it was set down."""
+    foot_m = spot.z
+    for body, own in zip(bodies, kind.stack(), strict=True):
+        position, (x, y, *_) = world.pose(body)
+        if 1.0 - 2.0 * float(x * x + y * y) < TILTED or abs(float(position[2]) - foot_m - own.shape.foot_m) > SLIPPED_M:
+            return "it falls over when it is set down" if body == bodies[0] else f"{body} falls off it"
+        if hypot(float(position[0]) - spot.x, float(position[1]) - spot.y) > SLIPPED_M:
+            return "it is not set down where it should be"
+        foot_m += own.height_m
+    return ""

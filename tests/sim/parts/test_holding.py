@@ -1,0 +1,81 @@
+"""The grip: chosen from mass and friction, refused where friction cannot hold, and physics fine where it must be."""
+
+import pytest
+
+from lab.errors import BadInput
+from lab.sim.arms.arm_models import arm_of
+from lab.sim.parts.holding import FINE_ITERATIONS, Holding, Load, holding
+from lab.sim.parts.kinds import Kind, kinds_of
+from lab.tasks.task import Task
+from lab.tasks.task_file import load
+
+
+def kinds(task: Task, **fields: float) -> list[Kind]:
+    parts = tuple(one.model_copy(update=fields) for one in task.parts)
+    return list(kinds_of(task.changed(parts=parts), arm_of(task.robot).gripper).values())
+
+
+def held(mass_kg: float, friction: float, force_n: float | None = None) -> Holding:
+    task = load("toast")
+    robot = task.robot.model_copy(update={"grip_force_n": force_n})  # acceleration 2 m/s2
+    return holding(robot, kinds(task, mass_kg=mass_kg, friction=friction))
+
+
+def test_friction_of_two_fingers_holds_weight_and_lifting() -> None:
+    """1 kg x (9.81 + 0.6 x 2) m/s2 = 11.01 N, over 2 x 0.5."""
+    assert Load("box", 1.0, 0.5).needs_n(2.0) == pytest.approx(11.01)
+
+
+@pytest.mark.parametrize(
+    ("mass_kg", "friction", "force_n"),
+    [
+        (0.04, 0.8, 25.0),  # needs 0.28 N: as usual
+        (0.01, 0.8, 10.0),  # 1000 N/kg
+        (1.0, 0.5, 2.5 * 11.01),
+        (6.0, 0.5, 2.5 * 66.06),
+        (6.0, 0.2, 200.0),  # needs 165 N: with less of a margin
+    ],
+)
+def test_where_nothing_is_said_the_force_is_chosen(mass_kg: float, friction: float, force_n: float) -> None:
+    assert held(mass_kg, friction).force_n == pytest.approx(force_n)
+
+
+@pytest.mark.parametrize(
+    ("mass_kg", "friction", "force_n", "fine"),
+    [
+        (0.04, 0.8, 25.0, False),
+        (0.04, 0.8, 41.0, True),  # firm: over 1000 N/kg
+        (0.04, 0.8, 0.6, True),  # barely: 2.5 x 0.28 N are 0.69
+        (0.04, 0.4, 25.0, True),  # slippery
+        (0.36, 0.8, 25.0, True),  # heavy
+        (0.3, 0.8, 51.0, True),
+        (0.3, 0.8, 49.0, False),
+    ],
+)
+def test_physics_is_fine_where_it_must_be(mass_kg: float, friction: float, force_n: float, fine: bool) -> None:
+    assert held(mass_kg, friction, force_n) == Holding(force_n, FINE_ITERATIONS if fine else None)
+
+
+@pytest.mark.parametrize(
+    ("mass_kg", "friction", "force_n", "said"),
+    [
+        (1.0, 0.8, 5.0, r"^robot.grip_force_n = 5: slice of 1 kg, friction 0.8, would slip .*: friction needs 6.88 N"),
+        (6.0, 0.1, None, r"strongest there is, 200 N, does not do: slice of 6 kg, friction 0.1, .* needs 330 N"),
+        (0.04, 0.0, 25.0, r"^robot.grip_force_n = 25: slice of 0.04 kg, friction 0, would slip .* however strongly"),
+        (0.04, 0.0, None, r"however strongly"),
+    ],
+)
+def test_what_friction_cannot_hold_is_refused(
+    mass_kg: float, friction: float, force_n: float | None, said: str
+) -> None:
+    with pytest.raises(BadInput, match=said):
+        held(mass_kg, friction, force_n)
+
+
+def test_a_pallet_weighs_what_it_carries() -> None:
+    task = load("fms-arm")
+    loads = {kind.name: Load.of(kind) for kind in kinds_of(task, arm_of(task.robot).gripper).values()}
+    name = next(name for name in loads if " on " in name)
+    part, pallet = name.split(" on ")
+    assert loads[name].mass_kg == pytest.approx(loads[part].mass_kg + loads[pallet].mass_kg)
+    assert loads[name].friction == loads[pallet].friction

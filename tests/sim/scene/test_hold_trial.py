@@ -1,0 +1,47 @@
+"""The trial of a grip before any work: what holds passes, what is lost is refused with what was seen, most is not tried."""
+
+import pytest
+
+from lab.errors import BadInput
+from lab.sim.arms.arm_models import arm_of
+from lab.sim.parts.holding import FINE_ITERATIONS, Holding
+from lab.sim.parts.kinds import kinds_of
+from lab.sim.scene import hold_trial
+from lab.sim.scene.hold_trial import check_held, tried
+from lab.tasks.task import Task
+from lab.tasks.task_file import load
+
+SHIPPED = ["toast", "toast-panda", "toast-iiwa", "toast-xarm6", "breakfast", "fms-arm", "sorting", "two-toasters"]
+
+
+def check(task: Task, force_n: float | None = None, **fields: float) -> None:
+    parts = tuple(one.model_copy(update=fields) for one in task.parts)
+    arm, robot = arm_of(task.robot), task.robot.model_copy(update={"grip_force_n": force_n})
+    check_held(robot, arm, list(kinds_of(task.changed(parts=parts), arm.gripper).values()))
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_nobody_tries_what_is_usual(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hold_trial, "tried", lambda *_: pytest.fail("it was tried"))
+    task = load(name)
+    check(task, task.robot.grip_force_n)
+
+
+@pytest.mark.parametrize("arm", ["toast", "toast-panda", "toast-iiwa", "toast-xarm6"])
+def test_a_heavy_slice_is_held_by_the_force_that_is_chosen(arm: str) -> None:
+    check(load(arm), mass_kg=1.0)
+
+
+def test_a_slippery_slice_between_tapered_fingers_is_refused() -> None:
+    """Friction would do by the numbers: 3 g x 11.01 m/s2 / (2 x 0.06) = 0.28 N."""
+    said = r"^robot.grip_force_n = 100: slice of 0.003 kg, friction 0.06, does not hold in a trial .*: it is lost while it is lifted"
+    with pytest.raises(BadInput, match=said):
+        check(load("toast-panda"), 100.0, mass_kg=0.003, friction=0.06)
+
+
+def test_what_happened_is_told(task: Task) -> None:
+    """Fingers that hardly press let the slice slide as it is lifted."""
+    arm = arm_of(task.robot)
+    kind = kinds_of(task, arm.gripper)["slice"]
+    assert tried(arm, kind, Holding(25.0), 0.5, 2.0) == ""
+    assert tried(arm, kind, Holding(0.05, FINE_ITERATIONS), 0.5, 2.0) == "it is lost while it is lifted"
