@@ -3,8 +3,9 @@
 Two fingers that press with F hold by friction 2 mu F against the weight and what lifting adds, m (g + a).
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import inf
 
 from lab.errors import BadInput
 from lab.sim.parts.kinds import Kind
@@ -37,7 +38,9 @@ class Load:
         return cls(kind.name, sum(one.part.mass_kg for one in kind.stack()), kind.part.friction)
 
     def needs_n(self, acceleration_m_s2: float) -> float:
-        """The least force [N] of each finger that friction needs to lift it."""
+        """The least force [N] of each finger that friction needs to lift it; endless for what has none."""
+        if not self.friction:
+            return inf
         return self.mass_kg * (GRAVITY_M_S2 + SLOW * acceleration_m_s2) / (2 * self.friction)
 
     def is_usual(self, force_n: float, acceleration_m_s2: float) -> bool:
@@ -56,33 +59,31 @@ class Holding:
 
 
 def holding(robot: RobotSettings, kinds: Iterable[Kind]) -> Holding:
-    """How a robot holds all that it may have to carry: with the force that its task gives, or one chosen for its parts.
-
-    Raises BadInput where friction cannot hold a part, with the force that it needs.
-    """
+    """How a robot holds all that it may have to carry: with the force that its task gives, or one chosen for its parts."""
     loads = [Load.of(kind) for kind in kinds]
-    if given := robot.grip_force_n:
-        force_n, says = given, f"robot.grip_force_n = {given:g}"
-    else:
-        force_n = min(_chosen_n(loads, robot.acceleration_m_s2), STRONGEST_N)
-        says = f"robot.grip_force_n: the strongest there is, {force_n:g} N, does not do"
-    for load in loads:
-        what = f"{says}: {load.name} of {load.mass_kg:g} kg, friction {load.friction:g},"
-        if not load.friction:
-            raise BadInput(f"{what} would slip from between the fingers, however strongly they press")
-        needed_n = load.needs_n(robot.acceleration_m_s2)
-        if force_n < needed_n:
-            raise BadInput(
-                f"{what} would slip from between the fingers: friction needs {needed_n:.3g} N to lift it with "
-                f"acceleration_m_s2 = {robot.acceleration_m_s2:g}, allowed are up to {STRONGEST_N:g}"
-            )
+    force_n = robot.grip_force_n or min(_chosen_n(loads, robot.acceleration_m_s2), STRONGEST_N)
     usual = all(load.is_usual(force_n, robot.acceleration_m_s2) for load in loads)
     return Holding(force_n, None if usual else FINE_ITERATIONS)
 
 
-def _chosen_n(loads: Iterable[Load], acceleration_m_s2: float) -> float:
+def check_friction(robot: RobotSettings, load: Load, force_n: float) -> None:
+    """BadInput where friction cannot hold a load that is lifted, with the force that it needs."""
+    needed_n = load.needs_n(robot.acceleration_m_s2)
+    if force_n >= needed_n:
+        return
+    says = (
+        f"robot.grip_force_n = {force_n:g}: {load.name} of {load.mass_kg:g} kg, friction {load.friction:g}, would slip"
+    )
+    if needed_n == inf:
+        raise BadInput(f"{says} from between the fingers, however strongly they press")
+    raise BadInput(
+        f"{says} from between the fingers: it needs {needed_n:.3g} N to be lifted with acceleration_m_s2 = "
+        f"{robot.acceleration_m_s2:g}, allowed are up to {STRONGEST_N:g}"
+    )
+
+
+def _chosen_n(loads: Sequence[Load], acceleration_m_s2: float) -> float:
     """As firmly as friction needs with a margin, otherwise as usual, and gentler with what is light."""
-    known = [load for load in loads if load.friction]
-    needed = max((load.needs_n(acceleration_m_s2) for load in known), default=0.0)
-    lightest = min((load.mass_kg for load in known), default=1.0)
+    needed = max(load.needs_n(acceleration_m_s2) for load in loads)
+    lightest = min(load.mass_kg for load in loads)
     return max(MARGIN * needed, min(USUAL_N, GENTLE_N_KG * lightest))

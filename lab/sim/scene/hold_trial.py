@@ -10,7 +10,7 @@ from lab.errors import BadInput, WorkFailed
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import Robot
-from lab.sim.parts.holding import SLOW, Holding, Load, holding
+from lab.sim.parts.holding import SLOW, Holding, Load, check_friction, holding
 from lab.sim.parts.kinds import Kind, Spot
 from lab.sim.world import World
 from lab.tasks.robot_fields import RobotSettings
@@ -29,6 +29,7 @@ def check_held(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind]) -> None:
     """BadInput where friction cannot hold a part, or where a part is lost in a trial; only what is unusual is tried."""
     held = holding(robot, kinds)
     for kind in kinds:
+        check_friction(robot, Load.of(kind), held.force_n)
         if robot.is_file or not Load.of(kind).is_usual(held.force_n, robot.acceleration_m_s2):
             went = tried(arm, kind, held, robot.speed_m_s, robot.acceleration_m_s2)
             if went:
@@ -37,13 +38,11 @@ def check_held(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind]) -> None:
 
 def _refusal(robot: RobotSettings, kind: Kind, held: Holding, went: str) -> str:
     load = Load.of(kind)
-    hint = "another friction, mass_kg or acceleration_m_s2 may do"
+    hint = "another mass_kg, friction or acceleration_m_s2 may do"
     if robot.grip_force_n is not None:
         hint = f"without grip_force_n a force is chosen, or {hint}"
-    return (
-        f"robot.grip_force_n = {held.force_n:.3g}: {load.name} of {load.mass_kg:g} kg, friction {load.friction:g}, does not hold "
-        f"in a trial of taking it up, swinging it and setting it down: {went}; {hint}"
-    )
+    what = f"{load.name} of {load.mass_kg:g} kg, friction {load.friction:g}"
+    return f"robot.grip_force_n = {held.force_n:.3g}: {what}, is not held: in a trial {went}; {hint}"
 
 
 class _Trial(NamedTuple):

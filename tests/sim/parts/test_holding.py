@@ -1,13 +1,15 @@
 """The grip: chosen from mass and friction, refused where friction cannot hold, and physics fine where it must be."""
 
+from dataclasses import replace
+
 import pytest
 
 from lab.errors import BadInput
 from lab.sim.arms.arm_models import arm_of
-from lab.sim.parts.holding import FINE_ITERATIONS, Holding, Load, holding
+from lab.sim.parts.holding import FINE_ITERATIONS, Holding, Load, check_friction, holding
 from lab.sim.parts.kinds import Kind, kinds_of
 from lab.tasks.task import Task
-from lab.tasks.task_file import load
+from lab.tasks.task_file import load as load_task
 
 
 def kinds(task: Task, **fields: float) -> list[Kind]:
@@ -16,7 +18,7 @@ def kinds(task: Task, **fields: float) -> list[Kind]:
 
 
 def held(mass_kg: float, friction: float, force_n: float | None = None) -> Holding:
-    task = load("toast")
+    task = load_task("toast")
     robot = task.robot.model_copy(update={"grip_force_n": force_n})  # acceleration 2 m/s2
     return holding(robot, kinds(task, mass_kg=mass_kg, friction=friction))
 
@@ -57,23 +59,34 @@ def test_physics_is_fine_where_it_must_be(mass_kg: float, friction: float, force
 
 
 @pytest.mark.parametrize(
-    ("mass_kg", "friction", "force_n", "said"),
+    ("load", "force_n", "said"),
     [
-        (1.0, 0.8, 5.0, r"^robot.grip_force_n = 5: slice of 1 kg, friction 0.8, would slip .*: friction needs 6.88 N"),
-        (6.0, 0.1, None, r"strongest there is, 200 N, does not do: slice of 6 kg, friction 0.1, .* needs 330 N"),
-        (0.04, 0.0, 25.0, r"^robot.grip_force_n = 25: slice of 0.04 kg, friction 0, would slip .* however strongly"),
-        (0.04, 0.0, None, r"however strongly"),
+        (
+            Load("slice", 1.0, 0.8),
+            5.0,
+            r"= 5: slice of 1 kg, friction 0.8, would slip .*: it needs 6.88 N to be lifted",
+        ),
+        (
+            Load("slice", 6.0, 0.1),
+            200.0,
+            r"= 200: slice of 6 kg, friction 0.1, .* it needs 330 N .* allowed are up to 200",
+        ),
+        (
+            Load("slice", 0.04, 0.0),
+            25.0,
+            r"= 25: slice of 0.04 kg, friction 0, would slip .*, however strongly they press$",
+        ),
     ],
 )
-def test_what_friction_cannot_hold_is_refused(
-    mass_kg: float, friction: float, force_n: float | None, said: str
-) -> None:
-    with pytest.raises(BadInput, match=said):
-        held(mass_kg, friction, force_n)
+def test_what_friction_cannot_hold_is_refused(load: Load, force_n: float, said: str) -> None:
+    robot = load_task("toast").robot
+    with pytest.raises(BadInput, match="^robot.grip_force_n " + said):
+        check_friction(robot, load, force_n)
+    check_friction(robot, replace(load, friction=0.8), 200.0)
 
 
 def test_a_pallet_weighs_what_it_carries() -> None:
-    task = load("fms-arm")
+    task = load_task("fms-arm")
     loads = {kind.name: Load.of(kind) for kind in kinds_of(task, arm_of(task.robot).gripper).values()}
     name = next(name for name in loads if " on " in name)
     part, pallet = name.split(" on ")
