@@ -16,7 +16,7 @@ from threading import Timer
 from typing import IO
 
 LAB = (sys.executable, "-c", "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()")
-LINE_CHARACTERS = 300
+ERROR, LINE_CHARACTERS = "lab: ", 300
 CODES = (0, 1, 2, 130)
 
 
@@ -33,17 +33,18 @@ class Ended:
 
     def fault(self, codes: Sequence[int] = CODES) -> str:
         """What is wrong with how it ended: a traceback, an unknown code, lines too long; empty if nothing is."""
-        said = self.stderr + self.stdout
+        printed = self.stderr + self.stdout
         if self.late:
             return f"no end within {self.seconds:.0f} s"
-        if "Traceback (most recent call last)" in said:
-            return f"traceback: {said.strip().splitlines()[-1][:200]}"
+        if "Traceback (most recent call last)" in printed:
+            return f"traceback: {printed.strip().splitlines()[-1][:200]}"
         if self.code not in codes:
             return f"exit {self.code}, allowed {', '.join(map(str, codes))}: {self.stderr.strip()[-200:]}"
         if self.code in (1, 2) and not self.stderr.strip():
             return f"exit {self.code} without a word"
-        longest = max((len(line) for line in re.split(r"[\r\n]", self.stderr)), default=0)
-        return f"a line of {longest} characters on stderr" if longest > LINE_CHARACTERS else ""
+        said = [line for line in re.split(r"[\r\n]", self.stderr) if line.startswith(ERROR)]
+        longest = max(map(len, said), default=0)
+        return f"an error of {longest} characters" if longest > LINE_CHARACTERS else ""
 
 
 def environment(home: Path, **more: str) -> dict[str, str]:
