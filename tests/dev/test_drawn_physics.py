@@ -1,0 +1,56 @@
+"""The harness's part `physics`: what is drawn into a task file, one refused before any work, and what counts as broken."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import Ended
+from drawn_physics import FORCE_N, MASS_KG, MOVED_M, SPEED_M_S, TASKS, attempt, drawn, judged
+
+from lab.tasks.task_file import find
+
+NOT_HELD = "lab: robot.grip_force_n = 1: slice of 2 kg, friction 0.1, would slip\n"
+
+
+@pytest.mark.parametrize("name", TASKS)
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_drawn_is_in_the_task(name: str, seed: int) -> None:
+    text = find(name).read_text(encoding="utf-8")
+    own, other = tomllib.loads(text), tomllib.loads(drawn(text, np.random.default_rng(seed)))
+    assert SPEED_M_S[0] <= other["robot"]["speed_m_s"] <= SPEED_M_S[1]
+    assert other["robot"].get("grip_force_n", FORCE_N[0]) <= FORCE_N[1]
+    assert all(MASS_KG[0] <= part["mass_kg"] <= MASS_KG[1] for part in other["parts"])
+    assert other["parts"][0]["mass_kg"] != own["parts"][0]["mass_kg"]
+    for here, there in zip(own["stations"], other["stations"], strict=True):
+        assert there["pose"] == pytest.approx(here["pose"], abs=MOVED_M + 0.08)
+
+
+def test_one_that_cannot_be_held_is_refused_before_any_work(
+    tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of this seed the sixth: a can of 7 g, held by 12 N, slips in the trial."""
+    monkeypatch.setenv("PYTHONPATH", str(root))
+    outcome = attempt(6, 1000, tmp_path)
+    assert (outcome.group, outcome.broke) == ("refused", "")
+    assert "can-4 of 0.00672 kg, friction 0.361, is not held: in a trial it slips by" in outcome.case
+
+
+def ended(code: int, stderr: str = "", **document: object) -> Ended:
+    return Ended(code, json.dumps({"parts": {"slice": 2}, "failure": None, **document}), stderr, 1.0, 0)
+
+
+@pytest.mark.parametrize(
+    ("ran", "check", "counts"),
+    [
+        (ended(0, delivered=2), ended(0), ("delivered", "")),
+        (ended(1, "lab: slice 2 is lost\n", delivered=1, failure="slice 2 is lost"), ended(0),
+         ("broke", "1 of 2 delivered: slice 2 is lost")),
+        (ended(2, NOT_HELD), ended(2, NOT_HELD), ("refused", "")),
+        (ended(2, NOT_HELD), ended(0), ("refused", f"refused, but the check said otherwise: {NOT_HELD.strip()}")),
+        (ended(-9), ended(0), ("broke", "exit -9, allowed 0, 1, 2, 130: ")),
+    ],
+)  # fmt: skip
+def test_what_a_drawn_run_counts_as(ran: Ended, check: Ended, counts: tuple[str, str]) -> None:
+    assert judged(ran, lambda: check) == counts
