@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from math import hypot, pi
 from typing import NamedTuple
 
@@ -30,10 +30,10 @@ def check_held(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind]) -> None:
     held = holding(robot, kinds)
     for kind in kinds:
         check_friction(robot, Load.of(kind), held.force_n)
-        if robot.is_file or not Load.of(kind).is_usual(held.force_n, robot.acceleration_m_s2):
-            went = tried(arm, kind, held, robot.speed_m_s, robot.acceleration_m_s2)
-            if went:
-                raise BadInput(_refusal(robot, kind, held, went))
+        if Load.of(kind).is_usual(held.force_n, robot.acceleration_m_s2) and not robot.is_file:
+            continue
+        if went := tried(Trial(arm, kind, held, robot.speed_m_s, robot.acceleration_m_s2)):
+            raise BadInput(_refusal(robot, kind, held, went))
 
 
 def _refusal(robot: RobotSettings, kind: Kind, held: Holding, went: str) -> str:
@@ -45,7 +45,9 @@ def _refusal(robot: RobotSettings, kind: Kind, held: Holding, went: str) -> str:
     return f"robot.grip_force_n = {held.force_n:.3g}: {what}, is not held: in a trial {went}; {hint}"
 
 
-class _Trial(NamedTuple):
+class Trial(NamedTuple):
+    """A kind that an arm takes up, moving as fast [m/s] and speeding up as much [m/s2] as in its task."""
+
     arm: Arm
     kind: Kind
     held: Holding
@@ -53,13 +55,9 @@ class _Trial(NamedTuple):
     acceleration_m_s2: float
 
 
-def tried(arm: Arm, kind: Kind, held: Holding, speed_m_s: float, acceleration_m_s2: float) -> str:
+@lru_cache(maxsize=64)
+def tried(trial: Trial) -> str:
     """What went wrong with one part in a world of its own, "" for nothing, or where the arm has no room for the trial."""
-    return _tried(_Trial(arm, kind, held, speed_m_s, acceleration_m_s2))
-
-
-@cache
-def _tried(trial: _Trial) -> str:
     place = _place(trial)
     if place is None:
         return ""
@@ -80,7 +78,7 @@ def _tried(trial: _Trial) -> str:
         return _ended(world, trial.kind, bodies, place)
 
 
-def _place(trial: _Trial) -> Spot | None:
+def _place(trial: Trial) -> Spot | None:
     """Where the part stands: ahead of the arm, where it reaches all of the way."""
     for out in OUT:
         spot = Spot(out, 0.0, FOOT_M, 0.0)
@@ -89,7 +87,7 @@ def _place(trial: _Trial) -> Spot | None:
     return None
 
 
-def _way(trial: _Trial, spot: Spot) -> list[ToolPose]:
+def _way(trial: Trial, spot: Spot) -> list[ToolPose]:
     """The tool poses: at the part, above it, swung to both sides and turned, above it again."""
     at = trial.kind.held_at(spot)
     up = at.shifted(dz=LIFT_M)

@@ -7,7 +7,7 @@ from lab.sim.arms.arm_models import arm_of
 from lab.sim.parts.holding import FINE_ITERATIONS, Holding
 from lab.sim.parts.kinds import kinds_of
 from lab.sim.scene import hold_trial
-from lab.sim.scene.hold_trial import check_held, tried
+from lab.sim.scene.hold_trial import Trial, check_held, tried
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
 
@@ -43,5 +43,5 @@ def test_what_happened_is_told(task: Task) -> None:
     """Fingers that hardly press let the slice slide as it is lifted."""
     arm = arm_of(task.robot)
     kind = kinds_of(task, arm.gripper)["slice"]
-    assert tried(arm, kind, Holding(25.0), 0.5, 2.0) == ""
-    assert tried(arm, kind, Holding(0.05, FINE_ITERATIONS), 0.5, 2.0) == "it is lost while it is lifted"
+    assert tried(Trial(arm, kind, Holding(25.0), 0.5, 2.0)) == ""
+    assert tried(Trial(arm, kind, Holding(0.05, FINE_ITERATIONS), 0.5, 2.0)) == "it is lost while it is lifted"
