@@ -53,7 +53,8 @@ def drawn(text: str, rng: np.random.Generator) -> str:
         (ACCELERATION, ACCELERATION_M_S2),
     ):
         text = line.sub(lambda found, ends=ends: found[1] + evenly(rng, ends) + " ", text)  # type: ignore[misc]
-    text = COUNT.sub(lambda found: f"count = {min(int(found[1]), PARTS)}", text)
+    most = int(rng.integers(1, PARTS + 1))
+    text = COUNT.sub(lambda found: f"count = {min(int(found[1]), most)}", text)
     force = f"grip_force_n = {evenly(rng, FORCE_N)}" if rng.random() < 0.5 else ""
     text = FORCE.sub(force, text)
     return POSE.sub(moved, text) if rng.random() < 0.5 else text
@@ -96,6 +97,8 @@ def judged(ran: Ended, check: Callable[[], Ended]) -> tuple[str, str]:
         same = checked.code == 2 and checked.stderr.endswith(ran.stderr)
         return "refused", "" if same else f"refused, but the check said otherwise: {ran.stderr.strip()[:200]}"
     document = json.loads(ran.stdout)
+    if "error" in document:
+        return "broke", document["error"][:250]
     wanted = sum(document["parts"].values())
     if ran.code == 0 and document["delivered"] == wanted:
         return "delivered", ""

@@ -27,14 +27,14 @@ def test_what_is_drawn_is_in_the_task(name: str, seed: int) -> None:
         assert there["pose"] == pytest.approx(here["pose"], abs=MOVED_M + 0.08)
 
 
-def test_one_that_cannot_be_held_is_refused_before_any_work(
+def test_one_that_cannot_be_carried_is_refused_before_any_work(
     tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of this seed the sixth: a can of 7 g, held by 12 N, slips in the trial."""
+    """Slippery pallets in a hurry: a rook would slide off."""
     monkeypatch.setenv("PYTHONPATH", str(root))
-    outcome = attempt(6, 1000, tmp_path)
+    outcome = attempt(7, 1002, tmp_path)
     assert (outcome.group, outcome.broke) == ("refused", "")
-    assert "can-4 of 0.00672 kg, friction 0.361, is not held: in a trial it slips by" in outcome.case
+    assert "acceleration_m_s2 = 3.37: rook on pallet would slide: friction 0.113" in outcome.case
 
 
 def ended(code: int, stderr: str = "", **document: object) -> Ended:
@@ -47,6 +47,7 @@ def ended(code: int, stderr: str = "", **document: object) -> Ended:
         (ended(0, delivered=2), ended(0), ("delivered", "")),
         (ended(1, "lab: slice 2 is lost\n", delivered=1, failure="slice 2 is lost"), ended(0),
          ("broke", "1 of 2 delivered: slice 2 is lost")),
+        (ended(1, "lab: it fell\n", error="it fell"), ended(0), ("broke", "it fell")),
         (ended(2, NOT_HELD), ended(2, NOT_HELD), ("refused", "")),
         (ended(2, NOT_HELD), ended(0), ("refused", f"refused, but the check said otherwise: {NOT_HELD.strip()}")),
         (ended(-9), ended(0), ("broke", "exit -9, allowed 0, 1, 2, 130: ")),

@@ -20,22 +20,29 @@ GENTLE_N, LIGHT_KG = (
     50.0,
     0.35,
 )  # a stronger grip, or a heavier part, tilts and creeps, as forces are not found in so few
-FINE_ITERATIONS = 500  # of the solver, where they must be; measured: nearly all hold, and with 60 a 1 kg box tilts
+FINE_ITERATIONS = 200  # of the solver, where they must be; measured: nearly all hold, and with 60 a 1 kg box tilts
+STAYS = 2.0  # times the acceleration friction holds a part on a pallet that is far from sliding off
 ROUGH = 0.5  # friction from which on what holds by the numbers has always held
 
 
 @dataclass(frozen=True)
 class Load:
-    """A part in the gripper, or a pallet with what stands on it: its mass, and the friction where the fingers touch it."""
+    """A part in the gripper, or a pallet with what stands on it: its mass, and the friction where the fingers touch it.
+
+    carries: the friction, of both, by which the part stays on its pallet; endless where nothing rides.
+    """
 
     name: str
     mass_kg: float
     friction: float
+    carries: float = inf
 
     @classmethod
     def of(cls, kind: Kind) -> "Load":
         """What is held when a kind is carried."""
-        return cls(kind.name, sum(one.part.mass_kg for one in kind.stack()), kind.part.friction)
+        stack = [one.part for one in kind.stack()]
+        carries = inf if kind.rider is None else kind.part.friction * kind.rider.part.friction
+        return cls(kind.name, sum(part.mass_kg for part in stack), kind.part.friction, carries)
 
     def needs_n(self, acceleration_m_s2: float) -> float:
         """The least force [N] of each finger that friction needs to lift it; endless for what has none."""
@@ -47,7 +54,8 @@ class Load:
         """Whether it is so far from what may go wrong that physics need not be fine, and nobody has to try it."""
         strong = force_n >= MARGIN * self.needs_n(acceleration_m_s2)
         gentle = self.mass_kg <= LIGHT_KG and force_n <= min(GENTLE_N, GENTLE_N_KG * self.mass_kg)
-        return strong and gentle and self.friction >= ROUGH
+        rides = self.carries * GRAVITY_M_S2 >= STAYS * acceleration_m_s2
+        return strong and gentle and rides and self.friction >= ROUGH
 
 
 @dataclass(frozen=True)
@@ -67,7 +75,12 @@ def holding(robot: RobotSettings, kinds: Iterable[Kind]) -> Holding:
 
 
 def check_friction(robot: RobotSettings, load: Load, force_n: float) -> None:
-    """BadInput where friction cannot hold a load that is lifted, with the force that it needs."""
+    """BadInput where friction cannot hold a load that is lifted, with the force it needs, or cannot keep it on its pallet."""
+    if load.carries * GRAVITY_M_S2 < robot.acceleration_m_s2:
+        raise BadInput(
+            f"robot.acceleration_m_s2 = {robot.acceleration_m_s2:g}: {load.name} would slide: friction {load.carries:.3g} "
+            f"between the two allows up to {load.carries * GRAVITY_M_S2:.4g} m/s2"
+        )
     needed_n = load.needs_n(robot.acceleration_m_s2)
     if force_n >= needed_n:
         return

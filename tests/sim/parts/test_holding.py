@@ -1,6 +1,7 @@
 """The grip: chosen from mass and friction, refused where friction cannot hold, and physics fine where it must be."""
 
 from dataclasses import replace
+from math import inf
 
 import pytest
 
@@ -85,6 +86,15 @@ def test_what_friction_cannot_hold_is_refused(load: Load, force_n: float, said: 
     check_friction(robot, replace(load, friction=0.8), 200.0)
 
 
+def test_what_slides_off_its_pallet_is_refused() -> None:
+    robot = load_task("toast").robot  # 2 m/s2
+    check_friction(robot, Load("sign on pallet", 0.1, 0.8, carries=0.21), 25.0)
+    with pytest.raises(
+        BadInput, match=r"^robot.acceleration_m_s2 = 2: sign on pallet would slide: friction 0.2 .* 1.96 m/s2$"
+    ):
+        check_friction(robot, Load("sign on pallet", 0.1, 0.8, carries=0.2), 25.0)
+
+
 def test_a_pallet_weighs_what_it_carries() -> None:
     task = load_task("fms-arm")
     loads = {kind.name: Load.of(kind) for kind in kinds_of(task, arm_of(task.robot).gripper).values()}
@@ -92,3 +102,7 @@ def test_a_pallet_weighs_what_it_carries() -> None:
     part, pallet = name.split(" on ")
     assert loads[name].mass_kg == pytest.approx(loads[part].mass_kg + loads[pallet].mass_kg)
     assert loads[name].friction == loads[pallet].friction
+    assert loads[name].carries == pytest.approx(0.64)  # 0.8 of each: 6.3 m/s2, and 2 x 2 are asked for
+    assert loads[name].is_usual(25.0, 2.0)
+    assert not loads[name].is_usual(25.0, 4.0)
+    assert loads[part].carries == inf
