@@ -48,7 +48,8 @@ def make_sound(room: Path) -> None:
         ended = lab(*words, cwd=room, env=env, stdin=stdin, timeout_s=600)
         assert ended.code in codes, f"lab {' '.join(words)}: exit {ended.code}: {ended.stderr[-500:]}"
 
-    made("teach", "world-1", "--advisor", "terminal", "--plain", "--episodes", "3", "--out", "lesson", "--save", "mine",
+    made("teach", "world-1", "--advisor", "terminal", "--plain", "--gate", "always", "--episodes", "3",
+         "--out", "lesson", "--save", "mine",
          stdin=answers, codes=(0, 1))  # fmt: skip
     made("sequence", "toast", "--method", "srl", "--episodes", "20", "--advisor", "terminal", "--gate", "always", "--plain",
          stdin=answers + "quit\n", codes=(0, 1, 130))  # fmt: skip
@@ -65,6 +66,8 @@ def make_sound(room: Path) -> None:
     made("toolbox", "export", "mine", "--out", "mine.zip")
     made("study", "compare", "world-1", "--sessions", "2", "--advisor", "expert", "--out", "compared")
     made("run", "toast", "--toasts", "1", "--out", "run")
+    lines = (room / "run" / "run.jsonl").read_text().splitlines(keepends=True)
+    (room / "run" / "run.jsonl").write_text("".join(lines[:-1]))  # as of a run that was stopped
 
 
 # ---- what stands in a folder
@@ -110,7 +113,42 @@ def _instances(folder: Path, sound: Path) -> None:
         shutil.copy(FOLDER / name, folder)
 
 
-def _arms(folder: Path, sound: Path) -> None:
+def _link(name: str, size: str = "0.04 0.04 0.04", at: str = "0 0 0", more: str = "") -> str:
+    mass = '<inertial><mass value="1"/><inertia ixx=".01" ixy="0" ixz="0" iyy=".01" iyz="0" izz=".01"/></inertial>'
+    solid = f'<collision><origin xyz="{at}"/><geometry><box size="{size}"/></geometry></collision>'
+    return f'<link name="{name}">{mass}{more}{solid}{solid.replace("collision", "visual")}</link>\n'
+
+
+def _joint(name: str, ends: tuple[str, str], xyz: str, axis: str, low: float, high: float) -> str:
+    kind = "prismatic" if name in ("left", "right") else "revolute"
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{ends[0]}"/><child link="{ends[1]}"/><origin xyz="{xyz}"/>'
+        f'<axis xyz="{axis}"/><limit lower="{low}" upper="{high}" velocity="2" effort="100"/></joint>\n'
+    )
+
+
+_MESH = '<visual><geometry><mesh filename="package://mine/part.stl" scale="0.01 0.01 0.01"/></geometry></visual>'
+ARM = "".join([
+    '<robot name="own"><material name="red"><color rgba="1 0 0 1"/></material>\n',
+    _link("foot", more=_MESH), *(_link(f"l{n}") for n in range(1, 6)),
+    '<link name="tool0"/><joint name="flange" type="fixed"><parent link="l5"/><child link="tool0"/></joint>\n',
+    _link("finger_a", "0.02 0.01 0.06", "0 0.005 0.03"), _link("finger_b", "0.02 0.01 0.06", "0 -0.005 0.03"),
+    _joint("j1", ("foot", "l1"), "0 0 0.3", "0 0 1", -2.9, 2.9), _joint("j2", ("l1", "l2"), "0 0 0.1", "0 1 0", -2, 2),
+    _joint("j3", ("l2", "l3"), "0 0 0.4", "0 1 0", -0.1, 2.6), _joint("j4", ("l3", "l4"), "0 0 0.4", "0 1 0", -2, 2),
+    _joint("j5", ("l4", "l5"), "0 0 0.1", "0 0 1", -3.1, 3.1),
+    _joint("left", ("tool0", "finger_a"), "0 0 0.03", "0 1 0", 0, 0.03),
+    _joint("right", ("tool0", "finger_b"), "0 0 0.03", "0 -1 0", 0, 0.03), "</robot>\n",
+])  # fmt: skip
+
+
+def _own_arm(folder: Path, sound: Path) -> None:
+    from trimesh.creation import box
+
+    (folder / "own.urdf").write_text(ARM)
+    box((1, 1, 1)).export(folder / "part.stl", file_type="stl")
+
+
+def _bodies(folder: Path, sound: Path) -> None:
     from lab.files import assets_folder
 
     for path in assets_folder().iterdir():
@@ -327,10 +365,10 @@ def _durations(path: Path) -> object:
     from lab.production.durations import Durations
     from lab.toolbox.registry import Toolbox
 
-    box = Toolbox(path.parents[2])
+    box, skillset = Toolbox(path.parents[2]), _skillset(path.stem, path)
     box.verify()
     record = box.load_record("durations", path.stem)
-    return None if record is None else Durations.from_json(record, _skillset())
+    return None if record is None else Durations.from_json(record, skillset)
 
 
 def _reused(path: Path) -> object:
@@ -341,12 +379,23 @@ def _reused(path: Path) -> object:
 
 
 @cache
-def _skillset() -> Any:
+def _skillset(key: str, path: Path) -> Any:
+    """The skills that a sound record was measured with."""
+    from lab.errors import BadInput
+    from lab.production.durations import Durations
     from lab.skills.skillset import SkillSet
     from lab.tasks.task_file import load
 
     task = load("toast")
-    return SkillSet.of(task, task.order(1))
+    record = json.loads(path.read_text())["record"]
+    for count in (1, 3):
+        skillset = SkillSet.of(task, task.order(count))
+        try:
+            Durations.from_json(record, skillset)
+            return skillset
+        except BadInput:
+            continue
+    raise AssertionError(f"{key} is of no run that was made")
 
 
 def _log(path: Path) -> object:
@@ -373,9 +422,9 @@ def _carried_read(path: Path) -> object:
 
 
 def _picture(path: Path) -> object:
-    from lab.vision import read_picture, see
+    from lab.cli.see import see_picture
 
-    return see(read_picture(path)).to_json()
+    return see_picture(path, None, "toast", None)
 
 
 def _lens(path: Path) -> object:
@@ -405,10 +454,8 @@ def _arm(path: Path) -> object:
     from lab.sim.arms.arm_models import arm_of
     from lab.tasks.robot_fields import RobotSettings
 
-    fingers = ("finger_left", "finger_right")
-    more: Any = {"tool_link": "tool", "fingers": fingers, "tip_m": 0.1}
-    name = "robot.urdf" if path.suffix == ".obj" else path.name
-    return arm_of(RobotSettings(model=name, start="here", **more), path.parent)
+    settings = RobotSettings(model="own.urdf", start="here", tool_link="tool0", fingers=("left", "right"), tip_m=0.09)
+    return arm_of(settings, path.parent)
 
 
 def _body(path: Path) -> object:
@@ -476,15 +523,16 @@ KINDS: dict[str, Kind] = {
     "exported tables": Kind("text", _exported, "csv/*", _read_back, 200),
     "exported documents": Kind("json", _exported, "json/*", _read_back, 200),
     "carried policy": Kind("json", _carried, "carried.json", _carried_read),
-    "picture": Kind("picture", _copied("pictures"), "pictures/0000*.png", _picture, 200),
+    "picture": Kind("picture", _copied("run/overhead.png"), "overhead.png", _picture, 200),
     "calibration": Kind("json", _copied("lens.json", "pictures/00001.png"), "lens.json", _lens, 200),
     "truth of pictures": Kind(
         "json", _copied("pictures/*.json", "pictures/*.png", "lens.json"), "[0p]*.json", _scored, 50
     ),
     "mesh of a part": Kind("binary", _meshes, "binary.stl", _part),
     "mesh of a part, text": Kind("text", _meshes, "t*", _part),
-    "arm": Kind("text", _arms, "robot*", _arm, 200),
-    "body of a station": Kind("text", _arms, "[ast]*.urdf", _body),
+    "arm": Kind("text", _own_arm, "own.urdf", _arm, 200),
+    "mesh of an arm": Kind("binary", _own_arm, "part.stl", _arm, 200),
+    "body of a station": Kind("text", _bodies, "[ast]*.urdf", _body),
     "kept sessions of a study": Kind("json lines", _copied("compared"), "compared/sessions.jsonl", _compared, 200),
     "kept imports": Kind("json", _cached, "teaching-lab/imports.json", _imports, 100),
 }

@@ -6,7 +6,8 @@ from difflib import get_close_matches
 MOST_CHARACTERS = 295  # of a message: with "lab: " before it, a line that is read at a glance
 MOST_OF_VALUE = 80  # characters of a bad value
 MOST_COMPARED = 10_000  # names with a bad one: more take seconds
-_GAP = " ... "
+KNOWN = " known: "  # before the names that are known, the last of a message
+_GAP, _MORE = " ... ", ", ..."
 _END = 150  # of a longer message: where it comes from stands first, what is allowed last
 
 
@@ -32,17 +33,25 @@ def shortened(value: object, most: int = MOST_OF_VALUE) -> str:
 class LabError(Exception):
     """Any failure the lab explains in one line; `exit_code` is what a command ends with.
 
-    What cannot be printed, such as a line break or an escape code in a bad value, is shown as its escape; the middle of a
-    message of more than MOST_CHARACTERS is left out.
+    What cannot be printed, such as a line break or an escape code in a bad value, is shown as its escape; of a message of
+    more than MOST_CHARACTERS the last known names are left out, or the middle.
     """
 
     exit_code = 1
 
     def __init__(self, message: str = "") -> None:
-        shown = printable(message)
-        if len(shown) > MOST_CHARACTERS:
-            shown = f"{shown[: MOST_CHARACTERS - len(_GAP) - _END]}{_GAP}{shown[-_END:]}"
-        super().__init__(shown)
+        super().__init__(_in_a_line(printable(message)))
+
+
+def _in_a_line(text: str) -> str:
+    """A message of at most MOST_CHARACTERS: of a list of known names at its end the last ones are left out, or its middle."""
+    if len(text) <= MOST_CHARACTERS:
+        return text
+    said, known, names = text.partition(KNOWN)
+    if known and len(said) < MOST_CHARACTERS - MOST_OF_VALUE:
+        kept = names[: MOST_CHARACTERS - len(said + known + _MORE)].rpartition(", ")[0]
+        return f"{said}{known}{kept}{_MORE}"
+    return f"{text[: MOST_CHARACTERS - len(_GAP) - _END]}{_GAP}{text[-_END:]}"
 
 
 class Notice(UserWarning):
@@ -66,7 +75,7 @@ def unknown(kind: str, value: object, known: Iterable[str], where: str) -> BadIn
     names = sorted(known)
     near = get_close_matches(str(value)[:MOST_OF_VALUE], names, n=1) if len(names) <= MOST_COMPARED else []
     hint = f" did you mean '{shortened(near[0])}'?" if near else ""
-    said = f"unknown {kind} '{shortened(value)}' ({shortened(where)}):{hint} known: "
+    said = f"unknown {kind} '{shortened(value)}' ({shortened(where)}):{hint}{KNOWN}"
     return BadInput(f"{said}{listed(names, max(20, MOST_CHARACTERS - len(said))) or 'none'}")
 
 

@@ -87,3 +87,14 @@ def test_a_long_value_is_shown_by_its_two_ends(text: str, most: int) -> None:
     assert shown.isprintable()
     assert len(shown) <= most
     assert shown == printable(text) or " ... " in shown
+
+
+def test_of_a_long_list_of_known_names_the_last_are_left_out_and_the_hint_stays() -> None:
+    message = str(
+        BadInput(
+            f"{'mine/' * 20}task.toml: line 3: {unknown('task', 'toats', ['toast', *map(str, range(99))], 'TASK')}"
+        )
+    )
+    assert "unknown task 'toats' (TASK): did you mean 'toast'? known: 0, 1, 10, " in message
+    assert message.endswith(", ...")
+    assert len(message) <= MOST_CHARACTERS

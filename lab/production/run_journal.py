@@ -14,7 +14,7 @@ from shutil import rmtree
 from typing import Any, NamedTuple
 
 from lab import __version__
-from lab.advice.json_lines import AppendedFile, EntryKinds
+from lab.advice.json_lines import AppendedFile, EntryKinds, differing
 from lab.errors import BadInput, WorkFailed
 from lab.production.controls import Held, StopKind
 from lab.production.stop_record import StopsChanged
@@ -255,8 +255,8 @@ class RunJournal:
         before = self._again.pop(0)
         if line_of(before) != line_of(entry):
             raise WorkFailed(
-                f"journal '{self.path}': the run cannot be carried out again: it says {line_of(before)[:200]}, and now comes "
-                f"{line_of(entry)[:200]}: another version of the lab made it, or the task has changed"
+                f"journal '{self.path}': the run cannot be carried out again: {differing(line_of(before), line_of(entry))}: "
+                "another lab made it, or the task has changed"
             )
 
     def write(self, entry: Entry) -> None:

@@ -45,7 +45,7 @@ def test_a_file_that_is_not_there_is_said(task: str, refusal: Refusal) -> None:
 def test_an_unknown_task_lists_the_known(task: str, refusal: Refusal) -> None:
     message = refusal(lambda: load(task))
     assert message.startswith("unknown task '")
-    assert message.endswith("known: " + ", ".join(sorted(shipped())))
+    assert "known: " + ", ".join(sorted(shipped()))[:100] in message
     assert ("did you mean 'toast'?" in message) == (task in ("toats", "Toast", "toast\0"))
 
 
