@@ -50,7 +50,7 @@ def make_sound(room: Path) -> None:
 
     made("teach", "world-1", "--advisor", "terminal", "--plain", "--gate", "always", "--episodes", "3",
          "--out", "lesson", "--save", "mine",
-         stdin=answers, codes=(0, 1))  # fmt: skip
+         stdin="r\nr\nb\nu\n" * 300, codes=(0, 1))  # fmt: skip
     made("sequence", "toast", "--method", "srl", "--episodes", "20", "--advisor", "terminal", "--gate", "always", "--plain",
          stdin=answers + "quit\n", codes=(0, 1, 130))  # fmt: skip
     made("see", "--make", "2", "--out", "pictures")
@@ -439,7 +439,7 @@ def _scored(path: Path) -> object:
     from lab.skills.scored_pictures import score_pictures
     from lab.vision.calibration import read_calibration
 
-    return score_pictures(path.parent, read_calibration(path.with_name("lens.json")))
+    return score_pictures(path.parent, read_calibration(path.parents[1] / "lens.json"))
 
 
 def _part(path: Path) -> object:
@@ -451,11 +451,12 @@ def _part(path: Path) -> object:
 
 
 def _arm(path: Path) -> object:
-    from lab.sim.arms.arm_models import arm_of
+    from lab.sim.arms import arm_models
     from lab.tasks.robot_fields import RobotSettings
 
+    arm_models._made.cache_clear()  # it knows an arm by its URDF's date alone
     settings = RobotSettings(model="own.urdf", start="here", tool_link="tool0", fingers=("left", "right"), tip_m=0.09)
-    return arm_of(settings, path.parent)
+    return arm_models.arm_of(settings, path.parent)
 
 
 def _body(path: Path) -> object:
@@ -469,11 +470,21 @@ def _compared(path: Path) -> object:
     from lab.studies.compared import Compared, compared
     from lab.studies.runner import Job
 
+    _compiled()
     before = path.read_bytes()
     try:
         return compared(Compared("world-1"), Job(2, 0, folder=path.parent))
     finally:
         path.write_bytes(before)
+
+
+@cache
+def _compiled() -> None:
+    """What sessions need is compiled before a file is read."""
+    from lab.studies.compared import Compared, compared
+    from lab.studies.runner import Job
+
+    compared(Compared("world-1"), Job(2, 0))
 
 
 def _imports(path: Path) -> object:
@@ -525,9 +536,7 @@ KINDS: dict[str, Kind] = {
     "carried policy": Kind("json", _carried, "carried.json", _carried_read),
     "picture": Kind("picture", _copied("run/overhead.png"), "overhead.png", _picture, 200),
     "calibration": Kind("json", _copied("lens.json", "pictures/00001.png"), "lens.json", _lens, 200),
-    "truth of pictures": Kind(
-        "json", _copied("pictures/*.json", "pictures/*.png", "lens.json"), "[0p]*.json", _scored, 50
-    ),
+    "truth of pictures": Kind("json", _copied("pictures", "lens.json"), "pictures/[0p]*.json", _scored, 50),
     "mesh of a part": Kind("binary", _meshes, "binary.stl", _part),
     "mesh of a part, text": Kind("text", _meshes, "t*", _part),
     "arm": Kind("text", _own_arm, "own.urdf", _arm, 200),

@@ -23,7 +23,7 @@ def escaped(text: str) -> str:
 
 def shortened(value: object, most: int = MOST_OF_VALUE) -> str:
     """A value as an error shows it: printable, and the middle of a long one left out."""
-    text = printable(str(value))
+    text = printable(_ends(str(value)))
     if len(text) <= most:
         return text
     end = (most - len(_GAP)) // 2
@@ -40,7 +40,12 @@ class LabError(Exception):
     exit_code = 1
 
     def __init__(self, message: str = "") -> None:
-        super().__init__(_in_a_line(printable(message)))
+        super().__init__(_in_a_line(printable(_ends(message))))
+
+
+def _ends(text: str) -> str:
+    """A text without the middle of a very long one, which would take seconds to be made printable."""
+    return text if len(text) <= 4 * MOST_CHARACTERS else text[: 2 * MOST_CHARACTERS] + text[-2 * MOST_CHARACTERS :]
 
 
 def _in_a_line(text: str) -> str:

@@ -1,19 +1,23 @@
-"""Files: where the shipped ones are; written whole or not at all; folders looked at before anything is made."""
+"""Files: where the shipped ones are; read within bounds; written whole or not at all; folders looked at before use."""
 
 import fcntl
+import json
 import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from errno import EFBIG, EINVAL
 from importlib.util import find_spec
 from pathlib import Path
 from secrets import token_hex
 from shutil import rmtree
 from tempfile import mkdtemp
+from typing import Any
 
 from lab.errors import BadInput, WorkFailed
 
 PACKAGE = Path(__file__).resolve().parent
+MOST_BYTES = 256 << 20  # of any file that is read; most kinds have a lower limit of their own
 
 
 def tasks_folder() -> Path:
@@ -48,6 +52,30 @@ def find(name: str, package: Path) -> Path:
     raise WorkFailed(
         f"the lab's own '{name}' folder is missing: looked for {wheel} and {checkout}; install the lab again"
     )
+
+
+def read_limited(path: Path, most: int = MOST_BYTES) -> bytes:
+    """All bytes of a file. Raises OSError, its reason in words, also for no regular file and for more than `most` bytes."""
+    if path.exists() and not path.is_file():
+        raise OSError(EINVAL, "it is no regular file", str(path))
+    with path.open("rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        content = file.read(most + 1) if size <= most else b""
+        if max(size, len(content)) > most:
+            raise OSError(EFBIG, f"it has {max(size, len(content))} bytes, allowed are {most}", str(path))
+        return content
+
+
+def json_of(content: str | bytes) -> Any:
+    """What JSON holds, as its standard has it, without NaN and infinities. ValueError for anything else."""
+    try:
+        return json.loads(content, parse_constant=_reject_constant)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
+def _reject_constant(text: str) -> None:
+    raise ValueError(f"{text} is not allowed")
 
 
 _DRAFT = ".run-"  # and eight characters: the folder of a draft

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from lab.errors import BadInput, unknown
+from lab.files import json_of, read_limited
 from lab.mdp import TabularMDP
-from lab.toolbox.strict_json import loads
 
 MOST_BYTES = 10_000_000
 
@@ -15,12 +15,10 @@ def answers_of(path: Path, mdp: TabularMDP) -> dict[int, int]:
     Raises BadInput for a file that cannot be read, is too large or no such object, and for states or actions that there are not.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise BadInput(f"'{path}' has more than {MOST_BYTES} bytes")
-        said = loads(path.read_bytes())
+        said = json_of(read_limited(path, MOST_BYTES))
     except OSError as error:
         raise BadInput(f"'{path}' cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError):
+    except ValueError:
         raise BadInput(f"'{path}' is no JSON: wanted an object of states and actions") from None
     if not isinstance(said, dict) or not said:
         raise BadInput(f'\'{path}\': wanted an object of states and actions, such as {{"(0, 1)": "right"}}')

@@ -9,18 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted, unknown
+from lab.files import read_limited
 from lab.sim import mesh_file
 from lab.sim.frames import Quaternion, Shape
+
+MAX_BYTES = 5_000_000  # of a URDF
 
 
 def read(path: Path) -> Xml.Element:
     """The root of a URDF; BadInput when it cannot be read, declares entities, or has no links."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_limited(path, MAX_BYTES).decode("utf-8")
         if "<!DOCTYPE" in text or "<!ENTITY" in text:
             raise BadInput(f"{path}: a URDF must not declare a document type or entities")
         root = Xml.fromstring(text)
-    except (OSError, UnicodeDecodeError, Xml.ParseError) as error:
+    except OSError as error:
+        raise BadInput(f"{path}: not a readable URDF: {error.strerror or error}") from None
+    except (UnicodeDecodeError, Xml.ParseError) as error:
         raise BadInput(f"{path}: not a readable URDF: {error}") from None
     links = root.findall("link")
     if root.tag != "robot" or not links:

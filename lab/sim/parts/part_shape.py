@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted
-from lab.files import assets_folder
+from lab.files import assets_folder, read_limited
 from lab.sim import urdf_reader
 from lab.sim.frames import Quaternion, Shape, ShapeKind, Vector
 from lab.sim.mesh_file import is_binary
@@ -204,7 +204,7 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     try:
         kind = path.suffix.lower().removeprefix(".")
         raw: dict[str, Any] = {"process": False, "skip_materials": True}  # as it is; and no other file is opened
-        data = path.read_bytes()
+        data = read_limited(path, MOST_BYTES)
         mesh: Any = trimesh.load(BytesIO(data), kind, force="mesh", **raw)
         points: Array = np.asarray(mesh.vertices, dtype=float)
     except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
