@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from mutated_commands import PART as MUTATED_COMMANDS
 from mutations import PART as MUTATIONS
 from page_attacks import PART as REQUESTS
 from parts import Part
@@ -15,7 +16,7 @@ from rich.console import Console
 from rich.progress import Progress
 from scoreboard import line, show, written
 
-PARTS: dict[str, Part] = {"mutations": MUTATIONS, "requests": REQUESTS}
+PARTS: dict[str, Part] = {"mutations": MUTATIONS, "mutated-commands": MUTATED_COMMANDS, "requests": REQUESTS}
 
 
 def main(
