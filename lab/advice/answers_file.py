@@ -7,6 +7,7 @@ from lab.files import json_of, read_limited
 from lab.mdp import TabularMDP
 
 MOST_BYTES = 10_000_000
+MOST_DIGITS = 9
 
 
 def answers_of(path: Path, mdp: TabularMDP) -> dict[int, int]:
@@ -27,10 +28,11 @@ def answers_of(path: Path, mdp: TabularMDP) -> dict[int, int]:
     numbers = {str(action): action for action in actions.values()}
     found = {}
     for name, what in said.items():
-        state = int(name) if name.isascii() and name.isdigit() and int(name) < mdp.n_states else states.get(name)
+        is_number = name.isascii() and name.isdigit() and len(name) <= MOST_DIGITS and int(name) < mdp.n_states
+        state = int(name) if is_number else states.get(name)
         if state is None:
             raise unknown("state", name, states, str(path))
-        word = str(what)
+        word = str(what) if isinstance(what, str | int | float | None) else f"a {type(what).__name__}"
         if word not in actions and word not in numbers:
             raise unknown("action", word, actions, f"{path}, state {name}")
         found[state] = actions[word] if word in actions else numbers[word]

@@ -173,6 +173,8 @@ def read_packed(path: Path) -> bytes:
 def _check_entry(entry: ZipInfo) -> None:
     """BadInput unless it is a plain file with a plain name, neither compressed nor encrypted."""
     name = entry.orig_filename
+    if not entry.filename:
+        raise BadInput("it holds a file without a name")
     if name.startswith(("/", "\\")) or ".." in re.split(r"[/\\]", name) or name[1:2] == ":":
         raise BadInput(f"'{name}' leads out of the folder that it is unpacked in")
     kind = stat.S_IFMT(entry.external_attr >> 16)

@@ -52,7 +52,7 @@ def test_a_folder_that_is_there_a_wrong_count_and_a_task_without_a_camera_are_re
         make_pictures("toast", 0, tmp_path / "none", 0)
     with pytest.raises(BadInput, match="no station of it is approached through the camera's grid"):
         make_pictures("fms-arm", 1, tmp_path / "none", 0)
-    with pytest.raises(BadInput, match="wanted the index that `lab see --make` writes"):
+    with pytest.raises(BadInput, match="wanted what `lab see --make` wrote"):
         score_pictures(tmp_path)
 
 
