@@ -23,6 +23,10 @@ JOBS = "set,job,operation,machine,time\n7,1,1,M1,8\n7,1,2,M2,16\n"
 GRID = "S...#\n.##..\n....G\n"
 
 
+QUICK = 3000  # tries of a batch where a file is read in a millisecond or two
+MOST_ACTIONS = 300  # of a program that is also written
+
+
 @dataclass(frozen=True)
 class Kind:
     """A kind of file.
@@ -343,6 +347,8 @@ def _program(path: Path) -> object:
     from lab.export.program import Program
 
     program = Program.load(path.parent)
+    if len(program.carried.actions) > MOST_ACTIONS:  # to write them is real work
+        return program
     options = Options("rectan", "2026/01/01 00:00")
     return [FORMATS[name].write(program, options) for name in ("jbi", "csv", "json")]
 
@@ -506,17 +512,17 @@ _CELLS = ("fms", "hoist-pu", "two-on-a-track")
 _MADE_BY_HAND = ("toast", "breakfast", "sorting", "toast-window", "two-toasters", "toast-case-1", "fms-arm")
 
 KINDS: dict[str, Kind] = {
-    "task": Kind("text", _tasks(*_MADE_BY_HAND), "*.toml", _any),
+    "task": Kind("text", _tasks(*_MADE_BY_HAND), "*.toml", _any, QUICK),
     "task, checked": Kind("text", _tasks("toast", "sorting"), "*.toml", _checked, 60),
-    "cell": Kind("text", _tasks(*_CELLS), "*.toml", _cell),
-    "world": Kind("text", _tasks("world-1"), "*.toml", _any),
-    "text grid": Kind("text", _texts({"grid.txt": GRID}), "*.txt", _any),
-    "instance": Kind("text", _instances, "*", _instance),
-    "jobs and layout": Kind("text", _texts({"jobs.csv": JOBS, "layout.csv": LAYOUT}), "*.csv", _instance),
-    "policy": Kind("tensors", _copied("toolbox/mine.safetensors"), "mine.safetensors", _policy),
-    "archive": Kind("zip", _copied("mine.zip"), "mine.zip", _archive),
-    "folder for the Hub, model": Kind("tensors", _hub, "model.safetensors", _hub_read),
-    "folder for the Hub, metadata": Kind("json", _hub, "config.json", _hub_read),
+    "cell": Kind("text", _tasks(*_CELLS), "*.toml", _cell, QUICK),
+    "world": Kind("text", _tasks("world-1"), "*.toml", _any, QUICK),
+    "text grid": Kind("text", _texts({"grid.txt": GRID}), "*.txt", _any, QUICK),
+    "instance": Kind("text", _instances, "*", _instance, QUICK),
+    "jobs and layout": Kind("text", _texts({"jobs.csv": JOBS, "layout.csv": LAYOUT}), "*.csv", _instance, QUICK),
+    "policy": Kind("tensors", _copied("toolbox/mine.safetensors"), "mine.safetensors", _policy, QUICK),
+    "archive": Kind("zip", _copied("mine.zip"), "mine.zip", _archive, QUICK),
+    "folder for the Hub, model": Kind("tensors", _hub, "model.safetensors", _hub_read, QUICK),
+    "folder for the Hub, metadata": Kind("json", _hub, "config.json", _hub_read, QUICK),
     "toolbox's log": Kind("json lines", _copied("toolbox"), "toolbox/log/mine.jsonl", _log),
     "toolbox's index": Kind("json", _many_policies, "toolbox/index.json", _index, 100),
     "record of durations": Kind("record", _copied("toolbox"), "toolbox/records/durations/*", _durations),
@@ -524,16 +530,18 @@ KINDS: dict[str, Kind] = {
     "lesson's journal": Kind("json lines", _copied("toolbox"), "toolbox/sessions/world-1-*/events.jsonl", _replayed),
     "recorded advice": Kind("json lines", _copied("lesson"), "lesson/events.jsonl", _recorded),
     "order's journal": Kind("json lines", _copied("toolbox"), "toolbox/sessions/order-of-toast-1/events.jsonl", _order),
-    "answers": Kind("json", _texts({"answers.json": '{"0": "right", "5": 1, "7": "up"}'}), "answers.json", _answers),
+    "answers": Kind(
+        "json", _texts({"answers.json": '{"0": "right", "5": 1, "7": "up"}'}), "answers.json", _answers, QUICK
+    ),
     "run's journal": Kind("json lines", _copied("run"), "run/run.jsonl", _run),
     "run's known policies": Kind("json", _copied("run"), "run/known.json", _run),
     "run's skills": Kind("tensors", _copied("run"), "run/skills/*", lambda path: _run(path.parents[1] / "run.jsonl")),
     "run's program": Kind("json", _copied("run"), "run/program.json", _program),
     "run's trajectory": Kind("zip", _copied("run"), "run/trajectory.npz", _program, 200),
-    "exported jobs": Kind("text", _exported, "jbi/*", _read_back),
+    "exported jobs": Kind("text", _exported, "jbi/*", _read_back, QUICK),
     "exported tables": Kind("text", _exported, "csv/*", _read_back, 200),
     "exported documents": Kind("json", _exported, "json/*", _read_back, 200),
-    "carried policy": Kind("json", _carried, "carried.json", _carried_read),
+    "carried policy": Kind("json", _carried, "carried.json", _carried_read, QUICK),
     "picture": Kind("picture", _copied("run/overhead.png"), "overhead.png", _picture, 200),
     "calibration": Kind("json", _copied("lens.json", "pictures/00001.png"), "lens.json", _lens, 200),
     "truth of pictures": Kind("json", _copied("pictures", "lens.json"), "pictures/[0p]*.json", _scored, 50),
@@ -541,7 +549,7 @@ KINDS: dict[str, Kind] = {
     "mesh of a part, text": Kind("text", _meshes, "t*", _part),
     "arm": Kind("text", _own_arm, "own.urdf", _arm, 200),
     "mesh of an arm": Kind("binary", _own_arm, "part.stl", _arm, 200),
-    "body of a station": Kind("text", _bodies, "[ast]*.urdf", _body),
-    "kept sessions of a study": Kind("json lines", _copied("compared"), "compared/sessions.jsonl", _compared, 200),
+    "body of a station": Kind("text", _bodies, "[ast]*.urdf", _body, QUICK),
+    "kept sessions of a study": Kind("json lines", _copied("compared"), "compared/sessions.jsonl", _compared, 40),
     "kept imports": Kind("json", _cached, "teaching-lab/imports.json", _imports, 100),
 }

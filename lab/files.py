@@ -154,16 +154,30 @@ def _locked(folder: Path, how: int = 0) -> Iterator[None]:
         os.close(handle)
 
 
+def is_file(path: Path | str) -> bool:
+    """Whether there is such a file; also False for what can be no file's name."""
+    return os.path.isfile(path)
+
+
+def within(folder: Path, name: str, beside: Path | None = None) -> Path | None:
+    """What a name out of a file means, seen from `beside` or `folder`; None where that leads out of `folder`, or is no name."""
+    try:
+        found = ((beside or folder) / name).resolve()
+    except (OSError, ValueError):
+        return None
+    return found if folder.resolve() in found.parents else None
+
+
 def beside_or_asset(name: str, folder: Path, what: str) -> Path:
     """A file that a task file names, in the task file's folder or below it, else in the lab's own assets.
 
     BadInput, beginning with `what`, when it is in neither, or when the name leads out of the folder.
     """
     for place in (folder, assets_folder()):
-        found = (place / name).resolve()
-        if place.resolve() not in found.parents:
+        found = within(place, name)
+        if found is None:
             raise BadInput(f"{what} '{name}': a file's name may not lead out of the task file's folder")
-        if found.is_file():
+        if is_file(found):
             return found
     known = ", ".join(sorted(path.name for path in assets_folder().glob("*.urdf")))
     raise BadInput(f"{what} '{name}': no such file in {folder}; of its own the lab has {known}")

@@ -167,7 +167,7 @@ def test_only_a_regular_file_is_read(tmp_path: Path, make: Callable[[Path], None
         ("-Infinity", "-Infinity is not allowed"),
         ("[" * 100_000, "nested too deeply"),
         ("1" * 5000, "limit"),
-        (b"\xff\xfe", "codec"),
+        (b"\xc3", "codec"),
     ],
 )
 def test_what_is_no_json_is_refused(text: str | bytes, said: str) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.errors import BadInput, unknown
+from lab.files import is_file
 from lab.plugins.family import Family
 
 _files: dict[str, tuple[str, str]] = {}  # by a member's name: the kind of its family, and the words it was named by
@@ -31,7 +32,7 @@ def take(
         return word
     path, _, name = word.rpartition(":")
     file = Path(path)
-    if not file.is_file():
+    if not is_file(file):
         raise BadInput(f"{word}: there is no file '{path}'")
     own = f"{file.stem}.{name}"
     if own in _files:

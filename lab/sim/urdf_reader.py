@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted, unknown
-from lab.files import read_limited
+from lab.files import is_file, read_limited, within
 from lab.sim import mesh_file
 from lab.sim.frames import Quaternion, Shape
 
@@ -216,10 +216,10 @@ def check_joint(path: Path, joint: Xml.Element, links: list[str]) -> None:
 
 def check_mesh(path: Path, name: str, folder: Path) -> None:
     """BadInput unless the mesh that the URDF at `path` names is an OBJ or STL file in `folder` with finite vertices."""
-    file = (path.parent / name).resolve()
-    if folder.resolve() not in file.parents:
+    file = within(folder, name, path.parent)
+    if file is None:
         raise BadInput(f"{path}: mesh '{name}' lies outside the URDF's folder")
-    if not file.is_file() or not 0 < file.stat().st_size <= mesh_file.MAX_BYTES:
+    if not is_file(file) or not 0 < file.stat().st_size <= mesh_file.MAX_BYTES:
         raise BadInput(f"{path}: mesh '{name}' is missing, empty or over {mesh_file.MAX_BYTES // 1_000_000} MB")
     kind = "an STL" if file.suffix.lower() == ".stl" else "an OBJ"
     try:

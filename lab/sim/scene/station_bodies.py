@@ -103,7 +103,7 @@ def _mesh_bounds(path: Path) -> tuple[Array, Array]:
         faces = len(mesh.faces)
     except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
         raise BadInput(f"it cannot be read as {kind.upper()}: {type(error).__name__}: {error}") from None
-    if faces < 1 or len(points) < 3 or not np.isfinite(points).all():
+    if faces < 1 or len(points) < 3 or points.shape[1:] != (3,) or not np.isfinite(points).all():
         raise BadInput(
             f"a mesh of {len(points)} vertices and {faces} faces: wanted finite ones, and faces between them"
         )
