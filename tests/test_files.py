@@ -9,7 +9,7 @@ import pytest
 
 from lab import files
 from lab.errors import BadInput, WorkFailed
-from lab.files import check_out, draft, json_of, nearest, read_limited, write_whole
+from lab.files import check_out, draft, is_file, json_of, nearest, read_limited, within, write_whole
 
 
 def test_a_file_is_written_and_replaced(tmp_path: Path) -> None:
@@ -177,3 +177,21 @@ def test_what_is_no_json_is_refused(text: str | bytes, said: str) -> None:
 
 def test_json_is_read() -> None:
     assert json_of('{"a": [1, null, "x"]}') == {"a": [1, None, "x"]}
+
+
+def test_a_name_out_of_a_file_leads_nowhere_else(tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "file").touch()
+    (folder / "link").symlink_to("/etc")
+    assert within(folder, "file") == folder / "file"
+    assert within(folder, "below/other") == folder / "below" / "other"
+    assert within(folder, "file", folder / "below") == folder / "below" / "file"
+    for name in ("", ".", "..", "../x", "/etc/passwd", "link/passwd", "a\0b"):
+        assert within(folder, name) is None, name
+
+
+def test_what_can_be_no_name_is_no_file(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert is_file(tmp_path / "file")
+    assert not any(is_file(tmp_path / name) for name in ("", "x" * 300, "a\0b", "file/below"))

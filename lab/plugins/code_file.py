@@ -3,11 +3,11 @@
 import sys
 from collections.abc import Callable, Sequence
 from importlib.util import module_from_spec, spec_from_file_location
+from os.path import isfile
 from pathlib import Path
 from typing import Any
 
 from lab.errors import BadInput, unknown
-from lab.files import is_file
 from lab.plugins.family import Family
 
 _files: dict[str, tuple[str, str]] = {}  # by a member's name: the kind of its family, and the words it was named by
@@ -32,7 +32,7 @@ def take(
         return word
     path, _, name = word.rpartition(":")
     file = Path(path)
-    if not is_file(file):
+    if not isfile(file):
         raise BadInput(f"{word}: there is no file '{path}'")
     own = f"{file.stem}.{name}"
     if own in _files:
