@@ -30,6 +30,7 @@ class Ended:
     seconds: float
     peak_bytes: int
     late: bool = False  # it was killed, as it took too long
+    cpu_s: float = 0.0
 
     def fault(self, codes: Sequence[int] = CODES) -> str:
         """What is wrong with how it ended: a traceback, an unknown code, lines too long; empty if nothing is."""
@@ -92,8 +93,8 @@ def lab(
             timer.cancel()
             kill_session(child.pid)
         child.returncode = os.waitstatus_to_exitcode(status)
-        took_s = time.monotonic() - begun
-        return Ended(child.returncode, _text(out), _text(err), took_s, used.ru_maxrss * 1024, bool(late))
+        took_s, cpu_s = time.monotonic() - begun, used.ru_utime + used.ru_stime
+        return Ended(child.returncode, _text(out), _text(err), took_s, used.ru_maxrss * 1024, bool(late), cpu_s)
 
 
 def _text(file: IO[bytes]) -> str:

@@ -1,13 +1,14 @@
 """What the lab says when something is wrong: one line, the bad value, where it came from, what is allowed; counts in words."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
-MOST_NAMES = 30  # an error lists so many known names at the most
-MOST_CHARACTERS = 1600  # of a message: a screen
-_END = (
-    MOST_CHARACTERS // 2 - 25
-)  # of a longer one that is shown: it says where it comes from first, what is allowed last
+MOST_CHARACTERS = 295  # of a message: with "lab: " before it, a line that is read at a glance
+MOST_OF_VALUE = 80  # characters of a bad value
+MOST_COMPARED = 10_000  # names with a bad one: more take seconds
+KNOWN = " known: "  # before the names that are known, the last of a message
+_GAP, _MORE = " ... ", ", ..."
+_END = 150  # of a longer message: where it comes from stands first, what is allowed last
 
 
 def printable(text: str) -> str:
@@ -20,20 +21,42 @@ def escaped(text: str) -> str:
     return text if text.isprintable() else "".join(c if c in "\n\t" else printable(c) for c in text)
 
 
+def shortened(value: object, most: int = MOST_OF_VALUE) -> str:
+    """A value as an error shows it: printable, and the middle of a long one left out."""
+    text = printable(_ends(str(value)))
+    if len(text) <= most:
+        return text
+    end = (most - len(_GAP)) // 2
+    return f"{text[: most - len(_GAP) - end]}{_GAP}{text[-end:]}"
+
+
 class LabError(Exception):
     """Any failure the lab explains in one line; `exit_code` is what a command ends with.
 
-    What cannot be printed, such as a line break or an escape code in a bad value, is shown as its escape; the middle of a
-    message that fills more than a screen is left out.
+    What cannot be printed, such as a line break or an escape code in a bad value, is shown as its escape; of a message of
+    more than MOST_CHARACTERS the last known names are left out, or the middle.
     """
 
     exit_code = 1
 
     def __init__(self, message: str = "") -> None:
-        shown = printable(message)
-        if len(shown) > MOST_CHARACTERS:
-            shown = f"{shown[:_END]} ... ({len(shown) - 2 * _END} more characters) ... {shown[-_END:]}"
-        super().__init__(shown)
+        super().__init__(_in_a_line(printable(_ends(message))))
+
+
+def _ends(text: str) -> str:
+    """A text without the middle of a very long one, which would take seconds to be made printable."""
+    return text if len(text) <= 4 * MOST_CHARACTERS else text[: 2 * MOST_CHARACTERS] + text[-2 * MOST_CHARACTERS :]
+
+
+def _in_a_line(text: str) -> str:
+    """A message of at most MOST_CHARACTERS: of a list of known names at its end the last ones are left out, or its middle."""
+    if len(text) <= MOST_CHARACTERS:
+        return text
+    said, known, names = text.partition(KNOWN)
+    if known and len(said) < MOST_CHARACTERS - MOST_OF_VALUE:
+        kept = names[: MOST_CHARACTERS - len(said + known + _MORE)].rpartition(", ")[0]
+        return f"{said}{known}{kept}{_MORE}"
+    return f"{text[: MOST_CHARACTERS - len(_GAP) - _END]}{_GAP}{text[-_END:]}"
 
 
 class Notice(UserWarning):
@@ -53,12 +76,24 @@ class WorkFailed(LabError):
 
 
 def unknown(kind: str, value: object, known: Iterable[str], where: str) -> BadInput:
-    """The error for a name that no table holds: shows it, where it came from, the nearest and all known names."""
+    """The error for a name that no table holds: shows it, where it came from, the nearest and the known names that fit."""
     names = sorted(known)
-    near = get_close_matches(str(value), names, n=1)
-    hint = f" did you mean '{near[0]}'?" if near else ""
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return BadInput(f"unknown {kind} '{value}' ({where}):{hint} known: {', '.join(names[:MOST_NAMES]) or 'none'}{more}")
+    near = get_close_matches(str(value)[:MOST_OF_VALUE], names, n=1) if len(names) <= MOST_COMPARED else []
+    hint = f" did you mean '{shortened(near[0])}'?" if near else ""
+    said = f"unknown {kind} '{shortened(value)}' ({shortened(where)}):{hint}{KNOWN}"
+    return BadInput(f"{said}{listed(names, max(20, MOST_CHARACTERS - len(said))) or 'none'}")
+
+
+def listed(names: Sequence[str], most: int) -> str:
+    """Names with commas between them, as many as `most` characters hold, and how many more there are."""
+    text = ", ".join(names[:most])
+    if len(text) <= most and len(names) <= most:
+        return text
+    shown = [shortened(name) for name in names[:most]]
+    while shown and len(text) > most:
+        shown.pop()
+        text = f"{', '.join(shown)} and {len(names) - len(shown)} more"
+    return text if shown else counted(len(names), "name")
 
 
 def counted(number: float, what: str) -> str:

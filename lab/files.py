@@ -1,19 +1,23 @@
-"""Files: where the shipped ones are; written whole or not at all; folders looked at before anything is made."""
+"""Files: where the shipped ones are; read within bounds; written whole or not at all; folders looked at before use."""
 
 import fcntl
+import json
 import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from errno import EFBIG, EINVAL
 from importlib.util import find_spec
 from pathlib import Path
 from secrets import token_hex
 from shutil import rmtree
 from tempfile import mkdtemp
+from typing import Any
 
 from lab.errors import BadInput, WorkFailed
 
 PACKAGE = Path(__file__).resolve().parent
+MOST_BYTES = 256 << 20  # of any file that is read; most kinds have a lower limit of their own
 
 
 def tasks_folder() -> Path:
@@ -48,6 +52,30 @@ def find(name: str, package: Path) -> Path:
     raise WorkFailed(
         f"the lab's own '{name}' folder is missing: looked for {wheel} and {checkout}; install the lab again"
     )
+
+
+def read_limited(path: Path, most: int = MOST_BYTES) -> bytes:
+    """All bytes of a file. Raises OSError, its reason in words, also for no regular file and for more than `most` bytes."""
+    if path.exists() and not path.is_file():
+        raise OSError(EINVAL, "it is no regular file", str(path))
+    with path.open("rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        content = file.read(most + 1) if size <= most else b""
+        if max(size, len(content)) > most:
+            raise OSError(EFBIG, f"it has {max(size, len(content))} bytes, allowed are {most}", str(path))
+        return content
+
+
+def json_of(content: str | bytes) -> Any:
+    """What JSON holds, as its standard has it, without NaN and infinities. ValueError for anything else."""
+    try:
+        return json.loads(content, parse_constant=_reject_constant)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
+def _reject_constant(text: str) -> None:
+    raise ValueError(f"{text} is not allowed")
 
 
 _DRAFT = ".run-"  # and eight characters: the folder of a draft
@@ -126,16 +154,30 @@ def _locked(folder: Path, how: int = 0) -> Iterator[None]:
         os.close(handle)
 
 
+def is_file(path: Path | str) -> bool:
+    """Whether there is such a file; also False for what can be no file's name."""
+    return os.path.isfile(path)
+
+
+def within(folder: Path, name: str, beside: Path | None = None) -> Path | None:
+    """What a name out of a file means, seen from `beside` or `folder`; None where that leads out of `folder`, or is no name."""
+    try:
+        found = ((beside or folder) / name).resolve()
+    except (OSError, ValueError):
+        return None
+    return found if folder.resolve() in found.parents else None
+
+
 def beside_or_asset(name: str, folder: Path, what: str) -> Path:
     """A file that a task file names, in the task file's folder or below it, else in the lab's own assets.
 
     BadInput, beginning with `what`, when it is in neither, or when the name leads out of the folder.
     """
     for place in (folder, assets_folder()):
-        found = (place / name).resolve()
-        if place.resolve() not in found.parents:
+        found = within(place, name)
+        if found is None:
             raise BadInput(f"{what} '{name}': a file's name may not lead out of the task file's folder")
-        if found.is_file():
+        if is_file(found):
             return found
     known = ", ".join(sorted(path.name for path in assets_folder().glob("*.urdf")))
     raise BadInput(f"{what} '{name}': no such file in {folder}; of its own the lab has {known}")

@@ -1,10 +1,22 @@
 """The lab's errors: exit codes, one line, the nearest name."""
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.errors import MOST_CHARACTERS, MOST_NAMES, BadInput, LabError, WorkFailed, counted, unknown
+from lab.errors import (
+    MOST_CHARACTERS,
+    BadInput,
+    LabError,
+    WorkFailed,
+    counted,
+    listed,
+    printable,
+    shortened,
+    unknown,
+)
 
 
 @pytest.mark.parametrize(("kind", "code"), [(BadInput, 2), (WorkFailed, 1), (LabError, 1)])
@@ -36,18 +48,53 @@ PRINTABLE = st.text(st.characters(exclude_categories=("C", "Z")), min_size=1)
 
 
 @given(PRINTABLE, st.lists(PRINTABLE, unique=True))
-def test_any_value_is_reported_in_one_line_with_all_that_is_known(value: str, known: list[str]) -> None:
+def test_any_value_is_reported_in_one_line_with_what_is_known(value: str, known: list[str]) -> None:
     message = str(unknown("task", value, known, "TASK"))
     assert len(message.splitlines()) == 1
-    assert f"'{value}' (TASK)" in message
-    more = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
-    assert message.endswith(f"known: {', '.join(sorted(known)[:MOST_NAMES]) or 'none'}{more}")
-
-
-def test_a_message_is_no_longer_than_a_screen_and_keeps_its_two_ends() -> None:
-    message = str(unknown("task", "x" * 100_000, ["toast"], "TASK"))
+    assert f"'{shortened(value)}' (TASK)" in message
+    everything = f"known: {', '.join(sorted(known)) or 'none'}"
+    assert message.endswith(everything) or re.search(r" and \d+ more$|known: \d+ names?$", message)
     assert len(message) <= MOST_CHARACTERS
-    assert message.startswith("unknown task 'xxx")
-    assert message.endswith("xxx' (TASK): known: toast")
-    assert " more characters) ... " in message
-    assert str(LabError(message)) == message  # said again it stays as it is
+
+
+def test_as_many_names_as_fit_are_listed() -> None:
+    names = [f"name-{number}" for number in range(1000)]
+    assert listed(names[:3], 30) == "name-0, name-1, name-2"
+    assert listed(names, 30) == "name-0, name-1 and 998 more"
+    assert listed(["x" * 100_000], 60) == "1 name"
+
+
+@given(st.text(max_size=2000), st.sampled_from([LabError, BadInput, WorkFailed]))
+def test_any_message_is_one_short_line_that_keeps_its_two_ends(text: str, kind: type[LabError]) -> None:
+    message = str(kind(text))
+    assert message.isprintable()
+    assert len(message) <= MOST_CHARACTERS
+    assert message == printable(text) or (
+        printable(text).startswith(message[:100]) and printable(text).endswith(message[-100:]) and " ... " in message
+    )
+    assert str(kind(message)) == message  # said again it stays as it is
+
+
+def test_of_a_long_message_where_it_comes_from_and_what_is_allowed_stay() -> None:
+    message = str(BadInput(f"{'x' * 100_000} (--gate): allowed are ccrl, never"))
+    assert message.startswith("xxx")
+    assert message.endswith("x (--gate): allowed are ccrl, never")
+
+
+@given(st.text(max_size=500), st.integers(20, 100))
+def test_a_long_value_is_shown_by_its_two_ends(text: str, most: int) -> None:
+    shown = shortened(text, most)
+    assert shown.isprintable()
+    assert len(shown) <= most
+    assert shown == printable(text) or " ... " in shown
+
+
+def test_of_a_long_list_of_known_names_the_last_are_left_out_and_the_hint_stays() -> None:
+    message = str(
+        BadInput(
+            f"{'mine/' * 20}task.toml: line 3: {unknown('task', 'toats', ['toast', *map(str, range(99))], 'TASK')}"
+        )
+    )
+    assert "unknown task 'toats' (TASK): did you mean 'toast'? known: 0, 1, 10, " in message
+    assert message.endswith(", ...")
+    assert len(message) <= MOST_CHARACTERS

@@ -2,13 +2,14 @@
 
 import os
 import signal
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from lab import files
 from lab.errors import BadInput, WorkFailed
-from lab.files import check_out, draft, nearest, write_whole
+from lab.files import check_out, draft, is_file, json_of, nearest, read_limited, within, write_whole
 
 
 def test_a_file_is_written_and_replaced(tmp_path: Path) -> None:
@@ -135,3 +136,62 @@ def test_every_file_that_ships_has_an_expected_kind() -> None:
         ".png",
         ".svg",
     }
+
+
+def test_a_file_is_read_within_bounds(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(b"12345")
+    assert read_limited(path, 5) == b"12345"
+    with pytest.raises(OSError, match="it has 5 bytes, allowed are 4"):
+        read_limited(path, 4)
+    with path.open("wb") as file:
+        file.truncate(1 << 33)  # sparse: nothing of it is read
+    with pytest.raises(OSError, match=f"it has {1 << 33} bytes, allowed are {1 << 28}"):
+        read_limited(path)
+
+
+@pytest.mark.parametrize("make", [os.mkdir, os.mkfifo], ids=["folder", "pipe"])
+def test_only_a_regular_file_is_read(tmp_path: Path, make: Callable[[Path], None]) -> None:
+    make(tmp_path / "other")
+    with pytest.raises(OSError, match="it is no regular file"):
+        read_limited(tmp_path / "other")
+    with pytest.raises(FileNotFoundError):
+        read_limited(tmp_path / "none")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "Expecting value"),
+        ("[NaN]", "NaN is not allowed"),
+        ("-Infinity", "-Infinity is not allowed"),
+        ("[" * 100_000, "nested too deeply"),
+        ("1" * 5000, "limit"),
+        (b"\xc3", "codec"),
+    ],
+)
+def test_what_is_no_json_is_refused(text: str | bytes, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        json_of(text)
+
+
+def test_json_is_read() -> None:
+    assert json_of('{"a": [1, null, "x"]}') == {"a": [1, None, "x"]}
+
+
+def test_a_name_out_of_a_file_leads_nowhere_else(tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "file").touch()
+    (folder / "link").symlink_to("/etc")
+    assert within(folder, "file") == folder / "file"
+    assert within(folder, "below/other") == folder / "below" / "other"
+    assert within(folder, "file", folder / "below") == folder / "below" / "file"
+    for name in ("", ".", "..", "../x", "/etc/passwd", "link/passwd", "a\0b"):
+        assert within(folder, name) is None, name
+
+
+def test_what_can_be_no_name_is_no_file(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert is_file(tmp_path / "file")
+    assert not any(is_file(tmp_path / name) for name in ("", "x" * 300, "a\0b", "file/below"))

@@ -67,6 +67,10 @@ HEAVY = (
     *("numpy", "pydantic", "scipy", "trimesh", "matplotlib", "numba", "meshcat", "cv2", "pybullet", "safetensors"),
     *("ortools", "starlette", "uvicorn", "gymnasium", "jinja2", "fsspec"),
 )
+READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothing that a stranger may have made
+    *("lab.view.meshcat", "lab.view.server_page", "lab.studies.report", "lab.cli.export", "lab.toolbox.remote_place"),
+    *("lab.api.lessons", "lab.api.pictures", "lab.api.runs", "lab.api.scenes"),
+)
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 
 
@@ -140,7 +144,7 @@ def import_faults(module: str, found: list[Import]) -> Iterator[str]:
 
 
 def code_faults(module: str, tree: ast.Module) -> Iterator[str]:
-    """Prints outside the CLI, global random state, pickled files and imports by string, one line each."""
+    """Prints outside the CLI, global random state, files read without bounds or pickled, imports by string, one line each."""
     for node in ast.walk(tree):
         text = ast.unparse(node) if isinstance(node, ast.Attribute | ast.Call | ast.ImportFrom) else ""
         line = f"{module}:{getattr(node, 'lineno', 0)}"
@@ -152,6 +156,8 @@ def code_faults(module: str, tree: ast.Module) -> Iterator[str]:
                 yield f"{line} imports by a string, which no wall can see"
             if called.rpartition(".")[2] in GENERATORS and not (node.args or node.keywords):
                 yield f"{line} calls {called}() without a seed"
+            if called.endswith((".read_bytes", ".read_text")) and module not in READS_ITS_OWN:
+                yield f"{line} calls {called}(): files are read within bounds, by lab.files.read_limited"
             if any(word.arg == "allow_pickle" and ast.unparse(word.value) != "False" for word in node.keywords):
                 yield f"{line} allows pickles"
         elif isinstance(node, ast.Attribute):

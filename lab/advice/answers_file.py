@@ -3,10 +3,11 @@
 from pathlib import Path
 
 from lab.errors import BadInput, unknown
+from lab.files import json_of, read_limited
 from lab.mdp import TabularMDP
-from lab.toolbox.strict_json import loads
 
 MOST_BYTES = 10_000_000
+MOST_DIGITS = 9
 
 
 def answers_of(path: Path, mdp: TabularMDP) -> dict[int, int]:
@@ -15,12 +16,10 @@ def answers_of(path: Path, mdp: TabularMDP) -> dict[int, int]:
     Raises BadInput for a file that cannot be read, is too large or no such object, and for states or actions that there are not.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise BadInput(f"'{path}' has more than {MOST_BYTES} bytes")
-        said = loads(path.read_bytes())
+        said = json_of(read_limited(path, MOST_BYTES))
     except OSError as error:
         raise BadInput(f"'{path}' cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError):
+    except ValueError:
         raise BadInput(f"'{path}' is no JSON: wanted an object of states and actions") from None
     if not isinstance(said, dict) or not said:
         raise BadInput(f'\'{path}\': wanted an object of states and actions, such as {{"(0, 1)": "right"}}')
@@ -29,10 +28,11 @@ def answers_of(path: Path, mdp: TabularMDP) -> dict[int, int]:
     numbers = {str(action): action for action in actions.values()}
     found = {}
     for name, what in said.items():
-        state = int(name) if name.isascii() and name.isdigit() and int(name) < mdp.n_states else states.get(name)
+        is_number = name.isascii() and name.isdigit() and len(name) <= MOST_DIGITS and int(name) < mdp.n_states
+        state = int(name) if is_number else states.get(name)
         if state is None:
             raise unknown("state", name, states, str(path))
-        word = str(what)
+        word = str(what) if isinstance(what, str | int | float | None) else f"a {type(what).__name__}"
         if word not in actions and word not in numbers:
             raise unknown("action", word, actions, f"{path}, state {name}")
         found[state] = actions[word] if word in actions else numbers[word]

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from errno import EINVAL
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,6 +10,7 @@ from annotated_types import MaxLen, Predicate
 
 from lab.advice.json_lines import EntryKinds
 from lab.errors import BadInput
+from lab.files import read_limited
 from lab.learning.session_events import (
     AdviceEnded,
     AdviceGiven,
@@ -27,6 +27,7 @@ from lab.learning.session_events import (
 SCHEMA = 1
 FILE = "events.jsonl"
 MAX_LINE_BYTES = 1 << 20
+MAX_BYTES = 64 << 20  # of a journal: hundreds of thousands of answers
 Name = Annotated[str, MaxLen(1000), Predicate(str.isprintable)]
 
 
@@ -170,9 +171,7 @@ def read_journal(folder: Path, where: str) -> Read:
     """
     path = folder / FILE if folder.is_dir() else folder
     try:
-        if path.exists() and not path.is_file():
-            raise OSError(EINVAL, "it is no regular file")
-        raw = path.read_bytes()
+        raw = read_limited(path, MAX_BYTES)
     except OSError as error:
         raise BadInput(f"journal '{path}' ({where}): cannot be read: {error.strerror or error}") from None
     whole = raw.rfind(b"\n") + 1

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lab.advice.entries import FILE, Answer, Closed, Entry, Read, Session, Undone, line_of, read_journal, undoable
-from lab.advice.json_lines import AppendedFile
+from lab.advice.json_lines import AppendedFile, differing
 from lab.errors import BadInput, WorkFailed
 from lab.learning.requests import AdvisorLeft, Ask, Request, allowed_words
 from lab.learning.session_events import EpisodeEnded
@@ -110,9 +110,9 @@ class Journal:
         return "the session's journal" if place is None else f"journal '{place}'"
 
     def _differs(self, entry: Entry) -> WorkFailed:
+        how = differing(line_of(self.entries[self._at]), line_of(entry))
         return WorkFailed(
-            f"{self._which}: it cannot be run again: it says {line_of(self.entries[self._at])[:200]}, and now "
-            f"comes {line_of(entry)[:200]}: another version of the lab made it, or what it was made with has changed"
+            f"{self._which}: it cannot be run again: {how}: another lab made it, or what it was made with has changed"
         )
 
     def closes(self, closed: Closed) -> None:

@@ -12,6 +12,7 @@ from typing import Any, Self
 from lab.errors import BadInput, WorkFailed
 
 MAX_LINE_BYTES = 1 << 22
+_SHOWN = 40  # characters of each of two lines that differ
 _PLAINLY = {"predicate_failed": "it holds what cannot be printed"}  # for pydantic's words, by the kind of fault
 
 
@@ -49,6 +50,14 @@ class EntryKinds:
             ]
             raise ValueError(f"{kind}: {'; '.join(wrong)}") from None
         return model(**{name: getattr(found, name) for name in found.__dataclass_fields__})
+
+
+def differing(before: str, now: str) -> str:
+    """How two lines of JSON differ, short enough for an error: how they begin, and each from where they do not agree."""
+    same = next((at for at, (one, other) in enumerate(zip(before, now, strict=False)) if one != other), len(before))
+    begin = max(before.rfind(mark, 0, same) for mark in (", ", "{")) + 1
+    then, comes = (line[begin : begin + _SHOWN].strip() for line in (before, now))
+    return f"in {before[:begin][:_SHOWN]}... it says {then}, now comes {comes}"
 
 
 @cache

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from lab.errors import BadInput, counted
+from lab.files import is_file
 from lab.learning.requests import Request
 from lab.mdp import IntArray, TabularMDP
 from lab.toolbox.names import SUFFIX
@@ -74,7 +75,7 @@ def _places(policy: Policy, mdp: TabularMDP) -> IntArray:
 def policy_of(name: str, toolbox: Toolbox | None) -> Policy:
     """The policy in use under a name, or in a file. BadInput for what is neither."""
     box = toolbox or Toolbox()
-    if name.endswith(SUFFIX) and Path(name).is_file():
+    if name.endswith(SUFFIX) and is_file(name):
         return box.load(Path(name))
     found = box.versions(name).in_use()
     if found is None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from lab.cli.output import complain, console
 from lab.errors import LabError
+from lab.files import is_file
 
 if TYPE_CHECKING:
     from lab.advice.entries import Read
@@ -113,7 +114,7 @@ def say_read(kept: "KeptSession | OrderSession", where: str) -> None:
         from lab.gym import parse_name
 
         named = list(parse_name(str(named[0]), where).options.values())
-    files = [word for word in named if isinstance(word, str) and is_path(word) and Path(word).is_file()]
+    files = [word for word in named if isinstance(word, str) and is_path(word) and is_file(word)]
     advisors = [AdvisorName.of(name) for name in options.advisors]
     files += [str(one) for name in advisors for one in (name.folder, name.answers) if one is not None]
     here = kept.read.path.parent.resolve()

@@ -1,23 +1,32 @@
 """What a robot carried out in a run: its motions, gripper outputs, rests and transfers, as the run's folder keeps them."""
 
+import struct
+import zlib
 from dataclasses import dataclass
 from functools import cached_property
+from io import BytesIO
+from math import prod
 from pathlib import Path
 from typing import Annotated, Any, Literal
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
 from lab.errors import BadInput
+from lab.files import read_limited
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.arm_models import arm_of
 from lab.tasks.record import Record
 from lab.tasks.robot_fields import RobotSettings
 
 PROGRAM, TRAJECTORY = "program.json", "trajectory.npz"
-MAX_BYTES = 200_000_000  # of one of the two files
+MAX_TEXT_BYTES, MAX_BYTES = 20_000_000, 200_000_000  # of the two files, the second one unpacked
 _ARRAYS = {"at_s": 1, "joints": 2, "closed": 1, "seen_at_s": 1, "seen": 2}  # and how many dimensions they have
+
+_HEADS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}  # by version
+_BROKEN = (BadZipFile, zlib.error, struct.error, SyntaxError, TypeError, OverflowError, MemoryError, UnicodeDecodeError)
 
 Array = NDArray[np.float64]
 At = Annotated[float, Field(ge=0)]
@@ -145,10 +154,10 @@ class Program:
         for path in paths:
             if not path.is_file():
                 raise BadInput(f"'{folder}' (RUN): no {path.name} in it; give the folder of a `lab run` (its --out)")
-            if path.stat().st_size > MAX_BYTES:
-                raise BadInput(f"'{path}': over {MAX_BYTES // 1_000_000} MB")
         try:
-            carried = Carried.model_validate_json(paths[0].read_bytes())
+            carried = Carried.model_validate_json(read_limited(paths[0], MAX_TEXT_BYTES))
+        except OSError as error:
+            raise BadInput(f"'{paths[0]}': {error.strerror or error}") from None
         except ValidationError as error:
             first = error.errors()[0]
             place = ".".join(map(str, first["loc"])) or "the document"
@@ -160,14 +169,32 @@ class Program:
 
 def _arrays(path: Path) -> list[Any]:
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        content = read_limited(path, MAX_BYTES)
+        _check_sizes(content)
+        with np.load(BytesIO(content), allow_pickle=False) as stored:
             found = {name: np.asarray(stored[name], bool if name == "closed" else float) for name in _ARRAYS}
-    except (OSError, KeyError, ValueError, EOFError) as error:
+    except (OSError, KeyError, ValueError, EOFError, RuntimeError, NotImplementedError, *_BROKEN) as error:
         raise BadInput(f"'{path}': not a run's trajectory: {error}") from None
     for name, dimensions in _ARRAYS.items():
         if found[name].ndim != dimensions or not np.isfinite(found[name]).all():
             raise BadInput(f"'{path}': '{name}' is not an array of {dimensions} dimensions of finite numbers")
     return list(found.values())
+
+
+def _check_sizes(content: bytes) -> None:
+    """ValueError unless the arrays, unpacked, are as large as they say, and no larger than a run's: nothing is unpacked."""
+    with ZipFile(BytesIO(content)) as archive:
+        entries = archive.infolist()
+        if (total := sum(entry.file_size for entry in entries)) > MAX_BYTES:
+            raise ValueError(f"unpacked it has {total} bytes, allowed are {MAX_BYTES}")
+        for entry in entries:
+            with archive.open(entry) as file:
+                read_head = _HEADS.get(np.lib.format.read_magic(file))
+                if read_head is None:
+                    raise ValueError(f"'{entry.filename}' is an array of an unknown version")
+                shape, _, kind = read_head(file)
+                if file.tell() + kind.itemsize * prod(shape) != entry.file_size:
+                    raise ValueError(f"'{entry.filename}' does not hold an array of {shape}")
 
 
 def _check_rows(program: Program, path: Path) -> None:

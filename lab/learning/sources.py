@@ -15,7 +15,7 @@ from typing import Any
 from platformdirs import user_cache_dir
 
 from lab.errors import WorkFailed
-from lab.files import write_whole
+from lab.files import json_of, read_limited, write_whole
 
 MOST_KEPT = 1000  # modules whose imports are kept
 
@@ -73,8 +73,8 @@ class _KnownImports:
         self._used: dict[str, list[str]] = {}
         self._new = False
         try:
-            found = json.loads(self._path.read_bytes())
-        except (OSError, ValueError, RecursionError):
+            found = json_of(read_limited(self._path))
+        except (OSError, ValueError):
             found = {}
         self._kept: dict[str, Any] = found if isinstance(found, dict) else {}
 

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable, Sequence
 from importlib.util import module_from_spec, spec_from_file_location
+from os.path import isfile
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ def take(
         return word
     path, _, name = word.rpartition(":")
     file = Path(path)
-    if not file.is_file():
+    if not isfile(file):
         raise BadInput(f"{word}: there is no file '{path}'")
     own = f"{file.stem}.{name}"
     if own in _files:

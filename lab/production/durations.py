@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.files import assets_folder
+from lab.files import assets_folder, read_limited
 from lab.learning.sources import sources
 from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
@@ -231,7 +231,7 @@ def durations_key(
         "obstacles": layout.obstacles,
         "moves": [asdict(skillset.moves), [*skillset.legs]],
         "policies": {name: [policy.signature, _hash(policy.q.tobytes())] for name, policy in policies.items()},
-        "assets": {path.name: _hash(path.read_bytes()) for path in files_of(task)},
+        "assets": {path.name: _hash(read_limited(path)) for path in files_of(task)},
         "source": code.texts,
         "libraries": _versions(code.libraries),
     }

@@ -14,8 +14,10 @@ from shutil import rmtree
 from typing import Any, NamedTuple
 
 from lab import __version__
-from lab.advice.json_lines import AppendedFile, EntryKinds
+from lab.advice.entries import MAX_BYTES
+from lab.advice.json_lines import AppendedFile, EntryKinds, differing
 from lab.errors import BadInput, WorkFailed
+from lab.files import json_of, read_limited
 from lab.production.controls import Held, StopKind
 from lab.production.stop_record import StopsChanged
 from lab.sim.world import TIME_STEP
@@ -202,7 +204,7 @@ class RunJournal:
             write_whole(path, json.dumps(now.made(), indent=0) + "\n")
             return now
         try:
-            made = json.loads(path.read_text(encoding="utf-8"))
+            made = json_of(read_limited(path, MAX_BYTES))
         except (OSError, ValueError) as error:
             raise BadInput(f"'{path}' (--resume): cannot be read: {error}") from None
         return now.only(made if isinstance(made, dict) else {})
@@ -255,8 +257,8 @@ class RunJournal:
         before = self._again.pop(0)
         if line_of(before) != line_of(entry):
             raise WorkFailed(
-                f"journal '{self.path}': the run cannot be carried out again: it says {line_of(before)[:200]}, and now comes "
-                f"{line_of(entry)[:200]}: another version of the lab made it, or the task has changed"
+                f"journal '{self.path}': the run cannot be carried out again: {differing(line_of(before), line_of(entry))}: "
+                "another lab made it, or the task has changed"
             )
 
     def write(self, entry: Entry) -> None:
@@ -295,6 +297,8 @@ def _check(entry: Entry) -> None:
     if isinstance(entry, Stopped):
         for kind, _, _ in entry.stops:
             StopKind(kind)
+    if isinstance(entry, SkillKept) and not all(isinstance(entry.row.get(word), str) for word in ("name", "source")):
+        raise ValueError("row: it has no name or no source")
     if isinstance(entry, Stopped | Commanded | Moved | Met) and not 0 <= entry.step <= MAX_STEP:
         raise ValueError(f"step {entry.step}: wanted 0 to {MAX_STEP}")
 
@@ -303,7 +307,7 @@ def read_run(folder: Path, where: str) -> tuple[RunBegan, tuple[Entry, ...], int
     """A run's head, its other lines, and how many bytes are whole lines; BadInput, naming the line, for no such journal."""
     path = folder / FILE if folder.is_dir() else folder
     try:
-        raw = path.read_bytes()
+        raw = read_limited(path, MAX_BYTES)
     except OSError as error:
         raise BadInput(f"journal '{path}' ({where}): cannot be read: {error.strerror or error}") from None
     whole = raw.rfind(b"\n") + 1

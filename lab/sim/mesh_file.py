@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lab.files import read_limited
+
 Array = NDArray[np.float64]
 MAX_BYTES = 20_000_000
 SUFFIXES = (".obj", ".stl")
@@ -13,7 +15,7 @@ _HEAD, _FACE = 84, 50  # [bytes] of a binary STL: header and count, and each tri
 
 def vertices(path: Path) -> Array:
     """The vertices (n, 3) of an OBJ or STL file, in its own unit. ValueError when they cannot be read as numbers."""
-    data = path.read_bytes()
+    data = read_limited(path, MAX_BYTES)
     if path.suffix.lower() == ".stl" and is_binary(data):
         faces = np.frombuffer(data, np.uint8, offset=_HEAD).reshape(-1, _FACE)[:, 12:48]
         return np.ascontiguousarray(faces).view("<f4").reshape(-1, 3).astype(float)
@@ -24,7 +26,7 @@ def vertices(path: Path) -> Array:
 
 def text_corners(path: Path | None) -> Array | None:
     """The corners (3 n, 3) of the triangles of an STL file in text, one after the other; None: it is no such file."""
-    if path is None or path.suffix.lower() != ".stl" or is_binary(path.read_bytes()):
+    if path is None or path.suffix.lower() != ".stl" or is_binary(read_limited(path, MAX_BYTES)):
         return None
     return vertices(path)
 

@@ -9,18 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted, unknown
+from lab.files import is_file, read_limited, within
 from lab.sim import mesh_file
 from lab.sim.frames import Quaternion, Shape
+
+MAX_BYTES = 5_000_000  # of a URDF
 
 
 def read(path: Path) -> Xml.Element:
     """The root of a URDF; BadInput when it cannot be read, declares entities, or has no links."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_limited(path, MAX_BYTES).decode("utf-8")
         if "<!DOCTYPE" in text or "<!ENTITY" in text:
             raise BadInput(f"{path}: a URDF must not declare a document type or entities")
         root = Xml.fromstring(text)
-    except (OSError, UnicodeDecodeError, Xml.ParseError) as error:
+    except OSError as error:
+        raise BadInput(f"{path}: not a readable URDF: {error.strerror or error}") from None
+    except (UnicodeDecodeError, Xml.ParseError) as error:
         raise BadInput(f"{path}: not a readable URDF: {error}") from None
     links = root.findall("link")
     if root.tag != "robot" or not links:
@@ -211,10 +216,10 @@ def check_joint(path: Path, joint: Xml.Element, links: list[str]) -> None:
 
 def check_mesh(path: Path, name: str, folder: Path) -> None:
     """BadInput unless the mesh that the URDF at `path` names is an OBJ or STL file in `folder` with finite vertices."""
-    file = (path.parent / name).resolve()
-    if folder.resolve() not in file.parents:
+    file = within(folder, name, path.parent)
+    if file is None:
         raise BadInput(f"{path}: mesh '{name}' lies outside the URDF's folder")
-    if not file.is_file() or not 0 < file.stat().st_size <= mesh_file.MAX_BYTES:
+    if not is_file(file) or not 0 < file.stat().st_size <= mesh_file.MAX_BYTES:
         raise BadInput(f"{path}: mesh '{name}' is missing, empty or over {mesh_file.MAX_BYTES // 1_000_000} MB")
     kind = "an STL" if file.suffix.lower() == ".stl" else "an OBJ"
     try:

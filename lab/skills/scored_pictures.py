@@ -1,24 +1,61 @@
 """Pictures read back: how many grids of those that `made_pictures` made are exact; parts in an overhead picture."""
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import hypot
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
+from pydantic import Field, ValidationError
 
 from lab.errors import BadInput, LabError
+from lab.files import read_limited
 from lab.sim.hand_camera import seen_corners
 from lab.sim.scene.scene_check import places_of
 from lab.skills.camera_grids import camera_view
-from lab.skills.made_pictures import INDEX, mat_of
+from lab.skills.made_pictures import INDEX, MOST_PICTURES, mat_of
+from lab.tasks.record import Record
 from lab.tasks.task import Task
 from lab.tasks.task_file import load
 from lab.vision import Image, View, read_picture, see
 from lab.vision.calibration import Calibration, calibrate
 from lab.vision.part_outline import Outlined, find_part
+
+MOST_BYTES = 10_000_000  # of what is told of a picture
+Cell = tuple[int, ...]
+Kept = TypeVar("Kept", bound=Record)
+
+
+class TruthOfMarker(Record):
+    """A marker in the scene: its kind, where it is [m], its pixel, and how much of it is hidden."""
+
+    kind: str
+    world_m: tuple[float, float, float]
+    pixel: tuple[float, float]
+    hidden: float
+
+
+class Truth(Record):
+    """What a picture shows, as `made_pictures` writes it."""
+
+    shape: Cell
+    start: Cell
+    goal: Cell
+    obstacles: list[Cell]
+    markers: list[TruthOfMarker]
+
+
+class PicturesIndex(Record):
+    """What a folder of pictures holds, as `made_pictures` writes it."""
+
+    task: str
+    station: str
+    pictures: Annotated[int, Field(ge=1, le=MOST_PICTURES)]
+    mats: Annotated[int, Field(ge=1, le=100)]
+    seed: int
+    strength: float
+
 
 PART_REACH_M, PART_REACH_RAD = 0.03, 0.2  # around a station's spots
 
@@ -36,16 +73,14 @@ def score_pictures(
     The camera is calibrated with the folder's pictures of the mat unless a calibration is given. A grid is exact when
     start, goal and obstacles are all right and nothing else is seen. BadInput for a folder without an index.
     """
-    try:
-        record = json.loads((folder / INDEX).read_bytes())
-        task, station = load(record["task"]), str(record["station"])
-        count, mats = int(record["pictures"]), int(record["mats"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise BadInput(f"{folder / INDEX}: wanted the index that `lab see --make` writes: {error}") from None
+    index = _read(PicturesIndex, folder / INDEX)
+    task, count = load(index.task), index.pictures
+    if index.station not in [one.name for one in task.stations if one.grid is not None]:
+        raise BadInput(f"{folder / INDEX}: station '{index.station}' of '{index.task}' has no grid")
     if calibration is None:
-        names = [folder / f"mat-{number + 1}.png" for number in range(mats)]
+        names = [folder / f"mat-{number + 1}.png" for number in range(index.mats)]
         calibration = calibrate([(str(name), read_picture(name)) for name in names], mat_of(task))
-    view, lens = calibrated_view(task, station, calibration), calibration.lens
+    view, lens = calibrated_view(task, index.station, calibration), calibration.lens
     wrong: list[dict[str, str]] = []
     errors: list[float] = []
     for number, image, truth in _kept(folder, count):
@@ -66,29 +101,42 @@ def score_pictures(
     }
 
 
-def _kept(folder: Path, count: int) -> Iterator[tuple[int, Image, dict[str, Any]]]:
+def _kept(folder: Path, count: int) -> Iterator[tuple[int, Image, Truth]]:
     for number in range(1, count + 1):
-        try:
-            truth = json.loads((folder / f"{number:05}.json").read_bytes())
-        except (OSError, ValueError) as error:
-            raise BadInput(f"{folder / f'{number:05}.json'}: {error}") from None
-        yield number, read_picture(folder / f"{number:05}.png"), truth
+        yield number, read_picture(folder / f"{number:05}.png"), _read(Truth, folder / f"{number:05}.json")
 
 
-def _compared(straight: Image, view: View, truth: dict[str, Any]) -> tuple[str, list[float]]:
+def _read(kind: type[Kept], path: Path) -> Kept:
+    """What `lab see --make` told in a file. BadInput."""
+    try:
+        return kind.model_validate_json(read_limited(path, MOST_BYTES))
+    except OSError as error:
+        raise BadInput(
+            f"{path}: cannot be read: {error.strerror or error}: wanted what `lab see --make` wrote"
+        ) from None
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        raise BadInput(f"{path}: {where}: {first['msg']}: wanted what `lab see --make` wrote") from None
+
+
+def _compared(straight: Image, view: View, truth: Truth) -> tuple[str, list[float]]:
     """Why what is read differs from the truth, "" when it does not; and how far off each marker was seen [m]."""
     try:
         seen = see(straight, view)
     except LabError as error:
         return str(error), []
-    off = []
-    for marker in truth["markers"]:
-        dx, dy = view.offsets_m.get(marker["kind"], (0.0, 0.0))
-        x, y = marker["world_m"][0] + dx, marker["world_m"][1] + dy
-        off.append(min(hypot(m.world_m[0] - x, m.world_m[1] - y) for m in seen.markers if m.kind == marker["kind"]))
-    record = seen.to_json()
-    different = [name for name in ("start", "goal", "obstacles") if record[name] != truth[name]]
-    return "; ".join(f"{name} {record[name]}, is {truth[name]}" for name in different), off
+    off: list[float] = []
+    for marker in truth.markers:
+        dx, dy = view.offsets_m.get(marker.kind, (0.0, 0.0))
+        x, y = marker.world_m[0] + dx, marker.world_m[1] + dy
+        alike = [hypot(m.world_m[0] - x, m.world_m[1] - y) for m in seen.markers if m.kind == marker.kind]
+        if not alike:
+            return f"no marker '{marker.kind}' is seen", off
+        off.append(min(alike))
+    record, is_so = seen.to_json(), truth.model_dump(mode="json")
+    different = [name for name in ("start", "goal", "obstacles") if record[name] != is_so[name]]
+    return "; ".join(f"{name} {record[name]}, is {is_so[name]}" for name in different), off
 
 
 def parts_seen(task: Task, image: Image, view: View) -> list[dict[str, Any]]:

@@ -103,13 +103,9 @@ def compared(what: Compared, job: Job) -> Findings:
         setting.subject()
     problem = prepared(what, job.seed)
     keys = {key_of(setting, problem, job): setting for setting in settings}
-    done: dict[str, Sessions] = {}
-    for entry in job.kept():
-        try:
-            if entry["key"] in keys:
-                done[entry["key"]] = Sessions.from_json(entry, job.sessions)
-        except (KeyError, TypeError, ValueError):
-            continue  # not ours: run anew
+    done: dict[str, Sessions] = job.kept_as(
+        lambda entry: (entry["key"], Sessions.from_json(entry, job.sessions)) if entry["key"] in keys else None
+    )
     left = [key for key in keys if key not in done]
     job.progress(len(done), len(keys))
     work = partial(sessions_of, sessions=job.sessions, seed=job.seed)

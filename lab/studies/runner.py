@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from hashlib import sha256
+from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, LabError, WorkFailed
+from lab.files import read_limited
 
 STORE = "sessions.jsonl"
 BATCH = 4  # items that a worker is given at once, where there are many
@@ -86,11 +88,30 @@ class Job:
         path = None if self.folder is None else self.folder / STORE
         if path is None or not path.is_file():
             return
-        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        try:
+            content = read_limited(path)
+        except OSError as error:
+            raise BadInput(f"'{path}': what is kept cannot be read: {error.strerror or error}") from None
+        for line in BytesIO(content):
             try:
-                yield json.loads(line)
+                yield json.loads(line.decode("utf-8", errors="replace"))
             except (ValueError, RecursionError):
                 continue
+
+    def kept_as(self, read: Callable[[Any], tuple[Any, Result] | None]) -> dict[Any, Result]:
+        """What `keep` wrote, as `read` understands a line: a key and what it holds, None where it is not wanted.
+
+        Lines that it cannot understand, such as another study's or damaged ones, are passed over: they are done again.
+        """
+        found = {}
+        for entry in self.kept():
+            try:
+                understood = read(entry)
+            except (BadInput, KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError):
+                continue
+            if understood is not None:
+                found[understood[0]] = understood[1]
+        return found
 
     def keep(self, record: dict[str, Any]) -> None:
         """Add a line to what the folder keeps; WorkFailed when it cannot be written."""
@@ -99,11 +120,25 @@ class Job:
         path = self.folder / STORE
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            cut = path.is_file() and not path.read_bytes().endswith(b"\n")
+            cut = path.is_file() and _is_cut(path)
             with path.open("a", encoding="utf-8") as file:
                 file.write(("\n" if cut else "") + json.dumps(record) + "\n")
         except OSError as error:
             raise WorkFailed(f"output folder '{self.folder}' (--out) cannot be written: {error.strerror}") from error
+
+
+def record_of(kind: type[Result], record: Any) -> Result:
+    """A dataclass from what JSON holds of it, every field as its type says. Raises ValueError for anything else."""
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind).validate_python(record)
+
+
+def _is_cut(path: Path) -> bool:
+    """Whether the last line of a file has no end."""
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - 1))
+        return file.read(1) not in (b"", b"\n")
 
 
 def seeds_of(setting: Any, sessions: int, seed: int) -> NDArray[np.uint64]:

@@ -127,7 +127,7 @@ class _Kept:
         own = what.setting({})
         self.job, self.problem = job, prepared(own.of, job.seed)
         key_of(own, self.problem, job)  # BadInput here for an advisor or a value that cannot be, not after the trials
-        self.entries = {one["key"]: one for one in job.kept() if isinstance(one, dict) and "key" in one}
+        self.entries: dict[str, Any] = job.kept_as(lambda entry: (str(entry["key"]), entry))
 
     def sessions(self, settings: Sequence[Setting], sessions: int, stream: int) -> list[Sessions | None]:
         """So many of each setting, all with the chances of that stream; None for a setting that cannot be."""
@@ -145,7 +145,7 @@ class _Kept:
                 continue
             try:
                 found[key] = Sessions.from_json(self.entries[key], sessions)
-            except (KeyError, TypeError, ValueError):
+            except (KeyError, TypeError, ValueError, OverflowError):
                 found[key] = None
                 left.append(one)
         by_setting = dict(zip(settings, keys, strict=True))

@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeVar, cast, get_args
 
 from pydantic import ValidationError
 
-from lab.errors import BadInput, unknown
+from lab.errors import BadInput, shortened, unknown
 from lab.files import tasks_folder
 from lab.tasks.cell_file import CellFile
 from lab.tasks.first_form import own_loc, renewed
@@ -59,7 +59,9 @@ def find(task: str) -> Path:
         if there:
             return Path(task)
         known = ", ".join(files)
-        raise BadInput(f"no task file '{task}': give a file that exists, .toml or a .txt grid, or what ships: {known}")
+        raise BadInput(
+            f"no task file '{shortened(task)}': give a file that exists, .toml or .txt, or what ships; known: {known}"
+        )
     if task not in files:
         raise unknown("task", task, files, "TASK")
     return files[task]

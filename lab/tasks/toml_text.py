@@ -31,6 +31,11 @@ _WORDS = {
 }
 _MOST_SHOWN = 120  # characters of a bad value
 MOST_PARTS = 100  # of a dotted key: what the TOML reader does with one grows with the square of them
+MOST_KEYS = 100_000  # and tables: of more, reading takes seconds
+MOST_VALUES = 2_500_000  # commas: a world of 100 x 100 x 100 cells has its obstacles in its file
+MOST_SCANNED = 1_000_000  # characters in which the lines of values are looked up
+_HEADER = re.compile(r"^[ \t]*\[[^\n]*\][ \t]*(?:#[^\n]*)?$", re.MULTILINE)
+_MANY_DIGITS = re.compile(r"[0-9A-Fa-f](?:_?[0-9A-Fa-f]){15}|[01](?:_?[01]){62}")  # what may be beyond 64 bits
 _LONG_KEY = re.compile(rf"""(?<![\w.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MOST_PARTS}}}""")
 _BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -55,17 +60,25 @@ class TomlText:
     @classmethod
     def parsed(cls, path: Path, text: str) -> "TomlText":
         """The values of a text; BadInput, with file and line, when it is no TOML, or a key has too many parts."""
+        if (keys := text.count("=") + len(_HEADER.findall(text))) > MOST_KEYS or text.count(",") > MOST_VALUES:
+            raise BadInput(
+                f"{path}: {keys} keys and tables, {text.count(',')} commas: allowed are {MOST_KEYS} and {MOST_VALUES}"
+            )
         if long := _LONG_KEY.search(text):
             line = text.count("\n", 0, long.start()) + 1
             raise BadInput(f"{path}: line {line}: a key of more than {MOST_PARTS} parts")
         try:
-            return cls(path, text, tomllib.loads(text))
+            raw = tomllib.loads(text)
         except (ValueError, RecursionError) as error:  # beside TOMLDecodeError: numbers or nests beyond Python's limits
             raise BadInput(f"{path}: not valid TOML: {error}") from None
+        found = cls(path, text, raw)
+        if _MANY_DIGITS.search(text) and (loc := _beyond_64_bits(raw)) is not None:
+            raise found.refusal(loc, f"{'.'.join(map(str, loc))}: a whole number beyond 64 bits")
+        return found
 
     @cached_property
     def _lines(self) -> dict[Loc, int]:
-        return lines_of(self.text)
+        return lines_of(self.text[:MOST_SCANNED])
 
     def line(self, loc: Sequence[str | int]) -> int | None:
         """The line, from 1, of a value, or of the nearest thing around it that the file has; None: only the file itself."""
@@ -78,6 +91,20 @@ class TomlText:
         """The error that names the file, the line of what is wrong, and what it is."""
         line = self.line(loc)
         return BadInput(f"{self.path}: {'' if line is None else f'line {line}: '}{message}")
+
+
+def _beyond_64_bits(raw: dict[str, Any]) -> Loc | None:
+    """The way to a whole number that TOML does not have: one that a float may not hold either."""
+    pending: list[tuple[Loc, Any]] = [((), raw)]
+    while pending:
+        loc, value = pending.pop()
+        if isinstance(value, dict):
+            pending += [((*loc, key), held) for key, held in value.items()]
+        elif isinstance(value, list):
+            pending += [((*loc, number), held) for number, held in enumerate(value)]
+        elif isinstance(value, int) and not -(2**63) <= value < 2**63:
+            return loc
+    return None
 
 
 def lines_of(text: str) -> dict[Loc, int]:

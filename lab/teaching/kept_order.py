@@ -10,10 +10,11 @@ from annotated_types import Ge
 
 from lab import __version__
 from lab.advice.advisors import AdvisorName
-from lab.advice.entries import Read, Session
+from lab.advice.entries import MAX_BYTES, Read, Session
 from lab.advice.journal import Journal
 from lab.advice.order_level import signature_of
 from lab.errors import BadInput
+from lab.files import json_of, read_limited
 from lab.sequencing.cell.cell import Cell
 from lab.tasks.instances import Asked
 from lab.tasks.record import write_whole
@@ -100,7 +101,7 @@ class OrderSession(SessionInFolder):
         if self._durations is not None or self.folder is None or not (self.folder / DURATIONS).exists():
             return self._durations
         try:
-            found = json.loads((self.folder / DURATIONS).read_text(encoding="utf-8"))
+            found = json_of(read_limited(self.folder / DURATIONS, MAX_BYTES))
         except (OSError, ValueError) as error:
             raise BadInput(f"'{self.folder / DURATIONS}' cannot be read: {error}") from None
         if not isinstance(found, dict):

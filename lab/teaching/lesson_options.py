@@ -9,6 +9,7 @@ from annotated_types import Ge, Le
 
 from lab.advice.advising import Advising
 from lab.errors import BadInput
+from lab.files import is_file
 from lab.learning.requests import Ask
 from lab.tasks.record import Learned
 from lab.tasks.task_file import names_file
@@ -44,14 +45,13 @@ class SessionOptions:
 
 def whole_path(name: str | None) -> str | None:
     """The whole path of a file, so that it is found from another folder; any other name is itself."""
-    is_file = name is not None and names_file(name) and Path(name).is_file()
-    return str(Path(name).absolute()) if name is not None and is_file else name
+    return str(Path(name).absolute()) if name is not None and names_file(name) and is_file(name) else name
 
 
 def recorded_whole(advisor: str) -> str:
     """An advisor's name; one that was recorded, or a policy's file, by its whole path."""
     kind, _, path = advisor.partition(":")
-    is_path = path and (kind == "recorded" or (kind == "policy" and Path(path).is_file()))
+    is_path = path and (kind == "recorded" or (kind == "policy" and is_file(path)))
     return f"{kind}:{Path(path).absolute()}" if is_path else advisor
 
 

@@ -16,6 +16,7 @@ from annotated_types import Ge
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from lab.errors import BadInput, counted
+from lab.files import MOST_BYTES, read_limited
 from lab.toolbox.names import SUFFIX, hash_of, slug
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import decode, encode
@@ -23,7 +24,7 @@ from lab.toolbox.registry import Toolbox
 
 FORMAT: Literal["teaching-lab-archive-1"] = "teaching-lab-archive-1"
 MANIFEST = "manifest.json"
-MAX_BYTES = 256 << 20  # of an archive, and so of all that is in it, as nothing in it is compressed
+MAX_BYTES = MOST_BYTES  # of an archive, and so of all that is in it, as nothing in it is compressed
 MAX_FILES = 10_000
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the date of every file in an archive: the first that a zip file can have
 _PLAIN_NAME = re.compile(r"[a-z0-9][a-z0-9-]*\.safetensors")
@@ -97,7 +98,7 @@ def unpack(path: Path) -> Policies:
 
     Raises BadInput, naming the file and what is wrong, for anything but a whole archive of the lab.
     """
-    content = read_limited(path)
+    content = read_packed(path)
     if content.count(_CENTRAL_HEADER) > MAX_FILES + 1:
         raise BadInput(f"archive {path}: it holds more than {MAX_FILES + 1} files")
     try:
@@ -159,25 +160,21 @@ def _entry(name: str) -> ZipInfo:
     return entry
 
 
-def read_limited(path: Path) -> bytes:
+def read_packed(path: Path) -> bytes:
     """All bytes of a regular file; BadInput when it has more than an archive may have, or cannot be read."""
     try:
-        if not path.exists():
-            raise BadInput(f"file {path}: there is no such file")
-        if not path.is_file():
-            raise BadInput(f"file {path}: it is no regular file")
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+        return read_limited(path, MAX_BYTES)
+    except FileNotFoundError:
+        raise BadInput(f"file {path}: there is no such file") from None
     except OSError as error:
         raise BadInput(f"file {path}: it cannot be read: {error.strerror or error}") from error
-    if len(content) > MAX_BYTES:
-        raise BadInput(f"file {path}: it has more than {MAX_BYTES} bytes")
-    return content
 
 
 def _check_entry(entry: ZipInfo) -> None:
     """BadInput unless it is a plain file with a plain name, neither compressed nor encrypted."""
     name = entry.orig_filename
+    if not entry.filename:
+        raise BadInput("it holds a file without a name")
     if name.startswith(("/", "\\")) or ".." in re.split(r"[/\\]", name) or name[1:2] == ":":
         raise BadInput(f"'{name}' leads out of the folder that it is unpacked in")
     kind = stat.S_IFMT(entry.external_attr >> 16)

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from lab.errors import BadInput
-from lab.toolbox import strict_json
+from lab.files import json_of
 
 EVALUATED = "evaluated"
 ROLLED_BACK = "rolled back"
@@ -32,7 +32,7 @@ def read_events(lines: Iterable[bytes]) -> tuple[list[Event], list[int]]:
     events, damaged = [], []
     for number, line in enumerate(lines, 1):
         try:
-            read = strict_json.loads(line)
+            read = json_of(line)
         except (ValueError, RecursionError):
             read = None
         if isinstance(read, dict) and isinstance(read.get("time"), str) and isinstance(read.get("what"), str):

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from lab.errors import BadInput, printable
-from lab.toolbox.archive import read_limited
+from lab.toolbox.archive import read_packed
 from lab.toolbox.card import Event, last_evaluation
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import decode, described, encode
@@ -83,7 +83,7 @@ def read_folder(folder: Path) -> Policy:
     """The policy of such a folder. Raises BadInput unless its model is the one that its metadata speaks of."""
     if not (folder / MODEL).is_file():
         raise BadInput(f"folder {folder}: it holds no {MODEL}, as a folder does that lab toolbox publish wrote")
-    content = read_limited(folder / MODEL)
+    content = read_packed(folder / MODEL)
     policy, told = decode(content, str(folder / MODEL)), _config(folder)
     digest = sha256(content)
     if told["sha256"] != digest:
@@ -96,7 +96,7 @@ def read_folder(folder: Path) -> Policy:
 def _config(folder: Path) -> dict[str, Any]:
     """The metadata that a folder tells."""
     try:
-        config = json.loads(read_limited(folder / CONFIG))
+        config = json.loads(read_packed(folder / CONFIG))
     except (ValueError, RecursionError) as error:
         raise BadInput(f"folder {folder}: {CONFIG} is not valid JSON: {error}") from error
     if not isinstance(config, dict) or config.get("format") != FORMAT or "sha256" not in config:

@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import BadInput
-from lab.files import write_whole
+from lab.files import read_limited, write_whole
 from lab.toolbox.names import SUFFIX, VERSIONS, hash_of
 from lab.toolbox.place import FileState, Place
 
@@ -93,7 +93,7 @@ class Index:
     def _loaded(self) -> tuple[dict[str, Row], dict[str, str]]:
         """What is kept of it; nothing when that is lost or damaged."""
         with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
-            text = (self._place.cache / FILE).read_bytes()
+            text = read_limited(self._place.cache / FILE)
             end = len(_HEAD) + 8
             body = text[end + len(_REST) : -1]
             if text[len(_HEAD) : end].decode() == _checksum(body):

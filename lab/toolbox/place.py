@@ -1,14 +1,14 @@
 """Where a toolbox keeps its bytes: the few calls that a local folder and an address elsewhere both have."""
 
-import stat
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from lab.errors import BadInput
+from lab.files import MOST_BYTES, read_limited
 
-MAX_FILE_BYTES = 1 << 30
+MAX_FILE_BYTES = MOST_BYTES
 
 
 class FileState(NamedTuple):
@@ -81,14 +81,9 @@ class Place(Protocol):
 
 
 def read_file(path: Path) -> bytes:
-    """All bytes of a local file. Raises BadInput for anything but a file, and for more than 1 GiB."""
+    """All bytes of a local file. Raises BadInput for anything but a file, and for more than MAX_FILE_BYTES."""
     try:
-        at = path.stat()
-        if not stat.S_ISREG(at.st_mode):
-            raise BadInput("it is not a file")
-        if at.st_size > MAX_FILE_BYTES:
-            raise BadInput(f"it has {at.st_size} bytes, allowed {MAX_FILE_BYTES}")
-        return path.read_bytes()
+        return read_limited(path, MAX_FILE_BYTES)
     except FileNotFoundError:
         raise BadInput("there is no such file") from None
     except OSError as error:

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, create_model
 
 from lab.errors import BadInput
-from lab.toolbox import strict_json
+from lab.files import json_of
 from lab.toolbox.names import FORMAT
 from lab.toolbox.policy import Policy
 
@@ -112,7 +112,7 @@ def _metadata() -> type[BaseModel]:
 
 
 def _read_metadata(metadata: dict[str, str]) -> dict[str, Any]:
-    values = {name: strict_json.loads(metadata[name]) for name in _METADATA if name in metadata}
+    values = {name: json_of(metadata[name]) for name in _METADATA if name in metadata}
     try:
         found = _metadata().model_validate_json(json.dumps(values))
     except ValidationError as error:

@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 from lab.errors import BadInput
-from lab.toolbox import strict_json
+from lab.files import json_of
 from lab.toolbox.names import hash_of, slug
 from lab.toolbox.place import Place
 
@@ -55,7 +55,7 @@ def faults(place: Place) -> dict[str, str]:
 
 def _read(place: Place, file: str) -> dict[str, Any]:
     try:
-        whole = strict_json.loads(place.read(file))
+        whole = json_of(place.read(file))
     except (BadInput, ValueError, RecursionError) as error:
         raise BadInput(f"record file {place.where(file)}: {error}") from error
     if not isinstance(whole, dict) or not isinstance(whole.get("record"), dict) or not {"kind", "key"} <= whole.keys():

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed, counted
-from lab.files import write_whole
+from lab.files import json_of, read_limited, write_whole
 from lab.vision.lens import TERMS, Lens
 from lab.vision.picture_files import Image, check_picture
 
@@ -250,14 +250,12 @@ def write_calibration(path: Path, calibration: Calibration) -> None:
 def read_calibration(path: Path) -> Calibration:
     """A calibration that was kept; BadInput, naming the file, for anything else."""
     try:
-        data = path.read_bytes()
+        data = read_limited(path, MAX_BYTES)
     except OSError as error:
         raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
     wanted = "wanted a calibration as `lab see PHOTO --calibrate --out FILE` writes it"
     try:
-        if len(data) > MAX_BYTES:
-            raise ValueError(f"{len(data)} bytes")
-        record = json.loads(data)
+        record = json_of(data)
         lens, distortion = record["lens"], record["lens"]["distortion"]
         width, height = (int(one) for one in lens["size"])
         fx, fy = (float(one) for one in lens["focal"])

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
+from lab.files import read_limited
 
 Image = NDArray[np.uint8]  # (H, W, 3), RGB
 
@@ -31,12 +32,7 @@ def read_picture(path: Path) -> Image:
     import cv2
 
     try:
-        if path.exists() and not path.is_file():
-            raise BadInput(f"{path}: not a file: wanted a PNG or JPEG picture")
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise BadInput(f"{path}: {size} bytes: pictures up to {MAX_BYTES} bytes are read")
-        data = path.read_bytes()
+        data = read_limited(path, MAX_BYTES)
     except OSError as error:
         raise BadInput(f"{path}: cannot be read: {error.strerror}") from error
     width, height = _size(data, path)

@@ -50,6 +50,8 @@ def test_they_advise_a_session_and_are_silent_elsewhere(tmp_path: Path) -> None:
         ({"(0, 0)": "rigth"}, "unknown action 'rigth'.*right"),
         ({"0": 4}, "unknown action '4'"),
         ({"0": None}, "unknown action 'None'"),
+        ({"0": [1]}, "unknown action 'a list'"),
+        ({"9" * 5000: "up"}, "unknown state '999"),
     ],
 )
 def test_what_is_no_answer_is_refused_in_a_line(tmp_path: Path, said: object, wrong: str) -> None:

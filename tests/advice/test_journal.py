@@ -28,6 +28,7 @@ from lab.advice.entries import (
     undoable,
 )
 from lab.advice.journal import Again, Journal, Undo
+from lab.advice.json_lines import differing
 from lab.advice.table_level import TableLevel
 from lab.errors import BadInput, WorkFailed
 from lab.learning.environment import TableEnvironment
@@ -403,3 +404,14 @@ def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / FILE)
     with pytest.raises(BadInput, match="cannot be read: it is no regular file"):
         read_journal(tmp_path, "DIR")
+
+
+def test_two_lines_that_differ_are_told_from_there_on() -> None:
+    before, now = (
+        '{"kind": "moved", "step": 1, "drop_s": 17.25}',
+        '{"kind": "moved", "step": 1, "drop_s": 18.0, "more": 1}',
+    )
+    assert differing(before, now) == (
+        'in {"kind": "moved", "step": 1,... it says "drop_s": 17.25}, now comes "drop_s": 18.0, "more": 1}'
+    )
+    assert len(differing("[" + "1, " * 99, "{" + "2, " * 99)) < 150

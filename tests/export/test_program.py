@@ -2,11 +2,15 @@
 
 import json
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.export.program import PROGRAM, TRAJECTORY, Program
@@ -89,3 +93,42 @@ def test_a_damaged_trajectory_is_refused(up6: Program, folder: Path) -> None:
     path.write_bytes(b"PK nothing")
     with pytest.raises(BadInput, match=r"trajectory\.npz': not a run's trajectory"):
         Program.load(folder)
+
+
+def _zipped(folder: Path, arrays: dict[str, bytes]) -> None:
+    with ZipFile(folder / TRAJECTORY, "w", ZIP_DEFLATED) as archive:
+        for name, content in arrays.items():
+            archive.writestr(f"{name}.npy", content)
+
+
+def _array(shape: tuple[int, ...], content: int) -> bytes:
+    head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".encode().ljust(117) + b"\n"
+    return b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head + bytes(content)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (_array((25_000_000, 2), 400_000_000), "unpacked it has 400000128 bytes, allowed are 200000000"),
+        (_array((10**9,), 1000), "'at_s.npy' does not hold an array of (1000000000,)"),
+        (_array((-1,), 0), "'at_s.npy' does not hold an array of (-1,)"),
+        (b"\x93NUMPY\x07\x00", "not a run's trajectory"),
+        (b"no array", "not a run's trajectory"),
+    ],
+)
+def test_a_trajectory_that_unpacks_to_more_than_it_may_is_refused(folder: Path, content: bytes, said: str) -> None:
+    _zipped(folder, {"at_s": content})
+    with pytest.raises(BadInput) as refused:
+        Program.load(folder)
+    assert said in str(refused.value)
+
+
+@given(st.binary(max_size=300), st.integers(0, 2000))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_trajectory_with_other_bytes_is_refused_or_read(folder: Path, content: bytes, at: int) -> None:
+    path = folder / TRAJECTORY
+    sound = path.read_bytes()
+    path.write_bytes(sound[:at] + content + sound[at + len(content) :])
+    with suppress(BadInput):  # and nothing else
+        Program.load(folder)
+    path.write_bytes(sound)

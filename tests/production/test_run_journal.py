@@ -22,6 +22,7 @@ from lab.production.run_journal import (
     RunEnded,
     RunJournal,
     SessionKept,
+    SkillKept,
     Stopped,
     line_of,
     read_run,
@@ -72,7 +73,7 @@ def test_a_run_that_is_gone_on_with_does_again_what_it_did(journal: RunJournal, 
 
 def test_a_run_that_goes_another_way_than_it_did_is_refused(journal: RunJournal, tmp_path: Path) -> None:
     again = RunJournal.resume(tmp_path)
-    with pytest.raises(WorkFailed, match=r"cannot be carried out again: it says .*17\.25.*, and now comes .*18\.0"):
+    with pytest.raises(WorkFailed, match=r"cannot be carried out again: in .*it says .*17\.25.*, now comes .*18\.0"):
         again.tell(replace(MOVED, drop_s=18.0))
     again.close()
 
@@ -143,6 +144,7 @@ def test_without_a_folder_nothing_is_written_and_nothing_known() -> None:
         ('{"kind": "moved", "step": -1}', "part: Field required"),
         (line_of(Stopped(-1, [])), "step -1: wanted 0 to"),
         (line_of(Stopped(1, [("nap", "", "")])), "'nap' is not a valid StopKind"),
+        (line_of(SkillKept({"source": "learned"}, "a.safetensors")), "row: it has no name or no source"),
         (line_of(HEAD), "a second run in one journal"),
         ("[" * 100_000, "nested too deeply"),
         ("\xff", "kind"),

@@ -84,6 +84,7 @@ def test_a_sound_urdf_is_accepted_and_its_looks_are_read(tmp_path: Path) -> None
         ("part.obj", "../part.obj", "mesh '../part.obj' lies outside"),
         ("part.obj", "/etc/hostname", "mesh '/etc/hostname' lies outside"),
         ("part.obj", "", "mesh '' lies outside"),
+        ("part.obj", "x" * 300, "is missing"),
         ('<robot name="thing">', '<!DOCTYPE robot><robot name="thing">', "must not declare a document type"),
         ('<robot name="thing">', '<!DOCTYPE r [<!ENTITY a "b">]><robot name="thing">', "document type or entities"),
         ("</robot>", "", "not a readable URDF"),

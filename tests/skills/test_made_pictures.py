@@ -52,7 +52,7 @@ def test_a_folder_that_is_there_a_wrong_count_and_a_task_without_a_camera_are_re
         make_pictures("toast", 0, tmp_path / "none", 0)
     with pytest.raises(BadInput, match="no station of it is approached through the camera's grid"):
         make_pictures("fms-arm", 1, tmp_path / "none", 0)
-    with pytest.raises(BadInput, match="wanted the index that `lab see --make` writes"):
+    with pytest.raises(BadInput, match="wanted what `lab see --make` wrote"):
         score_pictures(tmp_path)
 
 
@@ -67,3 +67,33 @@ def test_no_parts_are_seen_where_none_stand(made: Path) -> None:
 
     task = load("toast")
     assert parts_seen(task, read_picture(made / "00001.png"), camera_view(task, "toaster")) == []
+
+
+@pytest.mark.parametrize(
+    ("file", "change", "said"),
+    [
+        ("00001.json", {"markers": [{"kind": "gripper"}]}, "markers.0.world_m: Field required"),
+        ("00001.json", {"start": "x"}, "start: Input should be a valid"),
+        ("pictures.json", {"pictures": 0}, "pictures: Input should be greater than or equal to 1"),
+        ("pictures.json", {"station": "plate"}, "station 'plate' of 'toast' has no grid"),
+        ("pictures.json", {"more": 1}, "more: Extra inputs are not permitted"),
+    ],
+)
+def test_what_is_told_of_pictures_is_checked(
+    made: Path, tmp_path: Path, file: str, change: dict[str, object], said: str
+) -> None:
+    for path in made.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    (tmp_path / file).write_text(json.dumps(json.loads((tmp_path / file).read_text()) | change))
+    with pytest.raises(BadInput) as refused:
+        score_pictures(tmp_path)
+    assert said in str(refused.value)
+
+
+def test_a_marker_that_nobody_sees_is_told(made: Path, tmp_path: Path) -> None:
+    for path in made.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    truth = json.loads((tmp_path / "00001.json").read_text())
+    truth["markers"][0]["kind"] = "lamp"
+    (tmp_path / "00001.json").write_text(json.dumps(truth))
+    assert score_pictures(tmp_path)["wrong"][0]["reason"] == "no marker 'lamp' is seen"

@@ -6,11 +6,14 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from lab.studies.runner import Job
+import pytest
+
+from lab.errors import BadInput
+from lab.studies.runner import STORE, Job, record_of
 
 ROOT = str(Path(__file__).parents[2])
 
@@ -70,3 +73,33 @@ def test_workers_end_with_a_study_that_is_killed(tmp_path: Path) -> None:
         for pid in workers:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a study of these tests keeps."""
+
+    name: str
+    steps: list[int]
+
+
+def test_what_was_kept_is_read_and_what_is_not_understood_passed_over(tmp_path: Path) -> None:
+    job = Job(folder=tmp_path)
+    for steps in ([1, 2], [3], "x", [10**400], None):
+        job.keep({"key": str(steps), "found": {"name": "a", "steps": steps}})
+    job.keep({"key": "more", "found": {"name": "a", "steps": [1], "more": 2}})
+    with (tmp_path / STORE).open("ab") as file:
+        file.write(b'{"key": []}\n[1]\nnull\n"text"\n{"key": {}, "found": 1}\n\xff\xfe\n' + b"[" * 100_000 + b"\n7")
+    kept = job.kept_as(lambda entry: (entry["key"], record_of(Found, entry["found"])))
+    assert {key: found.steps for key, found in kept.items() if key != "more"} == {"[1, 2]": [1, 2], "[3]": [3]} | {
+        f"[{10**400}]": [10**400]
+    }
+    job.keep({"key": "last", "found": {"name": "b", "steps": []}})  # on a line of its own
+    assert "last" in job.kept_as(lambda entry: (entry["key"], record_of(Found, entry["found"])))
+
+
+def test_what_was_kept_is_not_read_from_a_file_without_end(tmp_path: Path) -> None:
+    with (tmp_path / STORE).open("wb") as file:
+        file.truncate(1 << 32)
+    with pytest.raises(BadInput, match="what is kept cannot be read: it has 4294967296 bytes"):
+        list(Job(folder=tmp_path).kept())

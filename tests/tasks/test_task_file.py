@@ -45,7 +45,7 @@ def test_a_file_that_is_not_there_is_said(task: str, refusal: Refusal) -> None:
 def test_an_unknown_task_lists_the_known(task: str, refusal: Refusal) -> None:
     message = refusal(lambda: load(task))
     assert message.startswith("unknown task '")
-    assert message.endswith("known: " + ", ".join(sorted(shipped())))
+    assert "known: " + ", ".join(sorted(shipped()))[:100] in message
     assert ("did you mean 'toast'?" in message) == (task in ("toats", "Toast", "toast\0"))
 
 
@@ -209,7 +209,7 @@ def test_a_file_too_long_to_be_a_task_is_refused_before_it_is_read(tmp_path: Pat
     assert load_world(str(path)).name == "world-1"
     with path.open("wb") as file:
         file.truncate(MAX_FILE_BYTES + 1)
-    assert refusal(lambda: load_any(str(path))).endswith("bytes: files up to 10000000 bytes are read")
+    assert refusal(lambda: load_any(str(path))).endswith("bytes, allowed are 10000000")
 
 
 @pytest.mark.parametrize("name", names_of("cell"))

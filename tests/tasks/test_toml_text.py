@@ -168,3 +168,25 @@ def test_a_long_bad_value_is_cut() -> None:
     assert explain(caught.value).startswith("a: Input should be a valid integer")
     assert explain(caught.value).endswith("xxx ...)")
     assert len(explain(caught.value)) < 250
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a = 1\n" * 200_000, "200000 keys and tables, 0 commas: allowed are 100000 and 2500000"),
+        ("[a]\n" * 200_000, "200000 keys and tables"),
+        ("a = [" + "1," * 2_600_000 + "]", "1 keys and tables, 2600000 commas"),
+        (f"x = 1\na = {2**63}\n", "line 2: a: a whole number beyond 64 bits"),
+        (f"a = [1, {{ b = -{'9' * 400} }}]\n", "line 1: a.1.b: a whole number beyond 64 bits"),
+        ("a = 0xffff_ffff_ffff_ffff\n", "line 1: a: a whole number beyond 64 bits"),
+    ],
+)
+def test_what_takes_seconds_or_is_no_number_of_toml_is_refused(text: str, said: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        TomlText.parsed(Path("mine.toml"), text)
+    assert str(caught.value).startswith(f"mine.toml: {said}")
+
+
+def test_large_numbers_and_long_texts_are_taken() -> None:
+    text = f'a = {2**63 - 1}\nb = 1.2345678901234567890123\nc = "{"9" * 40}"\nd = 1e300\n'
+    assert TomlText.parsed(Path("mine.toml"), text).raw["a"] == 2**63 - 1

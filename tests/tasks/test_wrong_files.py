@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lab.errors import BadInput
+from lab.errors import BadInput, LabError
 from lab.files import tasks_folder
 from lab.sim.scene.scene_check import check_apart, check_scene
 from lab.skills.prepared_scene import check_task
@@ -61,7 +61,7 @@ def test_a_wrong_file_is_one_line(wrong: dict[str, Any], tmp_path: Path) -> None
     said = written(wrong, tmp_path)
     path = tmp_path / "mine.toml"
     errors, warnings = check_task(str(path), None, 0)
-    assert (errors, warnings) == ([f"{path}: {said}"], [])
+    assert (errors, warnings) == ([str(LabError(f"{path}: {said}"))], [])
     assert "\n" not in errors[0]
 
 

@@ -228,6 +228,15 @@ def test_files_that_share_their_bytes(refused: Callable[..., str], make_policy: 
     assert "they overlap" in said
 
 
+def test_a_file_without_a_name(refused: Callable[..., str], make_policy: Make) -> None:
+    content = pack([make_policy(name="a")])[0]
+    at = content.rindex(b"PK\x01\x02")  # the last file of the list at its end
+    name = content[at + 28 : at + 30]
+    empty = content[: at + 46] + b"\0" + content[at + 47 :]
+    assert name != b"\0\0"
+    assert "it holds a file without a name" in refused(empty)
+
+
 def test_too_much(
     refused: Callable[..., str], make_policy: Make, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -235,7 +244,7 @@ def test_too_much(
     monkeypatch.setattr(archive, "MAX_FILES", 2)
     assert "it holds more than 3 files" in refused(content)
     monkeypatch.setattr(archive, "MAX_BYTES", 100)
-    with pytest.raises(BadInput, match="it has more than 100 bytes"):
+    with pytest.raises(BadInput, match="bytes, allowed are 100"):
         unpack(tmp_path / "given.zip")
 
 

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 from lab.errors import BadInput, WorkFailed
+from lab.files import read_limited
+from lab.toolbox import place
 from lab.toolbox.names import hash_of
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import encode
@@ -176,15 +178,15 @@ def test_one_that_may_not_be_read_is_not_replaced(
     box: Toolbox, make_policy: MakePolicy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     box.save(make_policy(1.0))
-    plain = Path.read_bytes
+    plain = read_limited
 
-    def refuse(path: Path) -> bytes:
+    def refuse(path: Path, most: int) -> bytes:
         if path.name == "insert.safetensors":
             raise OSError(5, "Input/output error")
-        return plain(path)
+        return plain(path, most)
 
     with monkeypatch.context() as patch:
-        patch.setattr(Path, "read_bytes", refuse)
+        patch.setattr(place, "read_limited", refuse)
         with pytest.raises(BadInput, match=r"policy file .*insert.safetensors: Input/output error"):
             box.save(make_policy(2.0, final_steps=9))
     assert in_use(box) == 1.0

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
-from lab.files import assets_folder, pybullet_data_folder
+from lab.files import assets_folder, is_file, pybullet_data_folder, within
 from lab.sim import models
 from lab.sim.arms import kinematics
 from lab.sim.arms.arm import Arm, Kinematics
@@ -71,10 +71,11 @@ def arm_of(settings: RobotSettings, folder: Path = Path()) -> Arm:
     changed = 0
     path = Path()
     if settings.is_file:
-        path = (folder / settings.model).resolve()
-        if folder.resolve() not in path.parents:
+        found = within(folder, settings.model)
+        if found is None:
             raise BadInput(f"robot.model '{settings.model}': the URDF lies outside the task file's folder")
-        if not path.is_file() or not 0 < path.stat().st_size <= MOST_BYTES:
+        path = found
+        if not is_file(path) or not 0 < path.stat().st_size <= MOST_BYTES:
             raise BadInput(f"robot.model '{settings.model}': no such file beside the task file, or over 5 MB")
         changed = path.stat().st_mtime_ns
     mount = (settings.opening_m, settings.base_up_m, settings.nearest_m)

@@ -14,7 +14,7 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from lab.errors import BadInput, unknown
-from lab.files import write_whole
+from lab.files import is_file, write_whole
 from lab.sim import mesh_file
 from lab.sim.urdf_reader import check_inertial, check_joint, check_mesh, check_numbers, finite, floats, read
 
@@ -183,7 +183,7 @@ def _find_meshes(path: Path, link: Xml.Element, folder: Path) -> None:
         if name.startswith(_PACKAGE):
             rest = name.removeprefix(_PACKAGE)
             places = [rest, rest.partition("/")[2]]
-        place = next((one for one in places if (path.parent / one).is_file()), places[0])
+        place = next((one for one in places if is_file(path.parent / one)), places[0])
         check_mesh(path, place, folder)
         mesh.set("filename", str((path.parent / place).resolve()))
     _lighten(link)

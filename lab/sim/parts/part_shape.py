@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted
-from lab.files import assets_folder
+from lab.files import assets_folder, is_file, read_limited, within
 from lab.sim import urdf_reader
 from lab.sim.frames import Quaternion, Shape, ShapeKind, Vector
 from lab.sim.mesh_file import is_binary
@@ -172,10 +172,10 @@ def _found(part: PartFields, field: str, name: str, folder: Path) -> Path:
     """The file of a field, beside the task file or of the assets; what leads out of both, as a link may, is refused."""
     where = f"part '{part.name}': {field} = '{name}'"
     for place in (folder, assets_folder()):
-        path = (place / name).resolve()
-        if not path.is_file():
+        if not is_file(place / name):
             continue
-        if place.resolve() not in path.parents:
+        path = within(place, name)
+        if path is None:
             raise BadInput(f"{where}: it lies outside the folder '{place}'")
         size = path.stat().st_size
         if not 0 < size <= MOST_BYTES:
@@ -204,11 +204,13 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     try:
         kind = path.suffix.lower().removeprefix(".")
         raw: dict[str, Any] = {"process": False, "skip_materials": True}  # as it is; and no other file is opened
-        data = path.read_bytes()
+        data = read_limited(path, MOST_BYTES)
         mesh: Any = trimesh.load(BytesIO(data), kind, force="mesh", **raw)
         points: Array = np.asarray(mesh.vertices, dtype=float)
     except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
         raise BadInput(f"{where}: it cannot be read as {kind.upper()}: {type(error).__name__}: {error}") from None
+    if points.shape[1:] != (3,):
+        raise BadInput(f"{where}: its vertices are not three numbers each")
     if not isinstance(mesh, trimesh.Trimesh) or len(points) < 4 or len(mesh.faces) < 4:
         raise BadInput(f"{where}: a mesh of {len(points)} vertices: wanted a solid, 4 or more and faces between them")
     if kind == "stl" and not is_binary(data) and len(mesh.faces) > MOST_TEXT:
@@ -217,6 +219,9 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
         )
     if not np.isfinite(points).all():
         raise BadInput(f"{where}: vertex {int(np.argmin(np.isfinite(points).all(axis=1)))} is not finite")
+    faces = np.asarray(mesh.faces)
+    if faces.min() < 0 or faces.max() >= len(points):
+        raise BadInput(f"{where}: a face of vertex {max(int(faces.max()), -int(faces.min()))}, it has {len(points)}")
     mesh.apply_scale(part.scale)  # type: ignore[no-untyped-call]
     _check_size(part, where, float(max(mesh.extents)))
     mesh.merge_vertices(merge_tex=True, merge_norm=True)  # seams of a texture are no holes

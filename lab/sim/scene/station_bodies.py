@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
-from lab.files import beside_or_asset
+from lab.files import beside_or_asset, read_limited
 from lab.sim import urdf_reader
 from lab.sim.frames import Rgba, Vector
 from lab.sim.mesh_file import MAX_BYTES
@@ -97,13 +97,13 @@ def _mesh_bounds(path: Path) -> tuple[Array, Array]:
         raise BadInput(f"{path.stat().st_size} bytes: wanted 1 to {MAX_BYTES // 1_000_000} MB")
     try:
         mesh: Any = trimesh.load(
-            BytesIO(path.read_bytes()), kind, force="mesh", skip_materials=True
+            BytesIO(read_limited(path, MAX_BYTES)), kind, force="mesh", skip_materials=True
         )  # opens no other file
         points = np.asarray(mesh.vertices, dtype=float)
         faces = len(mesh.faces)
     except Exception as error:  # whatever a reader of meshes comes to over a stranger's file
         raise BadInput(f"it cannot be read as {kind.upper()}: {type(error).__name__}: {error}") from None
-    if faces < 1 or len(points) < 3 or not np.isfinite(points).all():
+    if faces < 1 or len(points) < 3 or points.shape[1:] != (3,) or not np.isfinite(points).all():
         raise BadInput(
             f"a mesh of {len(points)} vertices and {faces} faces: wanted finite ones, and faces between them"
         )

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from lab.errors import BadInput
 from lab.sequencing.cell.objectives import MAKESPAN, cost
 from lab.sequencing.methods.carried_over import Decider
 from lab.sequencing.methods.carried_over_learning import CarriedLearning, learn_policy
@@ -20,7 +19,7 @@ from lab.sequencing.simulate.run import Run
 from lab.studies.charts import bars
 from lab.studies.findings import Findings, Row, row, those, varying_row
 from lab.studies.ours.carried_over_families import SMALL, Unseen, small_cells, unseen, unseen_cell
-from lab.studies.runner import Job
+from lab.studies.runner import Job, record_of
 from lab.tasks.carried_policy import write_policy
 
 ALL = "all families"
@@ -63,7 +62,7 @@ def carried_over(job: Job, reading: Mapping[str, Any]) -> Findings:
     families = [*SMALL, ALL]
     learned = _kept(job, "learned", families, partial(_learned, sessions=job.sessions, seed=job.seed), _policy_of)
     cells = unseen()
-    surveys = _kept(job, "surveyed", cells, surveyed, lambda held: Surveyed(**held))
+    surveys = _kept(job, "surveyed", cells, surveyed, partial(record_of, Surveyed))
     rows: list[Row] = []
     for group in dict.fromkeys((one.family, one.group) for one in cells):
         rows += rows_of(*group, {one: surveys[one] for one in cells if (one.family, one.group) == group}, learned)
@@ -80,13 +79,7 @@ def carried_over(job: Job, reading: Mapping[str, Any]) -> Findings:
 def _kept(job: Job, kind: str, items: Sequence[Any], work: Any, read: Any) -> dict[Any, Any]:
     """What `work`, a function of a module, makes of each item; what the folder holds of it is read, the rest is kept there."""
     names = {_key(job, kind, one): one for one in items}
-    done: dict[Any, Any] = {}
-    for entry in job.kept():
-        try:
-            if entry["key"] in names:
-                done[names[entry["key"]]] = read(entry["found"])
-        except (KeyError, TypeError, AttributeError, BadInput):
-            continue  # not ours: made anew
+    done = job.kept_as(lambda entry: (names[entry["key"]], read(entry["found"])) if entry["key"] in names else None)
     left = [one for one in items if one not in done]
     job.progress(len(done), len(items))
     for one, found in job.computed(work, left):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from lab.production.faults import FAULTS
 from lab.statistics import share
 from lab.studies.findings import Findings, Row, row
-from lab.studies.runner import Job
+from lab.studies.runner import Job, record_of
 from lab.tasks.task_file import load
 from lab.view.canvas import BLUE, INK, ORANGE, RED, picture_bytes
 
@@ -95,14 +95,8 @@ def struck(ran: Ran) -> list[str]:
 
 def measured(job: Job, settings: Sequence[Setting]) -> dict[Setting, Ran]:
     """The outcome of every run; those that the job's folder holds are read, the others are carried out and kept there."""
-    done: dict[Setting, Ran] = {}
-    for entry in job.kept():
-        try:
-            setting, ran = Setting(**entry["setting"]), Ran(**entry["ran"])
-        except (KeyError, TypeError):
-            continue  # not ours: carried out anew
-        if setting in settings:
-            done[setting] = ran
+    kept = job.kept_as(lambda entry: (record_of(Setting, entry["setting"]), record_of(Ran, entry["ran"])))
+    done: dict[Setting, Ran] = {setting: ran for setting, ran in kept.items() if setting in settings}
     left = sorted((one for one in settings if one not in done), key=lambda one: (one.task, one.seed))
     job.progress(len(done), len(settings))
     for setting, ran in job.computed(carried_out, left):

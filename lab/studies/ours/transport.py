@@ -87,14 +87,8 @@ def entries_of(instances: Sequence[Instance], methods: Sequence[str], seconds: f
 
 def measured(job: Job, entries: Sequence[Entry]) -> dict[Entry, Found]:
     """What came of every entry; those that the job's folder holds are read, the others are measured and kept there."""
-    names, done = {_key(one): one for one in entries}, dict[Entry, Found]()
-    for line in job.kept():
-        try:
-            entry, found = names.get(line["entry"]), Found.of_json(line["found"])
-        except (KeyError, TypeError):
-            continue  # not ours, or damaged: measured anew
-        if entry is not None:
-            done[entry] = found
+    names = {_key(one): one for one in entries}
+    done: dict[Entry, Found] = job.kept_as(lambda line: (names[line["entry"]], Found.of_json(line["found"])))
     left = [one for one in entries if one not in done]
     job.progress(len(done), len(entries))
     for entry, found in job.computed(carried_out, left, most=1):  # seconds each: a kill loses one a process

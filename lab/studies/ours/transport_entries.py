@@ -15,6 +15,7 @@ from lab.sequencing.cell.schedule_rows import rows_of
 from lab.sequencing.search import EpisodeSequenced, Search
 from lab.sequencing.simulate.run import follow, simulate
 from lab.studies.ours.transport_instances import Instance, cell_of
+from lab.studies.runner import record_of
 
 CYCLIC = "cyclic"
 FIRST, GROWS, SHARE = (
@@ -60,9 +61,8 @@ class Found:
 
     @classmethod
     def of_json(cls, found: Mapping[str, Any]) -> "Found":
-        """As it was kept. Raises TypeError and KeyError for what is something else."""
-        lists = {name: tuple(map(tuple, found[name])) for name in ("trace", "schedule")}
-        return cls(**{**found, **lists})
+        """As it was kept. Raises ValueError for what is something else."""
+        return record_of(cls, found)
 
 
 def methods_for(instance: Instance) -> tuple[str, ...]:

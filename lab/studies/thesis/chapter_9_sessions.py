@@ -98,14 +98,12 @@ def measured(job: Job, settings: Sequence[AdviceSetting]) -> dict[AdviceSetting,
     """
     wanted = list(dict.fromkeys(settings))
     keys = {setting.key(job.sessions, job.seed): setting for setting in wanted}
-    done: dict[AdviceSetting, AdviceOutcome] = {}
-    for entry in job.kept():
-        try:
-            key, outcome = str(entry["key"]), AdviceOutcome.from_json(entry)
-        except (ValueError, KeyError, TypeError, OverflowError):
-            continue  # not ours: computed anew
-        if key in keys and len(outcome.success) == job.sessions:
-            done[keys[key]] = outcome
+
+    def read(entry: Any) -> tuple[AdviceSetting, AdviceOutcome] | None:
+        outcome = AdviceOutcome.from_json(entry)
+        return (keys[entry["key"]], outcome) if len(outcome.success) == job.sessions else None
+
+    done: dict[AdviceSetting, AdviceOutcome] = job.kept_as(read)
     left = [setting for setting in wanted if setting not in done]
     job.progress(len(done), len(wanted))
     for setting, outcome in job.computed(partial(sessions_of, sessions=job.sessions, seed=job.seed), left):

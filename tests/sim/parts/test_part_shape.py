@@ -212,6 +212,7 @@ def test_a_mesh_in_millimetres_is_refused_with_the_scale_that_was_meant(write: C
         (b"v 0 0 0\nv nan 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n", "vertex 1 is not finite"),
         (b"v 0 0 0\nv .1 0 0\nv 0 .1 0\nv .1 .1 0\nf 1 2 3\nf 2 4 3\nf 1 3 2\nf 2 3 4\n", "it is flat: wanted a solid"),
         (b"\x00\xff no mesh at all", "thing.obj'"),
+        (b"v 0\nv .1\nv .2\nv .3\nf 1 2 3\nf 2 4 3\nf 1 3 2\nf 2 3 4\n", "its vertices are not three numbers each"),
     ],
 )
 def test_what_is_no_solid_is_refused(tmp_path: Path, content: bytes | None, says: str) -> None:

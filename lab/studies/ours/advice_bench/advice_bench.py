@@ -71,15 +71,14 @@ def advice_bench(job: Job, reading: Mapping[str, Any]) -> Findings:
 
 def measured(job: Job, cases: Sequence[Case], rules: tuple[str, ...]) -> dict[Case, Outcomes]:
     """What each case came to; what the job's folder holds is not run again."""
-    done: dict[Case, Outcomes] = {}
     mark = [job.sessions, job.seed, *rules]
-    for entry in job.kept():
-        try:
-            case = Case(*entry["case"])
-            if entry["of"] == mark and case in cases:
-                done[case] = {tuple(key): Outcome.from_json(lists) for key, lists in entry["found"]}
-        except (KeyError, TypeError, ValueError):
-            continue  # not ours: run anew
+
+    def read(entry: Any) -> tuple[Case, Outcomes] | None:
+        case = Case(*entry["case"])
+        found = {(str(rule), str(budget)): Outcome.from_json(lists) for (rule, budget), lists in entry["found"]}
+        return (case, found) if entry["of"] == mark and case in cases else None
+
+    done: dict[Case, Outcomes] = job.kept_as(read)
     left = [case for case in cases if case not in done]
     job.progress(len(done), len(cases))
     work = partial(tried, sessions=job.sessions, seed=job.seed, rules=rules)
