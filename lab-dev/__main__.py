@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from kills import PART as KILLS
 from page_attacks import PART as REQUESTS
 from parts import Part
 from rich.console import Console
 from rich.progress import Progress
 from scoreboard import line, show, written
 
-PARTS: dict[str, Part] = {"requests": REQUESTS}
+PARTS: dict[str, Part] = {"requests": REQUESTS, "kills": KILLS}
 
 
 def main(
