@@ -104,6 +104,10 @@ def base(room: Path) -> Path:
     box.remove("gone")
     box.save_record("durations", "kept", {"seconds": 12.5})
     (half / "others.zip").write_bytes(pack([policy("doubled", 5.0), policy("other", 6.0), policy("third", 7.0)])[0])
+    lab(
+        *_COMPARE, cwd=half, env=environment_in(half, room), timeout_s=LONGEST_S
+    )  # what is compiled is kept in the home
+    shutil.rmtree(half / "compared")
     ended = disturbed(half, _TEACH, built(room), Strike("w", 300, "after"), room)
     assert ended.code < 0, ended.stderr
     assert not read_journal(half / STOPPED, "the base").closed

@@ -403,3 +403,17 @@ def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / FILE)
     with pytest.raises(BadInput, match="cannot be read: it is no regular file"):
         read_journal(tmp_path, "DIR")
+
+
+@pytest.mark.parametrize("left", [b"", b'{"ki', b'{"kind": "session", "words": {"sub'])
+def test_a_journal_whose_first_line_was_cut_off_is_begun_anew(tmp_path: Path, left: bytes) -> None:
+    (tmp_path / "events.jsonl").write_bytes(left)
+    Journal.begin(tmp_path, HEAD).close()
+    assert read_journal(tmp_path, "here").session == HEAD
+
+
+def test_what_is_no_journal_stays(tmp_path: Path) -> None:
+    (tmp_path / "events.jsonl").write_bytes(b'{"kind": "mine"')
+    with pytest.raises(BadInput, match="holds a session already"):
+        Journal.begin(tmp_path, HEAD)
+    assert (tmp_path / "events.jsonl").read_bytes() == b'{"kind": "mine"'
