@@ -11,11 +11,12 @@ import typer
 from kills import PART as KILLS
 from page_attacks import PART as REQUESTS
 from parts import Part
+from resources import PART as RESOURCES
 from rich.console import Console
 from rich.progress import Progress
 from scoreboard import line, show, written
 
-PARTS: dict[str, Part] = {"requests": REQUESTS, "kills": KILLS}
+PARTS: dict[str, Part] = {"requests": REQUESTS, "kills": KILLS, "resources": RESOURCES}
 
 
 def main(

@@ -42,7 +42,7 @@ class Ended:
             return f"exit {self.code}, allowed {', '.join(map(str, codes))}: {self.stderr.strip()[-200:]}"
         if self.code in (1, 2) and not self.stderr.strip():
             return f"exit {self.code} without a word"
-        longest = max((len(line) for line in re.split(r"[\r\n]", self.stderr)), default=0)
+        longest = max((len(line) for line in re.split(r"[\r\n]", self.stderr) if line.startswith("lab: ")), default=0)
         return f"a line of {longest} characters on stderr" if longest > LINE_CHARACTERS else ""
 
 

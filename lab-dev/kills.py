@@ -48,7 +48,7 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     shuffled = list(names())
     random.Random(seed).shuffle(shuffled)
     name = shuffled[number % len(shuffled)]
-    expected = _undisturbed(name, room)
+    expected = known_as(name, room)
     home = fresh(room, f"kill-{number}", WORKS[name])
     at_s = chance.random() * expected.seconds if chance.random() < AT_RANDOM else None
     strike = None if at_s is not None else drawn(expected.calls, chance)
@@ -61,7 +61,8 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
 
 
 @cache
-def _undisturbed(name: str, room: Path) -> Undisturbed:
+def known_as(name: str, room: Path) -> Undisturbed:
+    """What a command comes to when nobody disturbs it, read once."""
     return undisturbed(name, room)
 
 

@@ -57,23 +57,23 @@ _BOX = ("bakery", "--part", "box:0.12x0.015x0.12:2", "--machine", "oven:60", "--
 _MACHINE = ("toolbox/doubled*", "toolbox/trash/*")
 _DRAFTS = ("toolbox/.doubled.safetensors.0123abcd.tmp", "toolbox/versions/doubled/.x.safetensors.0123abcd.tmp")
 WORKS: dict[str, Work] = {
-    "teach": Work(_TEACH, 150, session="teach"),
-    "teach --out": Work((*_TEACH, "--out", "lesson"), 120, session="teach"),
-    "teach --resume": Work(("teach", "--resume", STOPPED, "--json"), 120, (f"{STOPPED}/*",), session="teach"),
-    "run": Work(("run", "toast", "--toasts", "1", "--json"), 40, session="run"),
-    "study compare": Work(_COMPARE, 100),
-    "study run": Work((*_TABLE, "1"), 25),
-    "study run, 2 workers": Work((*_TABLE, "2"), 15),
+    "teach": Work(_TEACH, 100, session="teach"),
+    "teach --out": Work((*_TEACH, "--out", "lesson"), 80, session="teach"),
+    "teach --resume": Work(("teach", "--resume", STOPPED, "--json"), 80, (f"{STOPPED}/*",), session="teach"),
+    "run": Work(("run", "toast", "--toasts", "1", "--json"), 30, session="run"),
+    "study compare": Work(_COMPARE, 50),
+    "study run": Work((*_TABLE, "1"), 10),
+    "study run, 2 workers": Work((*_TABLE, "2"), 8),
     "sequence": Work(("sequence", "toast-case-1", "--toasts", "2", "--gantt", "order.svg", "--json"), 30),
-    "task random": Work(("task", "random", "8x8x8", "--out", "world.toml", "--json"), 30),
+    "task random": Work(("task", "random", "8x8x8", "--out", "world.toml", "--json"), 40),
     "new": Work(("new", *_BOX), 30),
-    "toolbox remove": Work(("toolbox", "remove", "doubled", "--json"), 50, _MACHINE),
-    "toolbox restore": Work(("toolbox", "restore", "gone", "--json"), 50, ("toolbox/trash/gone*",)),
-    "toolbox promote": Work(("toolbox", "promote", "doubled", "1", "--json"), 50, _MACHINE),
-    "toolbox rollback": Work(("toolbox", "rollback", "doubled", "--json"), 50, _MACHINE),
-    "toolbox import": Work(("toolbox", "import", "others.zip", "--replace", "--json"), 70, _MACHINE),
-    "toolbox export": Work(("toolbox", "export", "--out", "mine.zip", "--json"), 30),
-    "toolbox verify --repair": Work((*REPAIR, "--json"), 40, left=_DRAFTS),
+    "toolbox remove": Work(("toolbox", "remove", "doubled", "--json"), 80, _MACHINE),
+    "toolbox restore": Work(("toolbox", "restore", "gone", "--json"), 70, ("toolbox/trash/gone*",)),
+    "toolbox promote": Work(("toolbox", "promote", "doubled", "1", "--json"), 80, _MACHINE),
+    "toolbox rollback": Work(("toolbox", "rollback", "doubled", "--json"), 80, _MACHINE),
+    "toolbox import": Work(("toolbox", "import", "others.zip", "--replace", "--json"), 122, _MACHINE),
+    "toolbox export": Work(("toolbox", "export", "--out", "mine.zip", "--json"), 50),
+    "toolbox verify --repair": Work((*REPAIR, "--json"), 60, left=_DRAFTS),
 }
 
 

@@ -99,9 +99,12 @@ class Job:
         path = self.folder / STORE
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            cut = path.is_file() and not path.read_bytes().endswith(b"\n")
+            there = path.read_bytes() if path.is_file() else b""
+            whole = there.rfind(b"\n") + 1
+            if whole < len(there):  # a line that was cut off: it is done again now
+                os.truncate(path, whole)
             with path.open("a", encoding="utf-8") as file:
-                file.write(("\n" if cut else "") + json.dumps(record) + "\n")
+                file.write(json.dumps(record) + "\n")
         except OSError as error:
             raise WorkFailed(f"output folder '{self.folder}' (--out) cannot be written: {error.strerror}") from error
 
