@@ -9,15 +9,18 @@ import shutil
 from functools import cache
 from pathlib import Path
 
-from commands import Ended, lab
+from commands import Ended
+from forked import forked
 from parts import Outcome, Part
 from shim import Strike, built
 from works import (
     LONGEST_S,
     WORKS,
+    CarriedOut,
     Undisturbed,
     age,
     base,
+    by_itself,
     disturbed,
     environment_in,
     fresh,
@@ -33,6 +36,7 @@ from works import (
 
 COUNT = 1000
 LATE = 12  # calls at the end of a command, among which every other kill is
+ALONE = 8  # one in so many is a process of its own; the others are forked from one that has the lab loaded
 AT_RANDOM = 0.15  # of the kills are at any time
 
 
@@ -52,9 +56,11 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     home = fresh(room, f"kill-{number}", WORKS[name])
     at_s = chance.random() * expected.seconds if chance.random() < AT_RANDOM else None
     strike = None if at_s is not None else drawn(expected.calls, chance)
-    killed = disturbed(home, WORKS[name].words, built(room), strike, room, at_s or LONGEST_S)
+    alone = at_s is not None or number % ALONE == 0 or "study" in name
+    carried_out = by_itself if alone else forked(built(room), room)
+    killed = disturbed(home, WORKS[name].words, built(room), strike, room, at_s or LONGEST_S, carried_out)
     how = f"after {at_s:.2f} s" if at_s is not None else str(strike)
-    broke = judged(name, expected, home, killed, room)
+    broke = judged(name, expected, home, killed, room, carried_out)
     if not broke:
         shutil.rmtree(home.parent)
     return Outcome(name, f"{number}, seed {seed}: {name}: {how}", broke, figures={"MB": killed.peak_bytes / 1e6})
@@ -77,7 +83,9 @@ def drawn(calls: dict[str, int], chance: random.Random) -> Strike | None:
     return Strike(kind, at, chance.choice(("before", "after", "half") if kind == "w" else ("before", "after")))
 
 
-def judged(name: str, expected: Undisturbed, home: Path, killed: Ended, room: Path) -> str:
+def judged(
+    name: str, expected: Undisturbed, home: Path, killed: Ended, room: Path, carried_out: CarriedOut = by_itself
+) -> str:
     """What is wrong after a kill, and after the command that comes next; "" if nothing is."""
     before, changes = kept_before(room), WORKS[name].changes
     if killed.code >= 0 and killed.code != expected.code:
@@ -86,7 +94,7 @@ def judged(name: str, expected: Undisturbed, home: Path, killed: Ended, room: Pa
         return f"after the kill: {wrong}"
     age(home)
     words = next_words(name, expected, home)
-    then = lab(*words, cwd=home, env=environment_in(home, room), timeout_s=LONGEST_S)
+    then = carried_out(words, home, environment_in(home, room), LONGEST_S)
     said = f"then lab {' '.join(words)}"
     if fault := then.fault((0, expected.code)):
         return f"{said}: {fault}"

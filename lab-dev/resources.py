@@ -46,6 +46,7 @@ NEEDS_ROOM = "owm"  # the kinds of calls that a full disk refuses
 BARE = ("setpriv", "--bounding-set=-all", "--inh-caps=-all", "--ambient-caps=-all") if os.getuid() == 0 else ()
 MB = 1 << 20
 LATE = 12
+_SESSION_OF = {"teach": "toolbox/sessions/*", "teach --out": "lesson"}
 Before = Callable[[], None]
 Make = Callable[["Case"], None]
 
@@ -145,7 +146,7 @@ def little_memory(case: Case) -> None:
 
 def short_files(case: Case) -> None:
     """No file may grow beyond so much."""
-    size = case.chance.choice((0, 512, 1024, 4096, 16384))
+    size = case.chance.choice((4096, 16384, 65536))
     case.before, case.said = _limited(resource.RLIMIT_FSIZE, size), f"files up to {size} bytes"
 
 
@@ -302,7 +303,9 @@ def judged(case: Case, ended: Ended, room: Path) -> str:
     changes = (*WORKS[case.name].changes, *((f"{case.loses[0]}/*",) if case.loses[0] else ()))
     if wrong := lost(kept_before(room), case.home, changes) or unsound(case.home):
         return f"exit {ended.code}: {wrong}"
-    if ended.code == 0 and not case.unheard and (wrong := reached(case.expected, case.home)):
+    if case.loses[0] and ended.code == 0 and not any(case.home.glob(f"{_SESSION_OF[case.name]}/receipt.json")):
+        return "exit 0 without its session"
+    if ended.code == 0 and not case.unheard and not case.loses[0] and (wrong := reached(case.expected, case.home)):
         return f"exit 0: {wrong}"
     if ended.code == 2 and (more := _kept(state(case.home)) - _kept(state(base(room)))):
         return f"exit 2, but it has kept {min(more)}: {ended.stderr[-160:]}"
@@ -332,13 +335,12 @@ def _said_kept(ended: Ended, home: Path) -> str:
     except ValueError:
         return f"stdout is no JSON document: {ended.stdout[:80]!r}"
     kept = {row["name"] for row in Toolbox(home / "toolbox").list()}
-    name = document.get("saved_as")
+    name, files = document.get("saved_as"), document.get("files")
+    files = files if isinstance(files, dict) else {}
     if name and name not in kept:
         return f"it says that it kept '{name}', and it is not there"
-    gone = [
-        file for file in (document.get("files") or {}).values() if isinstance(file, str) and not (home / file).exists()
-    ]
-    return f"it names the file {gone[0]}, which is not there" if gone and isinstance(document["files"], dict) else ""
+    gone = [file for file in (files).values() if isinstance(file, str) and not (home / file).exists()]
+    return f"it names the file {gone[0]}, which is not there" if gone else ""
 
 
 def _goes_on(case: Case, room: Path, same: bool) -> str:

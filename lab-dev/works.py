@@ -7,7 +7,7 @@ import re
 import shutil
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
@@ -136,12 +136,26 @@ def fresh(room: Path, folder: str, work: Work) -> Path:
     return home
 
 
+def by_itself(words: tuple[str, ...], home: Path, env: Mapping[str, str], timeout_s: float) -> Ended:
+    """A command as a process of its own."""
+    return lab(*words, cwd=home, env=env, timeout_s=timeout_s)
+
+
+CarriedOut = Callable[[tuple[str, ...], Path, Mapping[str, str], float], Ended]
+
+
 def disturbed(
-    home: Path, words: tuple[str, ...], library: Path, strike: Strike | None, caches: Path, timeout_s: float = LONGEST_S
+    home: Path,
+    words: tuple[str, ...],
+    library: Path,
+    strike: Strike | None,
+    caches: Path,
+    timeout_s: float = LONGEST_S,
+    carried_out: CarriedOut = by_itself,
 ) -> Ended:
     """A command in a home, under the shim; what it writes is counted in `counts` beside the home."""
     said = shimmed(library, home, home.parent / f"{home.name}-counts", strike)
-    return lab(*words, cwd=home, env=environment_in(home, caches) | said, timeout_s=timeout_s)
+    return carried_out(words, home, environment_in(home, caches) | said, timeout_s)
 
 
 def environment_in(home: Path, caches: Path) -> dict[str, str]:
@@ -181,7 +195,7 @@ def state(home: Path) -> dict[str, str]:
     found: Counter[str] = Counter()
     for path in sorted(home.rglob("*")):
         inside = path.relative_to(home).as_posix()
-        if path.is_dir() or inside.startswith(("toolbox/log/", ".cache/")) or path.is_symlink():
+        if path.is_dir() or inside.startswith(("toolbox/log/", ".cache/", ".config/")) or path.is_symlink():
             continue
         content = path.read_bytes().replace(os.fsencode(home), b"HOME")
         if path.suffix == ".safetensors":
@@ -265,7 +279,8 @@ def _sessions(work: Work, home: Path) -> list[Path]:
 def kept_before(room: Path) -> Files:
     """The files of the base, by name."""
     home = base(room)
-    return {path.relative_to(home).as_posix(): path.read_bytes() for path in home.rglob("*") if path.is_file()}
+    files = (path for path in home.rglob("*") if path.is_file() and home / ".cache" not in path.parents)
+    return {path.relative_to(home).as_posix(): path.read_bytes() for path in files}
 
 
 def lost(before: Files, home: Path, changes: tuple[str, ...]) -> str:

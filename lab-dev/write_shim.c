@@ -33,7 +33,11 @@ static atomic_uint *counts; // a number a kind, then how many of the kinds that 
 static unsigned meant, at, always;
 static int deed = PASS, refusal;
 
-__attribute__((constructor)) static void begin(void) {
+// Reads the environment, when a process begins, and again where one is forked for a command of its own.
+__attribute__((constructor)) void write_shim_begin(void) {
+    counts = NULL;
+    meant = at = always = 0;
+    deed = PASS;
     const char *folder = getenv("LAB_SHIM_UNDER"), *file = getenv("LAB_SHIM_COUNTS");
     const char *kinds = getenv("LAB_SHIM_KINDS"), *when = getenv("LAB_SHIM_AT"), *what = getenv("LAB_SHIM_DO");
     if (!folder || !file || strlen(folder) >= sizeof under) return;
