@@ -16,7 +16,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from commands import Ended, environment, kill_session
+from commands import Ended, kill_session
+from works import environment_in
 
 _WARM = (
     ("teach", "world-1", "--advisor", "expert", "--episodes", "30", "--out", "lesson", "--json"),
@@ -42,7 +43,7 @@ def forked(library: Path, room: Path) -> Callable[[tuple[str, ...], Path, Mappin
         if getattr(_HERE, "server", None) is None:
             warm = room / f"warm-{threading.get_ident()}"
             warm.mkdir(exist_ok=True)
-            said = environment(warm, LD_PRELOAD=str(library), MPLCONFIGDIR=str(room / "matplotlib"))
+            said = environment_in(warm, room) | {"LD_PRELOAD": str(library)}
             _HERE.server = subprocess.Popen(
                 [sys.executable, __file__],
                 cwd=warm,

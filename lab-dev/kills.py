@@ -37,6 +37,7 @@ from works import (
 COUNT = 1000
 LATE = 12  # calls at the end of a command, among which every other kill is
 ALONE = 8  # one in so many is a process of its own; the others are forked from one that has the lab loaded
+COLD = 5 * ALONE  # one in so many finds nothing compiled, and keeps what it compiles in its home
 AT_RANDOM = 0.15  # of the kills are at any time
 
 
@@ -58,7 +59,8 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     strike = None if at_s is not None else drawn(expected.calls, chance)
     alone = at_s is not None or number % ALONE == 0 or "study" in name
     carried_out = by_itself if alone else forked(built(room), room)
-    killed = disturbed(home, WORKS[name].words, built(room), strike, room, at_s or LONGEST_S, carried_out)
+    caches = home if number % COLD == 0 else room
+    killed = disturbed(home, WORKS[name].words, built(room), strike, caches, at_s or LONGEST_S, carried_out)
     how = f"after {at_s:.2f} s" if at_s is not None else str(strike)
     broke = judged(name, expected, home, killed, room, carried_out)
     if not broke:
@@ -94,7 +96,7 @@ def judged(
         return f"after the kill: {wrong}"
     age(home)
     words = next_words(name, expected, home)
-    then = carried_out(words, home, environment_in(home, room), LONGEST_S)
+    then = carried_out(words, home, environment_in(home, home if (home / "cache").exists() else room), LONGEST_S)
     said = f"then lab {' '.join(words)}"
     if fault := then.fault((0, expected.code)):
         return f"{said}: {fault}"

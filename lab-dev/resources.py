@@ -121,7 +121,6 @@ def read_only(case: Case) -> None:
             ("toolbox/versions",),
             ("toolbox/log",),
             ("toolbox/sessions",),
-            (".cache",),
         )
     )
     case.said = f"read-only: {', '.join(case.read_only)}"
@@ -323,7 +322,7 @@ def judged(case: Case, ended: Ended, room: Path, carried_out: CarriedOut = by_it
 
 
 def _kept(there: dict[str, str]) -> set[str]:
-    return {what for what in there if not what.startswith((".cache", "session's"))}
+    return {what for what in there if not what.startswith("session's")}
 
 
 def _noise(ended: Ended) -> str:

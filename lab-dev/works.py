@@ -104,10 +104,6 @@ def base(room: Path) -> Path:
     box.remove("gone")
     box.save_record("durations", "kept", {"seconds": 12.5})
     (half / "others.zip").write_bytes(pack([policy("doubled", 5.0), policy("other", 6.0), policy("third", 7.0)])[0])
-    lab(
-        *_COMPARE, cwd=half, env=environment_in(half, room), timeout_s=LONGEST_S
-    )  # what is compiled is kept in the home
-    shutil.rmtree(half / "compared")
     ended = disturbed(half, _TEACH, built(room), Strike("w", 300, "after"), room)
     assert ended.code < 0, ended.stderr
     assert not read_journal(half / STOPPED, "the base").closed
@@ -159,8 +155,8 @@ def disturbed(
 
 
 def environment_in(home: Path, caches: Path) -> dict[str, str]:
-    """The environment of a command in a home; what libraries keep for themselves is elsewhere."""
-    return environment(home, MPLCONFIGDIR=str(caches / "matplotlib"))
+    """The environment of a command in a home; what can be had again, such as what is compiled, is kept elsewhere."""
+    return environment(home, MPLCONFIGDIR=str(caches / "matplotlib"), XDG_CACHE_HOME=str(caches / "cache"))
 
 
 def age(home: Path) -> None:
@@ -178,13 +174,14 @@ def undisturbed(name: str, room: Path) -> Undisturbed:
     file = room / f"{re.sub('[^a-z0-9]+', '-', name)}.json"
     if not file.exists():
         states, code, calls, took_s = list[dict[str, str]](), 0, dict[str, int](), 0.0
-        for turn in ("first", "second"):
-            home = fresh(room, f"{file.stem}-{turn}", WORKS[name])
+        for turn in ("to compile what it needs", "first", "second"):
+            home = fresh(room, f"{file.stem}-{turn.split()[0]}", WORKS[name])
             ended = disturbed(home, WORKS[name].words, built(room), None, room)
             assert not ended.fault((0, 1)), f"{name}: {ended.fault((0, 1))}"
             code, calls, took_s = ended.code, counted(home.parent / "home-counts"), ended.seconds
             states.append(state(home))
             shutil.rmtree(home.parent)
+        _, *states = states
         common = {what: value for what, value in states[0].items() if states[1].get(what) == value}
         file.write_text(json.dumps(asdict(Undisturbed(code, common, calls, took_s)), indent=1))
     return Undisturbed(**json.loads(file.read_text()))
@@ -195,7 +192,11 @@ def state(home: Path) -> dict[str, str]:
     found: Counter[str] = Counter()
     for path in sorted(home.rglob("*")):
         inside = path.relative_to(home).as_posix()
-        if path.is_dir() or inside.startswith(("toolbox/log/", ".cache/", ".config/")) or path.is_symlink():
+        if (
+            path.is_dir()
+            or inside.startswith(("toolbox/log/", "cache/", "matplotlib/", ".cache/", ".config/"))
+            or path.is_symlink()
+        ):
             continue
         content = path.read_bytes().replace(os.fsencode(home), b"HOME")
         if path.suffix == ".safetensors":
@@ -279,8 +280,7 @@ def _sessions(work: Work, home: Path) -> list[Path]:
 def kept_before(room: Path) -> Files:
     """The files of the base, by name."""
     home = base(room)
-    files = (path for path in home.rglob("*") if path.is_file() and home / ".cache" not in path.parents)
-    return {path.relative_to(home).as_posix(): path.read_bytes() for path in files}
+    return {path.relative_to(home).as_posix(): path.read_bytes() for path in home.rglob("*") if path.is_file()}
 
 
 def lost(before: Files, home: Path, changes: tuple[str, ...]) -> str:
