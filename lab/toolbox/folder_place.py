@@ -34,14 +34,14 @@ class FolderPlace:
         self.folder = self.cache = folder
         self.address = str(folder)
 
-    def check(self) -> None:
+    def check(self, to_write: bool = True) -> None:
         try:
             place = files.nearest(self.folder)
         except OSError as error:
             raise BadInput(f"toolbox {self.folder}: {error.strerror}") from error
         if not place.is_dir():
             raise BadInput(f"toolbox {self.folder}: '{place}' is a file, a folder is needed")
-        if not os.access(place, os.R_OK | os.W_OK | os.X_OK):
+        if to_write and not os.access(place, os.R_OK | os.W_OK | os.X_OK):
             raise BadInput(f"toolbox {self.folder}: '{place}' cannot be written")
 
     def names(self, under: str = "") -> list[str]:
