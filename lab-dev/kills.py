@@ -36,9 +36,9 @@ from works import (
 
 COUNT = 1000
 LATE = 12  # calls at the end of a command, among which every other kill is
-ALONE = 8  # one in so many is a process of its own; the others are forked from one that has the lab loaded
-COLD = 5 * ALONE  # one in so many finds nothing compiled, and keeps what it compiles in its home
-AT_RANDOM = 0.15  # of the kills are at any time
+ALONE = 10  # one in so many is a process of its own; the others are forked from one that has the lab loaded
+COLD = 4 * ALONE  # one in so many finds nothing compiled, and keeps what it compiles in its home
+AT_RANDOM = 0.1  # of the kills are at any time
 
 
 def prepare(room: Path, seed: int) -> None:
