@@ -8,23 +8,25 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-<<<<<<< HEAD
 from drawn_physics import PART as PHYSICS
-=======
+from kills import PART as KILLS
 from mutated_commands import PART as MUTATED_COMMANDS
 from mutations import PART as MUTATIONS
->>>>>>> mutations18
 from page_attacks import PART as REQUESTS
 from parts import Part
+from resources import PART as RESOURCES
 from rich.console import Console
 from rich.progress import Progress
 from scoreboard import line, show, written
 
-<<<<<<< HEAD
-PARTS: dict[str, Part] = {"requests": REQUESTS, "physics": PHYSICS}
-=======
-PARTS: dict[str, Part] = {"mutations": MUTATIONS, "mutated-commands": MUTATED_COMMANDS, "requests": REQUESTS}
->>>>>>> mutations18
+PARTS: dict[str, Part] = {
+    "kills": KILLS,
+    "mutations": MUTATIONS,
+    "mutated-commands": MUTATED_COMMANDS,
+    "requests": REQUESTS,
+    "resources": RESOURCES,
+    "physics": PHYSICS,
+}
 
 
 def main(

@@ -4,6 +4,7 @@ import fcntl
 import json
 import os
 import re
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from errno import EFBIG, EINVAL
@@ -84,18 +85,39 @@ _DRAFT = ".run-"  # and eight characters: the folder of a draft
 def write_whole(path: Path, content: bytes, drafts: Path | None = None) -> None:
     """Writes beside the target, or in the folder `drafts` next to it, then renames: readers never see half a file.
 
-    The folders must be there. Raises OSError when it cannot be written; then nothing is left behind.
+    What killed commands left of the same file goes. The folders must be there. Raises OSError when it cannot be written;
+    then nothing is left behind.
     """
-    beside = (drafts or path.parent) / f".{path.name}.{token_hex(4)}.tmp"
-    try:
-        with beside.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(beside, path)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
+    folder = drafts or path.parent
+    _clear_drafts(folder, path.name)
+    while True:
+        beside = folder / f".{path.name}.{token_hex(4)}.tmp"
+        try:
+            with beside.open("xb") as file:
+                with suppress(OSError):  # where nothing can be locked, nothing is taken for one that was left
+                    fcntl.flock(file, fcntl.LOCK_EX)
+                if not beside.exists():  # another process has taken it for one that was left
+                    continue
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+                os.replace(beside, path)
+        except BaseException:
+            with suppress(OSError):
+                beside.unlink(missing_ok=True)
+            raise
+        return
+
+
+def _clear_drafts(folder: Path, name: str) -> None:
+    """Removes the drafts of a file whose writers are gone: nobody holds their lock."""
+    draft_of = re.compile(rf"\.{re.escape(name)}\.[0-9a-f]{{8}}\.tmp")
+    with suppress(OSError), os.scandir(folder) as entries:
+        for left in [Path(entry) for entry in entries if draft_of.fullmatch(entry.name)]:
+            with suppress(OSError):
+                if stat.S_ISREG(left.lstat().st_mode):
+                    with _locked(left, fcntl.LOCK_NB):
+                        left.unlink(missing_ok=True)
 
 
 def nearest(folder: Path) -> Path:
@@ -144,9 +166,9 @@ def draft(folder: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _locked(folder: Path, how: int = 0) -> Iterator[None]:
-    """The lock of a folder, which ends with its holder. Raises BlockingIOError with LOCK_NB when another holds it."""
-    handle = os.open(folder, os.O_RDONLY)
+def _locked(path: Path, how: int = 0) -> Iterator[None]:
+    """The lock of a folder or a file, which ends with its holder. Raises BlockingIOError with LOCK_NB when another holds it."""
+    handle = os.open(path, os.O_RDONLY)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | how)
         yield

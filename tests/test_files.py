@@ -1,5 +1,6 @@
 """Files written whole or not at all, where a folder would be made, and the folders that ship, in a checkout and in a wheel."""
 
+import fcntl
 import os
 import signal
 from collections.abc import Callable
@@ -34,6 +35,19 @@ def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(
         write_whole(path, b"new")
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_a_killed_writer_left_goes_and_what_another_one_is_writing_stays(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    left, busy, other = (tmp_path / f".{name}.tmp" for name in ("file.0a1b2c3d", "file.00000000", "other.0a1b2c3d"))
+    for draft_file in (left, busy, other):
+        draft_file.write_bytes(b"half")
+    with busy.open("ab") as writing:
+        fcntl.flock(writing, fcntl.LOCK_EX)
+        write_whole(path, b"new")
+    assert {*tmp_path.iterdir()} == {path, busy, other}
+    write_whole(path, b"newer")
+    assert {*tmp_path.iterdir()} == {path, other}
 
 
 def test_a_folder_is_not_made(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from annotated_types import MaxLen, Predicate
 
-from lab.advice.json_lines import EntryKinds
+from lab.advice.json_lines import EntryKinds, is_unwritten
 from lab.errors import BadInput
 from lab.files import read_limited
 from lab.learning.session_events import (
@@ -23,9 +23,10 @@ from lab.learning.session_events import (
     EpisodeEnded,
     Event,
 )
+from lab.toolbox.names import JOURNAL
 
 SCHEMA = 1
-FILE = "events.jsonl"
+FILE = JOURNAL
 MAX_LINE_BYTES = 1 << 20
 MAX_BYTES = 64 << 20  # of a journal: hundreds of thousands of answers
 Name = Annotated[str, MaxLen(1000), Predicate(str.isprintable)]
@@ -193,6 +194,11 @@ def read_journal(folder: Path, where: str) -> Read:
             raise BadInput(f"journal '{path}' ({where}): line {number}: a second session in one journal")
     cut = raw[whole:].decode("utf-8", "replace")
     return Read(path, entries[0], tuple(entries[1:]), whole, cut)
+
+
+def is_unbegun(path: Path) -> bool:
+    """Whether a journal's first line was cut off: nothing of a session is in it."""
+    return is_unwritten(path, b'{"kind": "session", ')
 
 
 def _refuse_schema(line: bytes, path: Path, where: str) -> None:

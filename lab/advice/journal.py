@@ -8,7 +8,19 @@ people, and everything else that it tells is held against what was written.
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from lab.advice.entries import FILE, Answer, Closed, Entry, Read, Session, Undone, line_of, read_journal, undoable
+from lab.advice.entries import (
+    FILE,
+    Answer,
+    Closed,
+    Entry,
+    Read,
+    Session,
+    Undone,
+    is_unbegun,
+    line_of,
+    read_journal,
+    undoable,
+)
 from lab.advice.json_lines import AppendedFile, differing
 from lab.errors import BadInput, WorkFailed
 from lab.learning.requests import AdvisorLeft, Ask, Request, allowed_words
@@ -46,7 +58,11 @@ class Journal:
         journal = cls(path)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            journal._file = AppendedFile.new(path)
+            journal._file = AppendedFile.again(path) if is_unbegun(path) else AppendedFile.new(path)
+            if not is_unbegun(path):  # another command has been faster
+                journal.close()
+                raise FileExistsError
+            journal._file.cut(0)
         except FileExistsError:
             raise BadInput(
                 f"'{folder}' holds a session already: go on with it (--resume {folder}), or choose another folder"

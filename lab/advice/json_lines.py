@@ -3,6 +3,7 @@
 import fcntl
 import json
 import os
+import stat
 from collections.abc import Hashable, Mapping
 from dataclasses import asdict
 from functools import cache
@@ -67,6 +68,17 @@ def _reader(model: Hashable) -> Any:
     strict = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
     kind: Any = model
     return TypeAdapter(type(kind.__name__, (kind,), {"__pydantic_config__": strict, "__doc__": kind.__doc__}))
+
+
+def is_unwritten(path: Path, head: bytes) -> bool:
+    """Whether a file is there that a command was killed in before its first line, which begins with `head`, was whole."""
+    try:
+        with path.open("rb") as file:
+            begun = file.read(MAX_LINE_BYTES + 1) if stat.S_ISREG(os.fstat(file.fileno()).st_mode) else b"\n"
+    except OSError:
+        return False
+    ours = begun.startswith(head) or head.startswith(begun)
+    return ours and b"\n" not in begun and len(begun) <= MAX_LINE_BYTES
 
 
 class AppendedFile:

@@ -52,19 +52,21 @@ def lesson_seat(
 
 
 def teacher_of(toolbox: str | None, options: "LessonOptions", seat: "LessonSeat") -> "Teacher":
-    """The teacher that the options describe; raises BadInput for options and folders that cannot be."""
+    """The teacher that the options describe; raises BadInput for options that cannot be.
+
+    Whether policies can be kept is looked at before one is learned: whoever learns nothing needs not write.
+    """
     from dataclasses import replace
 
     from lab.teaching.teacher import Teacher
     from lab.toolbox.registry import Toolbox
 
     box = Toolbox(toolbox)
+    box.check(to_write=False)
     advising = replace(options.advising(seat.people()), toolbox=box)
     for journal in advising.cut_records():
         _say_cut(journal)
-    teacher = Teacher(box, advising, options.seed, seat.hear)
-    teacher.toolbox.check()
-    return teacher
+    return Teacher(box, advising, options.seed, seat.hear)
 
 
 def sequenced(

@@ -105,7 +105,9 @@ def teach(
     if folder is not None:
         check_out(folder)
     with lesson_seat(options.advisors, page=page, port=port, wait_s=wait, plain=plain) as seat:
-        document = teach_session(subject, options, teacher_of(toolbox, options, seat), folder, kept)
+        teacher = teacher_of(toolbox, options, seat)
+        teacher.toolbox.check()
+        document = teach_session(subject, options, teacher, folder, kept)
         seat.lesson_over(document)
     show(document, as_json, lesson_summary)
     if document["failure"] is not None:

@@ -89,7 +89,10 @@ def _durations(prepared: Prepared, teacher: Teacher, journal: RunJournal) -> tup
         teacher.tell(PhaseBegan("measure", len(skillset.legs) + len(skillset.travels) + works))
         kept = measure(prepared, lambda name, seconds: teacher.tell(MoveTimed(name, seconds)))
         if key:
-            teacher.toolbox.save_record(RECORDS, key, kept.to_json())
+            try:
+                teacher.toolbox.save_record(RECORDS, key, kept.to_json())
+            except LabError as error:  # they are measured again: nothing is lost but time
+                teacher.tell(RecordSkipped(f"the durations: {error}"))
     journal.write(DurationsKept(kept.to_json(), kept.sim_s))
     return kept, key
 

@@ -120,9 +120,10 @@ class Job:
         path = self.folder / STORE
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            cut = path.is_file() and _is_cut(path)
+            if path.is_file() and _is_cut(path):  # a line that was cut off: it is done again now
+                os.truncate(path, read_limited(path).rfind(b"\n") + 1)
             with path.open("a", encoding="utf-8") as file:
-                file.write(("\n" if cut else "") + json.dumps(record) + "\n")
+                file.write(json.dumps(record) + "\n")
         except OSError as error:
             raise WorkFailed(f"output folder '{self.folder}' (--out) cannot be written: {error.strerror}") from error
 

@@ -87,7 +87,7 @@ class PhaseBegan:
 
 @dataclass(frozen=True)
 class RecordSkipped:
-    """What was kept is damaged, and was not read."""
+    """What was kept is damaged, and was not read; or what was to be kept could not be."""
 
     why: str
 

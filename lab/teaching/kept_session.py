@@ -10,7 +10,7 @@ from shlex import quote
 from typing import Any, TypeVar
 
 from lab import __version__
-from lab.advice.entries import FILE, Read, Session, line_of, read_journal
+from lab.advice.entries import FILE, Read, Session, is_unbegun, line_of, read_journal
 from lab.advice.journal import Journal
 from lab.advice.receipt import Receipt, receipt
 from lab.errors import BadInput, WorkFailed
@@ -21,12 +21,11 @@ from lab.tasks.record import write_whole
 from lab.teaching.lesson_options import LessonOptions, SessionOptions
 from lab.teaching.lesson_plan import LessonPlan
 from lab.toolbox.folder_place import FolderPlace
-from lab.toolbox.names import SESSIONS, SUFFIX, default_address, slug
+from lab.toolbox.names import BEGUN, SESSIONS, SUFFIX, default_address, slug
 from lab.toolbox.policy import Policy
 from lab.toolbox.policy_file import encode
 from lab.toolbox.registry import Toolbox
 
-_BEGUN = "begun"  # the folder in a session's folder for the policy that it went on from
 _MOST = 100_000  # sessions of one name
 MOST_VALUES = 3_000_000  # a larger table's optimal values take too long to know
 Options = TypeVar("Options", bound=SessionOptions)
@@ -131,7 +130,7 @@ class NewSession(SessionInFolder):
         self.plan, problem = plan, plan.problem
         self.folder = claimed(self._toolbox, problem.name, Path.mkdir) if self._wanted is None else self._wanted
         if plan.begins_from is not None:
-            begun = FolderPlace(self.folder / _BEGUN)
+            begun = FolderPlace(self.folder / BEGUN)
             begun.write(f"{slug(plan.begins_from.name)}{SUFFIX}", encode(plan.begins_from))
         head = Session(
             self.options.to_json(),
@@ -216,11 +215,11 @@ class KeptSession(SessionInFolder):
         name = self.read.session.continues
         if not name:
             return None
-        kept, _ = Toolbox(self.folder / _BEGUN).index()
+        kept, _ = Toolbox(self.folder / BEGUN).index()
         for policy in kept.values():
             if (policy.name, policy.subtask) == (name, problem.subtask):
                 return policy
-        raise BadInput(f"session '{self.folder}': the policy that it went on from is not in '{_BEGUN}' any more")
+        raise BadInput(f"session '{self.folder}': the policy that it went on from is not in '{BEGUN}' any more")
 
 
 def check_same(given: Any, read: Read) -> None:
@@ -240,7 +239,7 @@ def check_alone(given: Any, nothing: Any, folder: Path) -> None:
 def check_new(folder: Path) -> None:
     """Raises BadInput when a folder (--out) holds a session: what is kept in it would mean another lesson."""
     path = folder / FILE
-    if not os.path.lexists(path):
+    if not os.path.lexists(path) or is_unbegun(path):
         return
     is_over = False
     with suppress(BadInput):

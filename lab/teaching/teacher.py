@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from lab.advice.advising import Advising
 from lab.advice.entries import Closed
 from lab.advice.journal import Journal
-from lab.errors import BadInput, WorkFailed, counted
+from lab.errors import BadInput, LabError, WorkFailed, counted
 from lab.learning.problem import Problem
 from lab.learning.session import SessionResult
 from lab.mdp import TabularMDP
@@ -88,11 +88,14 @@ class Teacher:
         return candidates(known, problem, first=str((record or {}).get("policy")).rpartition("@")[0])
 
     def _remember(self, problem: Problem, record: dict[str, str]) -> None:
-        """Note what is used for a problem, where that is news."""
+        """Note what is used for a problem, where that is news; a note that cannot be kept is told: any order will do."""
         with suppress(BadInput):  # a damaged note is written anew
             if self.toolbox.load_record(_REUSED, _record_key(problem)) == record:
                 return
-        self.toolbox.save_record(_REUSED, _record_key(problem), record)
+        try:
+            self.toolbox.save_record(_REUSED, _record_key(problem), record)
+        except LabError as error:
+            self.tell(RecordSkipped(f"what is used for '{problem.name}': {error}"))
 
     def unfinished(self, problem: Problem, name: str | None = None) -> Policy | None:
         """The unsolved policy to go on from: the one it would replace, the best one, or the one beside a solved one."""
@@ -138,7 +141,11 @@ class Teacher:
         return learner | policy.learner | length == learner and (alike or broken_off)
 
     def teach(self, plan: LessonPlan) -> Lesson:
-        """Teach what is planned, and save the policy, solved or not. WorkFailed when several sessions find no way."""
+        """Teach what is planned, and save the policy, solved or not. WorkFailed when several sessions find no way.
+
+        Nothing is learned where nothing can be kept: BadInput.
+        """
+        self.toolbox.check()
         problem, unfinished = plan.problem, plan.unfinished
         for known in self.advising.check_records(problem.mdp):
             self.tell(PolicyAdvises(known))

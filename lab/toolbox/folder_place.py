@@ -2,8 +2,10 @@
 
 import errno
 import fcntl
+import json
 import os
 import re
+import shutil
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -11,7 +13,7 @@ from pathlib import Path
 
 from lab import files
 from lab.errors import BadInput, WorkFailed
-from lab.toolbox.names import SESSIONS
+from lab.toolbox.names import BEGUN, JOURNAL, SESSIONS
 from lab.toolbox.place import FileState, read_file
 
 _NOT_WRITABLE = {
@@ -19,6 +21,7 @@ _NOT_WRITABLE = {
     *(errno.ENOTDIR, errno.EEXIST, errno.EISDIR, errno.ENAMETOOLONG),
 }
 _DRAFT = re.compile(r"\..+\.[0-9a-f]{8}\.tmp")  # what `files.write_whole` writes first
+_LONGEST_LINE = 1 << 20  # bytes of a log's last line that are looked at
 _FRESH_NS = 50_000_000  # a file changed so lately may change again without its times telling
 
 
@@ -31,14 +34,14 @@ class FolderPlace:
         self.folder = self.cache = folder
         self.address = str(folder)
 
-    def check(self) -> None:
+    def check(self, to_write: bool = True) -> None:
         try:
             place = files.nearest(self.folder)
         except OSError as error:
             raise BadInput(f"toolbox {self.folder}: {error.strerror}") from error
         if not place.is_dir():
             raise BadInput(f"toolbox {self.folder}: '{place}' is a file, a folder is needed")
-        if not os.access(place, os.R_OK | os.W_OK | os.X_OK):
+        if to_write and not os.access(place, os.R_OK | os.W_OK | os.X_OK):
             raise BadInput(f"toolbox {self.folder}: '{place}' cannot be written")
 
     def names(self, under: str = "") -> list[str]:
@@ -112,18 +115,27 @@ class FolderPlace:
             left.unlink(missing_ok=True)
 
     def tidy(self, older_s: float) -> list[str]:
-        """Half-written files, and folders of sessions that nothing was written into."""
+        """Half-written files, also of sessions that are linked here, and folders of sessions that were never begun."""
         gone, until_s = [], time.time() - older_s
         found = list[Path]()
         with suppress(OSError):  # a folder that is taken away meanwhile
-            found = [*self.folder.glob("**/.*.tmp"), *self.folder.glob(f"{SESSIONS}/*")]
-        for left in found:
-            is_draft = _DRAFT.fullmatch(left.name) is not None and not left.is_dir()
-            with suppress(OSError):  # another command has removed it; a folder with something in it stays
-                if left.is_symlink() or left.stat().st_mtime > until_s or not (is_draft or left.is_dir()):
+            found = [*self.folder.glob("**/.*.tmp"), *self.folder.glob(f"{SESSIONS}/*/.*.tmp")]
+        for left in dict.fromkeys(found):
+            is_draft = _DRAFT.fullmatch(left.name) is not None and left.is_file() and not left.is_symlink()
+            with suppress(OSError):  # another command has removed it
+                if is_draft and left.stat().st_mtime <= until_s:
+                    left.unlink()
+                    gone.append(str(left))
+        with suppress(OSError):
+            found = [*self.folder.glob(f"{SESSIONS}/*")]
+        for folder in found:
+            with suppress(OSError):  # a folder with something else in it stays
+                if folder.is_symlink() or not folder.is_dir() or folder.stat().st_mtime > until_s or _is_begun(folder):
                     continue
-                (left.unlink if is_draft else left.rmdir)()
-                gone.append(str(left))
+                (folder / JOURNAL).unlink(missing_ok=True)
+                shutil.rmtree(folder / BEGUN, ignore_errors=True)
+                folder.rmdir()
+                gone.append(str(folder))
         return gone
 
     def append(self, name: str, line: bytes) -> None:
@@ -133,8 +145,10 @@ class FolderPlace:
             handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o644)
             try:
                 size = os.fstat(handle).st_size
-                cut = size > 0 and os.pread(handle, 1, size - 1) != b"\n"  # by a crash: begin a new line
-                os.write(handle, b"\n" * cut + line + b"\n")
+                cut = _cut_line(os.pread(handle, _LONGEST_LINE, max(0, size - _LONGEST_LINE)))
+                if cut and not _is_whole(cut):  # by a crash: it never was said
+                    os.ftruncate(handle, size - len(cut))
+                _write_all(handle, b"\n" * _is_whole(cut) + line + b"\n")
             finally:
                 os.close(handle)
         except OSError as error:
@@ -143,7 +157,9 @@ class FolderPlace:
     def lines(self, name: str) -> list[bytes]:
         path = self.folder / name
         self._inside(path)
-        return read_file(path).splitlines() if path.exists() else []
+        content = read_file(path) if path.exists() else b""
+        cut = _cut_line(content)
+        return (content if _is_whole(cut) else content.removesuffix(cut)).splitlines()
 
     @contextmanager
     def lock(self, name: str) -> Iterator[None]:
@@ -171,6 +187,33 @@ class FolderPlace:
         """Raises BadInput when a name or a symbolic link leads out of the place."""
         if not path.resolve().is_relative_to(self.folder.resolve()):
             raise BadInput(f"{path}: it leads out of the toolbox {self.folder}")
+
+
+def _is_begun(folder: Path) -> bool:
+    """Whether the folder of a session holds a journal with a whole line."""
+    path = folder / JOURNAL
+    if not path.exists():
+        return False
+    with path.open("rb") as file:
+        return file.readline().endswith(b"\n")
+
+
+def _cut_line(content: bytes) -> bytes:
+    """What comes after the last line's end."""
+    return content[content.rfind(b"\n") + 1 :]
+
+
+def _is_whole(cut: bytes) -> bool:
+    """Whether all of a line is there but its end."""
+    try:
+        return isinstance(json.loads(cut), dict)
+    except (ValueError, RecursionError):
+        return False
+
+
+def _write_all(handle: int, content: bytes) -> None:
+    while content:
+        content = content[os.write(handle, content) :]
 
 
 def _refused(verb: str, path: Path, error: OSError) -> BadInput | WorkFailed:

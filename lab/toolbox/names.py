@@ -10,6 +10,7 @@ SUFFIX = ".safetensors"
 MAX_SLUG_LENGTH = 60
 HASH_DIGITS = 12
 SESSIONS = "sessions"  # the folder for the journals of lessons, on this machine
+JOURNAL, BEGUN = "events.jsonl", "begun"  # in the folder of a session: its journal, the policy that it went on from
 VERSIONS, LOG, TRASH = "versions", "log", "trash"  # the folders in a toolbox
 _ADDRESS = re.compile(r"[a-z][a-z0-9+.-]*://")
 

@@ -31,8 +31,8 @@ class Place(Protocol):
     cache: Path
     alone: bool
 
-    def check(self) -> None:
-        """Raises unless files can be written here; makes nothing."""
+    def check(self, to_write: bool = True) -> None:
+        """Raises unless files can be written here, or, without `to_write`, unless there can be such a place; makes nothing."""
 
     def names(self, under: str = "") -> list[str]:
         """The names of the files right in a folder of the place; hidden ones are left out."""

@@ -42,9 +42,9 @@ class Toolbox:
         self._index = Index(self.place)
         self._tidied = False
 
-    def check(self) -> None:
-        """Raises unless policies can be saved here; makes nothing."""
-        self.place.check()
+    def check(self, to_write: bool = True) -> None:
+        """Raises unless policies can be saved here, or, without `to_write`, unless it can be a toolbox; makes nothing."""
+        self.place.check(to_write)
 
     def save(self, policy: "Policy") -> Path:
         """Keeps a policy, and puts it in use unless the one in use does better; returns the file that holds it."""

@@ -65,7 +65,7 @@ class RemotePlace:
             raise BadInput(f"toolbox {self.address}: it names no bucket, such as {self._protocol}://bucket/lab")
         return fs, str(root).rstrip("/")
 
-    def check(self) -> None:
+    def check(self, to_write: bool = True) -> None:
         if self._listed("") or self._protocol not in _BUCKETS:
             return
         bucket = self._root.partition("/")[0]

@@ -415,3 +415,17 @@ def test_two_lines_that_differ_are_told_from_there_on() -> None:
         'in {"kind": "moved", "step": 1,... it says "drop_s": 17.25}, now comes "drop_s": 18.0, "more": 1}'
     )
     assert len(differing("[" + "1, " * 99, "{" + "2, " * 99)) < 150
+
+
+@pytest.mark.parametrize("left", [b"", b'{"ki', b'{"kind": "session", "words": {"sub'])
+def test_a_journal_whose_first_line_was_cut_off_is_begun_anew(tmp_path: Path, left: bytes) -> None:
+    (tmp_path / "events.jsonl").write_bytes(left)
+    Journal.begin(tmp_path, HEAD).close()
+    assert read_journal(tmp_path, "here").session == HEAD
+
+
+def test_what_is_no_journal_stays(tmp_path: Path) -> None:
+    (tmp_path / "events.jsonl").write_bytes(b'{"kind": "mine"')
+    with pytest.raises(BadInput, match="holds a session already"):
+        Journal.begin(tmp_path, HEAD)
+    assert (tmp_path / "events.jsonl").read_bytes() == b'{"kind": "mine"'

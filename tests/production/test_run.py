@@ -286,6 +286,24 @@ def test_the_same_scene_needs_nothing(prepared: Prepared, toolbox: Toolbox, meas
     assert (phases(heard), skipped(heard), measured) == (["learn"], [], [])
 
 
+def test_a_toolbox_that_may_only_be_read_serves_a_run(
+    prepared: Prepared, toolbox: Toolbox, measured: list[Prepared], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for kind in ("durations", "reused"):
+        rmtree(toolbox.folder / "records" / kind, ignore_errors=True)
+
+    def refused(*_: object, **__: object) -> None:
+        raise BadInput("toolbox: cannot be written")
+
+    for method in ("check", "put", "save_record"):
+        monkeypatch.setattr(toolbox, method, refused)
+    heard: list[Event] = []
+    taught = teach_all(prepared, Teacher(toolbox, tell=heard.append))
+    assert set(sources(taught).values()) == {"reused"}
+    assert "the durations: toolbox: cannot be written" in skipped(heard)
+    assert len(measured) == 1
+
+
 def move(task: Task, name: str, by: tuple[float, float]) -> Task:
     """The task with one stack of cubes elsewhere."""
     obstacles = tuple(

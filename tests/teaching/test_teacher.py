@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from lab.advice.advising import Advising
-from lab.errors import WorkFailed
+from lab.errors import BadInput, WorkFailed
 from lab.learning.problem import Problem
 from lab.learning.requests import AdviceRequest, AdvisorLeft
 from lab.learning.session import Session, SessionResult
 from lab.learning.session_events import AdviceRejected, EpisodeEnded, Event
 from lab.learning.settings import GateSettings, LearnerSettings
 from lab.mdp import TabularMDP, greedy_path, grid
-from lab.teaching.events import AdvisorGathered, LessonEvent
+from lab.teaching.events import AdvisorGathered, LessonEvent, RecordSkipped
 from lab.teaching.events import Event as LessonsEvent
 from lab.teaching.lesson_plan import MAX_SESSIONS, Interrupted, LessonPlan
 from lab.teaching.lesson_sessions import MORE_SESSIONS, WARM_EPISODES, fits, hopeful
@@ -62,6 +62,32 @@ def test_a_new_problem_is_learned_kept_and_then_found(teacher: Teacher) -> None:
     again = teacher.find_or_teach(plan(HOPELESS, about=problem("insert elsewhere")), index)
     assert (again.source, again.result, again.policy.name) == ("reused", None, lesson.policy.name)
     assert np.array_equal(again.policy.q, lesson.policy.q)
+
+
+def test_a_toolbox_that_may_only_be_read_is_enough_to_learn_nothing(
+    teacher: Teacher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    teacher.find_or_teach(plan(), known())
+    index, _ = teacher.toolbox.index()
+
+    def refused(*_: object, **__: object) -> None:
+        raise BadInput("toolbox: cannot be written")
+
+    for method in ("check", "put", "save_record"):
+        monkeypatch.setattr(teacher.toolbox, method, refused)
+    heard: list[LessonsEvent] = []
+    again = replace(teacher, tell=heard.append).find_or_teach(plan(about=problem(columns=4)), index)
+    assert (again.source, heard) == ("reused", [])
+    elsewhere = problem("insert elsewhere")
+    elsewhere = replace(elsewhere, mdp=replace(elsewhere.mdp, reward=elsewhere.mdp.reward * 2))
+    other = replace(teacher, tell=heard.append).find_or_teach(plan(about=elsewhere), index)
+    (skipped,) = [event for event in heard if isinstance(event, RecordSkipped)]
+    assert (other.source, skipped.why) == (
+        "reused",
+        "what is used for 'insert elsewhere': toolbox: cannot be written",
+    )
+    with pytest.raises(BadInput, match="cannot be written"):
+        teacher.find_or_teach(plan(about=problem(columns=5)), index)
 
 
 def test_what_another_arm_learned_is_used_but_not_in_silence(teacher: Teacher) -> None:

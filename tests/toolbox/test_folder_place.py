@@ -33,9 +33,15 @@ def test_files_and_logs(place: FolderPlace) -> None:
     for line in (b"one", b"two"):
         place.append("log/a", line)
     with (place.folder / "log" / "a").open("ab") as log:
-        log.write(b"cut o")  # by a crash
+        log.write(b'{"cut": o')  # by a crash
+    assert place.lines("log/a") == [b"one", b"two"]
     place.append("log/a", b"three")
-    assert place.lines("log/a") == [b"one", b"two", b"cut o", b"three"]
+    assert place.lines("log/a") == [b"one", b"two", b"three"]
+    with (place.folder / "log" / "a").open("ab") as log:
+        log.write(b'{"all": 4}')  # but the line's end
+    assert place.lines("log/a") == [b"one", b"two", b"three", b'{"all": 4}']
+    place.append("log/a", b"five")
+    assert place.lines("log/a") == [b"one", b"two", b"three", b'{"all": 4}', b"five"]
 
 
 def test_a_stamp_changes_with_the_file_and_is_not_trusted_when_fresh(place: FolderPlace) -> None:
@@ -98,17 +104,19 @@ def test_what_killed_commands_left_goes(tmp_path: Path, make_policy: MakePolicy)
     box.save(make_policy())
     sound = {path for path in box.folder.rglob("*") if path.is_file()}
     drafts = [box.folder / place / ".insert.0a1b2c3d.tmp" for place in (".", "records/durations", "versions/grasp")]
-    folders = [box.folder / "sessions" / name for name in ("maze-1", "maze-2", "maze-3")]
+    folders = [box.folder / "sessions" / name for name in ("maze-1", "maze-2", "maze-3", "maze-4")]
     own = box.folder / ".mine.tmp"  # not of our making
-    for path in (*drafts, own, folders[2] / "events.jsonl"):
+    for path in (*drafts, own, folders[3] / "events.jsonl", folders[3] / "begun" / "insert.safetensors"):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(b"half")
+    folders[2].mkdir()
+    (folders[2] / "events.jsonl").write_bytes(b"a line\n")
     for folder in folders[:2]:
         folder.mkdir()
     fresh = (drafts[1], folders[1])
     for path in {*drafts, own, *folders} - {*fresh}:
         os.utime(path, (0, 0))
-    assert box.repair() == [str(path) for path in (drafts[0], drafts[2], folders[0])]
+    assert sorted(box.repair()) == sorted(str(path) for path in (drafts[0], drafts[2], folders[0], folders[3]))
     assert {path for path in box.folder.rglob("*") if path.is_file()} == {
         *sound,
         own,
