@@ -20,6 +20,18 @@ INSTANCES = {
 }
 LAYOUT = "from,to,time\nLU,M1,6\nLU,M2,8\nM1,LU,12\nM1,M2,6\nM2,LU,10\nM2,M1,6\n"
 JOBS = "set,job,operation,machine,time\n7,1,1,M1,8\n7,1,2,M2,16\n"
+FAULTS = """
+[[faults]]
+what = "part moved"
+part = "slice 1"
+at_s = 20.0
+by_m = [0.03, 0.0]
+
+[[faults]]
+what = "machine slow"
+station = "toaster"
+share = 1.5
+"""
 GRID = "S...#\n.##..\n....G\n"
 
 
@@ -85,6 +97,13 @@ def _tasks(*names: str) -> Callable[[Path, Path], object]:
             shutil.copy(tasks_folder() / f"{name}.toml", folder)
 
     return made
+
+
+def _with_faults(folder: Path, sound: Path) -> None:
+    """Tasks, one of them with faults, which also is the form in which they are written to a file."""
+    _tasks(*_MADE_BY_HAND)(folder, sound)
+    text = (folder / "toast.toml").read_text()
+    (folder / "faulty.toml").write_text(f"{text}\n{FAULTS}")
 
 
 def _texts(texts: dict[str, str]) -> Callable[[Path, Path], object]:
@@ -512,7 +531,7 @@ _CELLS = ("fms", "hoist-pu", "two-on-a-track")
 _MADE_BY_HAND = ("toast", "breakfast", "sorting", "toast-window", "two-toasters", "toast-case-1", "fms-arm")
 
 KINDS: dict[str, Kind] = {
-    "task": Kind("text", _tasks(*_MADE_BY_HAND), "*.toml", _any, QUICK),
+    "task": Kind("text", _with_faults, "*.toml", _any, QUICK),
     "task, checked": Kind("text", _tasks("toast", "sorting"), "*.toml", _checked, 60),
     "cell": Kind("text", _tasks(*_CELLS), "*.toml", _cell, QUICK),
     "world": Kind("text", _tasks("world-1"), "*.toml", _any, QUICK),
