@@ -106,11 +106,10 @@ class Job:
         found = {}
         for entry in self.kept():
             try:
-                understood = read(entry)
+                if (understood := read(entry)) is not None:
+                    found[understood[0]] = understood[1]
             except (BadInput, KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError):
                 continue
-            if understood is not None:
-                found[understood[0]] = understood[1]
         return found
 
     def keep(self, record: dict[str, Any]) -> None:

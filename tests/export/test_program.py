@@ -110,9 +110,11 @@ def _array(shape: tuple[int, ...], content: int) -> bytes:
     ("content", "said"),
     [
         (_array((25_000_000, 2), 400_000_000), "unpacked it has 400000128 bytes, allowed are 200000000"),
-        (_array((10**9,), 1000), "'at_s.npy' does not hold an array of (1000000000,)"),
+        (_array((10**7,), 1000), "'at_s.npy' does not hold an array of (10000000,)"),
+        (_array((10**8,), 1000), "'at_s.npy' holds 100000000 numbers, allowed are 25000000"),
         (_array((-1,), 0), "'at_s.npy' does not hold an array of (-1,)"),
         (b"\x93NUMPY\x07\x00", "not a run's trajectory"),
+        (b"\x93NUMPY\x01\x00\x10\x00{'descr': '<f8',", "not a run's trajectory"),
         (b"no array", "not a run's trajectory"),
     ],
 )

@@ -88,6 +88,7 @@ def test_what_was_kept_is_read_and_what_is_not_understood_passed_over(tmp_path: 
     for steps in ([1, 2], [3], "x", [10**400], None):
         job.keep({"key": str(steps), "found": {"name": "a", "steps": steps}})
     job.keep({"key": "more", "found": {"name": "a", "steps": [1], "more": 2}})
+    job.keep({"key": ["no key"], "found": {"name": "a", "steps": [1]}})
     with (tmp_path / STORE).open("ab") as file:
         file.write(b'{"key": []}\n[1]\nnull\n"text"\n{"key": {}, "found": 1}\n\xff\xfe\n' + b"[" * 100_000 + b"\n7")
     kept = job.kept_as(lambda entry: (entry["key"], record_of(Found, entry["found"])))
