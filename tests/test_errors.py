@@ -4,7 +4,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lab.errors import MOST_CHARACTERS, MOST_NAMES, BadInput, LabError, WorkFailed, counted, unknown
+from lab.errors import (
+    MOST_CHARACTERS,
+    MOST_NAMES,
+    BadInput,
+    LabError,
+    WorkFailed,
+    counted,
+    out_of_memory,
+    unknown,
+)
 
 
 @pytest.mark.parametrize(("kind", "code"), [(BadInput, 2), (WorkFailed, 1), (LabError, 1)])
@@ -51,3 +60,15 @@ def test_a_message_is_no_longer_than_a_screen_and_keeps_its_two_ends() -> None:
     assert message.endswith("xxx' (TASK): known: toast")
     assert " more characters) ... " in message
     assert str(LabError(message)) == message  # said again it stays as it is
+
+
+def test_too_little_memory_is_known_by_its_words() -> None:
+    numpy = ImportError(
+        "\nIMPORTANT: READ THIS\n  * The NumPy version is 2\n\nOriginal error was: x.so: failed to map segment\n"
+    )
+    assert str(out_of_memory(numpy)) == "there is not enough memory: Original error was: x.so: failed to map segment"
+    assert str(out_of_memory(MemoryError())) == "there is not enough memory"
+    outer = ValueError("no table")
+    outer.__cause__ = MemoryError("of 5 GiB")
+    assert isinstance(out_of_memory(outer), WorkFailed)
+    assert out_of_memory(ImportError("no module named x")) is None
