@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from lab.studies.runner import Job
+from lab.studies.runner import STORE, Job
 
 ROOT = str(Path(__file__).parents[2])
 
@@ -70,3 +70,13 @@ def test_workers_end_with_a_study_that_is_killed(tmp_path: Path) -> None:
         for pid in workers:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
+
+
+def test_a_line_that_was_cut_off_is_written_anew(tmp_path: Path) -> None:
+    job = Job(folder=tmp_path)
+    store = tmp_path / STORE
+    for left in ("", '{"a": 1}\n{"b"'):
+        store.write_text(left)
+        job.keep({"b": 2})
+        assert store.read_text() == left[: left.rfind("\n") + 1] + '{"b": 2}\n'
+    assert [*job.kept()] == [{"a": 1}, {"b": 2}]
