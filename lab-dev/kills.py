@@ -36,8 +36,8 @@ from works import (
 
 COUNT = 1000
 LATE = 12  # calls at the end of a command, among which every other kill is
-ALONE = 10  # one in so many is a process of its own; the others are forked from one that has the lab loaded
-COLD = 4 * ALONE  # one in so many finds nothing compiled, and keeps what it compiles in its home
+ALONE = 40  # one in so many is a process of its own; the others are forked from one that has the lab loaded
+COLD = 2 * ALONE  # one in so many finds nothing compiled, and keeps what it compiles in its home
 AT_RANDOM = 0.1  # of the kills are at any time
 
 
@@ -55,10 +55,11 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     name = shuffled[number % len(shuffled)]
     expected = known_as(name, room)
     home = fresh(room, f"kill-{number}", WORKS[name])
-    at_s = chance.random() * expected.seconds if chance.random() < AT_RANDOM else None
+    carried_out = by_itself if number % ALONE == 0 or "workers" in name else forked(built(room), room)
+    share = chance.random() if chance.random() < AT_RANDOM else None
+    longest_s = expected.seconds if carried_out is by_itself else _forked_s(name, room)
+    at_s = None if share is None else share * longest_s
     strike = None if at_s is not None else drawn(expected.calls, chance)
-    alone = at_s is not None or number % ALONE == 0 or "study" in name
-    carried_out = by_itself if alone else forked(built(room), room)
     caches = home if number % COLD == 0 else room
     killed = disturbed(home, WORKS[name].words, built(room), strike, caches, at_s or LONGEST_S, carried_out)
     how = f"after {at_s:.2f} s" if at_s is not None else str(strike)
@@ -72,6 +73,15 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
 def known_as(name: str, room: Path) -> Undisturbed:
     """What a command comes to when nobody disturbs it, read once."""
     return undisturbed(name, room)
+
+
+@cache
+def _forked_s(name: str, room: Path) -> float:
+    """How long a command takes when it is forked, looked at once."""
+    home = fresh(room, "forked", WORKS[name])
+    took_s = disturbed(home, WORKS[name].words, built(room), None, room, LONGEST_S, forked(built(room), room)).seconds
+    shutil.rmtree(home.parent)
+    return took_s
 
 
 def drawn(calls: dict[str, int], chance: random.Random) -> Strike | None:

@@ -59,7 +59,8 @@ class Case:
     """A command and what it lacks: filled by a fault.
 
     said: what was done to it; before: runs in the child; read_only: folders under the home; room_kb: of a disk that the home is
-    on; loses: a folder that is removed after so many seconds; done: whether it is 0 or 1 where it cannot say that all was done.
+    on; loses: a folder that is removed after so many seconds; unheard: nobody may hear what it says; must_do: all the same, it
+    does what it should.
     """
 
     name: str
@@ -74,6 +75,7 @@ class Case:
     room_kb: int = 0
     loses: tuple[str, float] = ("", 0.0)
     unheard: bool = False
+    must_do: bool = False
 
 
 # ---- what is missing
@@ -124,6 +126,13 @@ def read_only(case: Case) -> None:
         )
     )
     case.said = f"read-only: {', '.join(case.read_only)}"
+
+
+def nothing_writable(case: Case) -> None:
+    """No folder may be written, and nothing need be."""
+    folders = (path for path in case.home.rglob("*") if path.is_dir())
+    case.read_only = (".", *(path.relative_to(case.home).as_posix() for path in folders))
+    case.said, case.must_do = "all folders read-only", True
 
 
 def no_home(case: Case) -> None:
@@ -194,12 +203,13 @@ def _to_nobody(number: int) -> None:
 
 FAULTS: dict[
     str, tuple[Make, int, tuple[str, ...]]
-] = {  # what is missing, how many of 40 attempts, which commands (all: ())
+] = {  # what is missing, how many of 42 attempts, which commands (all: ())
     "disk full": (disk_full, 9, ()),
     "disk full once": (disk_full_once, 4, ()),
     "disk breaks": (disk_breaks, 7, ()),
     "a small disk": (small_disk, 4, ()),
     "read-only folders": (read_only, 4, ()),
+    "read-only, nothing to write": (nothing_writable, 2, tuple(name for name, work in WORKS.items() if not work.share)),
     "no HOME": (no_home, 2, ()),
     "few descriptors": (few_descriptors, 2, ()),
     "little memory": (little_memory, 2, ()),
@@ -227,6 +237,7 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     make, _, works = FAULTS[kind]
     name = chance.choice(works or [*names()])
     case = Case(name, room / f"resource-{number}" / "home", known_as(name, room), chance)
+    fresh(room, case.home.parent.name, WORKS[name])
     make(case)
     told = f"{number}, seed {seed}: {name}: {case.said}"
     if case.room_kb and not BARE:
@@ -243,8 +254,6 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
 @contextmanager
 def _disk(case: Case, room: Path) -> Iterator[None]:
     """The home that the command begins in, on a small disk of its own where that is wanted."""
-    folder = case.home.parent.name
-    fresh(room, folder, WORKS[case.name])
     if not case.room_kb:
         yield
         return
@@ -303,6 +312,8 @@ def judged(case: Case, ended: Ended, room: Path, carried_out: CarriedOut = by_it
     wrong = ended.fault((0, 1, 2)) or _noise(ended)
     if case.unheard and not ended.late and ended.code in (0, 1, 2) and "Traceback" not in ended.stderr:
         wrong = _noise(ended)  # it may have nobody to say it to
+    if case.must_do and ended.code != case.expected.code:
+        wrong = f"exit {ended.code}: {ended.stderr[-200:]}"
     if wrong:
         return wrong
     changes = (*WORKS[case.name].changes, *((f"{case.loses[0]}/*",) if case.loses[0] else ()))

@@ -74,6 +74,12 @@ WORKS: dict[str, Work] = {
     "toolbox import": Work(("toolbox", "import", "others.zip", "--replace", "--json"), 140, _MACHINE),
     "toolbox export": Work(("toolbox", "export", "--out", "mine.zip", "--json"), 50),
     "toolbox verify --repair": Work((*REPAIR, "--json"), 60, left=_DRAFTS),
+    "toolbox list": Work(("toolbox", "list", "--json"), 0),
+    "toolbox show": Work(("toolbox", "show", "doubled", "--json"), 0),
+    "toolbox verify": Work(("toolbox", "verify", "--json"), 0),
+    "replay": Work(("replay", STOPPED, "--json"), 0),
+    "replay, all": Work(("replay", "--json"), 0),
+    "sequence, no picture": Work(("sequence", "toast-case-1", "--toasts", "2", "--json"), 0),
 }
 
 

@@ -75,6 +75,23 @@ class WorkFailed(LabError):
     exit_code = 1
 
 
+_NO_ROOM = ("failed to map segment", "annot allocate memory", "can't start new thread", "unable to allocate")
+
+
+def out_of_memory(error: BaseException) -> WorkFailed | None:
+    """The error for one that comes of too little memory, here or in what it comes from; None for any other.
+
+    Libraries that cannot be loaded for want of memory say so in words only.
+    """
+    cause: BaseException | None = error
+    while cause is not None:
+        words = [line.strip() for line in str(cause).splitlines() if any(part in line for part in _NO_ROOM)]
+        if isinstance(cause, MemoryError) or words:
+            return WorkFailed(f"there is not enough memory{f': {words[0][:200]}' if words else ''}")
+        cause = cause.__cause__ or cause.__context__
+    return None
+
+
 def unknown(kind: str, value: object, known: Iterable[str], where: str) -> BadInput:
     """The error for a name that no table holds: shows it, where it came from, the nearest and the known names that fit."""
     names = sorted(known)

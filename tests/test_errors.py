@@ -13,6 +13,7 @@ from lab.errors import (
     WorkFailed,
     counted,
     listed,
+    out_of_memory,
     printable,
     shortened,
     unknown,
@@ -98,3 +99,15 @@ def test_of_a_long_list_of_known_names_the_last_are_left_out_and_the_hint_stays(
     assert "unknown task 'toats' (TASK): did you mean 'toast'? known: 0, 1, 10, " in message
     assert message.endswith(", ...")
     assert len(message) <= MOST_CHARACTERS
+
+
+def test_too_little_memory_is_known_by_its_words() -> None:
+    numpy = ImportError(
+        "\nIMPORTANT: READ THIS\n  * The NumPy version is 2\n\nOriginal error was: x.so: failed to map segment\n"
+    )
+    assert str(out_of_memory(numpy)) == "there is not enough memory: Original error was: x.so: failed to map segment"
+    assert str(out_of_memory(MemoryError())) == "there is not enough memory"
+    outer = ValueError("no table")
+    outer.__cause__ = MemoryError("of 5 GiB")
+    assert isinstance(out_of_memory(outer), WorkFailed)
+    assert out_of_memory(ImportError("no module named x")) is None

@@ -3,8 +3,13 @@
 
 def main() -> None:
     """The `lab` command. Nothing is loaded before Ctrl-C is heard: the libraries of the commands take a while."""
+    import os
     import sys
 
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:  # it was closed: no file of ours may take its place and be printed into
+            os.open(os.devnull, os.O_RDWR)
+            setattr(sys, name, open(number, "w" if number else "r", closefd=False))  # noqa: SIM115
     try:
         from lab.cli.interrupt import ctrl_c_is_heard
 
@@ -17,4 +22,12 @@ def main() -> None:
 
         code = 130
         fail("stopped by Ctrl-C", code)
+    except (MemoryError, ImportError) as error:
+        from lab.cli.output import fail
+        from lab.errors import out_of_memory
+
+        why, code = out_of_memory(error), 1
+        if why is None:
+            raise
+        fail(str(why), code)
     sys.exit(code)

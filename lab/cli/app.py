@@ -29,7 +29,7 @@ from lab.cli import (
 )
 from lab.cli.families import CommandOfFamilies
 from lab.cli.output import begin, end, fail, silence, write
-from lab.errors import LabError
+from lab.errors import LabError, out_of_memory
 
 INTERRUPTED = 130
 STOPPED = "stopped by Ctrl-C"
@@ -118,10 +118,10 @@ def guarded(function: Callable[..., None]) -> Callable[..., None]:
         except Exception as error:
             from lab.plugins.sources import blame
 
-            why = blame(error)
+            why = blame(error) or out_of_memory(error)
             if why is None:
                 raise
-            end(why, 1)
+            end(str(why), 1)
 
     return run_guarded
 

@@ -5,9 +5,9 @@ import os
 import sys
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
-from lab.errors import LabError, Notice, escaped
+from lab.errors import LabError, Notice, WorkFailed, escaped
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -42,7 +42,14 @@ def write(text: str) -> None:
 
 
 def _print(text: str) -> None:
-    print(text, end="", flush=True)
+    try:
+        print(text, end="", flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        silence()
+        Stdout.told = True  # what it was is lost, and another document would be as well
+        raise WorkFailed(f"what is printed cannot be written to stdout: {error.strerror or error}") from error
 
 
 def write_json(document: dict[str, Any]) -> None:
@@ -71,12 +78,16 @@ def end(message: str, code: int) -> NoReturn:
 
 def complain(message: str) -> None:
     """Write one line to stderr, whatever the message holds."""
-    sys.stderr.write(f"lab: {LabError(' '.join(message.split()))}\n")
+    try:
+        sys.stderr.write(f"lab: {LabError(' '.join(message.split()))}\n")
+        sys.stderr.flush()
+    except OSError:  # nobody can hear it: the exit code says it all the same
+        silence(sys.stderr)
 
 
-def silence() -> None:
-    """Nobody reads stdout any more: let the interpreter's last flush go nowhere."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def silence(stream: TextIO | None = None) -> None:
+    """Nobody reads stdout, or this stream, any more: let the interpreter's last flush go nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), (stream or sys.stdout).fileno())
 
 
 def console() -> "Console":

@@ -34,6 +34,49 @@ def test_a_reader_that_leaves_early_is_no_drama(root: Path, words: str, code: in
     assert (ran.returncode, ran.stderr.count("\n"), "Traceback" in ran.stderr) == (code, lines, False)
 
 
+@pytest.mark.parametrize(
+    ("redirected", "words", "code", "said"),
+    [
+        (">/dev/full", "toolbox list --json", 1, "cannot be written to stdout: No space left on device"),
+        ("2>/dev/full", "toolbox show nosuch", 2, ""),
+        ("2>&-", "toolbox show nosuch", 2, ""),
+        (">&-", "toolbox list", 0, ""),
+        ("<&- >&- 2>&-", "task random 8x8x8 --out world.toml", 0, ""),
+    ],
+)
+def test_where_nobody_can_hear_it_the_exit_code_is_right(
+    root: Path, folder: Path, redirected: str, words: str, code: int, said: str
+) -> None:
+    script = f"import sys; from lab.cli import main; sys.argv = ['lab', *{words.split()}]; main()"
+    shell = ["sh", "-c", f'exec "$@" {redirected}', "sh", sys.executable, "-c", script]
+    env = {**os.environ, "PYTHONPATH": str(root)}
+    ran = subprocess.run(shell, cwd=folder, env=env, capture_output=True, text=True, check=False)
+    assert (ran.returncode, said in ran.stderr) == (code, True)
+    assert ran.stderr.count("\n") == bool(said)
+    if "--out" in words:
+        assert (folder / "world.toml").read_text().startswith("#") or "shape" in (folder / "world.toml").read_text()
+
+
+def test_a_library_that_does_not_fit_is_said_in_a_line(root: Path, folder: Path) -> None:
+    script = """
+import sys, types
+class Full:
+    def find_spec(self, name, path=None, target=None):
+        if name == "lab.cli.app":
+            raise ImportError("libx.so: failed to map segment from shared object")
+sys.meta_path.insert(0, Full())
+sys.argv = ["lab", "toolbox", "list"]
+from lab.cli import main
+main()
+"""
+    env = {**os.environ, "PYTHONPATH": str(root)}
+    ran = subprocess.run(
+        [sys.executable, "-c", script], cwd=folder, env=env, capture_output=True, text=True, check=False
+    )
+    line = "lab: there is not enough memory: libx.so: failed to map segment from shared object\n"
+    assert (ran.returncode, ran.stderr) == (1, line)
+
+
 def test_a_name_that_ascii_cannot_hold_does_not_end_a_command(root: Path, folder: Path, policy: MakePolicy) -> None:
     Toolbox(folder / "toolbox").save(policy("grüße ▁█"))
     code = "import sys; from lab.cli import main; sys.argv = ['lab', 'toolbox', 'list']; main()"

@@ -104,3 +104,13 @@ def test_what_was_kept_is_not_read_from_a_file_without_end(tmp_path: Path) -> No
         file.truncate(1 << 32)
     with pytest.raises(BadInput, match="what is kept cannot be read: it has 4294967296 bytes"):
         list(Job(folder=tmp_path).kept())
+
+
+def test_a_line_that_was_cut_off_is_written_anew(tmp_path: Path) -> None:
+    job = Job(folder=tmp_path)
+    store = tmp_path / STORE
+    for left in ("", '{"a": 1}\n{"b"'):
+        store.write_text(left)
+        job.keep({"b": 2})
+        assert store.read_text() == left[: left.rfind("\n") + 1] + '{"b": 2}\n'
+    assert [*job.kept()] == [{"a": 1}, {"b": 2}]
