@@ -13,7 +13,9 @@ from lab.tasks.robot_fields import STRONGEST_N, RobotSettings
 
 GRAVITY_M_S2 = 9.81
 SLOW = 0.6  # of the robot's speed and acceleration, as skills rise with a part
-MARGIN = 6.0  # times what friction needs a force is chosen; measured: with 2.5 parts are lost where they touch a machine
+MARGIN = (
+    6.0  # times what friction needs a force is chosen; measured: with 2.5 parts are lost where they touch a machine
+)
 USUAL_N = 25.0  # chosen where friction needs less, unless a part is lighter than this is gentle to
 GENTLE_N_KG = 1000.0  # newtons of grip for each kilogram that physics holds still in a usual step
 GENTLE_N, LIGHT_KG = (
