@@ -13,15 +13,10 @@ from lab.tasks.robot_fields import STRONGEST_N, RobotSettings
 
 GRAVITY_M_S2 = 9.81
 SLOW = 0.6  # of the robot's speed and acceleration, as skills rise with a part
-MARGIN = (
-    6.0  # times what friction needs a force is chosen; measured: with 2.5 parts are lost where they touch a machine
-)
+MARGIN = 6.0  # times what friction needs a force is chosen; measured: with 2.5 parts are lost where they touch machines
 USUAL_N = 25.0  # chosen where friction needs less, unless a part is lighter than this is gentle to
 GENTLE_N_KG = 1000.0  # newtons of grip for each kilogram that physics holds still in a usual step
-GENTLE_N, LIGHT_KG = (
-    50.0,
-    0.35,
-)  # a stronger grip, or a heavier part, tilts and creeps, as forces are not found in so few
+GENTLE_N, LIGHT_KG = 50.0, 0.35  # with a stronger grip, or a heavier part, forces are not found in a usual step
 FINE_ITERATIONS = 200  # of the solver, where they must be; measured: nearly all hold, and with 60 a 1 kg box tilts
 STAYS = 2.0  # times the acceleration friction holds a part on a pallet that is far from sliding off
 ROUGH = 0.5  # friction from which on what holds by the numbers has always held

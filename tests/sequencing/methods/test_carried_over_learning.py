@@ -20,9 +20,10 @@ def small(toast_cell: CellMaker) -> list[Cell]:
     return [toast_cell(case, parts) for case in ("I", "II", "III") for parts in (3, 4)]
 
 
-def test_learned_on_three_and_four_toasts_it_orders_thirty(toast_cell: CellMaker) -> None:
+@pytest.mark.parametrize("seed", range(3))
+def test_learned_on_three_and_four_toasts_it_orders_thirty(toast_cell: CellMaker, seed: int) -> None:
     """The best rule, nearest-ready, is 11 % above the optimum on average; the policy at most a third of that."""
-    policy = learn_policy(small(toast_cell), settings=SHORT)
+    policy = learn_policy(small(toast_cell), settings=SHORT, seed=seed)
     own, rule = 0.0, 0.0
     for case in ("I", "II", "III"):
         cell = toast_cell(case, 30)
