@@ -22,7 +22,10 @@ _SAMPLE = 0.004  # [m] between points of a path before it is timed
 _SETTLE_STEPS = 12  # after a path ends
 GRIP_STEPS = 72  # 0.3 s to close or open
 _PEDESTAL_M, _PEDESTAL_RGBA = 0.09, (0.22, 0.23, 0.26, 1.0)  # radius
-_LINKAGE_ITERATIONS = 200  # of the solver: with 60 a slice creeps 2 mm a second in fingers that a linkage moves
+_POINT_M, _PAD_M = 0.002, 0.011  # how far from the middle of a finger's pad, of 3 x 3 cm, friction resists turning
+_FINE_ITERATIONS = (
+    200  # of the solver: with 60 a slice creeps 2 mm a second in fingers that a linkage moves, a 1 kg box tilts
+)
 
 Array = NDArray[np.float64]
 
@@ -142,8 +145,13 @@ class MotionListener(Protocol):
 class Robot:
     """The arm in a world. Its motions are generators: each `next` sets the targets of one physics step."""
 
-    def __init__(self, world: World, arm: Arm, speed: float, acceleration: float, grip_force: float) -> None:
-        """Load the arm at the world's origin; `speed` [m/s], `acceleration` [m/s2], `grip_force` [N]."""
+    def __init__(
+        self, world: World, arm: Arm, speed: float, acceleration: float, grip_force: float, fine: bool = False
+    ) -> None:
+        """Load the arm at the world's origin; `speed` [m/s], `acceleration` [m/s2], `grip_force` [N].
+
+        fine: its pads hold as areas do, not as points, and physics is solved in many iterations.
+        """
         self.world, self.arm, self.grip_force = world, arm, grip_force
         self.speed, self.acceleration = speed, acceleration
         fingers = arm.fingers
@@ -151,11 +159,11 @@ class Robot:
         world.load(NAME, arm.urdf, (0.0, 0.0, arm.base_up_m), checked=True)
         if arm.base_up_m > 0.0:
             world.disc(f"{NAME} pedestal", _PEDESTAL_M, arm.base_up_m, (0.0, 0.0, arm.base_up_m / 2), _PEDESTAL_RGBA)
-        world.friction(NAME, 1.0, links=holding, spinning=0.002)
+        world.friction(NAME, 1.0, links=holding, spinning=_PAD_M if fine else _POINT_M)
         for follower, leader in fingers.leaders.items():
             world.gear(NAME, leader, follower, fingers.ratio(follower))
-        if len(fingers.joints) > 2:
-            world.at_least(_LINKAGE_ITERATIONS)
+        if fine or len(fingers.joints) > 2:
+            world.at_least(_FINE_ITERATIONS)
         self._free = [joint for joint in fingers.joints if joint not in fingers.driven]
         self.closed = False
         self.listener: MotionListener | None = None

@@ -17,7 +17,6 @@ MARGIN = 6.0  # times what friction needs a force is chosen; measured: with 2.5 
 USUAL_N = 25.0  # chosen where friction needs less, unless a part is lighter than this is gentle to
 GENTLE_N_KG = 1000.0  # newtons of grip for each kilogram that physics holds still in a usual step
 GENTLE_N, LIGHT_KG = 50.0, 0.35  # with a stronger grip, or a heavier part, forces are not found in a usual step
-FINE_ITERATIONS = 200  # of the solver, where they must be; measured: nearly all hold, and with 60 a 1 kg box tilts
 STAYS = 2.0  # times the acceleration friction holds a part on a pallet that is far from sliding off
 ROUGH = 0.5  # friction from which on what holds by the numbers has always held
 
@@ -57,10 +56,10 @@ class Load:
 
 @dataclass(frozen=True)
 class Holding:
-    """The force of each finger [N], and in how many iterations of the solver (None: its usual ones) it holds the parts."""
+    """The force of each finger [N]; fine: physics is solved finely, and a finger's pad holds as an area does, no point."""
 
     force_n: float
-    iterations: int | None = None
+    fine: bool = False
 
 
 def holding(robot: RobotSettings, kinds: Iterable[Kind]) -> Holding:
@@ -68,7 +67,7 @@ def holding(robot: RobotSettings, kinds: Iterable[Kind]) -> Holding:
     loads = [Load.of(kind) for kind in kinds]
     force_n = robot.grip_force_n or min(_chosen_n(loads, robot.acceleration_m_s2), STRONGEST_N)
     usual = all(load.is_usual(force_n, robot.acceleration_m_s2) for load in loads)
-    return Holding(force_n, None if usual else FINE_ITERATIONS)
+    return Holding(force_n, fine=not usual)
 
 
 def check_friction(robot: RobotSettings, load: Load, force_n: float) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import hypot, pi
+from math import hypot, pi, sqrt
 from typing import NamedTuple
 
 from lab.errors import BadInput, WorkFailed
@@ -15,7 +15,8 @@ from lab.sim.parts.kinds import Kind, Spot
 from lab.sim.world import World
 from lab.tasks.robot_fields import RobotSettings
 
-LIFT_M, SWING_M, TURN_RAD = 0.1, 0.25, pi / 4
+LIFT_M, SWING_M, CORNER_M, TURN_RAD = 0.1, 0.25, 0.2, pi / 4
+BLEND_M, AHEAD_M, SAFE = 0.1, 2.0, 1.4  # a corner as in transfers, taken faster than the arm gets in such a way [m]
 OUT = (0.5, 0.62, 0.75, 0.4, 0.9, 0.3)  # [m] ahead of the arm, the first that it reaches all over
 OFF = (0.002, 0.002, 0.04)  # [m], [rad] the part stands off where the fingers expect it: parts do, after some transfers
 FOOT_M = 0.1  # [m] the part's foot above the table
@@ -62,9 +63,7 @@ def tried(trial: Trial) -> str:
     if place is None:
         return ""
     with World() as world:
-        robot = Robot(world, trial.arm, trial.speed_m_s, trial.acceleration_m_s2, trial.held.force_n)
-        if trial.held.iterations is not None:
-            world.at_least(trial.held.iterations)
+        robot = Robot(world, trial.arm, trial.speed_m_s, trial.acceleration_m_s2, trial.held.force_n, trial.held.fine)
         bodies = _built(world, trial.kind, place)
         hand = _Hand(world, robot, trial.kind, bodies[0])
         robot.stand(_way(trial, place)[0])
@@ -88,10 +87,11 @@ def _place(trial: Trial) -> Spot | None:
 
 
 def _way(trial: Trial, spot: Spot) -> list[ToolPose]:
-    """The tool poses: at the part, above it, swung to both sides and turned, above it again."""
+    """The tool poses: at the part, above it, to one side, to the other and round a corner, turned above it."""
     at = trial.kind.held_at(spot)
     up = at.shifted(dz=LIFT_M)
-    return [at, up, up.shifted(dy=SWING_M), up.shifted(dy=-SWING_M, dyaw=TURN_RAD), up]
+    side = up.shifted(dy=-SWING_M)
+    return [at, up, up.shifted(dy=SWING_M), side, side.shifted(dx=CORNER_M), up.shifted(dyaw=TURN_RAD), up]
 
 
 def _built(world: World, kind: Kind, spot: Spot) -> list[str]:
@@ -138,13 +138,21 @@ class _Hand:
 
 
 def _motion(hand: _Hand, way: Sequence[ToolPose]) -> Iterator[None]:
-    at, up, *swung = way
+    at, up, start, corner, end, turned, above = way
     robot = hand.robot
     yield from robot.grip()
     hand.took()
     yield from robot.follow([up], slow=SLOW)
     hand.check("it is lifted")
-    for pose in swung:
+    yield from robot.follow([start])
+    hand.check("it is swung")
+    usual = robot.speed, robot.acceleration
+    robot.speed = SAFE * min(robot.speed, sqrt(AHEAD_M * robot.acceleration))
+    robot.acceleration = max(robot.acceleration, robot.speed**2 / (2 * CORNER_M))
+    yield from robot.follow([corner, end], blend=BLEND_M)
+    robot.speed, robot.acceleration = usual
+    hand.check("it is swung round a corner")
+    for pose in (turned, above):
         yield from robot.follow([pose])
         hand.check("it is swung")
     yield from robot.rest(HELD_STEPS)

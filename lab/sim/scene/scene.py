@@ -37,9 +37,7 @@ class Scene:
         world.box(TABLE, TABLE_M, TABLE_MIDDLE_M, TABLE_RGBA)
         robot = task.robot
         held = holding(robot, self.kinds.values())
-        self.robot = Robot(world, arm, robot.speed_m_s, robot.acceleration_m_s2, held.force_n)
-        if held.iterations is not None:
-            world.at_least(held.iterations)
+        self.robot = Robot(world, arm, robot.speed_m_s, robot.acceleration_m_s2, held.force_n, held.fine)
         self.stops_at_n = robot.force_limit_n or max(STOPS_AT_N, STOPS_AT_GRIPS * held.force_n)
         for station in task.stations:
             self._build_station(station)

@@ -7,7 +7,7 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sim.arms.arm_models import arm_of
-from lab.sim.parts.holding import FINE_ITERATIONS, Holding, Load, check_friction, holding
+from lab.sim.parts.holding import Holding, Load, check_friction, holding
 from lab.sim.parts.kinds import Kind, kinds_of
 from lab.tasks.task import Task
 from lab.tasks.task_file import load as load_task
@@ -55,7 +55,7 @@ def test_where_nothing_is_said_the_force_is_chosen(mass_kg: float, friction: flo
     ],
 )
 def test_physics_is_fine_where_it_must_be(mass_kg: float, friction: float, force_n: float, fine: bool) -> None:
-    assert held(mass_kg, friction, force_n) == Holding(force_n, FINE_ITERATIONS if fine else None)
+    assert held(mass_kg, friction, force_n) == Holding(force_n, fine)
 
 
 @pytest.mark.parametrize(
