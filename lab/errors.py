@@ -5,6 +5,7 @@ from difflib import get_close_matches
 
 MOST_CHARACTERS = 295  # of a message: with "lab: " before it, a line that is read at a glance
 MOST_OF_VALUE = 80  # characters of a bad value
+MOST_OF_PLACE = 140  # and of where it comes from: a path that is cut cannot be copied
 MOST_COMPARED = 10_000  # names with a bad one: more take seconds
 KNOWN = " known: "  # before the names that are known, the last of a message
 _GAP, _MORE = " ... ", ", ..."
@@ -97,7 +98,7 @@ def unknown(kind: str, value: object, known: Iterable[str], where: str) -> BadIn
     names = sorted(known)
     near = get_close_matches(str(value)[:MOST_OF_VALUE], names, n=1) if len(names) <= MOST_COMPARED else []
     hint = f" did you mean '{shortened(near[0])}'?" if near else ""
-    said = f"unknown {kind} '{shortened(value)}' ({shortened(where)}):{hint}{KNOWN}"
+    said = f"unknown {kind} '{shortened(value)}' ({shortened(where, MOST_OF_PLACE)}):{hint}{KNOWN}"
     return BadInput(f"{said}{listed(names, max(20, MOST_CHARACTERS - len(said))) or 'none'}")
 
 

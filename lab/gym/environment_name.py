@@ -116,8 +116,7 @@ def _refusal(name: GymName, where: str, error: Exception) -> BadInput:
         case BadInput():
             return BadInput(f"{which}: {error}")
         case refused.UnregisteredEnv():
-            listed = unknown("Gymnasium environment", name.id, _discrete(), where)
-            return BadInput(f"{listed}; one of your own is gym:MODULE:ID")
+            return unknown("Gymnasium environment", name.id, _discrete(), f"{where}; one of your own is gym:MODULE:ID")
         case ImportError() | refused.DependencyNotInstalled():
             return BadInput(f"{which}: it needs what is not installed: {said(error)}")
         case TypeError() if name.options:

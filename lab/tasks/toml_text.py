@@ -234,6 +234,9 @@ def explain(error: ValidationError, fields: Fields | None = None, own: Callable[
     got = repr(first["input"])
     got = got if len(got) <= _MOST_SHOWN else f"{got[:_MOST_SHOWN]} ..."
     shown = "" if isinstance(first["input"], dict) or not where else f" (got {got})"
+    if first["type"] == "literal_error":
+        near = get_close_matches(str(first["input"])[:_MOST_SHOWN], re.findall("'([^']*)'", message), n=1)
+        shown += f": did you mean '{near[0]}'?" if near else ""
     more = f" (and {len(findings) - 1} more)" if len(findings) > 1 else ""
     of_whole = first["type"] == "value_error" and first["loc"][-1:] and isinstance(first["loc"][-1], int)
     return f"{where + ': ' if where and not of_whole else ''}{message}{shown}{more}"

@@ -156,7 +156,7 @@ def test_a_killed_command_is_done_again(room: Path) -> None:
         ),
         (Ended(1, "{}", "Traceback (most recent call last):\nKeyError", 0.1, 0), "traceback: KeyError"),
         (Ended(0, "{}", "Exception ignored in: <_io>", 0.1, 0), "stderr says 'Exception ignored"),
-        (Ended(1, "{}", f"lab: {'x' * 300}\n", 0.1, 0), "a line of 305 characters"),
+        (Ended(1, "{}", f"lab: {'x' * 300}\n", 0.1, 0), "an error of 305 characters"),
     ],
 )
 def test_what_is_wrong_with_a_command_that_lacks_something(room: Path, ended: Ended, said: str) -> None:

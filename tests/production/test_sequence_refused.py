@@ -26,7 +26,7 @@ KNOWN = ", ".join(sorted(SEQUENCERS))
         ("world-1", "world-1: it is a world, there is nothing to sequence: learn it with lab teach world-1"),
         (
             "ovn.toml",
-            "no task file 'ovn.toml': give a file that exists, .toml or a .txt grid, or what ships: breakfast, fms-arm, fms, ",
+            "no task file 'ovn.toml': give a file that exists, .toml or .txt, or what ships; known: breakfast, fms-arm, fms, ",
         ),
         ("fsm", "unknown task 'fsm' (TASK): did you mean 'fms'? known: breakfast, fms, "),
         ("fms --case RSR --toasts 3", "--case RSR and --toasts 3: an order is one or the other"),

@@ -33,7 +33,7 @@ def test_a_fault_is_read(tmp_path: Path) -> None:
         (['what = "obstacle gone"', 'obstacle = "cubes D"'], "unknown obstacle 'cubes D'", 2),
         (['what = "part gone"', 'part = "loaf 1"'], "unknown part 'loaf 1'", 2),
         (['what = "part gone"', 'when = "carried"'], "wanted 'in machine' or 'standing'", 2),
-        (['what = "part vanished"'], "'part gone'", 1),
+        (['what = "part goen"'], "(got 'part goen'): did you mean 'part gone'?", 1),
         (['what = "camera blind"', "seconds = -1"], "seconds", 2),
     ],
 )

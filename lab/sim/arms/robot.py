@@ -46,7 +46,7 @@ def plan(
     blend: float = 0.0,
     before: Array | None = None,
 ) -> Trajectory:
-    """Time a path of tool poses, rounded by `blend` [m] at its corners: at most `speed` [m/s], and `acceleration` [m/s2] along it.
+    """Time a path of tool poses, rounded by `blend` [m]: at most `speed` [m/s], and `acceleration` [m/s2] along it.
 
     Joint speeds stay within the arm's; `before` (k,) [rad] are the joints it starts from. WorkFailed names a pose out of reach.
     """
