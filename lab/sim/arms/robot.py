@@ -28,6 +28,8 @@ _FINE_ITERATIONS = (
 )
 
 Array = NDArray[np.float64]
+_WEIGHTS = np.array([1.0, 1.0, 1.0, YAW_ARM])
+_NEAR_M = 1e-9
 
 
 @dataclass(frozen=True)
@@ -45,14 +47,16 @@ def plan(
     acceleration: float,
     blend: float = 0.0,
     before: Array | None = None,
+    gently: bool = False,
 ) -> Trajectory:
     """Time a path of tool poses, rounded by `blend` [m]: at most `speed` [m/s], and `acceleration` [m/s2] along it.
 
+    gently: across it, too, so that it slows down for its corners; otherwise it goes round them as fast as straight on.
     Joint speeds stay within the arm's; `before` (k,) [rad] are the joints it starts from. WorkFailed names a pose out of reach.
     """
     points = _rounded(_sampled(poses), blend)
     way = np.concatenate([[0.0], np.cumsum(_lengths(points))])
-    ticks = _trapezoid(float(way[-1]), speed, acceleration)
+    ticks = _slowed(points, speed, acceleration) if gently else _trapezoid(float(way[-1]), speed, acceleration)
     timed = np.stack([np.interp(ticks, way, points[:, k]) for k in range(4)], axis=1)
     joints = arm.inverse_path(timed, before)
     _check_reached(joints, timed)
@@ -61,7 +65,7 @@ def plan(
     velocities = np.gradient(joints, TIME_STEP, axis=0) if len(joints) > 1 else np.zeros_like(joints)
     hurry = float(np.max(np.abs(velocities) / arm.speed)) if len(joints) > 1 else 0.0
     if hurry > 1.0:
-        return plan(arm, poses, speed / (hurry * 1.02), acceleration / (hurry * 1.02) ** 2, blend, before)
+        return plan(arm, poses, speed / (hurry * 1.02), acceleration / (hurry * 1.02) ** 2, blend, before, gently)
     return Trajectory(joints, velocities)
 
 
@@ -96,8 +100,7 @@ def _rounded(points: Array, blend: float) -> Array:
 
 
 def _lengths(points: Array) -> Array:
-    steps = np.diff(points, axis=0) * np.array([1.0, 1.0, 1.0, YAW_ARM])
-    return np.asarray(np.linalg.norm(steps, axis=1))
+    return np.asarray(np.linalg.norm(np.diff(points, axis=0) * _WEIGHTS, axis=1))
 
 
 def _trapezoid(length: float, speed: float, acceleration: float) -> Array:
@@ -112,6 +115,31 @@ def _trapezoid(length: float, speed: float, acceleration: float) -> Array:
     left = np.maximum(total - t, 0.0)
     slowing = np.where(left < speeding, length - acceleration * left**2 / 2.0, ramp + top * (t - speeding))
     return np.asarray(np.where(t < speeding, acceleration * t**2 / 2.0, slowing))
+
+
+def _slowed(points: Array, speed: float, acceleration: float) -> Array:
+    """Way [m] after each physics step along points (n, 4), as fast as `acceleration` along and across the way allows."""
+    steps = _lengths(points)
+    way = np.concatenate([[0.0], np.cumsum(steps)])
+    if len(points) < 3 or way[-1] < _NEAR_M:
+        return _trapezoid(float(way[-1]), speed, acceleration)
+    ahead = np.diff(points, axis=0) * _WEIGHTS / np.maximum(steps, _NEAR_M)[:, None]
+    bends = np.linalg.norm(np.diff(ahead, axis=0), axis=1) / np.maximum(
+        (steps[:-1] + steps[1:]) / 2.0, _NEAR_M
+    )  # [1/m]
+    squares = np.concatenate(
+        [[0.0], np.minimum(speed**2, acceleration / np.maximum(bends, 1e-9)), [0.0]]
+    )  # of the speed
+    faster = 2.0 * acceleration * way  # than at rest, by speeding up since the first point
+    squares = np.minimum.accumulate(squares - faster) + faster
+    squares = np.minimum.accumulate((squares + faster)[::-1])[::-1] - faster
+    speeds = np.sqrt(np.maximum(squares, 0.0))
+    seconds = 2.0 * steps / np.maximum(speeds[:-1] + speeds[1:], _NEAR_M)
+    times = np.concatenate([[0.0], np.cumsum(seconds)])
+    t = np.minimum(np.arange(1, int(np.ceil(times[-1] / TIME_STEP - _NEAR_M)) + 1) * TIME_STEP, times[-1])
+    at = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(steps) - 1)
+    since, gained = t - times[at], np.diff(speeds) / np.maximum(seconds, _NEAR_M)
+    return np.asarray(np.minimum(way[at] + speeds[at] * since + gained[at] * since**2 / 2.0, way[at + 1]))
 
 
 def _turned_back(turn: float, first: Array, speed: float, acceleration: float) -> Array:
@@ -150,10 +178,10 @@ class Robot:
     ) -> None:
         """Load the arm at the world's origin; `speed` [m/s], `acceleration` [m/s2], `grip_force` [N].
 
-        fine: its pads hold as areas do, not as points, and physics is solved in many iterations.
+        fine: it slows down for corners, its pads hold as areas do, not as points, and physics is solved in many iterations.
         """
         self.world, self.arm, self.grip_force = world, arm, grip_force
-        self.speed, self.acceleration = speed, acceleration
+        self.speed, self.acceleration, self.fine = speed, acceleration, fine
         fingers = arm.fingers
         holding = [link for side in fingers.links for link in side]
         world.load(NAME, arm.urdf, (0.0, 0.0, arm.base_up_m), checked=True)
@@ -229,7 +257,7 @@ class Robot:
         first = poses[0]
         turn = (self._counted(here.yaw) - first.yaw + pi) % (2 * pi) - pi
         start = ToolPose(here.x, here.y, here.z, first.yaw + turn)
-        way = plan(self.arm, [start, *poses], self.speed * slow, self.acceleration * slow, blend, before)
+        way = plan(self.arm, [start, *poses], self.speed * slow, self.acceleration * slow, blend, before, self.fine)
         self._half_on = self.arm.is_half_on(way.positions[-1], poses[-1])
         heard = self.listener
         if heard is not None:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import hypot, pi, sqrt
+from math import hypot, pi
 from typing import NamedTuple
 
 from lab.errors import BadInput, WorkFailed
@@ -16,7 +16,7 @@ from lab.sim.world import World
 from lab.tasks.robot_fields import RobotSettings
 
 LIFT_M, SWING_M, CORNER_M, TURN_RAD = 0.1, 0.25, 0.2, pi / 4
-BLEND_M, AHEAD_M, SAFE = 0.1, 2.0, 1.4  # a corner as in transfers, taken faster than the arm gets in such a way [m]
+BLEND_M = 0.1  # of its corner, as in transfers
 OUT = (0.5, 0.62, 0.75, 0.4, 0.9, 0.3)  # [m] ahead of the arm, the first that it reaches all over
 OFF = (0.002, 0.002, 0.04)  # [m], [rad] the part stands off where the fingers expect it: parts do, after some transfers
 FOOT_M = 0.1  # [m] the part's foot above the table
@@ -146,11 +146,7 @@ def _motion(hand: _Hand, way: Sequence[ToolPose]) -> Iterator[None]:
     hand.check("it is lifted")
     yield from robot.follow([start])
     hand.check("it is swung")
-    usual = robot.speed, robot.acceleration
-    robot.speed = SAFE * min(robot.speed, sqrt(AHEAD_M * robot.acceleration))
-    robot.acceleration = max(robot.acceleration, robot.speed**2 / (2 * CORNER_M))
     yield from robot.follow([corner, end], blend=BLEND_M)
-    robot.speed, robot.acceleration = usual
     hand.check("it is swung round a corner")
     for pose in (turned, above):
         yield from robot.follow([pose])

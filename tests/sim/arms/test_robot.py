@@ -53,19 +53,20 @@ def check_sound(way: Trajectory, poses: list[ToolPose], speed: float, start: np.
     assert np.all(np.linalg.norm(went, axis=1) <= speed * TIME_STEP * 1.001)
 
 
-@given(st.lists(poses, min_size=2, max_size=4), speeds, accelerations, blends)
+@given(st.lists(poses, min_size=2, max_size=4), speeds, accelerations, blends, st.booleans())
 def test_a_plan_keeps_to_every_limit_and_ends_at_its_target(
-    path: list[ToolPose], speed: float, acceleration: float, blend: float
+    path: list[ToolPose], speed: float, acceleration: float, blend: float, gently: bool
 ) -> None:
     start = inverse(path[0])
     assert start is not None
-    way = plan(UP6, path, speed, acceleration, blend, start)
+    way = plan(UP6, path, speed, acceleration, blend, start, gently)
     check_sound(way, path, speed, start)
 
 
-def test_a_straight_way_takes_as_long_as_by_hand() -> None:
+@pytest.mark.parametrize("gently", [False, True])
+def test_a_straight_way_takes_as_long_as_by_hand(gently: bool) -> None:
     """0.5 m at 0.5 m/s and 2 m/s2: 0.25 s to speed up, 0.25 s to slow down, 0.75 s in between."""
-    way = plan(UP6, [ToolPose(0.6, -0.25, 0.3), ToolPose(0.6, 0.25, 0.3)], 0.5, 2.0)
+    way = plan(UP6, [ToolPose(0.6, -0.25, 0.3), ToolPose(0.6, 0.25, 0.3)], 0.5, 2.0, gently=gently)
     assert len(way.positions) * TIME_STEP == pytest.approx(1.25)
     halfway = forward(way.positions[len(way.positions) // 2 - 1])
     assert halfway.y == pytest.approx(0.0, abs=1e-9)
@@ -79,12 +80,29 @@ def test_a_short_way_never_reaches_full_speed() -> None:
     assert len(way.positions) == np.ceil(2 * np.sqrt(0.02 / 2.0) / TIME_STEP)
 
 
-def test_no_way_is_one_target() -> None:
+@pytest.mark.parametrize("gently", [False, True])
+def test_no_way_is_one_target(gently: bool) -> None:
     here = ToolPose(0.6, 0.1, 0.3, 0.2)
-    for path in ([here], [here, here]):
-        way = plan(UP6, path, 0.5, 2.0)
+    for path in ([here], [here, here], [here, here, here]):
+        way = plan(UP6, path, 0.5, 2.0, gently=gently)
         assert way.positions == pytest.approx(np.array([inverse(here)]))
         assert not way.velocities.any()
+
+
+@pytest.mark.parametrize(
+    ("gently", "corner", "back"), [(False, (5.0, 20.0), (25.0, 200.0)), (True, (2.0, 3.2), (2.0, 3.2))]
+)
+def test_a_gentle_way_slows_down_for_its_corners(
+    gently: bool, corner: tuple[float, float], back: tuple[float, float]
+) -> None:
+    """2 m/s2 along and 2 across are up to 2.8 together, over 8 steps; a way back is a stop."""
+    for end, (least, most) in ((ToolPose(0.9, 0.2, 0.3), corner), (ToolPose(0.6, -0.19, 0.3), back)):
+        path = [ToolPose(0.6, -0.2, 0.3), ToolPose(0.9, -0.2, 0.3), end]
+        way = plan(UP6, path, 0.5, 2.0, blend=0.1, gently=gently)
+        tools = np.array([(tool.x, tool.y) for tool in map(forward, way.positions)])
+        speeds = np.diff(tools, axis=0) / TIME_STEP
+        felt = np.linalg.norm(speeds[8:] - speeds[:-8], axis=1) / (8 * TIME_STEP)
+        assert least <= felt.max() <= most
 
 
 def test_blending_cuts_the_corner_but_not_the_ends() -> None:
