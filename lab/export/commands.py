@@ -7,7 +7,8 @@ from math import ceil, pi
 import numpy as np
 
 from lab.export.program import Action, Array, Motion, Press, Program, Transfer
-from lab.sim.arms.robot import GRIP_STEPS, YAW_ARM
+from lab.sim.arms.robot import GRIP_STEPS
+from lab.sim.arms.tool_path import COUNTED, way_of
 from lab.sim.world import TIME_STEP
 
 WITHIN_M = 1e-4  # a way is written as straight pieces that deviate so little from it; a turn counts as YAW_ARM
@@ -114,12 +115,6 @@ def step_between(start: Array, end: Array) -> Array:
     return step
 
 
-def way_of(poses: Array) -> Array:
-    """How far along they are (n,) [m], for tool poses (n, 4): a turn counts as YAW_ARM."""
-    steps = np.diff(poses, axis=0) * np.array([1.0, 1.0, 1.0, YAW_ARM])
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
-
-
 def _length(poses: Array) -> float:
     return float(way_of(poses)[-1])
 
@@ -132,7 +127,7 @@ def _speed(poses: Array) -> float:
 def straightened(poses: Array) -> Array:
     """Few tool poses (m, 4) whose straight pieces keep within WITHIN_M of the way through `poses` (n, 4), ends included."""
     way = way_of(poses)
-    kept = thinned(way, poses * np.array([1.0, 1.0, 1.0, YAW_ARM]), WITHIN_M)
+    kept = thinned(way, poses * COUNTED, WITHIN_M)
     rows = [poses[:1]]
     for start, end in zip(poses[kept[:-1]], poses[kept[1:]], strict=True):
         pieces = max(1, ceil(abs(end[3] - start[3]) / MOST_TURN - 1e-9))

@@ -34,7 +34,7 @@ from lab.export.inform import (
 from lab.export.options import Options
 from lab.export.program import Array, Program
 from lab.sim.arms.arm import Arm
-from lab.sim.arms.robot import YAW_ARM
+from lab.sim.arms.tool_path import YAW_ARM
 
 PULSES = {
     "up6": tuple(n * 4096 / (2 * pi) for n in (120.0, 120.0, 120.0, 50.0, 50.0, 30.0))

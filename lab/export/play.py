@@ -13,7 +13,8 @@ from lab.export.recorder import SEEN_EVERY, tips
 from lab.export.timed import TimedPoints
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import NAME, YAW_ARM, Robot
+from lab.sim.arms.robot import NAME, Robot
+from lab.sim.arms.tool_path import YAW_ARM
 from lab.sim.parts.holding import USUAL_N
 from lab.sim.world import TIME_STEP, World
 from lab.tasks.robot_fields import RobotSettings

@@ -17,7 +17,7 @@ from lab.export.commands import Await, Command, Grip, Joint, Path, Pause, jobs_o
 from lab.export.options import Options
 from lab.export.program import Array, Program
 from lab.sim.arms.arm import Arm
-from lab.sim.arms.robot import YAW_ARM
+from lab.sim.arms.tool_path import YAW_ARM
 
 AXES = 6
 GRIPPER = 1  # its digital output

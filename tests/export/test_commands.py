@@ -18,10 +18,9 @@ from lab.export.commands import (
     moving,
     straightened,
     thinned,
-    way_of,
 )
 from lab.export.program import Program
-from lab.sim.arms.robot import YAW_ARM
+from lab.sim.arms.tool_path import COUNTED, way_of
 
 
 def test_a_straight_line_needs_two_rows_and_a_corner_one_more() -> None:
@@ -56,7 +55,7 @@ def test_straight_pieces_keep_to_any_way_and_turn_the_short_way_round(corners: n
     assert np.abs(np.diff(pieces[:, 3])).max() <= pi / 2 + 1e-9
     way, along = way_of(poses), way_of(pieces)
     if way[-1] > 1e-6:
-        flat = np.array([1.0, 1.0, 1.0, YAW_ARM])
+        flat = COUNTED
         ends = np.array([np.interp(way, along * way[-1] / along[-1], pieces[:, k]) for k in range(4)]).T
         assert np.linalg.norm((ends - poses) * flat, axis=1).max() < 20 * WITHIN_M  # their lengths differ a little
 

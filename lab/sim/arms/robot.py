@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from math import atan2, pi
 from typing import Protocol
 
@@ -12,24 +11,19 @@ from numpy.typing import NDArray
 from lab.errors import WorkFailed
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.kinematics import ToolPose
+from lab.sim.arms.tool_path import YAW_ARM, evenly, rounded, sampled, slowed, way_of
 from lab.sim.urdf_reader import rotation
 from lab.sim.world import TIME_STEP, World
 
 NAME = "robot"
 _TURNED_RAD = pi / 2  # [rad] from here on the tool begins a path by turning on the spot
-YAW_ARM = 0.15  # [m/rad] a turn of the tool counts as this much way
-_SAMPLE = 0.004  # [m] between points of a path before it is timed
 _SETTLE_STEPS = 12  # after a path ends
 GRIP_STEPS = 72  # 0.3 s to close or open
 _PEDESTAL_M, _PEDESTAL_RGBA = 0.09, (0.22, 0.23, 0.26, 1.0)  # radius
 _POINT_M, _PAD_M = 0.002, 0.011  # how far from the middle of a finger's pad, of 3 x 3 cm, friction resists turning
-_FINE_ITERATIONS = (
-    200  # of the solver: with 60 a slice creeps 2 mm a second in fingers that a linkage moves, a 1 kg box tilts
-)
+_FINE_ITERATIONS = 200  # of the solver: with 60 a slice creeps 2 mm a second in fingers that a linkage moves
 
 Array = NDArray[np.float64]
-_WEIGHTS = np.array([1.0, 1.0, 1.0, YAW_ARM])
-_NEAR_M = 1e-9
 
 
 @dataclass(frozen=True)
@@ -54,9 +48,9 @@ def plan(
     gently: across it, too, so that it slows down for its corners; otherwise it goes round them as fast as straight on.
     Joint speeds stay within the arm's; `before` (k,) [rad] are the joints it starts from. WorkFailed names a pose out of reach.
     """
-    points = _rounded(_sampled(poses), blend)
-    way = np.concatenate([[0.0], np.cumsum(_lengths(points))])
-    ticks = _slowed(points, speed, acceleration) if gently else _trapezoid(float(way[-1]), speed, acceleration)
+    points = rounded(sampled(poses), blend)
+    way = way_of(points)
+    ticks = slowed(points, speed, acceleration) if gently else evenly(float(way[-1]), speed, acceleration)
     timed = np.stack([np.interp(ticks, way, points[:, k]) for k in range(4)], axis=1)
     joints = arm.inverse_path(timed, before)
     _check_reached(joints, timed)
@@ -78,74 +72,10 @@ def _check_reached(joints: Array, poses: Array) -> None:
         raise WorkFailed(f"the tool cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m")
 
 
-def _sampled(poses: Sequence[ToolPose]) -> Array:
-    corners = np.array([[p.x, p.y, p.z, p.yaw] for p in poses])
-    rows = [corners[:1]]
-    for start, end in pairwise(corners):
-        count = max(1, int(np.ceil(_lengths(np.array([start, end]))[0] / _SAMPLE)))
-        rows.append(start + (end - start) * (np.arange(1, count + 1) / count)[:, None])
-    return np.concatenate(rows)
-
-
-def _rounded(points: Array, blend: float) -> Array:
-    """A moving average along the path cuts its corners by about blend / 2; the ends stay."""
-    half = int(blend / _SAMPLE / 2)
-    if half < 1 or len(points) < 3:
-        return points
-    padded = np.concatenate([np.repeat(points[:1], half, 0), points, np.repeat(points[-1:], half, 0)])
-    kernel = np.full(2 * half + 1, 1.0 / (2 * half + 1))
-    smooth = np.stack([np.convolve(padded[:, k], kernel, mode="valid") for k in range(4)], axis=1)
-    smooth[0], smooth[-1] = points[0], points[-1]
-    return smooth
-
-
-def _lengths(points: Array) -> Array:
-    return np.asarray(np.linalg.norm(np.diff(points, axis=0) * _WEIGHTS, axis=1))
-
-
-def _trapezoid(length: float, speed: float, acceleration: float) -> Array:
-    """Way [m] after each physics step when speeding up, cruising and slowing down over `length` [m]."""
-    if length < 1e-9:
-        return np.array([0.0])
-    ramp = min(speed**2 / acceleration, length) / 2.0
-    top = np.sqrt(2.0 * acceleration * ramp)
-    speeding, cruising = top / acceleration, (length - 2.0 * ramp) / top
-    total = 2.0 * speeding + cruising
-    t = np.minimum(np.arange(1, int(np.ceil(total / TIME_STEP)) + 1) * TIME_STEP, total)
-    left = np.maximum(total - t, 0.0)
-    slowing = np.where(left < speeding, length - acceleration * left**2 / 2.0, ramp + top * (t - speeding))
-    return np.asarray(np.where(t < speeding, acceleration * t**2 / 2.0, slowing))
-
-
-def _slowed(points: Array, speed: float, acceleration: float) -> Array:
-    """Way [m] after each physics step along points (n, 4), as fast as `acceleration` along and across the way allows."""
-    steps = _lengths(points)
-    way = np.concatenate([[0.0], np.cumsum(steps)])
-    if len(points) < 3 or way[-1] < _NEAR_M:
-        return _trapezoid(float(way[-1]), speed, acceleration)
-    ahead = np.diff(points, axis=0) * _WEIGHTS / np.maximum(steps, _NEAR_M)[:, None]
-    bends = np.linalg.norm(np.diff(ahead, axis=0), axis=1) / np.maximum(
-        (steps[:-1] + steps[1:]) / 2.0, _NEAR_M
-    )  # [1/m]
-    squares = np.concatenate(
-        [[0.0], np.minimum(speed**2, acceleration / np.maximum(bends, 1e-9)), [0.0]]
-    )  # of the speed
-    faster = 2.0 * acceleration * way  # than at rest, by speeding up since the first point
-    squares = np.minimum.accumulate(squares - faster) + faster
-    squares = np.minimum.accumulate((squares + faster)[::-1])[::-1] - faster
-    speeds = np.sqrt(np.maximum(squares, 0.0))
-    seconds = 2.0 * steps / np.maximum(speeds[:-1] + speeds[1:], _NEAR_M)
-    times = np.concatenate([[0.0], np.cumsum(seconds)])
-    t = np.minimum(np.arange(1, int(np.ceil(times[-1] / TIME_STEP - _NEAR_M)) + 1) * TIME_STEP, times[-1])
-    at = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(steps) - 1)
-    since, gained = t - times[at], np.diff(speeds) / np.maximum(seconds, _NEAR_M)
-    return np.asarray(np.minimum(way[at] + speeds[at] * since + gained[at] * since**2 / 2.0, way[at + 1]))
-
-
 def _turned_back(turn: float, first: Array, speed: float, acceleration: float) -> Array:
     """Rows (n, k) that take the tool on the spot from `turn` [rad] by half turns to `first` (k,): its range ends there."""
     back = first[-1] - turn
-    ticks = _trapezoid(abs(float(back)), speed / YAW_ARM, acceleration / YAW_ARM)
+    ticks = evenly(abs(float(back)), speed / YAW_ARM, acceleration / YAW_ARM)
     rows = np.repeat(first[None], len(ticks), axis=0)
     rows[:, -1] = turn + np.sign(back) * ticks
     return rows

@@ -13,7 +13,8 @@ from lab.files import assets_folder
 from lab.sim.arms import kinematics
 from lab.sim.arms.arm_models import arm_named
 from lab.sim.arms.kinematics import ToolPose
-from lab.sim.arms.robot import NAME, YAW_ARM, Robot, Trajectory, plan
+from lab.sim.arms.robot import NAME, Robot, Trajectory, plan
+from lab.sim.arms.tool_path import YAW_ARM
 from lab.sim.models import FINGER_OPEN, SLICE
 from lab.sim.world import TIME_STEP, World
 
@@ -67,11 +68,12 @@ def test_a_plan_keeps_to_every_limit_and_ends_at_its_target(
 def test_a_straight_way_takes_as_long_as_by_hand(gently: bool) -> None:
     """0.5 m at 0.5 m/s and 2 m/s2: 0.25 s to speed up, 0.25 s to slow down, 0.75 s in between."""
     way = plan(UP6, [ToolPose(0.6, -0.25, 0.3), ToolPose(0.6, 0.25, 0.3)], 0.5, 2.0, gently=gently)
-    assert len(way.positions) * TIME_STEP == pytest.approx(1.25)
-    halfway = forward(way.positions[len(way.positions) // 2 - 1])
-    assert halfway.y == pytest.approx(0.0, abs=1e-9)
+    off = 1e-4 if gently else 1e-9  # which speeds up between two points less than it may
+    assert len(way.positions) * TIME_STEP == pytest.approx(1.25, abs=gently * TIME_STEP)
+    halfway = forward(way.positions[149])
+    assert halfway.y == pytest.approx(0.0, abs=10 * off)
     quarter = forward(way.positions[59])  # after 0.25 s: 1/2 * 2 * 0.25^2 m
-    assert quarter.y == pytest.approx(-0.25 + 0.0625, abs=1e-9)
+    assert quarter.y == pytest.approx(-0.25 + 0.0625, abs=off)
     assert quarter.x == pytest.approx(0.6)
 
 
