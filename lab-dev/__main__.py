@@ -18,11 +18,13 @@ from resources import PART as RESOURCES
 from rich.console import Console
 from rich.progress import Progress
 from scoreboard import line, show, written
+from sizes import PART as SIZES
 
 PARTS: dict[str, Part] = {
     "kills": KILLS,
     "mutations": MUTATIONS,
     "mutated-commands": MUTATED_COMMANDS,
+    "sizes": SIZES,
     "requests": REQUESTS,
     "resources": RESOURCES,
     "physics": PHYSICS,

@@ -65,6 +65,8 @@ def _asked(
     assert server.stdout is not None
     with tempfile.TemporaryDirectory() as folder:
         out, err = Path(folder, "out"), Path(folder, "err")
+        out.touch()  # a command may be killed before it has opened them
+        err.touch()
         begun = time.monotonic()
         request = {"words": words, "cwd": str(home), "env": dict(env), "out": str(out), "err": str(err)}
         server.stdin.write(json.dumps(request) + "\n")

@@ -14,6 +14,7 @@ from lab.sequencing.search import SAME, LearnedSequence, Log, Search
 from lab.sequencing.simulate.merged import MergedCell, MergedKey, MergedState
 
 SMALL_JOBS = (5, 6, 7)  # parts; what is learned with so few is tried with more
+MOST_VALUES = 2_000_000  # of a table: half a gigabyte
 PRACTICE, TRIES = 5, 20  # each small job is practised in a fifth of the episodes, and tried in a twentieth
 
 Action = tuple[int, int, int]  # position, choice, and the part where parts are told apart (else 0)
@@ -81,6 +82,7 @@ class TimeLearner:
     def __init__(self, cell: Cell, objective: str, rng: np.random.Generator, bounded: bool = True) -> None:
         check_built_in(objective, "srl-time")
         self.q: Table = {}
+        self._values = 0
         self.merged = MergedCell(cell)
         self.distinct = objective in WITH_DUE_TIMES
         self._cell, self._objective, self._rng, self._bounded = cell, objective, rng, bounded
@@ -164,11 +166,17 @@ class TimeLearner:
         return job.code(counts), robot, waits
 
     def _row(self, state: MergedState) -> Row:
-        """The values of what may be done now; none when all is done, or nothing can move any more."""
+        """The values of what may be done now; none when all is done, or nothing can move any more.
+
+        Where the table is full, a state that it does not hold has the values that states begin with, each time anew.
+        """
         key = (*self.merged.key(state), state.now, state.who) if self.distinct else self.merged.key(state)
-        if key not in self.q:
-            self.q[key] = {action: self._at_least(state, action) for action in self.actions(state)}
-        return self.q[key]
+        if (row := self.q.get(key)) is None:
+            row = {action: self._at_least(state, action) for action in self.actions(state)}
+            if self._values + len(row) <= MOST_VALUES:
+                self.q[key] = row
+                self._values += len(row)
+        return row
 
     def _at_least(self, state: MergedState, action: Action) -> float:
         """What an action costs, and what has to come at least after it; 0 where nobody is to know."""

@@ -44,6 +44,17 @@ def test_one_toast_by_hand(oven_cell: CellMaker) -> None:
     assert values == pytest.approx([12.0, 14.0])  # from the oven on: 10 s of waiting and 2 s of carrying
 
 
+def test_a_full_table_holds_no_more_states_and_an_order_is_found_all_the_same(
+    toast_cell: CellMaker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lab.sequencing.methods.srl_time.MOST_VALUES", 10)
+    cell = toast_cell("I", 3)
+    result = learned(cell, 30)
+    assert sum(map(len, result.q.values())) <= 10
+    assert result.sequence is not None
+    assert result.cost == simulate(cell, result.sequence).makespan_s >= optimum(cell).cost
+
+
 @settings(max_examples=25, deadline=None)
 @given(data=st.data(), seed=st.integers(0, 2**32 - 1))
 def test_values_never_exceed_the_truth_and_only_rise(cells: Cells, data: st.DataObject, seed: int) -> None:
