@@ -65,8 +65,9 @@ def evenly(length: float, speed: float, acceleration: float) -> Array:
 
 def slowed(points: Array, speed: float, acceleration: float) -> Array:
     """Way [m] after each physics step along points (n, 4), as fast as `acceleration` along and across the way allows."""
+    points = points[np.concatenate([[True], lengths(points) > _NEAR_M])]
     steps, way = lengths(points), way_of(points)
-    if len(points) < 3 or way[-1] < _NEAR_M:
+    if len(points) < 3:
         return evenly(float(way[-1]), speed, acceleration)
     speeds = np.sqrt(_squares(points, steps, speed, acceleration))
     seconds = 2.0 * steps / np.maximum(speeds[:-1] + speeds[1:], _NEAR_M)

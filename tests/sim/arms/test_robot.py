@@ -91,6 +91,13 @@ def test_no_way_is_one_target(gently: bool) -> None:
         assert not way.velocities.any()
 
 
+@pytest.mark.parametrize("gently", [False, True])
+def test_almost_no_way_takes_almost_no_time(gently: bool) -> None:
+    here, there = ToolPose(0.6, 0.1, 0.3), ToolPose(0.6, 0.100001, 0.3)
+    for path in ([here, there, there], [here, here, there], [here, there, here, there]):
+        assert len(plan(UP6, path, 0.5, 2.0, gently=gently).positions) <= 2
+
+
 @pytest.mark.parametrize(
     ("gently", "corner", "back"), [(False, (5.0, 20.0), (25.0, 200.0)), (True, (2.0, 3.2), (2.0, 3.2))]
 )
