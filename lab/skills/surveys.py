@@ -99,37 +99,36 @@ class Surveys:
 
     def _dock(self, place: str, carried: str) -> Cell:
         """The workspace cell from which the tool goes straight to the approach of `place`; BadInput names what blocks it."""
+        near, approach = self.cells_near(place), self.approach(place)
         survey = self.workspace(carried)
         with World() as world:
             scene = Scene(world, self.task, (), self.layout)
-            approach = self.approach(place)
             surveyor = Surveyor(scene, carried or None, clearance=_DOCK_CLEARANCE)
             cause = surveyor.cause(approach)
-            for cell in [] if cause else self._cells_near(survey, approach):
+            for cell in [] if cause else near:
                 way = _between(self.cell_pose(cell), approach)
                 if not survey.blocked[cell] and not any(surveyor.cause(pose) for pose in way):
                     return cell
-        near = self._cells_near(survey, approach)
-        if not near:
-            grid = self.task.workspace
-            high_x, high_y = (
-                low + n * cell for low, n, cell in zip(grid.lower_m, grid.shape[:2], grid.cell_m, strict=False)
-            )
-            raise BadInput(
-                f"workspace.shape = {list(grid.shape)}: it has no cell near '{place}' at ({approach.x:.2f}, {approach.y:.2f}) m: "
-                f"it goes from ({grid.lower_m[0]:.2f}, {grid.lower_m[1]:.2f}) to ({high_x:.2f}, {high_y:.2f}) m"
-            )
         cause = cause or ", ".join(survey.names(near))
         raise BadInput(
             f"station '{place}' cannot be approached{f' with {carried}' if carried else ''}: in the way: {cause}"
         )
 
-    def _cells_near(self, survey: Survey, pose: ToolPose) -> list[Cell]:
-        """The cells of the lowest level within 1.6 cells of a pose, nearest first."""
-        reach = 1.6 * max(self.task.workspace.cell_m[:2])
-        at = {cell: self.cell_pose(cell) for cell in np.ndindex(*survey.causes.shape[:2], 1)}
-        far = {cell: hypot(p.x - pose.x, p.y - pose.y) for cell, p in at.items()}
-        return sorted((cell for cell in far if far[cell] <= reach), key=lambda cell: (far[cell], cell))
+    def cells_near(self, place: str) -> list[Cell]:
+        """The workspace's cells of the lowest level within 1.6 cells of a place's approach, nearest first; BadInput for none."""
+        grid, approach = self.task.workspace, self.approach(place)
+        reach = 1.6 * max(grid.cell_m[:2])
+        at = {cell: self.cell_pose(cell) for cell in np.ndindex(*grid.shape[:2], 1)}
+        far = {cell: hypot(p.x - approach.x, p.y - approach.y) for cell, p in at.items()}
+        if near := sorted((cell for cell in far if far[cell] <= reach), key=lambda cell: (far[cell], cell)):
+            return near
+        high_x, high_y = (
+            low + n * cell for low, n, cell in zip(grid.lower_m, grid.shape[:2], grid.cell_m, strict=False)
+        )
+        raise BadInput(
+            f"workspace.shape = {list(grid.shape)}: it has no cell near '{place}' at ({approach.x:.2f}, {approach.y:.2f}) m: "
+            f"it goes from ({grid.lower_m[0]:.2f}, {grid.lower_m[1]:.2f}) to ({high_x:.2f}, {high_y:.2f}) m"
+        )
 
     def approach(self, place: str) -> ToolPose:
         """Where a transfer to or from `place` ends: above a station, or above the start of a camera's grid."""

@@ -47,6 +47,8 @@ class Transfer(Skill):
     def setup(self, surveys: Surveys) -> Problem:
         """The workspace as a 3D grid: cells that are out of reach or too near to something are blocked."""
         self.surveys = surveys
+        for place in (self.origin, self.target):
+            surveys.cells_near(place)  # before the workspace is surveyed, which may take long
         survey = surveys.workspace(self.kind)
         start, goal = surveys.dock(self.origin, self.kind), surveys.dock(self.target, self.kind)
         if start == goal:
