@@ -268,7 +268,7 @@ def read_calibration(path: Path) -> Calibration:
         own = Lens((width, height), (fx, fy), (cx, cy), cast(tuple[float, float, float, float, float], terms))
         rows = tuple(tuple(float(one) for one in row) for row in turn)
         found = float(record["residual_px"]), int(record["points"]), str(record["method"])
-    except (ValueError, KeyError, TypeError, BadInput, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, BadInput, RecursionError, OverflowError) as error:
         why = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
         raise BadInput(f"{path}: no calibration: {why}: {wanted}") from None
     if not np.isfinite([*shift, found[0]]).all():

@@ -105,6 +105,7 @@ def test_a_file_holds_it_whole(found: Calibration, tmp_path: Path) -> None:
         ("[]", "no calibration"),
         ("{}", "'lens' is missing"),
         ('{"lens": {"distortion": {}}}', "'size' is missing"),
+        (json.dumps({"lens": {"distortion": {}, "size": [1, 1], "focal": [10**400, 1]}}), "too large"),
         ("x" * 100_001, "100001 bytes"),
     ],
 )
