@@ -59,7 +59,7 @@ class Case:
     """A command and what it lacks: filled by a fault.
 
     said: what was done to it; before: runs in the child; read_only: folders under the home; room_kb: of a disk that the home is
-    on; loses: a folder that is removed after so many seconds; unheard: nobody may hear what it says; must_do: all the same, it
+    on; loses: a folder that is removed after so many seconds; was_whole: when all had been written; unheard: nobody may hear what it says; must_do: all the same, it
     does what it should.
     """
 
@@ -74,6 +74,7 @@ class Case:
     read_only: tuple[str, ...] = ()
     room_kb: int = 0
     loses: tuple[str, float] = ("", 0.0)
+    was_whole: bool = False
     unheard: bool = False
     must_do: bool = False
 
@@ -283,7 +284,7 @@ def carried_out(case: Case, room: Path, quickly: CarriedOut | None) -> Ended:
     if quickly is not None:
         return quickly(WORKS[case.name].words, case.home, said, LONGEST_S)
     folder, after_s = case.loses
-    timer = Timer(after_s, shutil.rmtree, (case.home / folder,), {"ignore_errors": True})
+    timer = Timer(after_s, _lose, (case, _receipts(case)))
     for name in case.read_only:
         (case.home / name).chmod(0o555)
     if folder:
@@ -307,6 +308,16 @@ def carried_out(case: Case, room: Path, quickly: CarriedOut | None) -> Ended:
             _resize(case.home, 1 << 30)
 
 
+def _lose(case: Case, receipts: int) -> None:
+    """Somebody removes the folder; `receipts`: of sessions that were there before the command."""
+    case.was_whole = _receipts(case) > receipts
+    shutil.rmtree(case.home / case.loses[0], ignore_errors=True)
+
+
+def _receipts(case: Case) -> int:
+    return len([*case.home.glob(f"{_SESSION_OF[case.name]}/receipt.json")])
+
+
 def judged(case: Case, ended: Ended, room: Path, carried_out: CarriedOut = by_itself) -> str:
     """What is wrong with how it ended, what it left, and what the same command does once nothing is missing; "" if nothing."""
     wrong = ended.fault((0, 1, 2)) or _noise(ended)
@@ -319,7 +330,7 @@ def judged(case: Case, ended: Ended, room: Path, carried_out: CarriedOut = by_it
     changes = (*WORKS[case.name].changes, *((f"{case.loses[0]}/*",) if case.loses[0] else ()))
     if wrong := lost(kept_before(room), case.home, changes) or unsound(case.home):
         return f"exit {ended.code}: {wrong}"
-    if case.loses[0] and ended.code == 0 and not any(case.home.glob(f"{_SESSION_OF[case.name]}/receipt.json")):
+    if case.loses[0] and ended.code == 0 and not case.was_whole and not _receipts(case):
         return "exit 0 without its session"
     if ended.code == 0 and not case.unheard and not case.loses[0] and (wrong := reached(case.expected, case.home)):
         return f"exit 0: {wrong}"

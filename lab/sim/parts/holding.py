@@ -16,7 +16,7 @@ SLOW = 0.6  # of the robot's speed and acceleration, as skills rise with a part
 MARGIN = 6.0  # times what friction needs a force is chosen; measured: with 2.5 parts are lost where they touch machines
 USUAL_N = 25.0  # chosen where friction needs less, unless a part is lighter than this is gentle to
 GENTLE_N_KG = 1000.0  # newtons of grip for each kilogram that physics holds still in a usual step
-GENTLE_N, LIGHT_KG = 50.0, 0.35  # with a stronger grip, or a heavier part, forces are not found in a usual step
+GENTLE_N, USUAL_KG = 50.0, (0.02, 0.35)  # with a stronger grip, or others, forces are not found in a usual step
 STAYS = 2.0  # times the acceleration friction holds a part on a pallet that is far from sliding off
 ROUGH = 0.5  # friction from which on what holds by the numbers has always held
 
@@ -49,7 +49,7 @@ class Load:
     def is_usual(self, force_n: float, acceleration_m_s2: float) -> bool:
         """Whether it is so far from what may go wrong that physics need not be fine, and nobody has to try it."""
         strong = force_n >= MARGIN * self.needs_n(acceleration_m_s2)
-        gentle = self.mass_kg <= LIGHT_KG and force_n <= min(GENTLE_N, GENTLE_N_KG * self.mass_kg)
+        gentle = USUAL_KG[0] <= self.mass_kg <= USUAL_KG[1] and force_n <= min(GENTLE_N, GENTLE_N_KG * self.mass_kg)
         rides = self.carries * GRAVITY_M_S2 >= STAYS * acceleration_m_s2
         return strong and gentle and rides and self.friction >= ROUGH
 

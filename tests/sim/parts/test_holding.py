@@ -49,6 +49,7 @@ def test_where_nothing_is_said_the_force_is_chosen(mass_kg: float, friction: flo
         (0.04, 0.8, 41.0, True),  # firm: over 1000 N/kg
         (0.04, 0.8, 1.6, True),  # barely: 6 x 0.28 N are 1.65
         (0.04, 0.4, 25.0, True),  # slippery
+        (0.019, 0.8, 19.0, True),  # light
         (0.36, 0.8, 25.0, True),  # heavy
         (0.3, 0.8, 51.0, True),
         (0.3, 0.8, 49.0, False),
