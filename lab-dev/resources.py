@@ -59,8 +59,8 @@ class Case:
     """A command and what it lacks: filled by a fault.
 
     said: what was done to it; before: runs in the child; read_only: folders under the home; room_kb: of a disk that the home is
-    on; loses: a folder that is removed after so many seconds; was_whole: when all had been written; unheard: nobody may hear what it says; must_do: all the same, it
-    does what it should.
+    on; loses: a folder that is removed after so many seconds; was_whole: all of it had been written by then; unheard: nobody
+    may hear what it says; must_do: all the same, it does what it should.
     """
 
     name: str
@@ -336,7 +336,7 @@ def judged(case: Case, ended: Ended, room: Path, carried_out: CarriedOut = by_it
         return f"exit 0: {wrong}"
     if ended.code == 2 and (more := _kept(state(case.home)) - _kept(state(base(room)))):
         return f"exit 2, but it has kept {min(more)}: {ended.stderr[-160:]}"
-    if case.loses[0] != "toolbox" and (wrong := _said_kept(ended, case.home)):
+    if not case.loses[0] and (wrong := _said_kept(ended, case.home)):
         return f"exit {ended.code}: {wrong}"
     if case.loses[0]:
         return "" if case.loses[0] == "lesson" else _goes_on(case, room, carried_out, same=False)
