@@ -297,10 +297,22 @@ def _check(entry: Entry) -> None:
     if isinstance(entry, Stopped):
         for kind, _, _ in entry.stops:
             StopKind(kind)
-    if isinstance(entry, SkillKept) and not all(isinstance(entry.row.get(word), str) for word in ("name", "source")):
-        raise ValueError("row: it has no name or no source")
+    if isinstance(entry, SkillKept):
+        _check_row(entry.row)
     if isinstance(entry, Stopped | Commanded | Moved | Met) and not 0 <= entry.step <= MAX_STEP:
         raise ValueError(f"step {entry.step}: wanted 0 to {MAX_STEP}")
+
+
+def _check_row(row: dict[str, Any]) -> None:
+    """ValueError for the row of a skill that lacks what is told of it at the end of a run."""
+    for name in ("name", "source"):
+        if not isinstance(row.get(name), str):
+            raise ValueError(f"row: it has no {name}")
+    for name in ("episodes", "moves", "helped_steps", "saved_episodes", "saved_helped_steps"):
+        if not isinstance(row.get(name), int):
+            raise ValueError(f"row: it has no whole number of {name}")
+    if not isinstance(row.get("from_task"), str | None) or not {"from_task", "fitness"} <= row.keys():
+        raise ValueError("row: it has no from_task, or no fitness")
 
 
 def read_run(folder: Path, where: str) -> tuple[RunBegan, tuple[Entry, ...], int]:
