@@ -95,6 +95,7 @@ def batch(room: Path, name: str, seed: int, numbers: range, say: Any, folder: Pa
         paths[which].write_bytes(content)
         say(number)
         peak_begins()
+        before_mb = peak_mb()
         begun = time.process_time()
         signal.setitimer(signal.ITIMER_PROF, 2 * MOST_S)
         result, why = verdict(kind, paths[which])
@@ -106,8 +107,8 @@ def batch(room: Path, name: str, seed: int, numbers: range, say: Any, folder: Pa
         told.slowest_s, told.most_mb = max(told.slowest_s, took_s), max(told.most_mb, mb)
         if result and took_s > MOST_S:
             result, why = "", f"{took_s:.1f} s: {result} {why}"
-        if result and mb > MOST_MB:
-            result, why = "", f"{mb:.0f} MB: {result} {why}"
+        if result and mb - before_mb > MOST_MB:
+            result, why = "", f"{mb - before_mb:.0f} MB: {result} {why}"
         if not result:
             told.broke.append({"case": f"{name} {number} ({how}) of {paths[which].name}", "why": why})
             kept = room / "broke" / f"{name.replace(' ', '-')}-{number}-{paths[which].name}"

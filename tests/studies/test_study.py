@@ -83,7 +83,7 @@ def test_the_advisor_table_is_handed_on() -> None:
     [
         (
             {"name": "figure-9.5"},
-            r"^unknown study 'figure-9\.5' \(STUDY\): did you mean 'figure-9\.4'\? known: .*table-9\.2",
+            r"^unknown study 'figure-9\.5' \(STUDY\): did you mean 'figure-9\.4'\? known: advice-budget, .* more$",
         ),
         ({"advisor_table": "learnt"}, r"^unknown advisor table 'learnt' \(--advisor-table\): did you mean 'learned'\?"),
         ({"out": "taken"}, r"^output folder 'taken' \(--out\): 'taken' is a file; give a folder$"),

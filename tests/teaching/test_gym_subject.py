@@ -484,7 +484,7 @@ def test_the_options_of_a_command_change_the_settings() -> None:
 @pytest.mark.parametrize(
     ("word", "said"),
     [
-        ("gym:FrozenLak-v1", "unknown Gymnasium environment 'FrozenLak-v1' (SUBTASK): did you mean 'FrozenLake-v1'?"),
+        ("gym:FrozenLak-v1", "(SUBTASK; one of your own is gym:MODULE:ID): did you mean 'FrozenLake-v1'? known: "),
         ("gym:Own/Thing-v0", "one of your own is gym:MODULE:ID"),
         ("gym:FrozenLake-v99", "did you mean 'FrozenLake-v1'?"),
         ("gym:nowhere:Thing-v0", "it needs what is not installed: ModuleNotFoundError: No module named 'nowhere'"),

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from graphlib import TopologicalSorter
 from heapq import heappop, heappush
 from itertools import pairwise
+from math import inf
 from typing import NamedTuple
 
 from ortools.sat.python import cp_model
@@ -92,7 +93,14 @@ class TransportModel:
         if not self.cell.track:
             return by_begin
         by_end = self._in_order(solver, lambda task: (solver.value(task.end), solver.value(task.begin)))
-        return min(by_begin, by_end, key=lambda found: cost(follow(self.cell, found), self._objective))
+        return min(by_begin, by_end, key=self._cost)
+
+    def _cost(self, sequence: tuple[int, ...]) -> float:
+        """What a run of the decisions costs; endless where it spoils a part that a track keeps waiting."""
+        try:
+            return cost(follow(self.cell, sequence), self._objective)
+        except BadInput:
+            return inf
 
     def _in_order(self, solver: cp_model.CpSolver, when: Callable[[Task], tuple[int, int]]) -> tuple[int, ...]:
         number = {task: n for n, task in enumerate(self.tasks.all) if solver.boolean_value(task.done)}

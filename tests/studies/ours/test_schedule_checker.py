@@ -7,7 +7,7 @@ from math import inf
 from typing import Any
 
 import pytest
-from hypothesis import event, given, settings
+from hypothesis import event, example, given, settings
 from hypothesis import strategies as st
 
 from lab.errors import WorkFailed
@@ -142,7 +142,55 @@ def least_of_all(cell: Cell) -> float | None:
     return best
 
 
+# A track keeps a part of this one waiting for longer than it may, if the decisions are taken in the order of their ends.
+BURNS: Plain = {
+    "name": "drawn",
+    "order": ["job0", "job0"],
+    "stations": [
+        {"name": "in", "kind": "storage", "capacity": "unlimited"},
+        {"name": "out", "kind": "storage", "capacity": "unlimited"},
+        {"name": "buffer", "kind": "buffer", "capacity": 1},
+        {
+            "name": "m0",
+            "kind": "machine",
+            "capacity": "unlimited",
+            "processing_s": 1.0,
+            "servers": 1,
+            "at_most_s": 20.0,
+        },
+        {"name": "m1", "kind": "machine", "capacity": 2, "processing_s": 1.0, "at_most_s": 20.0},
+        {"name": "m2", "kind": "machine", "capacity": 2, "processing_s": 1.0, "at_most_s": 20.0},
+    ],
+    "products": [
+        {
+            "name": "job0",
+            "routes": [
+                [
+                    {"station": "in"},
+                    {"station": "m1", "processing_s": 7.0, "buffer": "buffer"},
+                    {"station": "m0", "processing_s": 0.0},
+                    {"station": "m2", "processing_s": 9.0},
+                    {"station": "out"},
+                ]
+            ],
+        }
+    ],
+    "robots": [{"name": f"r{number}", "start": "in", "speed": speed} for number, speed in enumerate((1.0, 2.0, 1.0))],
+    "release_s": [0.0, 0.0],
+    "track": {
+        "stretches": [
+            ["out", "in", 9.0],
+            ["buffer", "in", 1.0],
+            ["m0", "in", 3.0],
+            ["m1", "out", 1.0],
+            ["m2", "m1", 7.0],
+        ]
+    },
+}
+
+
 @settings(max_examples=int(os.environ.get("LAB_RANDOM_CELLS", "8")), deadline=None)
+@example(cell=BURNS)
 @given(cell=plain_cells())
 def test_three_solvers_and_the_checker_agree(cell: Plain) -> None:
     """All lists of decisions, CP-SAT, and the search that fits the cell: by states, by tours, or the portfolio.
