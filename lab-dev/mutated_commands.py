@@ -86,6 +86,7 @@ def attempt(number: int, seed: int, room: Path) -> Outcome:
     command = READ_BY[number % len(READ_BY)]
     kind, chance = KINDS[command.kind], Random(f"{seed} command {number}")
     folder = room / "commands" / str(number)
+    shutil.rmtree(folder, ignore_errors=True)  # what a run that was stopped has left
     files = sound_files(folder, room, kind)
     damaged = chance.choice(files)
     content, how = mutated(damaged.read_bytes(), kind.content, chance)
