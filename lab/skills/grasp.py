@@ -58,7 +58,7 @@ class Grasp(AroundPart):
         if astray:
             yield from by_free_cells(bench, self.surveys, replace(goal, z=approach.z))
         yield from self.down(bench, policy, goal)
-        yield from robot.grip()
+        yield from robot.grip(bench.scene.grips_n[self.kind])
         bench.held = body
         if astray:
             yield from by_free_cells(bench, self.surveys, approach, self.kind)

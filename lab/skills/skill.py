@@ -77,7 +77,7 @@ class Bench:
         own = scene.kinds[kind]
         scene.robot.open_at_once(own.grip.width_m / 2 + FINGERS_OFF_M)
         scene.add(name, kind, own.foot_at(pose))
-        for _ in scene.robot.grip():
+        for _ in scene.robot.grip(scene.grips_n[kind]):
             scene.world.step()
         self.held = scene.body_of(name, kind)
 

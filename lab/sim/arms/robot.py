@@ -106,7 +106,7 @@ class Robot:
     def __init__(
         self, world: World, arm: Arm, speed: float, acceleration: float, grip_force: float, fine: bool = False
     ) -> None:
-        """Load the arm at the world's origin; `speed` [m/s], `acceleration` [m/s2], `grip_force` [N].
+        """Load the arm at the world's origin; `speed` [m/s], `acceleration` [m/s2], `grip_force` [N] unless `grip` is told.
 
         fine: it slows down for corners, its pads hold as areas do, not as points, and physics is solved in many iterations.
         """
@@ -210,9 +210,9 @@ class Robot:
             self.listener.rested(steps)
         yield from _stay(steps)
 
-    def grip(self) -> Iterator[None]:
-        """Close the fingers and keep pressing with the grip force."""
-        self._press(self.arm.fingers.strokes[0], self.grip_force)
+    def grip(self, force_n: float | None = None) -> Iterator[None]:
+        """Close the fingers and keep pressing, each with a force [N], by default the grip force."""
+        self._press(self.arm.fingers.strokes[0], self.grip_force if force_n is None else force_n)
         self.closed = True
         yield from self._pressed()
 

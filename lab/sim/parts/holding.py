@@ -3,7 +3,7 @@
 Two fingers that press with F hold by friction 2 mu F against the weight and what lifting adds, m (g + a).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
 
@@ -46,6 +46,11 @@ class Load:
             return inf
         return self.mass_kg * (GRAVITY_M_S2 + SLOW * acceleration_m_s2) / (2 * self.friction)
 
+    def chosen_n(self, acceleration_m_s2: float) -> float:
+        """The force [N] chosen for it: what friction needs with a margin, otherwise as usual, and gentler where it is light."""
+        chosen = max(MARGIN * self.needs_n(acceleration_m_s2), min(USUAL_N, GENTLE_N_KG * self.mass_kg))
+        return min(chosen, STRONGEST_N)
+
     def is_usual(self, force_n: float, acceleration_m_s2: float) -> bool:
         """Whether it is so far from what may go wrong that physics need not be fine, and nobody has to try it."""
         strong = force_n >= MARGIN * self.needs_n(acceleration_m_s2)
@@ -54,30 +59,25 @@ class Load:
         return strong and gentle and rides and self.friction >= ROUGH
 
 
-@dataclass(frozen=True)
-class Holding:
-    """The force of each finger [N]; fine: physics is solved finely, and a finger's pad holds as an area does, no point."""
-
-    force_n: float
-    fine: bool = False
+def grip_force_n(robot: RobotSettings, load: Load) -> float:
+    """The force [N] with which each finger holds a load: the one that the task gives, or the load's own."""
+    return robot.grip_force_n or load.chosen_n(robot.acceleration_m_s2)
 
 
-def holding(robot: RobotSettings, kinds: Iterable[Kind]) -> Holding:
-    """How a robot holds all that it may have to carry: with the force that its task gives, or one chosen for its parts."""
+def needs_fine(robot: RobotSettings, kinds: Iterable[Kind]) -> bool:
+    """Whether physics is to be solved finely, a finger's pad holding as an area does: one of the kinds is unusual."""
     loads = [Load.of(kind) for kind in kinds]
-    force_n = robot.grip_force_n or min(_chosen_n(loads, robot.acceleration_m_s2), STRONGEST_N)
-    usual = all(load.is_usual(force_n, robot.acceleration_m_s2) for load in loads)
-    return Holding(force_n, fine=not usual)
+    return not all(load.is_usual(grip_force_n(robot, load), robot.acceleration_m_s2) for load in loads)
 
 
-def check_friction(robot: RobotSettings, load: Load, force_n: float) -> None:
+def check_friction(robot: RobotSettings, load: Load) -> None:
     """BadInput where friction cannot hold a load that is lifted, with the force it needs, or cannot keep it on its pallet."""
     if load.carries * GRAVITY_M_S2 < robot.acceleration_m_s2:
         raise BadInput(
             f"robot.acceleration_m_s2 = {robot.acceleration_m_s2:g}: {load.name} would slide: friction {load.carries:.3g} "
             f"between the two allows up to {load.carries * GRAVITY_M_S2:.4g} m/s2"
         )
-    needed_n = load.needs_n(robot.acceleration_m_s2)
+    needed_n, force_n = load.needs_n(robot.acceleration_m_s2), grip_force_n(robot, load)
     if force_n >= needed_n:
         return
     says = (
@@ -89,10 +89,3 @@ def check_friction(robot: RobotSettings, load: Load, force_n: float) -> None:
         f"{says} from between the fingers: it needs {needed_n:.3g} N to be lifted with acceleration_m_s2 = "
         f"{robot.acceleration_m_s2:g}, allowed are up to {STRONGEST_N:g}"
     )
-
-
-def _chosen_n(loads: Sequence[Load], acceleration_m_s2: float) -> float:
-    """As firmly as friction needs with a margin, otherwise as usual, and gentler with what is light."""
-    needed = max(load.needs_n(acceleration_m_s2) for load in loads)
-    lightest = min(load.mass_kg for load in loads)
-    return max(MARGIN * needed, min(USUAL_N, GENTLE_N_KG * lightest))

@@ -10,7 +10,7 @@ from lab.errors import BadInput, WorkFailed
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import Robot
-from lab.sim.parts.holding import SLOW, Holding, Load, check_friction, holding
+from lab.sim.parts.holding import SLOW, Load, check_friction, grip_force_n, needs_fine
 from lab.sim.parts.kinds import Kind, Spot
 from lab.sim.world import World
 from lab.tasks.robot_fields import RobotSettings
@@ -28,32 +28,34 @@ ABOVE_M = 0.0005  # [m] between what stands on one another, at first
 
 def check_held(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind]) -> None:
     """BadInput where friction cannot hold a part, or where a part is lost in a trial; only what is unusual is tried."""
-    held = holding(robot, kinds)
+    fine = needs_fine(robot, kinds)
     for kind in kinds:
-        check_friction(robot, Load.of(kind), held.force_n)
-        if Load.of(kind).is_usual(held.force_n, robot.acceleration_m_s2) and not robot.is_file:
+        load = Load.of(kind)
+        check_friction(robot, load)
+        force_n = grip_force_n(robot, load)
+        if load.is_usual(force_n, robot.acceleration_m_s2) and not robot.is_file:
             continue
-        if went := tried(Trial(arm, kind, held, robot.speed_m_s, robot.acceleration_m_s2)):
-            raise BadInput(_refusal(robot, kind, held, went))
+        if went := tried(Trial(arm, kind, force_n, robot.speed_m_s, robot.acceleration_m_s2, fine)):
+            raise BadInput(_refusal(robot, load, force_n, went))
 
 
-def _refusal(robot: RobotSettings, kind: Kind, held: Holding, went: str) -> str:
-    load = Load.of(kind)
+def _refusal(robot: RobotSettings, load: Load, force_n: float, went: str) -> str:
     hint = "another mass_kg, friction or acceleration_m_s2 may do"
     if robot.grip_force_n is not None:
         hint = f"without grip_force_n a force is chosen, or {hint}"
     what = f"{load.name} of {load.mass_kg:g} kg, friction {load.friction:g}"
-    return f"robot.grip_force_n = {held.force_n:.3g}: {what}, is not held: in a trial {went}; {hint}"
+    return f"robot.grip_force_n = {force_n:.3g}: {what}, is not held: in a trial {went}; {hint}"
 
 
 class Trial(NamedTuple):
-    """A kind that an arm takes up, moving as fast [m/s] and speeding up as much [m/s2] as in its task."""
+    """A kind that an arm takes up with a force [N], moving as fast [m/s] and speeding up as much [m/s2] as in its task."""
 
     arm: Arm
     kind: Kind
-    held: Holding
+    force_n: float
     speed_m_s: float
     acceleration_m_s2: float
+    fine: bool = False
 
 
 @lru_cache(maxsize=64)
@@ -63,7 +65,7 @@ def tried(trial: Trial) -> str:
     if place is None:
         return ""
     with World() as world:
-        robot = Robot(world, trial.arm, trial.speed_m_s, trial.acceleration_m_s2, trial.held.force_n, trial.held.fine)
+        robot = Robot(world, trial.arm, trial.speed_m_s, trial.acceleration_m_s2, trial.force_n, trial.fine)
         bodies = _built(world, trial.kind, place)
         hand = _Hand(world, robot, trial.kind, bodies[0])
         robot.stand(_way(trial, place)[0])

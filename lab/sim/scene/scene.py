@@ -8,7 +8,7 @@ from lab.sim.arms.arm_models import arm_of
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import Robot
 from lab.sim.frames import Rgba, Vector
-from lab.sim.parts.holding import holding
+from lab.sim.parts.holding import Load, grip_force_n, needs_fine
 from lab.sim.parts.kinds import Kind, Spot, beside, comes_as, kinds_of
 from lab.sim.scene import station_bodies
 from lab.sim.scene.places import Layout, Places
@@ -36,9 +36,10 @@ class Scene:
         self.places = Places(task, self.kinds)
         world.box(TABLE, TABLE_M, TABLE_MIDDLE_M, TABLE_RGBA)
         robot = task.robot
-        held = holding(robot, self.kinds.values())
-        self.robot = Robot(world, arm, robot.speed_m_s, robot.acceleration_m_s2, held.force_n, held.fine)
-        self.stops_at_n = robot.force_limit_n or max(STOPS_AT_N, STOPS_AT_GRIPS * held.force_n)
+        self.grips_n = {name: grip_force_n(robot, Load.of(kind)) for name, kind in self.kinds.items()}
+        firmest_n, fine = max(self.grips_n.values()), needs_fine(robot, self.kinds.values())
+        self.robot = Robot(world, arm, robot.speed_m_s, robot.acceleration_m_s2, firmest_n, fine)
+        self.stops_at_n = robot.force_limit_n or max(STOPS_AT_N, STOPS_AT_GRIPS * firmest_n)
         for station in task.stations:
             self._build_station(station)
         for obstacle, place in zip(task.obstacles, layout.obstacles, strict=True):

@@ -7,8 +7,9 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sim.arms.arm_models import arm_of
-from lab.sim.parts.holding import Holding, Load, check_friction, holding
+from lab.sim.parts.holding import Load, check_friction, grip_force_n, needs_fine
 from lab.sim.parts.kinds import Kind, kinds_of
+from lab.tasks.robot_fields import RobotSettings
 from lab.tasks.task import Task
 from lab.tasks.task_file import load as load_task
 
@@ -18,10 +19,9 @@ def kinds(task: Task, **fields: float) -> list[Kind]:
     return list(kinds_of(task.changed(parts=parts), arm_of(task.robot).gripper).values())
 
 
-def held(mass_kg: float, friction: float, force_n: float | None = None) -> Holding:
-    task = load_task("toast")
-    robot = task.robot.model_copy(update={"grip_force_n": force_n})  # acceleration 2 m/s2
-    return holding(robot, kinds(task, mass_kg=mass_kg, friction=friction))
+def robot_of(force_n: float | None = None) -> RobotSettings:
+    """Accelerates with 2 m/s2."""
+    return load_task("toast").robot.model_copy(update={"grip_force_n": force_n})
 
 
 def test_friction_of_two_fingers_holds_weight_and_lifting() -> None:
@@ -39,7 +39,11 @@ def test_friction_of_two_fingers_holds_weight_and_lifting() -> None:
     ],
 )
 def test_where_nothing_is_said_the_force_is_chosen(mass_kg: float, friction: float, force_n: float) -> None:
-    assert held(mass_kg, friction).force_n == pytest.approx(force_n)
+    assert grip_force_n(robot_of(), Load("box", mass_kg, friction)) == pytest.approx(force_n)
+
+
+def test_a_force_that_the_task_gives_is_for_all() -> None:
+    assert [grip_force_n(robot_of(30.0), Load("box", mass_kg, 0.8)) for mass_kg in (0.01, 5.0)] == [30.0, 30.0]
 
 
 @pytest.mark.parametrize(
@@ -56,7 +60,8 @@ def test_where_nothing_is_said_the_force_is_chosen(mass_kg: float, friction: flo
     ],
 )
 def test_physics_is_fine_where_it_must_be(mass_kg: float, friction: float, force_n: float, fine: bool) -> None:
-    assert held(mass_kg, friction, force_n) == Holding(force_n, fine)
+    task = load_task("toast")
+    assert needs_fine(robot_of(force_n), kinds(task, mass_kg=mass_kg, friction=friction)) == fine
 
 
 @pytest.mark.parametrize(
@@ -80,19 +85,17 @@ def test_physics_is_fine_where_it_must_be(mass_kg: float, friction: float, force
     ],
 )
 def test_what_friction_cannot_hold_is_refused(load: Load, force_n: float, said: str) -> None:
-    robot = load_task("toast").robot
     with pytest.raises(BadInput, match="^robot.grip_force_n " + said):
-        check_friction(robot, load, force_n)
-    check_friction(robot, replace(load, friction=0.8), 200.0)
+        check_friction(robot_of(force_n), load)
+    check_friction(robot_of(200.0), replace(load, friction=0.8))
 
 
 def test_what_slides_off_its_pallet_is_refused() -> None:
-    robot = load_task("toast").robot  # 2 m/s2
-    check_friction(robot, Load("sign on pallet", 0.1, 0.8, carries=0.21), 25.0)
+    check_friction(robot_of(), Load("sign on pallet", 0.1, 0.8, carries=0.21))
     with pytest.raises(
         BadInput, match=r"^robot.acceleration_m_s2 = 2: sign on pallet would slide: friction 0.2 .* 1.962 m/s2$"
     ):
-        check_friction(robot, Load("sign on pallet", 0.1, 0.8, carries=0.2), 25.0)
+        check_friction(robot_of(), Load("sign on pallet", 0.1, 0.8, carries=0.2))
 
 
 def test_a_pallet_weighs_what_it_carries() -> None:

@@ -4,7 +4,6 @@ import pytest
 
 from lab.errors import BadInput
 from lab.sim.arms.arm_models import arm_of
-from lab.sim.parts.holding import Holding
 from lab.sim.parts.kinds import kinds_of
 from lab.sim.scene import hold_trial
 from lab.sim.scene.hold_trial import Trial, check_held, tried
@@ -43,5 +42,5 @@ def test_what_happened_is_told(task: Task) -> None:
     """Fingers that hardly press let the slice slide as it is lifted."""
     arm = arm_of(task.robot)
     kind = kinds_of(task, arm.gripper)["slice"]
-    assert tried(Trial(arm, kind, Holding(25.0), 0.5, 2.0)) == ""
-    assert tried(Trial(arm, kind, Holding(0.05, fine=True), 0.5, 2.0)) == "it is lost while it is lifted"
+    assert tried(Trial(arm, kind, 25.0, 0.5, 2.0)) == ""
+    assert tried(Trial(arm, kind, 0.05, 0.5, 2.0, fine=True)) == "it is lost while it is lifted"

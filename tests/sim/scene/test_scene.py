@@ -11,7 +11,7 @@ from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.kinds import Spot
 from lab.sim.scene.places import SLAB, Layout
 from lab.sim.scene.scene import Scene, in_grid, marker_of, pallet_of
-from lab.sim.scene.scene_check import places_of
+from lab.sim.scene.scene_check import check_scene, places_of
 from lab.sim.world import World
 from lab.tasks.task import Order, Task
 from lab.tasks.task_file import load
@@ -53,6 +53,18 @@ def test_a_built_scene_holds_everything_and_stays_as_it_was_put(task: Task, worl
         assert turned(turn) == pytest.approx(off[2], abs=5e-3)
     for obstacle, place in zip(task.obstacles, layout.obstacles, strict=True):
         assert tuple(world.pose(obstacle.name)[0][:2]) == place
+
+
+def test_each_part_is_held_by_a_force_of_its_own(world: World) -> None:
+    """A slice of 5 g is taken with 5 N, a cup of 1.5 kg in the same task with 6 x 1.5 kg x 11.01 m/s2 / (2 x 0.8) = 61.9 N."""
+    task, masses = load("breakfast"), {"slice": 0.005, "cup": 1.5}
+    parts = tuple(part.model_copy(update={"mass_kg": masses[part.name]}) for part in task.parts)
+    task = task.changed(parts=parts, robot=task.robot.model_copy(update={"grip_force_n": None}))
+    check_scene(task)
+    scene = Scene(world, task, (), as_written(task))
+    assert scene.grips_n["slice"] == pytest.approx(5.0)
+    assert scene.grips_n["cup"] == pytest.approx(61.9, abs=0.1)
+    assert scene.robot.grip_force == scene.grips_n["cup"]
 
 
 @pytest.mark.parametrize(("name", "order"), [("breakfast", ("slice", "cup")), ("fms-arm", ("rook", "sign", "rook"))])
