@@ -180,11 +180,11 @@ def test_only_who_has_the_seat_commands_but_anybody_stops(panel: SeatPanel, desk
 def test_an_emergency_stop_does_not_wait_for_the_lock(panel: SeatPanel, desk: RunDesk) -> None:
     """The session's thread is busy with the panel meanwhile."""
     with panel.lock:
-        server = threading.Thread(target=panel.said, args=(2, '{"command": "stop"}'))
-        server.start()
         pressed = threading.Event()
         desk.controls.on_change.append(pressed.set)
-        assert pressed.wait(20) or desk.controls.holds_arm
+        server = threading.Thread(target=panel.said, args=(2, '{"command": "stop"}'))
+        server.start()
+        assert pressed.wait(20)
         assert desk.controls.holds_arm
     server.join(20)
     assert not server.is_alive()

@@ -13,8 +13,8 @@ RAN = Ran(
 
 
 def test_a_run_with_drawn_faults_is_the_same_again() -> None:
-    """Two toasts in physics with the faults of seed 3, twice."""
-    one, two = carried_out(Setting("toast", 3)), carried_out(Setting("toast", 3))
+    """Two toasts in physics with the faults of seed 4, twice."""
+    one, two = carried_out(Setting("toast", 4)), carried_out(Setting("toast", 4))
     assert one.came in CAME
     assert one.drawn
     assert (one.rows, one.failure, one.makespan_s) == (two.rows, two.failure, two.makespan_s)
