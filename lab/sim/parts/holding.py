@@ -64,6 +64,13 @@ def grip_force_n(robot: RobotSettings, load: Load) -> float:
     return robot.grip_force_n or load.chosen_n(robot.acceleration_m_s2)
 
 
+def with_force(robot: RobotSettings, load: Load) -> str:
+    """How a refusal begins: the field, its value, who gave it, and what it is to hold."""
+    chosen = ", chosen for it" if robot.grip_force_n is None else ""
+    what = f"{load.name} of {load.mass_kg:g} kg, friction {load.friction:g}"
+    return f"robot.grip_force_n = {grip_force_n(robot, load):.3g}{chosen}: {what}"
+
+
 def needs_fine(robot: RobotSettings, kinds: Iterable[Kind]) -> bool:
     """Whether physics is to be solved finely, a finger's pad holding as an area does: one of the kinds is unusual."""
     loads = [Load.of(kind) for kind in kinds]
@@ -77,12 +84,10 @@ def check_friction(robot: RobotSettings, load: Load) -> None:
             f"robot.acceleration_m_s2 = {robot.acceleration_m_s2:g}: {load.name} would slide: friction {load.carries:.3g} "
             f"between the two allows up to {load.carries * GRAVITY_M_S2:.4g} m/s2"
         )
-    needed_n, force_n = load.needs_n(robot.acceleration_m_s2), grip_force_n(robot, load)
-    if force_n >= needed_n:
+    needed_n = load.needs_n(robot.acceleration_m_s2)
+    if grip_force_n(robot, load) >= needed_n:
         return
-    says = (
-        f"robot.grip_force_n = {force_n:g}: {load.name} of {load.mass_kg:g} kg, friction {load.friction:g}, would slip"
-    )
+    says = f"{with_force(robot, load)}, would slip"
     if needed_n == inf:
         raise BadInput(f"{says} from between the fingers, however strongly they press")
     raise BadInput(

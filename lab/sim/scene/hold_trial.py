@@ -10,7 +10,7 @@ from lab.errors import BadInput, WorkFailed
 from lab.sim.arms.arm import Arm
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.robot import Robot
-from lab.sim.parts.holding import SLOW, Load, check_friction, grip_force_n, needs_fine
+from lab.sim.parts.holding import SLOW, Load, check_friction, grip_force_n, needs_fine, with_force
 from lab.sim.parts.kinds import Kind, Spot
 from lab.sim.world import World
 from lab.tasks.robot_fields import RobotSettings
@@ -36,15 +36,14 @@ def check_held(robot: RobotSettings, arm: Arm, kinds: Sequence[Kind]) -> None:
         if load.is_usual(force_n, robot.acceleration_m_s2) and not robot.is_file:
             continue
         if went := tried(Trial(arm, kind, force_n, robot.speed_m_s, robot.acceleration_m_s2, fine)):
-            raise BadInput(_refusal(robot, load, force_n, went))
+            raise BadInput(_refusal(robot, load, went))
 
 
-def _refusal(robot: RobotSettings, load: Load, force_n: float, went: str) -> str:
+def _refusal(robot: RobotSettings, load: Load, went: str) -> str:
     hint = "another mass_kg, friction or acceleration_m_s2 may do"
     if robot.grip_force_n is not None:
         hint = f"without grip_force_n a force is chosen, or {hint}"
-    what = f"{load.name} of {load.mass_kg:g} kg, friction {load.friction:g}"
-    return f"robot.grip_force_n = {force_n:.3g}: {what}, is not held: in a trial {went}; {hint}"
+    return f"{with_force(robot, load)}, is not held: in a trial {went}; {hint}"
 
 
 class Trial(NamedTuple):

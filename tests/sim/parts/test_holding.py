@@ -90,6 +90,12 @@ def test_what_friction_cannot_hold_is_refused(load: Load, force_n: float, said: 
     check_friction(robot_of(200.0), replace(load, friction=0.8))
 
 
+def test_a_refusal_says_whether_the_force_was_chosen() -> None:
+    """6 kg x 11.01 m/s2 / (2 x 0.1) = 330 N, and 200 are the most."""
+    with pytest.raises(BadInput, match=r"^robot.grip_force_n = 200, chosen for it: slice of 6 kg"):
+        check_friction(robot_of(), Load("slice", 6.0, 0.1))
+
+
 def test_what_slides_off_its_pallet_is_refused() -> None:
     check_friction(robot_of(), Load("sign on pallet", 0.1, 0.8, carries=0.21))
     with pytest.raises(
