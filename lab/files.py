@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from errno import EFBIG, EINVAL
 from importlib.util import find_spec
+from math import isfinite
 from pathlib import Path
 from secrets import token_hex
 from shutil import rmtree
@@ -70,13 +71,19 @@ def read_limited(path: Path, most: int = MOST_BYTES) -> bytes:
 def json_of(content: str | bytes) -> Any:
     """What JSON holds, as its standard has it, without NaN and infinities. ValueError for anything else."""
     try:
-        return json.loads(content, parse_constant=_reject_constant)
+        return json.loads(content, parse_constant=_reject_constant, parse_float=_finite)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
 
 
 def _reject_constant(text: str) -> None:
     raise ValueError(f"{text} is not allowed")
+
+
+def _finite(text: str) -> float:
+    if not isfinite(number := float(text)):
+        raise ValueError(f"{text[:40]} is too large a number")
+    return number
 
 
 _DRAFT = ".run-"  # and eight characters: the folder of a draft

@@ -179,6 +179,7 @@ def test_only_a_regular_file_is_read(tmp_path: Path, make: Callable[[Path], None
         ("", "Expecting value"),
         ("[NaN]", "NaN is not allowed"),
         ("-Infinity", "-Infinity is not allowed"),
+        ("[-1e400]", "-1e400 is too large a number"),
         ("[" * 100_000, "nested too deeply"),
         ("1" * 5000, "limit"),
         (b"\xc3", "codec"),

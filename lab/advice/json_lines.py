@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from lab.errors import BadInput, WorkFailed
+from lab.files import json_of
 
 MAX_LINE_BYTES = 1 << 22
 _SHOWN = 40  # characters of each of two lines that differ
@@ -34,10 +35,7 @@ class EntryKinds:
 
         if len(line) > most_bytes:
             raise ValueError(f"{len(line)} bytes long, allowed {most_bytes}")
-        try:
-            record = json.loads(line.decode("utf-8"))
-        except RecursionError:
-            raise ValueError("nested too deeply") from None
+        record = json_of(line.decode("utf-8"))
         kind = record.pop("kind", None) if isinstance(record, dict) else None
         if not isinstance(kind, str) or kind not in self._kinds:
             raise ValueError(f"kind {kind!r} is none of {', '.join(self._kinds)}")

@@ -147,6 +147,10 @@ def test_without_a_folder_nothing_is_written_and_nothing_known() -> None:
         (line_of(SkillKept({"source": "learned"}, "a.safetensors")), "row: it has no name"),
         (line_of(SkillKept({"name": "grasp", "source": "learned"}, "a")), "row: it has no whole number of episodes"),
         (line_of(HEAD), "a second run in one journal"),
+        (
+            line_of(SkillKept({"name": "grasp", "episodes": 1}, "a")).replace("1", "1e400"),
+            "1e400 is too large a number",
+        ),
         ("[" * 100_000, "nested too deeply"),
         ("\xff", "kind"),
     ],
