@@ -45,7 +45,7 @@ model = "{new.arm}"               # {", ".join(MODELS)}, or a URDF file beside t
 start = "input"             # where the arm waits at time 0
 speed_m_s = 0.5             # along the path
 acceleration_m_s2 = 2.0
-# grip_force_n = 25.0       # of each finger; by default chosen from what the parts weigh and their friction{opening}
+# grip_force_n = 25.0       # of each finger, at most; by default chosen from what the parts weigh and their friction{opening}
 """
 
 

@@ -20,8 +20,9 @@ class RobotSettings(Record):
     out of the gripper and along whose y axis its fingers close, fingers, the joints that move them, and tip_m, how far the
     finger tips are out along z [m]. nearest_m [m]: nearer to its own axis than this the tool never goes. opening_m [m]:
     between the open fingers, by default all that the gripper has. base_up_m: its foot above the table [m]. grip_force_n: of
-    each finger [N], by default chosen for each kind of part from its mass and friction. force_limit_n: a protective stop
-    holds the arm that presses on something harder [N], by default 150 or six times the grip force.
+    each finger [N], at most: a part that is light for it is held with 1000 N/kg; by default chosen for each kind of part from
+    its mass and friction. force_limit_n: a protective stop holds the arm that presses on something harder [N], by default
+    150 or six times the grip force.
     """
 
     model: str = "up6"

@@ -15,7 +15,7 @@ GRAVITY_M_S2 = 9.81
 SLOW = 0.6  # of the robot's speed and acceleration, as skills rise with a part
 MARGIN = 6.0  # times what friction needs a force is chosen; measured: with 2.5 parts are lost where they touch machines
 USUAL_N = 25.0  # chosen where friction needs less, unless a part is lighter than this is gentle to
-GENTLE_N_KG = 1000.0  # newtons of grip for each kilogram that physics holds still in a usual step
+GENTLE_N_KG = 1000.0  # at most for each kilogram: pressed harder, light parts creep in physics, or are squeezed out
 GENTLE_N, USUAL_KG = 50.0, (0.02, 0.35)  # with a stronger grip, or others, forces are not found in a usual step
 STAYS = 2.0  # times the acceleration friction holds a part on a pallet that is far from sliding off
 ROUGH = 0.5  # friction from which on what holds by the numbers has always held
@@ -46,29 +46,35 @@ class Load:
             return inf
         return self.mass_kg * (GRAVITY_M_S2 + SLOW * acceleration_m_s2) / (2 * self.friction)
 
+    def held_n(self, asked_n: float, acceleration_m_s2: float) -> float:
+        """The force [N] with which it is held when one is asked for: gentler where it is light, and friction needs less."""
+        return min(asked_n, max(MARGIN * self.needs_n(acceleration_m_s2), GENTLE_N_KG * self.mass_kg))
+
     def chosen_n(self, acceleration_m_s2: float) -> float:
-        """The force [N] chosen for it: what friction needs with a margin, otherwise as usual, and gentler where it is light."""
-        chosen = max(MARGIN * self.needs_n(acceleration_m_s2), min(USUAL_N, GENTLE_N_KG * self.mass_kg))
-        return min(chosen, STRONGEST_N)
+        """The force [N] chosen where none is asked for: as usual, or what friction needs with a margin."""
+        usual = max(MARGIN * self.needs_n(acceleration_m_s2), USUAL_N)
+        return min(self.held_n(usual, acceleration_m_s2), STRONGEST_N)
 
     def is_usual(self, force_n: float, acceleration_m_s2: float) -> bool:
         """Whether it is so far from what may go wrong that physics need not be fine, and nobody has to try it."""
         strong = force_n >= MARGIN * self.needs_n(acceleration_m_s2)
-        gentle = USUAL_KG[0] <= self.mass_kg <= USUAL_KG[1] and force_n <= min(GENTLE_N, GENTLE_N_KG * self.mass_kg)
+        gentle = USUAL_KG[0] <= self.mass_kg <= USUAL_KG[1] and force_n <= GENTLE_N
         rides = self.carries * GRAVITY_M_S2 >= STAYS * acceleration_m_s2
         return strong and gentle and rides and self.friction >= ROUGH
 
 
 def grip_force_n(robot: RobotSettings, load: Load) -> float:
-    """The force [N] with which each finger holds a load: the one that the task gives, or the load's own."""
-    return robot.grip_force_n or load.chosen_n(robot.acceleration_m_s2)
+    """The force [N] with which each finger holds a load: the one that the task gives, if it is not too light for it."""
+    if robot.grip_force_n is None:
+        return load.chosen_n(robot.acceleration_m_s2)
+    return load.held_n(robot.grip_force_n, robot.acceleration_m_s2)
 
 
 def with_force(robot: RobotSettings, load: Load) -> str:
     """How a refusal begins: the field, its value, who gave it, and what it is to hold."""
-    chosen = ", chosen for it" if robot.grip_force_n is None else ""
-    what = f"{load.name} of {load.mass_kg:g} kg, friction {load.friction:g}"
-    return f"robot.grip_force_n = {grip_force_n(robot, load):.3g}{chosen}: {what}"
+    force_n = grip_force_n(robot, load)
+    chosen = "" if force_n == robot.grip_force_n else ", chosen for it"
+    return f"robot.grip_force_n = {force_n:.3g}{chosen}: {load.name} of {load.mass_kg:g} kg, friction {load.friction:g}"
 
 
 def needs_fine(robot: RobotSettings, kinds: Iterable[Kind]) -> bool:

@@ -42,15 +42,24 @@ def test_where_nothing_is_said_the_force_is_chosen(mass_kg: float, friction: flo
     assert grip_force_n(robot_of(), Load("box", mass_kg, friction)) == pytest.approx(force_n)
 
 
-def test_a_force_that_the_task_gives_is_for_all() -> None:
-    assert [grip_force_n(robot_of(30.0), Load("box", mass_kg, 0.8)) for mass_kg in (0.01, 5.0)] == [30.0, 30.0]
+@pytest.mark.parametrize(
+    ("mass_kg", "friction", "force_n"),
+    [
+        (5.0, 0.8, 30.0),
+        (0.01, 0.8, 10.0),  # light: 1000 N/kg
+        (0.01, 0.02, 6 * 0.01 * 11.01 / 0.04),  # and slippery
+        (0.01, 0.0, 30.0),
+    ],
+)
+def test_a_force_that_the_task_gives_is_the_most(mass_kg: float, friction: float, force_n: float) -> None:
+    assert grip_force_n(robot_of(30.0), Load("box", mass_kg, friction)) == pytest.approx(force_n)
 
 
 @pytest.mark.parametrize(
     ("mass_kg", "friction", "force_n", "fine"),
     [
         (0.04, 0.8, 25.0, False),
-        (0.04, 0.8, 41.0, True),  # firm: over 1000 N/kg
+        (0.04, 0.8, 60.0, False),  # held with 40 N
         (0.04, 0.8, 1.6, True),  # barely: 6 x 0.28 N are 1.65
         (0.04, 0.4, 25.0, True),  # slippery
         (0.019, 0.8, 19.0, True),  # light
