@@ -102,9 +102,12 @@ def _heights(shape: PartShape, gripper: Gripper) -> list[float]:
     """Where the finger tips may be above the foot [m]: near the top, for flat sides; near the middle; anywhere else."""
     low = max(OVER_FLOOR_M, shape.height_m - gripper.depth_m + PALM_M)
     high = shape.height_m - HOLD_M
+    if high < low - 1e-9:
+        return []
+    high = max(high, low)
     usual = min(max(shape.height_m - DEEP_M, low), high)
     middle = min(max(shape.foot_m - PAD_M / 2, low), high)
-    return [usual, middle, *np.linspace(low, high, 6).tolist()] if high >= low else []
+    return [usual, middle, *np.linspace(low, high, 6).tolist()]
 
 
 def _grip(shape: PartShape, pads: "_Pads", yaw: float, up_m: float) -> Grip:

@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import example
 from hypothesis import given as drawn
 from hypothesis import settings
 from hypothesis import strategies as st
@@ -100,6 +101,7 @@ def test_the_tool_goes_to_the_middle_of_what_it_grips_not_to_the_centre_of_mass(
 
 @settings(deadline=None, max_examples=60)
 @drawn(st.floats(0.004, 0.08), st.floats(0.004, 0.08), st.floats(0.004, 0.15))
+@example(0.0625, 0.03125, OVER_FLOOR_M + HOLD_M)
 def test_a_box_of_any_size_is_gripped_within_the_opening_or_refused_with_its_widths(
     x: float, y: float, z: float
 ) -> None:
