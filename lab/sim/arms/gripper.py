@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+PAD_M = 0.011  # how far from the middle of a finger's pad, of 3 x 3 cm, friction resists turning
+
 
 @dataclass(frozen=True)
 class Gripper:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lab.errors import WorkFailed
 from lab.sim.arms.arm import Arm
+from lab.sim.arms.gripper import PAD_M
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.arms.tool_path import YAW_ARM, evenly, rounded, sampled, slowed, way_of
 from lab.sim.urdf_reader import rotation
@@ -20,7 +21,7 @@ _TURNED_RAD = pi / 2  # [rad] from here on the tool begins a path by turning on 
 _SETTLE_STEPS = 12  # after a path ends
 GRIP_STEPS = 72  # 0.3 s to close or open
 _PEDESTAL_M, _PEDESTAL_RGBA = 0.09, (0.22, 0.23, 0.26, 1.0)  # radius
-_POINT_M, _PAD_M = 0.002, 0.011  # how far from the middle of a finger's pad, of 3 x 3 cm, friction resists turning
+_POINT_M = 0.002  # the same as PAD_M where a finger touches in a point
 _FINE_ITERATIONS = 200  # of the solver: with 60 a slice creeps 2 mm a second in fingers that a linkage moves
 
 Array = NDArray[np.float64]
@@ -117,7 +118,7 @@ class Robot:
         world.load(NAME, arm.urdf, (0.0, 0.0, arm.base_up_m), checked=True)
         if arm.base_up_m > 0.0:
             world.disc(f"{NAME} pedestal", _PEDESTAL_M, arm.base_up_m, (0.0, 0.0, arm.base_up_m / 2), _PEDESTAL_RGBA)
-        world.friction(NAME, 1.0, links=holding, spinning=_PAD_M if fine else _POINT_M)
+        world.friction(NAME, 1.0, links=holding, spinning=PAD_M if fine else _POINT_M)
         for follower, leader in fingers.leaders.items():
             world.gear(NAME, leader, follower, fingers.ratio(follower))
         if fine or len(fingers.joints) > 2:

@@ -1,13 +1,16 @@
 """How firmly a gripper holds parts by friction, and how finely physics must be solved so that they do not creep.
 
-Two fingers that press with F hold by friction 2 mu F against the weight and what lifting adds, m (g + a).
+Two fingers that press with F hold by friction 2 mu F against the weight and what lifting adds, m (g + a). Swung with a,
+a part whose middle is h from the finger tips also turns about them. What pads of radius r hold at once of a force and of a
+moment lies within an ellipsoid (Howe and Cutkosky 1996): 2 mu F >= m sqrt(g^2 + a^2 + (a h / r)^2).
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import inf
+from math import hypot, inf
 
 from lab.errors import BadInput
+from lab.sim.arms.gripper import PAD_M
 from lab.sim.parts.kinds import Kind
 from lab.tasks.robot_fields import STRONGEST_N, RobotSettings
 
@@ -25,26 +28,39 @@ ROUGH = 0.5  # friction from which on what holds by the numbers has always held
 class Load:
     """A part in the gripper, or a pallet with what stands on it: its mass, and the friction where the fingers touch it.
 
-    carries: the friction, of both, by which the part stays on its pallet; endless where nothing rides.
+    lever_m: from the finger tips up or down to its middle. carries: the friction, of both, by which the part stays on its
+    pallet; endless where nothing rides.
     """
 
     name: str
     mass_kg: float
     friction: float
+    lever_m: float = 0.0
     carries: float = inf
 
     @classmethod
     def of(cls, kind: Kind) -> "Load":
         """What is held when a kind is carried."""
-        stack = [one.part for one in kind.stack()]
+        mass_kg, moment, foot_m = 0.0, 0.0, 0.0
+        for one in kind.stack():
+            mass_kg += one.part.mass_kg
+            moment += one.part.mass_kg * (foot_m + one.shape.foot_m)
+            foot_m += one.height_m
         carries = inf if kind.rider is None else kind.part.friction * kind.rider.part.friction
-        return cls(kind.name, sum(part.mass_kg for part in stack), kind.part.friction, carries)
+        return cls(kind.name, mass_kg, kind.part.friction, abs(moment / mass_kg - kind.grip.up_m), carries)
 
     def needs_n(self, acceleration_m_s2: float) -> float:
         """The least force [N] of each finger that friction needs to lift it; endless for what has none."""
         if not self.friction:
             return inf
         return self.mass_kg * (GRAVITY_M_S2 + SLOW * acceleration_m_s2) / (2 * self.friction)
+
+    def needs_swung_n(self, acceleration_m_s2: float) -> float:
+        """The least force [N] of each finger with which it neither slips nor turns as it is swung; endless without friction."""
+        if not self.friction:
+            return inf
+        turning = acceleration_m_s2 * self.lever_m / PAD_M
+        return self.mass_kg * hypot(GRAVITY_M_S2, acceleration_m_s2, turning) / (2 * self.friction)
 
     def held_n(self, asked_n: float, acceleration_m_s2: float) -> float:
         """The force [N] with which it is held when one is asked for: gentler where it is light, and friction needs less."""
@@ -84,19 +100,19 @@ def needs_fine(robot: RobotSettings, kinds: Iterable[Kind]) -> bool:
 
 
 def check_friction(robot: RobotSettings, load: Load) -> None:
-    """BadInput where friction cannot hold a load that is lifted, with the force it needs, or cannot keep it on its pallet."""
+    """BadInput where friction cannot hold a load that is moved, with the force it needs, or cannot keep it on its pallet."""
     if load.carries * GRAVITY_M_S2 < robot.acceleration_m_s2:
         raise BadInput(
             f"robot.acceleration_m_s2 = {robot.acceleration_m_s2:g}: {load.name} would slide: friction {load.carries:.3g} "
             f"between the two allows up to {load.carries * GRAVITY_M_S2:.4g} m/s2"
         )
-    needed_n = load.needs_n(robot.acceleration_m_s2)
-    if grip_force_n(robot, load) >= needed_n:
-        return
-    says = f"{with_force(robot, load)}, would slip"
-    if needed_n == inf:
-        raise BadInput(f"{says} from between the fingers, however strongly they press")
-    raise BadInput(
-        f"{says} from between the fingers: it needs {needed_n:.3g} N to be lifted with acceleration_m_s2 = "
-        f"{robot.acceleration_m_s2:g}, allowed are up to {STRONGEST_N:g}"
-    )
+    lifted_n, swung_n = load.needs_n(robot.acceleration_m_s2), load.needs_swung_n(robot.acceleration_m_s2)
+    force_n, says = grip_force_n(robot, load), with_force(robot, load)
+    if lifted_n == inf:
+        raise BadInput(f"{says}, would slip from between the fingers, however strongly they press")
+    for needed_n, goes, moved in ((lifted_n, "slip from", "lifted"), (swung_n, "turn or slip", "swung")):
+        if force_n < needed_n:
+            raise BadInput(
+                f"{says}, would {goes} between the fingers: it needs {needed_n:.3g} N to be {moved} with acceleration_m_s2 "
+                f"= {robot.acceleration_m_s2:g}, allowed are up to {STRONGEST_N:g}"
+            )

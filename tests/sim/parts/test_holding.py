@@ -19,14 +19,23 @@ def kinds(task: Task, **fields: float) -> list[Kind]:
     return list(kinds_of(task.changed(parts=parts), arm_of(task.robot).gripper).values())
 
 
-def robot_of(force_n: float | None = None) -> RobotSettings:
-    """Accelerates with 2 m/s2."""
-    return load_task("toast").robot.model_copy(update={"grip_force_n": force_n})
+def robot_of(force_n: float | None = None, acceleration_m_s2: float = 2.0) -> RobotSettings:
+    return load_task("toast").robot.model_copy(update={"grip_force_n": force_n, "acceleration_m_s2": acceleration_m_s2})
 
 
 def test_friction_of_two_fingers_holds_weight_and_lifting() -> None:
     """1 kg x (9.81 + 0.6 x 2) m/s2 = 11.01 N, over 2 x 0.5."""
     assert Load("box", 1.0, 0.5).needs_n(2.0) == pytest.approx(11.01)
+
+
+def test_pads_hold_force_and_moment_of_what_is_swung() -> None:
+    """1 kg, its middle 3.3 cm under the tips of pads of 1.1 cm, swung with 4 m/s2: 9.81, 4 and 3 x 4 make 16.01 m/s2."""
+    load = Load("box", 1.0, 0.5, lever_m=0.033)
+    assert load.needs_swung_n(4.0) == pytest.approx(16.01, abs=0.01)
+    check_friction(robot_of(16.1, 4.0), load)
+    said = "^robot.grip_force_n = 15.9: box .* would turn or slip between the fingers: it needs 16 N to be swung with"
+    with pytest.raises(BadInput, match=said):
+        check_friction(robot_of(15.9, 4.0), load)
 
 
 @pytest.mark.parametrize(
@@ -124,3 +133,9 @@ def test_a_pallet_weighs_what_it_carries() -> None:
     assert loads[name].is_usual(25.0, 2.0)
     assert not loads[name].is_usual(25.0, 4.0)
     assert loads[part].carries == inf
+
+
+def test_the_lever_goes_from_the_tips_to_the_middle() -> None:
+    """A slice of 12 cm is taken 3 cm below its top."""
+    task = load_task("toast")
+    assert Load.of(kinds(task)[0]).lever_m == pytest.approx(0.03)

@@ -36,12 +36,13 @@ def test_a_light_and_slippery_slice_is_not_squeezed_out() -> None:
     check(load("toast-panda"), 100.0, mass_kg=0.003, friction=0.06)
 
 
-def test_a_slice_that_slips_when_it_is_swung_is_refused(task: Task) -> None:
-    """By the numbers friction holds it as it is lifted: 0.5 kg x (9.81 + 0.6 x 8) m/s2 / (2 x 0.3) = 12.2 N."""
-    hasty = task.changed(robot=task.robot.model_copy(update={"speed_m_s": 1.0, "acceleration_m_s2": 8.0}))
-    said = r"^robot.grip_force_n = 14: slice of 0.5 kg, friction 0.3, is not held: in a trial it slips by .* while it is swung"
+def test_a_slice_that_slips_when_it_is_swung_is_refused() -> None:
+    """Pads as areas would hold it by the numbers, with 22.8 N; those of this gripper hang on a linkage, and give way."""
+    task = load("toast-xarm6")
+    hasty = task.changed(robot=task.robot.model_copy(update={"speed_m_s": 1.0, "acceleration_m_s2": 4.0}))
+    said = r"^robot.grip_force_n = 25: slice of 0.9 kg, friction 0.3, is not held: in a trial it slips by .* while it is swung"
     with pytest.raises(BadInput, match=said):
-        check(hasty, 14.0, mass_kg=0.5, friction=0.3)
+        check(hasty, 25.0, mass_kg=0.9, friction=0.3)
 
 
 def test_what_happened_is_told(task: Task) -> None:
