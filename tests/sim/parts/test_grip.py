@@ -9,9 +9,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import example
+from hypothesis import example, settings
 from hypothesis import given as drawn
-from hypothesis import settings
 from hypothesis import strategies as st
 
 from lab.errors import BadInput
