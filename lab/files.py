@@ -67,7 +67,7 @@ def source_hash(package: Path = PACKAGE) -> str:
     """
     digest = hashlib.sha256()
     for path in [package] if package.is_file() else sorted(package.rglob("*.py")):
-        text = path.read_bytes()
+        text = read_limited(path)
         digest.update(f"{path.relative_to(package).as_posix()} {len(text)} ".encode() + text)
     return digest.hexdigest()
 
