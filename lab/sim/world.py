@@ -351,7 +351,9 @@ class World:
             renderer=self._p.ER_TINY_RENDERER,
             lightDirection=[0.3, -0.4, 1.0],
         )
-        return np.asarray(pixels, dtype=np.uint8).reshape(height, width, 4)[:, :, :3]
+        # An engine that was built without numpy gives a tuple of numbers from 0 to 255.
+        rgba = np.frombuffer(bytes(pixels), np.uint8) if isinstance(pixels, tuple) else np.asarray(pixels, np.uint8)
+        return rgba.reshape(height, width, 4)[:, :, :3]
 
     # ---- what a viewer sees -------------------------------------------------------------------------------------
 
