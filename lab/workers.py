@@ -56,19 +56,15 @@ class Task(Generic[Result]):
             return self.work(*self.arguments)
 
 
-def _nothing() -> None:
-    """What a worker does first where nothing is asked for."""
-
-
 class Workers:
     """This process and `count` - 1 others, None: one a core; with 1, everything is done here. In the end of the block they end.
 
-    first: what each of the others does as soon as it has begun, such as loading what it will need. What is handed out
-    are functions of modules with arguments that can be pickled, as they are at that moment; what cannot be is done here.
+    What is handed out are functions of modules with arguments that can be pickled, as they are at that moment; what cannot
+    be is done here.
     """
 
-    def __init__(self, count: int | None = 1, first: Callable[[], object] = _nothing) -> None:
-        self._others, self._first = (count or cores()) - 1, first
+    def __init__(self, count: int | None = 1) -> None:
+        self._others = (count or cores()) - 1
         self._handed_out: SimpleQueue[Task[Any] | None] = SimpleQueue()
         self._processes: list[subprocess.Popen[bytes]] = []
 
@@ -129,9 +125,6 @@ class Workers:
         """Give one worker task after task, as long as it takes them; the same function is sent once."""
         try:
             worker = self._listener.accept()
-            worker.send_bytes(bytes(ForkingPickler.dumps(self._first)))
-            worker.send_bytes(bytes(ForkingPickler.dumps(())))
-            worker.recv()
         except Exception:  # it did not begin, or this process ends: whatever it is, nothing was handed out yet
             return
         known = b""

@@ -14,7 +14,6 @@ from lab.errors import BadInput
 from lab.files import check_out
 from lab.production.conditions import Conditions
 from lab.production.report import Report
-from lab.production.run import load_for_work
 from lab.production.run import run as run_task
 from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import RunJournal
@@ -122,8 +121,8 @@ def run(
         raise BadInput(f"out '{out}' with the advisor {advising}: a journal can only name advisors that have a name")
     words = RunOptions(task=str(task), advisors=tuple(map(str, advising.names)), seed=seed, **given)
     with ExitStack() as stack:
-        beside = stack.enter_context(Workers(workers, load_for_work))
-        prepared = prepare(loaded, loaded.ordered(words.toasts, words.parts), seed)
+        beside = stack.enter_context(Workers(workers))
+        prepared = prepare(loaded, loaded.ordered(words.toasts, words.parts), seed, workers=beside)
         nowhere = stack.enter_context(TemporaryDirectory())
         folder = Path(nowhere) / "run" if out is None else Path(out)
         check_out(folder)

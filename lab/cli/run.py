@@ -63,42 +63,42 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Find or learn the skills, time them, find their best order, and carry them out in physics."""
-    from dataclasses import replace
-
-    from lab.files import check_out
-    from lab.production.conditions import Conditions
-    from lab.production.controls import Controls
-    from lab.production.operation.commands import pace
-    from lab.production.operation.run_desk import RunDesk
-    from lab.production.run import load_for_work
-    from lab.production.run import run as run_task
-    from lab.production.run_advice import RunAdvice
-    from lab.production.run_journal import RunJournal
-    from lab.production.run_options import RunOptions, begun, gone_on
-    from lab.skills.prepared_scene import prepare
-    from lab.tasks.task_file import load
-    from lab.teaching.lesson_options import DEFAULT_ADVISORS
-    from lab.view.summary import delivered_in_words, run_summary
     from lab.workers import Workers
 
-    if cyclic and order is not None:
-        raise BadInput(f"--cyclic and --order {order}: an order is one or the other")
-    given = RunOptions(
-        task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order, cyclic
-    )
-    if resume is None:
-        options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
-        loaded = load(options.task)
-    else:
-        options, loaded = gone_on(given, resume, out)
-    folder = resume or out or Path(f"{loaded.name}-run")
-    check_out(folder)
-    watched = page or view or "web" in options.advisors
-    controls = Controls(pace(speed or ("4" if watched else "max")))
-    lessons = options.lessons()
-    lessons.advising()
-    with Workers(workers, load_for_work) as beside:
-        prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed)
+    with Workers(workers) as beside:  # the others load what they need while this process does
+        from dataclasses import replace
+
+        from lab.files import check_out
+        from lab.production.conditions import Conditions
+        from lab.production.controls import Controls
+        from lab.production.operation.commands import pace
+        from lab.production.operation.run_desk import RunDesk
+        from lab.production.run import run as run_task
+        from lab.production.run_advice import RunAdvice
+        from lab.production.run_journal import RunJournal
+        from lab.production.run_options import RunOptions, begun, gone_on
+        from lab.skills.prepared_scene import prepare
+        from lab.tasks.task_file import load
+        from lab.teaching.lesson_options import DEFAULT_ADVISORS
+        from lab.view.summary import delivered_in_words, run_summary
+
+        if cyclic and order is not None:
+            raise BadInput(f"--cyclic and --order {order}: an order is one or the other")
+        given = RunOptions(
+            task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order, cyclic
+        )
+        if resume is None:
+            options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
+            loaded = load(options.task)
+        else:
+            options, loaded = gone_on(given, resume, out)
+        folder = resume or out or Path(f"{loaded.name}-run")
+        check_out(folder)
+        watched = page or view or "web" in options.advisors
+        controls = Controls(pace(speed or ("4" if watched else "max")))
+        lessons = options.lessons()
+        lessons.advising()
+        prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed, workers=beside)
         journal = begun(options, loaded, folder) if resume is None else RunJournal.resume(folder)
         try:
             with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:

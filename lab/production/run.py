@@ -26,10 +26,6 @@ from lab.teaching.teacher import Teacher
 from lab.workers import Workers
 
 
-def load_for_work() -> None:
-    """Loads what workers of a run need, while this process still prepares it."""
-
-
 def teach_all(
     prepared: Prepared,
     teacher: Teacher,

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
+from math import isfinite
 from pathlib import Path
 from typing import Any, Self
 
@@ -279,16 +280,18 @@ class World:
         force: float | Sequence[float] = 2000.0,
     ) -> None:
         """Set the position motors' targets [rad or m], with velocities fed forward; `force` [Nm or N] is the most they use."""
-        if not (np.isfinite(positions).all() and (velocities is None or np.isfinite(velocities).all())):
-            raise WorkFailed(f"joint targets of '{name}' are not finite: {list(positions)}, moving {velocities}")
+        targets = [float(v) for v in positions]
+        speeds = [0.0] * len(names) if velocities is None else [float(v) for v in velocities]
+        if not all(map(isfinite, targets + speeds)):
+            raise WorkFailed(f"joint targets of '{name}' are not finite: {targets}, moving {speeds}")
         entry = self._bodies[name]
         self._call(
             "setJointMotorControlArray",
             entry.number,
             [entry.joints[joint] for joint in names],
             self._p.POSITION_CONTROL,
-            targetPositions=[float(v) for v in positions],
-            targetVelocities=[0.0] * len(names) if velocities is None else [float(v) for v in velocities],
+            targetPositions=targets,
+            targetVelocities=speeds,
             forces=[force] * len(names) if isinstance(force, float) else list(force),
             positionGains=[0.3] * len(names),
             velocityGains=[1.0] * len(names),
@@ -368,13 +371,17 @@ class World:
 
     def frame(self) -> Frame:
         """Where everything is now."""
+        return Frame(self.time_s, self.poses())
+
+    def poses(self) -> dict[str, Pose]:
+        """Where each body of `bodies` is now, by its name."""
         poses: dict[str, Pose] = {}
         for name, entry in self._bodies.items():
             for link, shapes in entry.looks.items():
                 if shapes:
                     (x, y, z), (i, j, k, w) = self._pose(name, link)
                     poses[_label(name, link)] = (x, y, z, i, j, k, w)
-        return Frame(self.time_s, poses)
+        return poses
 
 
 def _label(name: str, link: str) -> str:

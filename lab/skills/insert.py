@@ -173,8 +173,8 @@ class Insert(Skill):
 
         A marker that is where it was belongs to nothing else: what is gone has not moved to another thing's place.
         """
-        view = self.seen.view
-        now = [*find_markers(self.grid.camera().picture(bench.scene.world), view)[0]]
+        view = self.grid.view(CHECK_PIXELS)
+        now = [*find_markers(self.grid.camera(CHECK_PIXELS).picture(bench.scene.world), view)[0]]
         missing = []
         for before in (marker for marker in self.seen.markers if marker.kind != "gripper"):
             near = min((m for m in now if m.kind == before.kind), key=lambda m: _far(m, before), default=None)

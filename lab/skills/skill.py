@@ -24,7 +24,7 @@ from lab.tasks.task_fields import Stage
 from lab.vision import GridView
 
 if TYPE_CHECKING:
-    from lab.skills.surveys import Surveys
+    from lab.skills.surveys import SurveyName, Surveys
     from lab.toolbox.policy import Policy
 
 LOST_M = 0.03  # [m] a part farther than this from where the fingers hold it is not held
@@ -180,6 +180,11 @@ class Skill:
         return None
 
     # ---- survey and aim ------------------------------------------------------------------------------------------
+
+    @property
+    def survey(self) -> "SurveyName | None":
+        """The survey that its set-up takes longest for, which can be made beside others; None: there is none."""
+        return None
 
     def setup(self, surveys: "Surveys") -> Problem:
         """Survey the scene and state the problem to learn. BadInput when it has no solution, naming what is in the way."""

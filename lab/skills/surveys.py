@@ -1,11 +1,12 @@
 """What the sub-tasks survey of one scene, each survey made once: the workspace, the surroundings of a station, the grids."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterable, Sequence
+from functools import partial
 from math import hypot
 
 import numpy as np
 
-from lab.errors import BadInput
+from lab.errors import BadInput, LabError
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.kinds import Spot, beside
 from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor
@@ -17,8 +18,10 @@ from lab.skills.camera_grids import RELEASE_ABOVE, TOUCH_CLEARANCE, SurveyedGrid
 from lab.skills.once import Made, once
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import CameraGrid
+from lab.workers import Workers
 
 Cell = tuple[int, ...]
+SurveyName = tuple[Hashable, ...]  # a method of Surveys and its arguments
 
 NEAR_SHAPE = (5, 5, 6)  # x, y, z around a part; z from the grasp upwards
 NEAR_STEP_M = (0.012, 0.012, 0.030)
@@ -73,6 +76,12 @@ class Surveys:
         self.places = places_of(task)
         self.kinds = self.places.kinds
         self.made: Made = {}
+
+    def make(self, names: Iterable[SurveyName | None], workers: Workers) -> None:
+        """Make surveys, each once, side by side; one that cannot be made is left to whoever asks for it, who hears why."""
+        missing = [name for name in dict.fromkeys(names) if name is not None and name not in self.made]
+        self.made.update(zip(missing, workers.each(partial(_survey, self), missing), strict=True))
+        self.made = {name: found for name, found in self.made.items() if found is not None}
 
     # ---- transfer: the whole workspace --------------------------------------------------------------------------
 
@@ -196,6 +205,15 @@ class Surveys:
     def camera_grid(self, station: str, kind: str) -> SurveyedGrid:
         """The camera's grid before a station, for a part of a kind."""
         return SurveyedGrid(self.task, self.layout, self.places, station, kind, self.parts)
+
+
+def _survey(surveys: Surveys, name: SurveyName) -> Survey | None:
+    method, *arguments = name
+    try:
+        found: Survey = getattr(surveys, str(method))(*arguments)
+    except LabError:
+        return None
+    return found
 
 
 def _between(one: ToolPose, other: ToolPose) -> list[ToolPose]:
