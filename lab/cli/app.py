@@ -35,7 +35,7 @@ class Command(NamedTuple):
 COMMANDS = {  # what is typed after `lab` -> the command
     "run": Command(
         "run",
-        "Find or learn the skills, time them, find their best order, and carry them out in physics.",
+        "Find or learn the skills, time them, find an order for them, and carry them out in physics.",
         "lab run toast --toasts 3",
     ),
     "operate": Command(
@@ -61,7 +61,7 @@ COMMANDS = {  # what is typed after `lab` -> the command
     ),
     "sequence": Command(
         "sequence",
-        "The high level alone: the order of the robot's transfers, beside the proven optimum.",
+        "The high level alone: the order of the robot's transfers, beside the proven optimum or bound.",
         "lab sequence toast --case II --toasts 4 --gantt order.svg",
         more="{words of sequencing}",
     ),

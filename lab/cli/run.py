@@ -52,7 +52,7 @@ def run(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Find or learn the skills, time them, find their best order, and carry them out in physics."""
+    """Find or learn the skills, time them, find an order for them, and carry them out in physics."""
     from dataclasses import replace
 
     from lab.files import check_out
