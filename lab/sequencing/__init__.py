@@ -180,7 +180,7 @@ _SHIPPED: dict[str, Sequencer] = {
     "srl": Sequencer(_srl, "the thesis's: learns from the reward of whole episodes, as printed", drawn=True),
     "srl-time": Sequencer(
         _srl_time,
-        "Q-learning that begins at a lower bound of the full model: close to heuristic search (learning real-time A*)",
+        "Q-learning that begins at a lower bound of the full model; close to the heuristic search LRTA*",
         react=_learned_on,
     ),
     "srl-improved": Sequencer(
@@ -210,7 +210,7 @@ BESIDE_METHODS = {  # by what an order may be that no method found alone
     "advised": "srl with advice",
     "unadvised": "srl that was never advised",
     "given": "the given order",
-    "cyclic": "the shortest cycle, repeated",
+    "cyclic": "one cycle, repeated",
 }
 
 
