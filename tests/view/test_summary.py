@@ -284,10 +284,13 @@ def test_sequences_that_went_otherwise(change: dict[str, Any], line: str) -> Non
 def test_a_sequence_with_advice() -> None:
     advice = {"requests": 12, "helped_steps": 40, "misleads": 1, "rejected_at_episode": None}
     lines = shown(sequence_summary(FOUND | {"advice": [advice, advice | {"rejected_at_episode": 95}]}))
+    assert lines[2].startswith("srl with advice: 110.00 s")
     assert lines[4:] == [
         "session 1: asked in 12 episodes, 40 moves advised",
         "session 2: asked in 12 episodes, 40 moves advised; rejected its advisor in episode 95",
     ]
+    unheard = shown(sequence_summary(FOUND | {"advice": [advice | {"helped_steps": 0}]}))
+    assert unheard[2].startswith("srl alone: 110.00 s")
 
 
 def test_a_sequence_in_drawn_times() -> None:
