@@ -38,9 +38,11 @@ def test_dependencies_have_lower_bounds_and_no_upper_ones(project: dict[str, Any
             assert not set(line) & set("<!~,"), line
 
 
-def test_the_version_stands_once(project: dict[str, Any]) -> None:
+def test_one_version_stands_everywhere(project: dict[str, Any], root: Path) -> None:
     assert "version" in project["project"]["dynamic"]
     assert lab.__version__.count(".") == 2
+    assert f"\nversion: {lab.__version__}\n" in (root / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\n## [{lab.__version__}]" in (root / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("mark", ["run-command", "test-command"])

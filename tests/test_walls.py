@@ -71,6 +71,7 @@ READS_ITS_OWN = (  # what ships with the lab, or what it has just written: nothi
     *("lab.view.meshcat", "lab.view.server_page", "lab.studies.report", "lab.cli.export", "lab.toolbox.remote_place"),
     *("lab.api.lessons", "lab.api.pictures", "lab.api.runs", "lab.api.scenes"),
 )
+BY_TABLE = ("lab", "lab.cli.app")  # what these load stands in a table of their own
 GENERATORS = {"Generator", "default_rng", "SeedSequence", "BitGenerator", "PCG64"}
 
 
@@ -152,7 +153,7 @@ def code_faults(module: str, tree: ast.Module) -> Iterator[str]:
             called = ast.unparse(node.func)
             if called in ("print", "pprint", "rich.print") and module != "lab.cli.output":
                 yield f"{line} prints: only the CLI does"
-            if called in ("__import__", "import_module", "importlib.import_module") and module != "lab":
+            if called in ("__import__", "import_module", "importlib.import_module") and module not in BY_TABLE:
                 yield f"{line} imports by a string, which no wall can see"
             if called.rpartition(".")[2] in GENERATORS and not (node.args or node.keywords):
                 yield f"{line} calls {called}() without a seed"
@@ -235,7 +236,7 @@ def test_the_architecture_is_the_one_that_is_told() -> None:
 
 
 def test_the_package_itself_loads_nothing_until_it_is_touched() -> None:
-    assert {item.target for item in house()["lab"][1] if item.at_load} == {"typing"}
+    assert not [item.target for item in house()["lab"][1] if item.at_load]
 
 
 def test_ctrl_c_is_heard_before_anything_is_loaded() -> None:
@@ -243,8 +244,8 @@ def test_ctrl_c_is_heard_before_anything_is_loaded() -> None:
 
 
 def test_starting_the_command_loads_nothing_heavy() -> None:
-    """From lab.cli.app along module-level imports no heavy library is reached, or `lab --help` takes seconds."""
-    pending, seen = ["lab.cli.app"], set[str]()
+    """From the commands along module-level imports no heavy library is reached, or `lab run --help` takes seconds."""
+    pending, seen = [module for module in house() if within(module, "lab.cli")], set[str]()
     while pending:
         module = pending.pop()
         if module in seen or module not in house():

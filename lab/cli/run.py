@@ -62,7 +62,7 @@ def run(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Find or learn the skills, time them, find their best order, and carry them out in physics."""
+    """Find or learn the skills, time them, find an order for them, and carry them out in physics."""
     from lab.workers import Workers
 
     with Workers(workers) as beside:  # the others load what they need while this process does

@@ -52,12 +52,14 @@ FILES = {
 class Report:
     """What a whole run came to; `began_s` is the clock's reading (`time.perf_counter`) when it began.
 
-    files: by name, those that are written; missing: why another one could not be.
+    method: by what the sequence was found (see `lab.sequencing.method_in_words`). files: by name, those that are written;
+    missing: why another one could not be.
     """
 
     prepared: Prepared
     taught: Taught
     sequenced: SequenceResult
+    method: str
     proven: Optimum
     outcome: Outcome
     recording: Recording
@@ -99,6 +101,7 @@ class Report:
             "retries": list(outcome.retries),
             "skills": list(self.taught.rows.values()),
             "sequence": list(self.sequenced.sequence),
+            "method": self.method,
             "predicted_makespan_s": self.sequenced.cost,
             "measured_makespan_s": outcome.schedule.makespan_s if self.success else None,
             "optimal_makespan_s": self.proven.optimal_s,

@@ -138,7 +138,9 @@ def run(
     outcome, recording = carry_out(prepared, taught.cell, order.found.sequence, conditions, teacher.tell, relearner)
     receipts = None if advice is None else advice.receipts(order)
     report = Report(
-        prepared, taught, order.found, order.proven, outcome, recording, began, receipts=receipts, cycle=order.cycle
+        *(prepared, taught, order.found, order.used, order.proven, outcome, recording, began),
+        receipts=receipts,
+        cycle=order.cycle,
     )
     teacher.tell(PhaseBegan("draw", 1))
     write_files(report, out, drawn, workers)

@@ -161,9 +161,9 @@ PLATE, BUFFER = "pose = [0.0, 0.80, 0.0]", "pose = [0.42, 0.56, 0.0]"
         (
             'learner = "dyna-q"',
             'learner = "qq"',
-            "t.toml: line 141: unknown learner 'qq' (subtasks.transfer.learner): ",
+            "t.toml: line 142: unknown learner 'qq' (subtasks.transfer.learner): ",
         ),
-        ('gate = "ccrl"', 'gate = "cc"', "t.toml: line 142: unknown gate 'cc' (subtasks.transfer.gate): "),
+        ('gate = "ccrl"', 'gate = "cc"', "t.toml: line 143: unknown gate 'cc' (subtasks.transfer.gate): "),
         (
             'process = "butter" ',
             "processing_s = 9.0\nprocess = 'butter' #",
