@@ -73,7 +73,8 @@ def replay(
     from lab.view.summary import replay_summary, table_of
 
     if movie is not None and (folder is None or not is_run(folder)):
-        raise BadInput(f"'{folder or ''}': --movie goes with the folder of a run (lab run --out)")
+        where = "" if folder is None else f"'{folder}': "
+        raise BadInput(f"{where}--movie goes with the folder of a run (lab run --out)")
     if folder is None:
         rows = session_rows(Toolbox(toolbox))
         show({"sessions": rows}, as_json, lambda d: table_of(d["sessions"], ("session", "problem", "advisor", "state")))
