@@ -22,6 +22,7 @@ WIDTH, HEIGHT, STRIP = 560, 350, 34  # pixels of the picture, and of the strip w
 FRAMES_PER_S = 10
 STAYS_S = 1.0  # [s] of the movie: the last picture stays for so long
 READABLE_S = 0.8  # [s] of the movie: what is told for less is not shown
+SAME_S = 0.01  # times that are nearer are the same
 COLOURS = 256  # of a GIF
 PAPER, INK, PALE, ACCENT = (255, 255, 255), (38, 50, 66), (120, 132, 146), (31, 97, 141)
 
@@ -78,8 +79,10 @@ def _pictures(replay: Replay, times_s: Floats, speed: float) -> "Iterator[Image]
         told = [words for at_s, words in captions if at_s <= time_s]
         middle = HEIGHT + STRIP / 2 + 1
         clock = f"{int(time_s) // 60}:{int(time_s) % 60:02d}   {speed:.0f} ×"
-        pen.text((WIDTH - 10, middle), clock, PALE, words_font, anchor="rm")
         pen.text((10, middle), told[-1] if told else "", INK, words_font, anchor="lm")
+        free = WIDTH - 20 - pen.textlength(clock, words_font)  # the end of words that are too long is not seen
+        pen.rectangle((free, HEIGHT, WIDTH, HEIGHT + STRIP), PAPER)
+        pen.text((WIDTH - 10, middle), clock, PALE, words_font, anchor="rm")
         pen.rectangle((0, HEIGHT, WIDTH, HEIGHT + 2), paper)
         pen.rectangle((0, HEIGHT, round(WIDTH * time_s / max(replay.duration_s, 1e-9)), HEIGHT + 2), ACCENT)
         yield picture
@@ -98,15 +101,16 @@ def _around(replay: Replay, moments: Moments) -> Floats:
 
 
 def readable(replay: Replay, speed: float) -> list[tuple[float, str]]:
-    """What is told when a move begins, and what is told for long enough to be read at this speed."""
+    """What is told for long enough to be read at this speed, from when on; in between, what was told when the move began."""
     ends = [at_s for at_s, _ in replay.captions[1:]] + [replay.duration_s]
-    begun: set[float] = set()
+    begun, move = -1.0, ""
     kept = []
     for (at_s, words), end_s in zip(replay.captions, ends, strict=True):
-        begins = at_s not in begun and any(abs(at_s - begin_s) < 0.01 for begin_s in replay.begins_s)
-        begun.add(at_s)
-        if begins or (end_s - at_s) / speed >= READABLE_S:
-            kept.append((at_s, words))
+        if at_s > begun and any(abs(at_s - begin_s) < SAME_S for begin_s in replay.begins_s):
+            begun, move = at_s, words
+        long = (end_s - at_s) / speed >= READABLE_S
+        if long or move:
+            kept.append((at_s, words if long else move))
     return kept
 
 

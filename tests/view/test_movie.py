@@ -49,9 +49,16 @@ def test_it_moves_for_as_long_as_was_asked_for(page: Path, tmp_path: Path, form:
     assert [path.name for path in out.parent.iterdir()] == [out.name]
 
 
-def test_words_that_stay_too_short_are_left_out(page: Path) -> None:
-    assert [words for _, words in readable(read_replay(page), 10.0)] == ["It begins", "It rolls"]
-    assert len(readable(read_replay(page), 1.0)) == 5
+def test_words_that_stay_too_short_give_way_to_those_of_the_move(page: Path) -> None:
+    shown = readable(read_replay(page), 10.0)
+    assert [(at_s, words) for at_s, words in shown if words != "It begins"] == [(4.0, "It rolls")]
+    assert shown[-1] == (99.0, "It begins")
+    assert [words for _, words in readable(read_replay(page), 1.0)][1:] == [
+        "It is begun",
+        "A step",
+        "It rolls",
+        "It stops",
+    ]
 
 
 def test_a_name_or_a_folder_that_cannot_be_is_refused_before_a_picture_is_drawn(page: Path, tmp_path: Path) -> None:
