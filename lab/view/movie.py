@@ -37,9 +37,15 @@ def write_movie(
     """
     if out.suffix.lower() not in FORMATS:
         raise BadInput(f"movie '{out}': its name must end in {' or '.join(FORMATS)}")
-    if out.is_dir() or not os.access(nearest(out.parent), os.W_OK | os.X_OK):
-        raise BadInput(f"movie '{out}' cannot be written: it is a folder, or its folder is not writable")
+    try:
+        fits = not out.is_dir() and os.access(nearest(out.parent), os.W_OK | os.X_OK)
+    except OSError:  # a name that cannot be
+        fits = False
+    if not fits:
+        raise BadInput(f"movie '{str(out)[:100]}' cannot be written: it is a folder, or its folder is not writable")
     replay = read_replay(page)
+    if replay.duration_s <= 0.0:
+        raise BadInput(f"'{page}' has a single picture: nothing moves in it")
     count = max(2, round(seconds * FRAMES_PER_S))
     times_s = np.linspace(0.0, replay.duration_s, count)
     pictures = []

@@ -69,3 +69,10 @@ def test_a_name_or_a_folder_that_cannot_be_is_refused_before_a_picture_is_drawn(
     for name in ("ball.mp4", "folder.gif", "replay.html/ball.gif"):
         with pytest.raises(BadInput, match=name):
             write_movie(page, tmp_path / name, 1.0, never)
+
+
+def test_a_replay_in_which_nothing_moves_is_refused(tmp_path: Path) -> None:
+    ball = Body("ball", (Shape("sphere", (0.2,)),))
+    page = replay_html(Recording((ball,), [Frame(0.0, {"ball": (0, 0, 0, 0, 0, 0, 1)})]), tmp_path / "replay.html")
+    with pytest.raises(BadInput, match="nothing moves"):
+        write_movie(page, tmp_path / "ball.gif", 1.0)
