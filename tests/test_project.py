@@ -51,4 +51,4 @@ def test_the_readme_has_each_set_up_command_on_one_line(root: Path, mark: str) -
     assert found, f"README.md: no fenced block follows <!-- {mark} -->"
     command = rest.partition("\n```")[0]
     assert "\n" not in command
-    assert command.startswith("python3.11 -m venv ")
+    assert command.startswith("python3 -m venv ")

@@ -38,7 +38,7 @@ ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
         *(f"lab.vision.{name}" for name in ("markers", "hidden_discs", "part_outline", "picture_files")),
         *(f"lab.vision.{name}" for name in ("lens", "calibration", "photo_effects")),
     },
-    "PIL": set(),
+    "PIL": {"lab.view.movie"},
     "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
     "ortools": {
         *(
@@ -271,7 +271,7 @@ def faults(module: str, source: str) -> list[str]:
         ("lab.sim.arms.robot", "def f():\n    import pybullet as p", "lab.sim.arms.robot:2 imports pybullet"),
         ("lab.view.plots", "from meshcat.geometry import Box", "allowed in ['lab.view.meshcat']"),
         ("lab.skills.insert", "import cv2.gapi", "allowed in ['lab.vision.calibration', 'lab.vision.hidden_discs', "),
-        ("lab.view.plots", "from PIL import Image", "allowed in no module"),
+        ("lab.view.plots", "import websockets", "allowed in no module"),
         (
             "lab.sequencing.methods.exact",
             "from ortools.sat.python import cp_model",

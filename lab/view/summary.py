@@ -131,7 +131,10 @@ def run_replay_summary(replay: Mapping[str, Any]) -> RenderableType:
     if replay["over"]:
         over = replay["failure"] or f"all of {counted(replay['delivered'], 'part')} delivered"
     skills = counted(len(replay["skills"]), "skill")
-    return Group(Text(f"{replay['task']} in {replay['run']}: {skills} there"), table, Text(over))
+    lines = [Text(over)]
+    if movie := replay.get("movie"):
+        lines.append(Text(f"{movie['file']}: {movie['frames']} pictures, {movie['speed']:.3g} x real time"))
+    return Group(Text(f"{replay['task']} in {replay['run']}: {skills} there"), table, *lines)
 
 
 def _event_text(event: Mapping[str, Any]) -> str:
