@@ -2,23 +2,21 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from importlib.metadata import packages_distributions, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.files import assets_folder, read_limited
-from lab.learning.sources import sources
+from lab.files import assets_folder, read_limited, source_hash
 from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import one_robot
 from lab.sim import urdf_reader
 from lab.sim.scene.places import Layout
-from lab.sim.world import TIME_STEP, World
+from lab.sim.world import TIME_STEP, World, engine
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Status
@@ -29,8 +27,6 @@ from lab.toolbox.registry import Toolbox
 
 RECORDS = "durations"  # the kind of record in the toolbox
 LONGEST_S = 86_400.0  # of a move or a process
-MEASURED_BY = (__name__,)  # the modules that carry moves out, with all that they import
-DECIDED_BY_RESULT = ("lab.sequencing", "lab.learning", "lab.advice", "lab.view")  # moves and policies hold it
 
 Way = Pair | Carried
 
@@ -218,22 +214,20 @@ def kept_durations(toolbox: Toolbox, key: str, skillset: SkillSet) -> Durations 
         raise BadInput(f"record '{key}' in toolbox {toolbox.address}: {error}") from None
 
 
-def durations_key(
-    task: Task, layout: Layout, skillset: SkillSet, policies: Mapping[str, Policy], modules: Sequence[str] = MEASURED_BY
-) -> str:
-    """A hash of all that the durations depend on: task and its files, layout, moves, policies, assets, source and libraries.
+def durations_key(task: Task, layout: Layout, skillset: SkillSet, policies: Mapping[str, Policy]) -> str:
+    """A hash (24 hex digits) of all that the durations depend on.
 
-    `modules` are the ones that measure. WorkFailed when a source or a library's version cannot be found.
+    These are the task and its files, the layout, the moves, the policies, the assets, all of the lab's own source, and
+    the physics engine. Raises WorkFailed when the engine's version is not known.
     """
-    code = sources(modules, DECIDED_BY_RESULT)
     decides = {
         "task": task.model_dump(mode="json", exclude={"name", "title", "sequencing", "subtasks", "faults"}),
         "obstacles": layout.obstacles,
         "moves": [asdict(skillset.moves), [*skillset.legs]],
         "policies": {name: [policy.signature, _hash(policy.q.tobytes())] for name, policy in policies.items()},
         "assets": {path.name: _hash(read_limited(path)) for path in files_of(task)},
-        "source": code.texts,
-        "libraries": _versions(code.libraries),
+        "source": source_hash(),
+        "engine": engine(),
     }
     return _hash(json.dumps(decides, sort_keys=True).encode())[:24]
 
@@ -249,11 +243,3 @@ def files_of(task: Task) -> list[Path]:
 
 def _hash(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-def _versions(libraries: Collection[str]) -> dict[str, str]:
-    distributions = packages_distributions()
-    for name in libraries:
-        if name not in distributions:
-            raise WorkFailed(f"the version of the library '{name}' cannot be found")
-    return {name: version(distributions[name][0]) for name in libraries}

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Self
 
@@ -22,6 +23,17 @@ PART_ROLLING = 0.0005  # [m] and its rolling, unless it is a box: without, a bal
 Array = NDArray[np.float64]
 Position = Sequence[float] | Array
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
+ENGINES = ("pybullet", "pybullet-arm64")  # the distributions that bring the module pybullet; one of them is installed
+
+
+def engine() -> str:
+    """The name and version of the installed physics engine, such as "pybullet 3.2.7"; raises WorkFailed when there is none."""
+    for name in ENGINES:
+        try:
+            return f"{name} {version(name)}"
+        except PackageNotFoundError:
+            continue
+    raise WorkFailed(f"no physics engine is installed ({' or '.join(ENGINES)}): install the lab again")
 
 
 @dataclass
@@ -339,7 +351,9 @@ class World:
             renderer=self._p.ER_TINY_RENDERER,
             lightDirection=[0.3, -0.4, 1.0],
         )
-        return np.asarray(pixels, dtype=np.uint8).reshape(height, width, 4)[:, :, :3]
+        # An engine that was built without numpy gives a tuple of numbers from 0 to 255.
+        rgba = np.frombuffer(bytes(pixels), np.uint8) if isinstance(pixels, tuple) else np.asarray(pixels, np.uint8)
+        return rgba.reshape(height, width, 4)[:, :, :3]
 
     # ---- what a viewer sees -------------------------------------------------------------------------------------
 
