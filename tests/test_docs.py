@@ -4,12 +4,12 @@ import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 import typer
+from page_examples import run
 
 import lab
 from lab.cli.app import made
@@ -18,7 +18,6 @@ from lab.studies import STUDIES
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
-BLOCK = re.compile(r"^```(python|sh)\n(\S.*?)^```", re.MULTILINE | re.DOTALL)  # one that begins indented is a fragment
 MADE = re.compile(r"^<!-- made: (\S+) -> (\S+) -->\n!\[.*?\]\((\S+)\)", re.MULTILINE)
 KEPT = "LAB_DOCS_PICTURES"  # set: the pictures in docs/ are made anew by the pages that show them
 PAGES = sorted(DOCS.glob("**/*.md"))
@@ -41,14 +40,8 @@ def test_the_examples_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pyt
     monkeypatch.setenv("LAB_TOOLBOX", str(tmp_path / "toolbox"))
     monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:{os.environ['PATH']}")
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    text, names = page.read_text(encoding="utf-8"), {"__name__": page.stem}
-    for kind, block in BLOCK.findall(text):
-        if kind == "python":
-            exec(compile(block, str(page), "exec"), names)
-        elif page.parent.name == "lessons":
-            ran = subprocess.run(["bash", "-euo", "pipefail", "-c", block], capture_output=True, text=True, check=False)
-            assert ran.returncode == 0, ran.stderr[-2000:]
-    for made_as, kept, shown in MADE.findall(text):
+    run(page, commands=page.parent.name == "lessons")
+    for made_as, kept, shown in MADE.findall(page.read_text(encoding="utf-8")):
         (file,) = work.glob(made_as)
         assert kept == shown
         assert (page.parent / kept).is_file() or KEPT in os.environ
