@@ -4,8 +4,8 @@ import subprocess
 import sys
 import tomllib
 from itertools import chain
-from runpy import run_path
 from pathlib import Path
+from runpy import run_path
 from typing import Any
 
 import pytest
