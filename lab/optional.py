@@ -7,7 +7,7 @@ from lab.errors import BadInput, out_of_memory
 
 EXTRAS = {  # extra of pyproject.toml -> the optional libraries that it brings, by the names they are imported under
     "dask": ("distributed",),
-    "data": ("minari", "pandas", "tensorboard"),
+    "data": ("h5py", "minari", "pandas", "tensorboard"),
     "remote": ("fsspec", "s3fs"),
     "tune": ("optuna",),
 }

@@ -56,7 +56,12 @@ def without(tmp_path: Path) -> Without:
         return subprocess.run(
             [sys.executable, "-c", code, *words[len(words) == 1 :]],
             cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}", "LAB_TOOLBOX": str(tmp_path / "toolbox")},
+            env={
+                **os.environ,
+                "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}",
+                "LAB_TOOLBOX": str(tmp_path / "toolbox"),
+                "MINARI_DATASETS_PATH": str(tmp_path / "minari"),
+            },
             capture_output=True,
             text=True,
             check=False,
@@ -106,7 +111,7 @@ TABLE = "import lab; lab.teach('world-1', advisor=None, episodes=2).{}"
         ("botocore", ("toolbox", "list", "--toolbox", "s3://lab/box"), "toolbox s3://lab/box: {} botocore"),
         ("gcsfs", ("toolbox", "list", "--toolbox", "gs://lab/box"), "toolbox gs://lab/box: {} gcsfs"),
         ("minari", (*REPLAY, "--minari", "lab/kept-v0"), "dataset 'lab/kept-v0': {} '.[data]' {}"),
-        ("h5py", (*REPLAY, "--minari", "lab/kept-v0"), "dataset 'lab/kept-v0': {} h5py"),
+        ("h5py", (*REPLAY, "--minari", "lab/kept-v0"), "dataset 'lab/kept-v0': {} '.[data]' {}"),
         ("tensorboard", (*REPLAY, "--tensorboard", "curves"), "folder 'curves': {} '.[data]' {}"),
     ],
 )
@@ -123,6 +128,13 @@ def test_a_command_says_what_to_install(
     assert (ran.returncode, ran.stderr.splitlines()[-1]) == (2, f"lab: {line}")
     assert "Traceback" not in ran.stderr
     assert json.loads(ran.stdout) == {"error": line, "exit_code": 2}
+    assert {path.name for path in tmp_path.iterdir()} <= {
+        "sitecustomize.py",
+        "__pycache__",
+        "toolbox",
+        "small.txt",
+        "kept",
+    }
 
 
 @pytest.mark.parametrize(

@@ -86,6 +86,7 @@ class StepRecord:
         from gymnasium.spaces import Discrete
 
         with optional(f"dataset '{dataset_id}'"):
+            import h5py  # noqa: F401  # Minari misses it only when it has made the dataset's folder
             from minari import create_dataset_from_buffers
             from minari.data_collector import EpisodeBuffer
             from minari.storage import get_dataset_path
@@ -104,7 +105,7 @@ class StepRecord:
             for n, one in enumerate(self.episodes)
         ]
         try:
-            with optional(f"dataset '{dataset_id}'"), warnings.catch_warnings():  # Minari loads its storage here
+            with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # about authors and links that a session has not
                 create_dataset_from_buffers(
                     dataset_id,
