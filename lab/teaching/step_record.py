@@ -86,7 +86,7 @@ class StepRecord:
         from gymnasium.spaces import Discrete
 
         with optional(f"dataset '{dataset_id}'"):
-            import h5py  # noqa: F401  # Minari misses it only when it has made the dataset's folder
+            import h5py  # type: ignore[import-untyped]  # noqa: F401  # Minari misses it only with a folder half made
             from minari import create_dataset_from_buffers
             from minari.data_collector import EpisodeBuffer
             from minari.storage import get_dataset_path
