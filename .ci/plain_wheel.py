@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from runpy import run_path
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -138,10 +139,11 @@ def families(place: Place) -> None:
 
 
 def lessons(place: Place) -> None:
-    """The five lessons, their commands and their Python."""
-    script = (ROOT / "lab-dev" / "page_examples.py").read_text(encoding="utf-8")
-    for page in sorted((ROOT / "docs" / "lessons").glob("*.md")):
-        place.called(["-c", script, str(page)], f"the lesson {page.stem}")
+    """The pages whose commands are run, the five lessons among them: their commands and their Python."""
+    script = ROOT / "lab-dev" / "page_examples.py"
+    for folder in run_path(str(script))["COMMANDS_RUN"]:
+        for page in sorted((ROOT / "docs" / folder).glob("*.md")):
+            place.called(["-c", script.read_text(encoding="utf-8"), str(page)], f"the page {folder}/{page.stem}")
 
 
 def refused(place: Place) -> None:

@@ -40,7 +40,7 @@ def test_the_examples_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pyt
     monkeypatch.setenv("LAB_TOOLBOX", str(tmp_path / "toolbox"))
     monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:{os.environ['PATH']}")
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    run(page, commands=page.parent.name == "lessons")
+    run(page)
     for made_as, kept, shown in MADE.findall(page.read_text(encoding="utf-8")):
         (file,) = work.glob(made_as)
         assert kept == shown
