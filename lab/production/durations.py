@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,6 +25,7 @@ from lab.skills.skillset import Carried, Pair, SkillSet, products, stations
 from lab.tasks.task import Order, Task
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
+from lab.workers import Workers
 
 RECORDS = "durations"  # the kind of record in the toolbox
 LONGEST_S = 86_400.0  # of a move or a process
@@ -42,10 +44,10 @@ class TimedMove(NamedTuple):
 class Durations:
     """Measured times [s]: the robot's moves, empty and with what it carries; its services, and what machines take."""
 
-    empty_s: Mapping[Pair, float]
-    loaded_s: Mapping[Carried, float]
-    process_s: Mapping[str, float]
-    service_s: Mapping[Pair, float] = field(default_factory=dict)
+    empty_s: dict[Pair, float]
+    loaded_s: dict[Carried, float]
+    process_s: dict[str, float]
+    service_s: dict[Pair, float] = field(default_factory=dict)
     sim_s: float = 0.0
 
     def to_json(self) -> dict[str, dict[str, float]]:
@@ -70,6 +72,16 @@ class Durations:
             self,
             empty_s={pair: means.get(pair, seconds) for pair, seconds in self.empty_s.items()},
             loaded_s={way: means.get(way, seconds) for way, seconds in self.loaded_s.items()},
+        )
+
+    def joined(self, other: "Durations") -> "Durations":
+        """All times of both; where both have one, the other's."""
+        return Durations(
+            self.empty_s | other.empty_s,
+            self.loaded_s | other.loaded_s,
+            self.process_s | other.process_s,
+            self.service_s | other.service_s,
+            self.sim_s + other.sim_s,
         )
 
     @classmethod
@@ -119,48 +131,72 @@ def _times(record: Mapping[str, Any], table: str, wanted: set[str]) -> dict[str,
     return {name: float(seconds) for name, seconds in times.items()}
 
 
-def measure(prepared: Prepared, on_move: Callable[[str, float], None] | None = None) -> Durations:
-    """Carry every needed move out once in simulation and time it [s]; WorkFailed when one does not succeed."""
-    tell, skillset = on_move or (lambda name, seconds: None), prepared.skillset
-    loaded: dict[Carried, float] = {}
-    process: dict[str, float] = {}
-    steps = 0
-    for way, leg in skillset.legs.items():
-        with World() as world:
-            floor = Floor(world, skillset, prepared.surveys.layout)
+@dataclass(frozen=True)
+class Trial:
+    """What is timed in one world of its own: a way with a part and the process behind it, empty ways, or a service."""
+
+    loaded: Carried | None = None
+    process: bool = False
+    empty: tuple[Pair, ...] = ()
+    service: Pair | None = None
+
+
+def trials(skillset: SkillSet) -> list[Trial]:
+    """What times every move of these skills once; each trial can be made beside the others."""
+    timed = set[str]()
+    made = list[Trial]()
+    for way in skillset.legs:
+        made.append(Trial(loaded=way, process=bool(skillset.processes[way.target]) and way.target not in timed))
+        timed.add(way.target)
+    made += [Trial(service=own) for own, skills in skillset.services.items() if skills]
+    origins = dict.fromkeys(origin for origin, _ in skillset.travels)
+    return made + [Trial(empty=tuple(pair for pair in skillset.travels if pair[0] == origin)) for origin in origins]
+
+
+def measure(
+    prepared: Prepared, on_move: Callable[[str, float], None] | None = None, workers: Workers | None = None
+) -> Durations:
+    """Carry every needed move out once in simulation and time it [s]; WorkFailed when one does not succeed.
+
+    Each trial has a world of its own, so that the times do not depend on how many processes share the trials.
+    """
+    tell, skillset, timed = on_move or (lambda name, seconds: None), prepared.skillset, trials(prepared.skillset)
+    whole = Durations({}, {}, {})
+    for found in (workers or Workers()).each(partial(carried_out, prepared), timed):
+        for way, seconds in (found.loaded_s | found.empty_s).items():
+            tell(f"{_word(way)}, {'loaded' if isinstance(way, Carried) else 'empty'}", seconds)
+        for station, seconds in found.process_s.items():
+            tell(skillset.processes[station][-1].name, seconds)
+        for own, seconds in found.service_s.items():
+            tell(_service(own), seconds)
+        whole = whole.joined(found)
+    return whole
+
+
+def carried_out(prepared: Prepared, trial: Trial) -> Durations:
+    """What one trial times [s]; WorkFailed when a move does not succeed."""
+    skillset = prepared.skillset
+    with World() as world:
+        floor = Floor(world, skillset, prepared.surveys.layout)
+        found = Durations({}, {}, {})
+        if trial.loaded is not None:
+            leg = skillset.legs[trial.loaded]
             for skill in leg:
                 skill.furnish(floor.bench)
             leg[0].begin(floor.bench)
             part = leg[0].part
-            loaded[way] = _timed(floor, leg, part)
-            tell(f"{_word(way)}, loaded", loaded[way])
-            for skill in () if way.target in process else skillset.processes[way.target]:
-                process[way.target] = _timed(floor, [skill], part)
-                tell(skill.name, process[way.target])
-            steps += world.steps
-    empty, service, more = _measure_empty(prepared, tell)
-    return Durations(empty, loaded, process, service, (steps + more) * TIME_STEP)
-
-
-def _measure_empty(
-    prepared: Prepared, tell: Callable[[str, float], None]
-) -> tuple[dict[Pair, float], dict[Pair, float], int]:
-    """The times [s] of all ways of the empty gripper and of all services, and the physics steps that took."""
-    empty: dict[Pair, float] = {}
-    service: dict[Pair, float] = {}
-    skillset = prepared.skillset
-    with World() as world:
-        floor = Floor(world, skillset, prepared.surveys.layout)
-        for pair, way in skillset.travels.items():
+            found.loaded_s[trial.loaded] = _timed(floor, leg, part)
+            for skill in skillset.processes[trial.loaded.target] if trial.process else ():
+                found.process_s[trial.loaded.target] = _timed(floor, [skill], part)
+        for pair in trial.empty:
+            way = skillset.travels[pair]
             way[0].begin(floor.bench)
-            empty[pair] = _timed(floor, way)
-            tell(f"{_word(pair)}, empty", empty[pair])
-        for own, skills in skillset.services.items():
-            if skills:
-                skills[0].begin(floor.bench)
-                service[own] = _timed(floor, skills)
-                tell(_service(own), service[own])
-        return empty, service, world.steps
+            found.empty_s[pair] = _timed(floor, way)
+        if trial.service is not None:
+            skills = skillset.services[trial.service]
+            skills[0].begin(floor.bench)
+            found.service_s[trial.service] = _timed(floor, skills)
+        return replace(found, sim_s=world.steps * TIME_STEP)
 
 
 def _timed(floor: Floor, skills: Sequence[Skill], part: str = "") -> float:

@@ -317,13 +317,13 @@ class Skill:
         try:
             next(self._motion)
         except StopIteration:
-            self.status = Status.SUCCESS
+            self._motion, self.status = None, Status.SUCCESS
         except (SkillFailed, WorkFailed) as failure:
-            self.status, self.reason = Status.FAILURE, str(failure)
+            self.fail(str(failure))
         return self.status
 
     def fail(self, reason: str) -> None:
-        """Break off, because of something outside of the skill."""
+        """End without success."""
         self._motion, self.status, self.reason = None, Status.FAILURE, reason
 
     def stop(self) -> None:

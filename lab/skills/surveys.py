@@ -1,7 +1,6 @@
 """What the sub-tasks survey of one scene, each survey made once: the workspace, the surroundings of a station, the grids."""
 
 from collections.abc import Sequence
-from functools import cache
 from math import hypot
 
 import numpy as np
@@ -15,6 +14,7 @@ from lab.sim.scene.scene import Scene
 from lab.sim.scene.scene_check import places_of
 from lab.sim.world import World
 from lab.skills.camera_grids import RELEASE_ABOVE, TOUCH_CLEARANCE, SurveyedGrid
+from lab.skills.once import Made, once
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import CameraGrid
 
@@ -72,10 +72,7 @@ class Surveys:
         self.task, self.layout, self.parts = task, Layout(layout.obstacles, ()), len(order)
         self.places = places_of(task)
         self.kinds = self.places.kinds
-        self.workspace = cache(self._workspace)
-        self.dock = cache(self._dock)
-        self.around = cache(self._around)
-        self.camera_grid = cache(self._camera_grid)
+        self.made: Made = {}
 
     # ---- transfer: the whole workspace --------------------------------------------------------------------------
 
@@ -85,7 +82,8 @@ class Surveys:
         x, y, z = (low + (i + 0.5) * size for low, i, size in zip(grid.lower_m, cell, grid.cell_m, strict=True))
         return ToolPose(x, y, z, 0.0)
 
-    def _workspace(self, carried: str) -> Survey:
+    @once
+    def workspace(self, carried: str) -> Survey:
         grid = self.task.workspace
         with World() as world:
             scene = Scene(world, self.task, (), self.layout)
@@ -97,7 +95,8 @@ class Surveys:
                 survey.causes[cell] = OUT_OF_REACH  # no arm turns through there, from one side of itself to the other
         return survey
 
-    def _dock(self, place: str, carried: str) -> Cell:
+    @once
+    def dock(self, place: str, carried: str) -> Cell:
         """The workspace cell from which the tool goes straight to the approach of `place`; BadInput names what blocks it."""
         near, approach = self.cells_near(place), self.approach(place)
         survey = self.workspace(carried)
@@ -156,7 +155,8 @@ class Surveys:
 
     # ---- grasp and place: around one part ------------------------------------------------------------------------
 
-    def _around(self, station_name: str, kind: str, loaded: bool) -> Survey:
+    @once
+    def around(self, station_name: str, kind: str, loaded: bool) -> Survey:
         """Around the part that stands (or, loaded, is to stand) on a station's first spot, with neighbours on all sides."""
         station, own = self.task.station(station_name), self.kinds[kind]
         spot = self.places.spots(station)[0]
@@ -192,7 +192,8 @@ class Surveys:
         scene.add(name, kind, spot)
         scene.solid += scene.bodies_of(name, kind)
 
-    def _camera_grid(self, station: str, kind: str) -> SurveyedGrid:
+    @once
+    def camera_grid(self, station: str, kind: str) -> SurveyedGrid:
         """The camera's grid before a station, for a part of a kind."""
         return SurveyedGrid(self.task, self.layout, self.places, station, kind, self.parts)
 
