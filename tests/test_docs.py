@@ -5,12 +5,12 @@ import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+from page_examples import COMMANDS_RUN, run
 
 import lab
 from lab.cli.app import made
@@ -19,11 +19,9 @@ from lab.studies import STUDIES
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
-BLOCK = re.compile(r"^```(python|sh)\n(\S.*?)^```", re.MULTILINE | re.DOTALL)  # one that begins indented is a fragment
 MADE = re.compile(r"^<!-- made: (\S+) -> (\S+) -->\n!\[.*?\]\((\S+)\)", re.MULTILINE)
 KEPT = "LAB_DOCS_PICTURES"  # set: the pictures in docs/ are made anew by the pages that show them
 PAGES = sorted(DOCS.glob("**/*.md"))
-COMMANDS_RUN = ("lessons", "quickstart")  # folders whose commands are run, too
 RUN = [page for page in PAGES if page.parent.name in COMMANDS_RUN or "```python\n" in page.read_text(encoding="utf-8")]
 SHIM = f"""#!/bin/sh
 exec {shlex.quote(sys.executable)} -c "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()" "$@"
@@ -43,14 +41,8 @@ def test_the_examples_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pyt
     monkeypatch.setenv("LAB_TOOLBOX", str(tmp_path / "toolbox"))
     monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:{os.environ['PATH']}")
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    text, names = page.read_text(encoding="utf-8"), {"__name__": page.stem}
-    for kind, block in BLOCK.findall(text):
-        if kind == "python":
-            exec(compile(block, str(page), "exec"), names)
-        elif page.parent.name in COMMANDS_RUN:
-            ran = subprocess.run(["bash", "-euo", "pipefail", "-c", block], capture_output=True, text=True, check=False)
-            assert ran.returncode == 0, ran.stderr[-2000:]
-    for made_as, kept, shown in MADE.findall(text):
+    run(page)
+    for made_as, kept, shown in MADE.findall(page.read_text(encoding="utf-8")):
         (file,) = work.glob(made_as)
         assert kept == shown
         assert (page.parent / kept).is_file() or KEPT in os.environ

@@ -1,8 +1,11 @@
-"""What the project says of itself: what wheel and sdist take, dependencies, version, and the README's set-up commands."""
+"""What the project says of itself: what wheel and sdist take, dependencies, version, the README's set-up commands, .ci/run."""
 
+import subprocess
+import sys
 import tomllib
 from itertools import chain
 from pathlib import Path
+from runpy import run_path
 from typing import Any
 
 import pytest
@@ -52,3 +55,41 @@ def test_the_readme_has_each_set_up_command_on_one_line(root: Path, mark: str) -
     command = rest.partition("\n```")[0]
     assert "\n" not in command
     assert command.startswith("python3 -m venv ")
+
+
+def test_each_extra_is_tried_alone(project: dict[str, Any], root: Path) -> None:
+    """By .ci/plain_wheel.py; those of developers are tried by all else that .ci/run does."""
+    extras = set(project["project"]["optional-dependencies"])
+    assert run_path(str(root / ".ci" / "plain_wheel.py"))["EXTRAS"].keys() == extras - {"docs", "test", "dev"}
+
+
+def test_an_interpreter_is_found_on_path_and_where_pyenv_keeps_it(root: Path, tmp_path: Path) -> None:
+    """One of each version, and none that ends with an error, as pyenv's shims of other versions do."""
+    name = f"python3.{sys.version_info[1]}"
+    shims, kept = tmp_path / "shims", tmp_path / "versions" / f"{name.removeprefix('python')}.99" / "bin"
+    shims.mkdir()
+    kept.mkdir(parents=True)
+    (shims / name).write_text("#!/bin/sh\nexit 127\n")
+    (shims / name).chmod(0o755)
+    working = f'#!/bin/sh\nexec "{sys.executable}" "$@"\n'
+    (kept / "python3").write_text(working)
+    (kept / "python3").chmod(0o755)
+    lines = (root / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+    first = next(n for n, line in enumerate(lines) if line.startswith("pythons()"))
+    function = "\n".join(lines[first : lines.index("}", first) + 1])
+
+    def found() -> list[str]:
+        ran = subprocess.run(
+            ["/bin/bash", "-euo", "pipefail", "-c", f"{function}\npythons"],
+            env={"PATH": str(shims), "PYENV_ROOT": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return ran.stdout.splitlines()
+
+    assert found() == [sys.executable]
+    (kept / "python3").unlink()
+    assert found() == []
+    (shims / name).write_text(working)
+    assert found() == [sys.executable]

@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.errors",),
-    ("lab.files", "lab.mdp", "lab.plugins", "lab.statistics", "lab.workers"),
+    ("lab.files", "lab.mdp", "lab.optional", "lab.plugins", "lab.statistics", "lab.workers"),
     ("lab.learning", "lab.vision"),
     ("lab.sequencing", "lab.toolbox"),
     ("lab.advice", "lab.tasks"),

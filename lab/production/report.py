@@ -111,6 +111,7 @@ class Report:
             "camera_deviation_m": max(outcome.camera_deviations_m, default=None),
             "sim_s": outcome.sim_s - outcome.skipped_s + self.taught.durations.sim_s,
             "skipped_s": outcome.skipped_s,
+            "timed_s": self.taught.durations.sim_s,  # of sim_s; 0: all durations were known
             "faults": [*verdict.rows],
             "outcome": verdict.came,
             "interrupted": outcome.interrupted,

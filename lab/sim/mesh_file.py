@@ -1,4 +1,4 @@
-"""The vertices of a mesh file, OBJ or STL, read without a heavy library."""
+"""Mesh files, OBJ or STL: their vertices, read without a heavy library, and their bytes for a library that reads UTF-8 only."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ def vertices(path: Path) -> Array:
         faces = np.frombuffer(data, np.uint8, offset=_HEAD).reshape(-1, _FACE)[:, 12:48]
         return np.ascontiguousarray(faces).view("<f4").reshape(-1, 3).astype(float)
     word = "vertex" if path.suffix.lower() == ".stl" else "v"
-    lines = (line.split() for line in data.decode("utf-8").splitlines())
+    lines = (line.split() for line in _text(data).splitlines())
     return np.array([parts[1:4] for parts in lines if parts[:1] == [word]], dtype=float)
 
 
@@ -29,6 +29,22 @@ def text_corners(path: Path | None) -> Array | None:
     if path is None or path.suffix.lower() != ".stl" or is_binary(read_limited(path, MAX_BYTES)):
         return None
     return vertices(path)
+
+
+def readable(path: Path) -> bytes:
+    """The bytes of an OBJ or STL file, its text in UTF-8. ValueError when it is neither text nor a whole binary STL."""
+    data = read_limited(path, MAX_BYTES)
+    return data if path.suffix.lower() == ".stl" and is_binary(data) else _text(data).encode()
+
+
+def _text(data: bytes) -> str:
+    """A text in UTF-8, or in Latin-1: only names and comments hold more than ASCII. ValueError when it is no text."""
+    if b"\0" in data:
+        raise ValueError("it is neither text in UTF-8 or Latin-1 nor a whole binary STL")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
 
 
 def is_binary(data: bytes) -> bool:

@@ -224,7 +224,7 @@ def check_mesh(path: Path, name: str, folder: Path) -> None:
     kind = "an STL" if file.suffix.lower() == ".stl" else "an OBJ"
     try:
         vertices = mesh_file.vertices(file)
-    except (UnicodeDecodeError, ValueError) as error:
+    except ValueError as error:
         raise BadInput(f"{path}: mesh '{name}' is not {kind} file: {error}") from None
     if len(vertices) < 4 or vertices.shape[1] < 3 or not np.isfinite(vertices).all():
         raise BadInput(

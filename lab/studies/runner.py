@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput, LabError, WorkFailed
 from lab.files import read_limited
+from lab.optional import optional
 
 STORE = "sessions.jsonl"
 BATCH = 4  # items that a worker is given at once, where there are many
@@ -166,10 +167,8 @@ def _end_with_parent(parent: int) -> None:
 
 
 def _on_cluster(work: Callable[[Item], Result], items: list[Item], address: str) -> Iterator[tuple[Item, Result]]:
-    try:
+    with optional(f"--dask {address}"):
         from distributed import Client, as_completed
-    except ImportError:
-        raise BadInput(f"--dask {address}: Dask is not installed: pip install 'teaching-lab[dask]'") from None
     try:
         client = Client(address, timeout="10s")  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError, RuntimeError) as error:

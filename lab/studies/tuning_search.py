@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from lab.errors import BadInput
 from lab.learning.tuned_ranges import Range, Span
+from lab.optional import optional
 
 BATCH = 8  # trials that are asked for at once, whatever the number of workers
 Values = dict[str, Any]
@@ -67,10 +67,8 @@ def search(
 
 
 def _optuna() -> Any:
-    try:
+    with optional("tuning"):
         import optuna
-    except ImportError:
-        raise BadInput("tuning: Optuna is not installed: pip install 'teaching-lab[tune]'") from None
     from warnings import simplefilter
 
     simplefilter("ignore", optuna.exceptions.ExperimentalWarning)

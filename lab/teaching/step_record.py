@@ -14,9 +14,8 @@ from lab.learning.environment import Environment, Step
 from lab.learning.selection import Draw
 from lab.learning.session_events import EpisodeEnded
 from lab.mdp import TabularMDP
+from lab.optional import optional
 from lab.teaching.events import LessonBegan, LessonEvent, QuestionAnswered, SessionBegan
-
-EXTRA = "pip install 'teaching-lab[data]'"
 
 
 @dataclass
@@ -84,13 +83,13 @@ class StepRecord:
         Observations are states, infos tell which steps were advised. BadInput when Minari is not installed, when nothing was
         recorded, and when there is a dataset of that name already.
         """
-        try:
-            from gymnasium.spaces import Discrete
+        from gymnasium.spaces import Discrete
+
+        with optional(f"dataset '{dataset_id}'"):
+            import h5py  # type: ignore[import-untyped]  # noqa: F401  # Minari misses it only with a folder half made
             from minari import create_dataset_from_buffers
             from minari.data_collector import EpisodeBuffer
             from minari.storage import get_dataset_path
-        except ImportError as error:
-            raise BadInput(f"dataset '{dataset_id}': {error.name} is not installed: {EXTRA}") from None
         if self.mdp is None or not self.episodes:
             raise BadInput(f"dataset '{dataset_id}': no episode was recorded")
         buffers = [
@@ -127,12 +126,10 @@ class StepRecord:
 
         BadInput when TensorBoard is not installed or the folder cannot be written.
         """
-        try:
+        with optional(f"folder '{folder}'"):
             from tensorboard.compat.proto.event_pb2 import Event
             from tensorboard.compat.proto.summary_pb2 import Summary
             from tensorboard.summary.writer.event_file_writer import EventFileWriter
-        except ImportError as error:
-            raise BadInput(f"folder '{folder}': {error.name} is not installed: {EXTRA}") from None
         try:
             writer = EventFileWriter(str(folder))
         except OSError as error:

@@ -12,13 +12,13 @@ from typing import Any, TypeVar
 
 from lab.errors import BadInput, WorkFailed
 from lab.files import write_whole
+from lab.optional import optional
 from lab.toolbox.folder_place import FolderPlace
 from lab.toolbox.names import hash_of, slug
 from lab.toolbox.place import MAX_FILE_BYTES, FileState
 
 LIMIT_S = 30.0  # for one call
 _AT_ONCE = 64  # files that are read in one call
-NEEDS = "pip install 'teaching-lab[remote]'"
 _BUCKETS = {"s3", "s3a", "gs", "gcs", "az", "abfs", "abfss"}  # whose folders are not made; the first part is a bucket
 _STAMPS = ("ETag", "etag", "LastModified", "last_modified", "updated", "mtime", "modified", "created", "ino")
 _OPTIONS: dict[str, dict[str, Any]] = {
@@ -50,15 +50,13 @@ class RemotePlace:
 
     def _connected(self) -> tuple[Any, str]:
         try:
-            from fsspec.core import url_to_fs
-        except ImportError:
-            raise BadInput(f"toolbox {self.address}: needs {NEEDS}") from None
-        try:
-            options = {"use_listings_cache": False, **_OPTIONS.get(self._protocol, {})}
-            fs, root = url_to_fs(self.address, **options)
-        except ImportError as error:
-            needs = NEEDS if self._protocol in _OPTIONS else str(error)
-            raise BadInput(f"toolbox {self.address}: needs {needs}") from None
+            with optional(f"toolbox {self.address}"):
+                from fsspec.core import url_to_fs
+
+                options = {"use_listings_cache": False, **_OPTIONS.get(self._protocol, {})}
+                fs, root = url_to_fs(self.address, **options)
+        except BadInput:
+            raise
         except Exception as error:
             raise BadInput(f"toolbox {self.address}: {_reason(error)}") from error
         if self._protocol in _BUCKETS and not str(root).strip("/"):

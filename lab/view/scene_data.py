@@ -3,6 +3,7 @@
 import base64
 from collections.abc import Sequence
 from functools import lru_cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput, unknown
 from lab.sim.frames import Body, Shape, Viewpoint, unique_names
+from lab.sim.mesh_file import readable
 
 CREASE_RAD = 0.6  # faces that meet at a larger angle keep a sharp edge
 
@@ -69,7 +71,7 @@ def read_mesh(path: Path, changed_ns: int) -> Json:
     import trimesh
 
     try:
-        mesh = trimesh.load(path, force="mesh")
+        mesh: Any = trimesh.load(BytesIO(readable(path)), path.suffix.lower().removeprefix("."), force="mesh")
         assert isinstance(mesh, trimesh.Trimesh)
         mesh.merge_vertices(merge_tex=True, merge_norm=True)  # files split vertices; what is sharp is decided here
         mesh = trimesh.Trimesh(

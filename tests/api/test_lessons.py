@@ -98,13 +98,6 @@ def test_it_shows_itself(tmp_path: Path) -> None:
         lesson.curve.save("curve.png")
 
 
-def test_without_pandas_the_rows_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    lesson = lab.teach(lab.world(ROWS), advisor=None, episodes=2)
-    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
-    with pytest.raises(lab.BadInput, match="pandas is not installed: pip install pandas"):
-        lesson.to_dataframe()
-
-
 @pytest.mark.parametrize(
     ("problem", "said", "fault"),
     [

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lab.sim.mesh_file import vertices
+from lab.sim.mesh_file import readable, vertices
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.5]])
 
@@ -25,5 +25,12 @@ def test_the_same_triangle_from_every_kind(tmp_path: Path) -> None:
 def test_a_binary_stl_that_is_cut_off_is_no_mesh(tmp_path: Path) -> None:
     path = tmp_path / "cut.stl"
     path.write_bytes(b"\xff" * 80 + struct.pack("<I", 2) + b"\0" * 60)
-    with pytest.raises(UnicodeDecodeError):
+    with pytest.raises(ValueError, match=r"neither text .* nor a whole binary STL"):
         vertices(path)
+
+
+def test_a_text_in_latin_1_is_read_and_handed_on_in_utf_8(tmp_path: Path) -> None:
+    text = "# Prüfteil\n" + "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS)
+    (tmp_path / "a.obj").write_bytes(text.encode("latin-1"))
+    assert vertices(tmp_path / "a.obj") == pytest.approx(CORNERS)
+    assert readable(tmp_path / "a.obj").decode("utf-8") == text

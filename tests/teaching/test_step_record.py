@@ -8,7 +8,6 @@ import pytest
 import lab
 from lab.errors import BadInput
 from lab.learning.requests import AdviceRequest
-from lab.teaching.step_record import StepRecord
 
 ROWS = "S..\n.#.\n..G"
 
@@ -87,14 +86,3 @@ def test_a_kept_lesson_is_told_again_into_both(
     told = command("replay", "kept", *words)
     assert told.json["files"]["tensorboard"] == "curves"
     assert minari.load_dataset("lab/kept-v0").total_episodes == 5
-
-
-def test_what_is_not_installed_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    import sys
-
-    monkeypatch.setitem(sys.modules, "minari", None)
-    monkeypatch.setitem(sys.modules, "tensorboard.compat.proto.event_pb2", None)
-    with pytest.raises(BadInput, match=r"is not installed: pip install 'teaching-lab\[data\]'"):
-        StepRecord().to_minari("a/b-v0")
-    with pytest.raises(BadInput, match=r"is not installed: pip install 'teaching-lab\[data\]'"):
-        StepRecord().to_tensorboard(tmp_path)

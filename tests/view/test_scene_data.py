@@ -80,6 +80,12 @@ def test_an_unreadable_mesh_is_named(name: str, tmp_path: Path) -> None:
         describe([Body("a", (Shape("mesh", mesh=path),))], Viewpoint())
 
 
+def test_a_comment_in_latin_1_is_no_fault(tmp_path: Path) -> None:
+    text = trimesh.creation.box((1, 1, 1)).export(file_type="obj")
+    (tmp_path / "part.obj").write_bytes("# Prüfteil\n".encode("latin-1") + text.encode())
+    assert read_mesh(tmp_path / "part.obj", 0)["kind"] == "mesh"
+
+
 def test_two_bodies_of_one_name_are_refused() -> None:
     with pytest.raises(BadInput, match="used twice"):
         describe([Body("a", ()), Body("a", ())], Viewpoint())

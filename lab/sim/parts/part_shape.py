@@ -15,16 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput, counted
-from lab.files import assets_folder, is_file, read_limited, within
+from lab.files import assets_folder, is_file, within
 from lab.sim import urdf_reader
 from lab.sim.frames import Quaternion, Shape, ShapeKind, Vector
-from lab.sim.mesh_file import is_binary
+from lab.sim.mesh_file import MAX_BYTES, is_binary, readable
 from lab.tasks.part_fields import PartFields
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-MOST_BYTES = 20_000_000  # of a mesh file
 MOST_TEXT = 40_000  # triangles of an STL in text: PyBullet, which reads none, is handed them one by one
 MOST_HULL = 256  # vertices: more make physics slow and no rounder
 LARGEST_M, SMALLEST_M = 2.0, 0.002  # of a part's longest edge: beyond them its unit is not the metre
@@ -180,8 +179,8 @@ def _found(part: PartFields, field: str, name: str, folder: Path) -> Path:
         if path is None:
             raise BadInput(f"{where}: it lies outside the folder '{place}'")
         size = path.stat().st_size
-        if not 0 < size <= MOST_BYTES:
-            raise BadInput(f"{where}: {size} bytes: wanted 1 to {MOST_BYTES // 1_000_000} MB")
+        if not 0 < size <= MAX_BYTES:
+            raise BadInput(f"{where}: {size} bytes: wanted 1 to {MAX_BYTES // 1_000_000} MB")
         return path
     raise BadInput(f"{where}: no such file, neither in '{folder}' nor in the lab's assets")
 
@@ -206,7 +205,7 @@ def _mesh(part: PartFields, path: Path) -> "Trimesh":
     try:
         kind = path.suffix.lower().removeprefix(".")
         raw: dict[str, Any] = {"process": False, "skip_materials": True}  # as it is; and no other file is opened
-        data = read_limited(path, MOST_BYTES)
+        data = readable(path)
         mesh: Any = trimesh.load(BytesIO(data), kind, force="mesh", **raw)
         points: Array = np.asarray(mesh.vertices, dtype=float)
     except Exception as error:  # whatever a reader of meshes comes to over a stranger's file

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lab.errors import BadInput
-from lab.files import beside_or_asset, read_limited
+from lab.files import beside_or_asset
 from lab.sim import urdf_reader
 from lab.sim.frames import Rgba, Vector
-from lab.sim.mesh_file import MAX_BYTES
+from lab.sim.mesh_file import MAX_BYTES, readable
 from lab.sim.world import World
 from lab.tasks.task_fields import Station
 
@@ -97,7 +97,7 @@ def _mesh_bounds(path: Path) -> tuple[Array, Array]:
         raise BadInput(f"{path.stat().st_size} bytes: wanted 1 to {MAX_BYTES // 1_000_000} MB")
     try:
         mesh: Any = trimesh.load(
-            BytesIO(read_limited(path, MAX_BYTES)), kind, force="mesh", skip_materials=True
+            BytesIO(readable(path)), kind, force="mesh", skip_materials=True
         )  # opens no other file
         points = np.asarray(mesh.vertices, dtype=float)
         faces = len(mesh.faces)

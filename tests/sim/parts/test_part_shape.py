@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from lab.errors import BadInput
 from lab.files import assets_folder
+from lab.sim.mesh_file import MAX_BYTES
 from lab.sim.parts import part_shape
 from lab.sim.parts.part_shape import PartShape, shape_of
 from lab.sim.urdf_reader import looks, rotation
@@ -179,6 +180,27 @@ def test_faces_that_look_inwards_are_turned_around(write: Callable[..., Path]) -
     assert shape_of(mesh_part(), write(box)).inertia_m2 == pytest.approx((13e-4 / 12, 20e-4 / 12, 25e-4 / 12))
 
 
+def test_a_face_that_is_turned_round_is_turned_back(write: Callable[..., Path]) -> None:
+    box = trimesh.creation.box((0.02, 0.03, 0.04))
+    faces = np.array(box.faces)
+    faces[3] = faces[3][::-1]
+    turned = trimesh.Trimesh(box.vertices, faces, process=False)
+    assert not turned.is_winding_consistent
+    assert shape_of(mesh_part(), write(turned)).inertia_m2 == pytest.approx((13e-4 / 12, 20e-4 / 12, 25e-4 / 12))
+
+
+@pytest.mark.parametrize(("kind", "first"), [("stl_ascii", "solid Prüfteil"), ("obj", "# Prüfteil")])
+def test_a_name_in_latin_1_does_not_keep_a_mesh_from_being_read(kind: str, first: str, tmp_path: Path) -> None:
+    text = trimesh.creation.box((0.02, 0.03, 0.04)).export(file_type=kind)
+    name = f"thing.{kind[:3]}"
+    (tmp_path / name).write_bytes("\n".join([first, *text.splitlines()[1:]]).encode("latin-1"))
+    shape = shape_of(mesh_part(file=name), tmp_path)
+    assert shape.height_m == pytest.approx(0.04)
+    with World() as world:
+        world.part("thing", shape, 0.1, 0.5, (0, 0, 0.1))
+        assert world.pose("thing")[0] == pytest.approx((0, 0, 0.1))
+
+
 def holed() -> trimesh.Trimesh:
     box = trimesh.creation.box((0.02, 0.03, 0.04))
     return trimesh.Trimesh(box.vertices, box.faces[1:])
@@ -225,7 +247,7 @@ def test_what_is_no_solid_is_refused(tmp_path: Path, content: bytes | None, says
 
 def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
     with (tmp_path / "thing.stl").open("wb") as file:
-        file.truncate(part_shape.MOST_BYTES + 1)
+        file.truncate(MAX_BYTES + 1)
     assert "20000001 bytes: wanted 1 to 20 MB" in refusal(mesh_part(), tmp_path)
 
 

@@ -83,6 +83,13 @@ def test_the_appliers_ground_is_as_large_as_its_body(task: Task, world: World) -
             assert (top(world, x, y) is not None) is inside
 
 
+def test_a_comment_in_latin_1_is_no_fault(wedge: Path) -> None:
+    path = wedge / "wedge.obj"
+    before = bounds(machine(body=path.name, floor_m=0.1), wedge)
+    (wedge / "other.obj").write_bytes("# Prüfteil\n".encode("latin-1") + path.read_bytes())
+    assert bounds(machine(body="other.obj", floor_m=0.1), wedge) == before
+
+
 def test_a_body_that_is_no_file_of_these_is_refused(tmp_path: Path) -> None:
     (tmp_path / "press.step").write_text("solid")
     station = machine(body="press.step", floor_m=0.1)

@@ -1,7 +1,6 @@
 """The sessions of a study: named by their setting, the same wherever they run, kept, and not run again."""
 
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import partial
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lab.errors import BadInput, WorkFailed
+from lab.errors import WorkFailed
 from lab.learning import batch as compiled
 from lab.learning.batch import Batch
 from lab.learning.settings import GateSettings
@@ -315,12 +314,6 @@ def test_a_cluster_that_is_not_there(few: list[AdviceSetting], monkeypatch: pyte
         measured(Job(10, dask="127.0.0.1:9", folder=folder), few)
     assert "\n" not in str(failed.value)
     assert not folder.exists()
-
-
-def test_without_dask(few: list[AdviceSetting], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(BadInput, match=r"Dask is not installed: pip install 'teaching-lab\[dask\]'"):
-        measured(Job(10, dask="127.0.0.1:9"), few)
 
 
 # ---- what is kept -------------------------------------------------------------------------------------------------
