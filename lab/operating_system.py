@@ -7,7 +7,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from errno import EAGAIN, ELOOP
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from socket import socket
 
 WINDOWS: bool = sys.platform == "win32"
 if WINDOWS:
@@ -109,6 +112,14 @@ def flush_c_streams() -> None:
     import ctypes
 
     ctypes.CDLL("ucrtbase" if WINDOWS else None).fflush(None)
+
+
+def keep_port(own: "socket") -> None:
+    """Before `bind`: a port that was just given up is to be had again, one that somebody has is not, nor is it taken from us."""
+    import socket
+
+    how: int = getattr(socket, "SO_EXCLUSIVEADDRUSE", socket.SO_REUSEADDR)  # Windows shares a reused one
+    own.setsockopt(socket.SOL_SOCKET, how, 1)
 
 
 def most_descriptors() -> int | None:

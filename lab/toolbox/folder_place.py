@@ -112,7 +112,8 @@ class FolderPlace:
 
     def sweep(self, under: str) -> None:
         for left in (self.folder / under).glob(".*.tmp"):
-            left.unlink(missing_ok=True)
+            with suppress(PermissionError):  # Windows removes nothing that somebody has open
+                left.unlink(missing_ok=True)
 
     def tidy(self, older_s: float) -> list[str]:
         """Half-written files, also of sessions that are linked here, and folders of sessions that were never begun."""
