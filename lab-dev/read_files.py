@@ -512,21 +512,6 @@ def _compiled() -> None:
     compared(Compared("world-1"), Job(2, 0))
 
 
-def _imports(path: Path) -> object:
-    import os
-
-    from lab.learning.sources import sources
-
-    os.environ["XDG_CACHE_HOME"] = str(path.parents[1])
-    return sources(("lab.learning.values",))
-
-
-def _cached(folder: Path, sound: Path) -> None:
-    (folder / "teaching-lab").mkdir()
-    (folder / "teaching-lab" / "imports.json").write_text("{}")
-    _imports(folder / "teaching-lab" / "imports.json")
-
-
 _CELLS = ("fms", "hoist-pu", "two-on-a-track")
 _MADE_BY_HAND = ("toast", "breakfast", "sorting", "toast-window", "two-toasters", "toast-case-1", "fms-arm")
 
@@ -570,5 +555,4 @@ KINDS: dict[str, Kind] = {
     "mesh of an arm": Kind("binary", _own_arm, "part.stl", _arm, 200),
     "body of a station": Kind("text", _bodies, "[ast]*.urdf", _body, QUICK),
     "kept sessions of a study": Kind("json lines", _copied("compared"), "compared/sessions.jsonl", _compared, 40),
-    "kept imports": Kind("json", _cached, "teaching-lab/imports.json", _imports, 100),
 }

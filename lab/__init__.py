@@ -3,9 +3,10 @@
 What is listed in `__all__` is stable: see docs/api.md. Each is loaded when it is touched.
 """
 
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # as typing's, which would be all that `import lab` takes time for
 if TYPE_CHECKING:
+    from typing import Any
+
     from lab.api.lessons import LessonResult, teach
     from lab.api.orders import OrderResult, sequence
     from lab.api.pictures import Page, Picture
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from lab.toolbox.policy import Policy
     from lab.toolbox.registry import Toolbox
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _FACE = {
     "lab.api.lessons": ("LessonResult", "teach"),
@@ -84,7 +85,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name not in _MODULES:
         raise AttributeError(f"module 'lab' has no attribute '{name}'")
     from importlib import import_module

@@ -14,12 +14,12 @@ _END = 150  # of a longer message: where it comes from stands first, what is all
 
 def printable(text: str) -> str:
     """Text with each character that cannot be printed, such as a line break or an escape code, as its escape."""
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def escaped(text: str) -> str:
     """As `printable`, of several lines: line breaks and tabs stay."""
-    return text if text.isprintable() else "".join(c if c in "\n\t" else printable(c) for c in text)
+    return "\n".join("\t".join(map(printable, line.split("\t"))) for line in text.split("\n"))
 
 
 def shortened(value: object, most: int = MOST_OF_VALUE) -> str:

@@ -1,5 +1,6 @@
 """Files: where the shipped ones are; read within bounds; written whole or not at all; folders looked at before use."""
 
+import hashlib
 import json
 import os
 import re
@@ -7,6 +8,7 @@ import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from errno import EFBIG, EINVAL
+from functools import cache
 from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
@@ -53,6 +55,20 @@ def find(name: str, package: Path) -> Path:
     raise WorkFailed(
         f"the lab's own '{name}' folder is missing: looked for {wheel} and {checkout}; install the lab again"
     )
+
+
+@cache
+def source_hash(package: Path = PACKAGE) -> str:
+    """A hash (64 hex digits) of every Python source of a package, by its place in it; a single file is a package of its own.
+
+    What is computed once and kept, such as measured durations and compiled functions, is kept under this hash: whatever
+    source may have decided it is in it. Raises OSError when a source cannot be read.
+    """
+    digest = hashlib.sha256()
+    for path in [package] if package.is_file() else sorted(package.rglob("*.py")):
+        text = read_limited(path)
+        digest.update(f"{path.relative_to(package).as_posix()} {len(text)} ".encode() + text)
+    return digest.hexdigest()
 
 
 def read_limited(path: Path, most: int = MOST_BYTES) -> bytes:

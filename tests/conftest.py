@@ -85,6 +85,14 @@ def _own_toolbox(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
+def _one_process_a_test() -> Iterator[None]:
+    """Tests run side by side already: what a test does in this process is shared with others only where it asks for that."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("lab.workers.cores", lambda: 1)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
 def _ctrl_c_is_heard() -> Iterator[None]:
     """Begun in the background, a shell has the tests and all that they start ignore Ctrl-C; some of them press it."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)

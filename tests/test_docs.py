@@ -1,5 +1,6 @@
 """The documentation's examples are run, page by page, in an empty folder; its tables are those of the code."""
 
+import importlib
 import os
 import re
 import shlex
@@ -7,9 +8,9 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
-import typer
 
 import lab
 from lab.cli.app import made
@@ -22,7 +23,8 @@ BLOCK = re.compile(r"^```(python|sh)\n(\S.*?)^```", re.MULTILINE | re.DOTALL)  #
 MADE = re.compile(r"^<!-- made: (\S+) -> (\S+) -->\n!\[.*?\]\((\S+)\)", re.MULTILINE)
 KEPT = "LAB_DOCS_PICTURES"  # set: the pictures in docs/ are made anew by the pages that show them
 PAGES = sorted(DOCS.glob("**/*.md"))
-RUN = [page for page in PAGES if page.parent.name == "lessons" or "```python\n" in page.read_text(encoding="utf-8")]
+COMMANDS_RUN = ("lessons", "quickstart")  # folders whose commands are run, too
+RUN = [page for page in PAGES if page.parent.name in COMMANDS_RUN or "```python\n" in page.read_text(encoding="utf-8")]
 SHIM = f"""#!/bin/sh
 exec {shlex.quote(sys.executable)} -c "import sys; from lab.cli import main; sys.argv[0] = 'lab'; main()" "$@"
 """
@@ -30,7 +32,7 @@ exec {shlex.quote(sys.executable)} -c "import sys; from lab.cli import main; sys
 
 @pytest.mark.parametrize("page", RUN, ids=lambda page: page.stem)
 def test_the_examples_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Python on every page, commands in the lessons; the pictures that a page shows are there afterwards."""
+    """Python on every page, commands in lessons and quick starts; the pictures that a page shows are there afterwards."""
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "lab").write_text(SHIM)
     (tmp_path / "bin" / "lab").chmod(0o755)
@@ -45,7 +47,7 @@ def test_the_examples_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pyt
     for kind, block in BLOCK.findall(text):
         if kind == "python":
             exec(compile(block, str(page), "exec"), names)
-        elif page.parent.name == "lessons":
+        elif page.parent.name in COMMANDS_RUN:
             ran = subprocess.run(["bash", "-euo", "pipefail", "-c", block], capture_output=True, text=True, check=False)
             assert ran.returncode == 0, ran.stderr[-2000:]
     for made_as, kept, shown in MADE.findall(text):
@@ -59,18 +61,40 @@ def test_the_examples_of_a_page_run(page: Path, tmp_path: Path, monkeypatch: pyt
 @pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.stem)
 def test_the_commands_on_a_page_can_be_said(page: Path) -> None:
     """Each `lab ...` names a command that there is, with options that it has."""
-    top = typer.main.get_command(made())
+    top: Any = made()
     for line in re.findall(r"(?:^|`)(lab [^`\n|&]*)", page.read_text(encoding="utf-8"), re.MULTILINE):
         words = shlex.split(line.replace("'\\''", ""), comments=True)[1:]
-        if not words or words[0] not in top.commands or words[-1].endswith("\\"):  # type: ignore[attr-defined]
+        if not words or words[0] not in top.commands or words[-1].endswith("\\"):
             continue
         command = top
         while hasattr(command, "commands") and words and words[0] in command.commands:
             command = command.commands[words.pop(0)]
+        command = command.load() if hasattr(command, "load") else command
         known = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
         for word in words:
             if word.startswith("--"):
                 assert word.partition("=")[0] in known | {"--help"}, line
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.stem)
+def test_the_pictures_of_a_page_are_there(page: Path) -> None:
+    """The site's builder looks for pages and their headings, not for pictures."""
+    for shown in re.findall(r"!\[.*?\]\((\S+?)\)", page.read_text(encoding="utf-8")):
+        assert (page.parent / shown).is_file(), shown
+
+
+def test_the_site_has_every_page_and_no_other() -> None:
+    told = re.findall(r"^ +- (?:\w+: )?(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE)
+    assert sorted(told) == [path.relative_to(DOCS).as_posix() for path in PAGES]
+
+
+def test_the_reference_names_what_is_there() -> None:
+    """The builder leaves out, without a word, a member that a module does not have."""
+    told = (DOCS / "reference.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^::: (\S+)\n    options: \{members: \[(.*)\]\}$", told, re.MULTILINE)
+    assert len(rows) == told.count(":::")
+    for module, members in rows:
+        assert all(hasattr(importlib.import_module(module), name) for name in members.split(", ")), module
 
 
 def test_the_stable_names_are_those_of_the_package() -> None:

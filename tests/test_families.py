@@ -104,7 +104,7 @@ ROWS: Tables = (
     (SEQUENCERS, "dummy-method", Sequencer(lambda: queued, "as fifo")),
     (STUDIES, "dummy-study", Study("A dummy", study)),
     (FORMATS, "dummy-format", Format("as csv", trajectory_csv.write, trajectory_csv.read)),
-    (COMMANDS, "dummy-command", Command(greet, "lab dummy-command you")),
+    (COMMANDS, "dummy-command", Command(greet, "Greets somebody.", "lab dummy-command you")),
 )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from lab import files
 from lab.errors import BadInput, WorkFailed
-from lab.files import check_out, draft, is_file, json_of, nearest, read_limited, within, write_whole
+from lab.files import check_out, draft, is_file, json_of, nearest, read_limited, source_hash, within, write_whole
 from lab.operating_system import lock
 
 
@@ -211,3 +211,34 @@ def test_what_can_be_no_name_is_no_file(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert is_file(tmp_path / "file")
     assert not any(is_file(tmp_path / name) for name in ("", "x" * 300, "a\0b", "file/below"))
+
+
+def test_a_hash_of_sources_changes_with_every_source_and_its_place(tmp_path: Path) -> None:
+    def hash_of(**texts: str) -> str:
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        for place, text in texts.items():
+            path = folder / (place.replace("_in_", "/") + ".py")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+        (folder / "notes.txt").write_text(folder.name)  # is no source
+        return source_hash(folder)
+
+    hashes = [
+        hash_of(top="x = 1\n", room_in_low="y = 1\n"),
+        hash_of(top="x = 2\n", room_in_low="y = 1\n"),
+        hash_of(top="x = 1\n", room_in_low="y = 2\n"),
+        hash_of(top="x = 1\n", low="y = 1\n"),
+        hash_of(top="x = 1\n"),
+        hash_of(top="x = 1\n", room_in_low=""),
+    ]
+    assert len(set(hashes)) == len(hashes)
+    assert hash_of(top="x = 1\n", room_in_low="y = 1\n") == hashes[0]
+
+
+def test_a_single_file_is_hashed_as_a_package_of_its_own(tmp_path: Path) -> None:
+    hashes = []
+    for text in ("x = 1\n", "x = 2\n"):
+        (tmp_path / "mine.py").write_text(text)
+        source_hash.cache_clear()
+        hashes.append(source_hash(tmp_path / "mine.py"))
+    assert hashes[0] != hashes[1]

@@ -57,9 +57,11 @@ def test_one_engine_is_installed_on_every_system_and_never_both(
     assert engines == ["pybullet" if plain else "pybullet-arm64"]
 
 
-def test_the_version_stands_once(project: dict[str, Any]) -> None:
+def test_one_version_stands_everywhere(project: dict[str, Any], root: Path) -> None:
     assert "version" in project["project"]["dynamic"]
     assert lab.__version__.count(".") == 2
+    assert f"\nversion: {lab.__version__}\n" in (root / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\n## [{lab.__version__}]" in (root / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("mark", ["run-command", "test-command"])
@@ -68,4 +70,4 @@ def test_the_readme_has_each_set_up_command_on_one_line(root: Path, mark: str) -
     assert found, f"README.md: no fenced block follows <!-- {mark} -->"
     command = rest.partition("\n```")[0]
     assert "\n" not in command
-    assert command.startswith("python3.11 -m venv ")
+    assert command.startswith("python3 -m venv ")

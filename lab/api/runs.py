@@ -22,6 +22,7 @@ from lab.sequencing.cell.schedule_rows import rows_of
 from lab.skills.prepared_scene import prepare
 from lab.tasks.task_file import load
 from lab.teaching.teacher import Teacher
+from lab.workers import Workers
 
 if TYPE_CHECKING:
     import pandas
@@ -102,12 +103,14 @@ def run(
     seed: int = 0,
     toolbox: ToolboxOrPlace = None,
     out: Path | str | None = None,
+    workers: int | None = None,
     **options: Unpack[TaskOptions],
 ) -> RunResult:
     """Find or learn a task's skills, time them, order them, and carry them out in physics, as `lab run` does.
 
     advisor: as in `lab.teach`; toolbox: where skills are found and kept; None: they are learned anew and not kept; out: a
     folder for pictures, replay, numbers and the journal, with which `lab run --resume` goes on; None: nothing is written.
+    workers: processes that time moves and draw, None: one a core; the numbers are the same.
     A run that fails raises nothing: see `RunResult.failure`. Raises BadInput for what does not fit, WorkFailed where a
     skill cannot be learned.
     """
@@ -117,8 +120,9 @@ def run(
     if out is not None and not all(isinstance(one, str) for one in advisors):
         raise BadInput(f"out '{out}' with the advisor {advising}: a journal can only name advisors that have a name")
     words = RunOptions(task=str(task), advisors=tuple(map(str, advising.names)), seed=seed, **given)
-    prepared = prepare(loaded, loaded.ordered(words.toasts, words.parts), seed)
     with ExitStack() as stack:
+        beside = stack.enter_context(Workers(workers))
+        prepared = prepare(loaded, loaded.ordered(words.toasts, words.parts), seed, workers=beside)
         nowhere = stack.enter_context(TemporaryDirectory())
         folder = Path(nowhere) / "run" if out is None else Path(out)
         check_out(folder)
@@ -127,6 +131,6 @@ def run(
         teacher = Teacher(toolbox_of(toolbox, f"{nowhere}/toolbox"), advising, seed)
         advice = RunAdvice(teacher.toolbox, words.lessons(), journal, words.order or "", cyclic=words.cyclic)
         conditions = Conditions(words.override / 100, journal=journal, fault_seed=words.faults, advice=advice)
-        report = run_task(prepared, teacher, folder, conditions)
+        report = run_task(prepared, teacher, folder, conditions, beside)
         replay = (folder / "replay.html").read_text(encoding="utf-8")
     return RunResult(report, report.to_json() | ({"files": {}} if out is None else {}), replay)

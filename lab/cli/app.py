@@ -2,32 +2,15 @@
 
 import sys
 from collections.abc import Callable
-from functools import wraps
+from functools import partial, wraps
+from importlib import import_module
 from io import TextIOWrapper
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, cast
 
 import typer
 
 from lab import __version__
-from lab.cli import (
-    compare,
-    export,
-    new,
-    operate,
-    replay,
-    run,
-    see,
-    sequence,
-    study,
-    task,
-    teach,
-    toolbox,
-    toolbox_archive,
-    toolbox_evaluate,
-    tune,
-    view,
-)
-from lab.cli.families import CommandOfFamilies
+from lab.cli.command_group import CommandGroup, UnloadedCommand
 from lab.cli.output import begin, end, fail, silence, write
 from lab.errors import LabError, out_of_memory
 
@@ -41,59 +24,165 @@ GROUPS = {
 
 
 class Command(NamedTuple):
-    """What a command calls, an example of its use, and what its help says below that (see `lab.cli.families`)."""
+    """A command: where it is, and what its help says."""
 
-    function: Callable[..., None]
+    function: str | Callable[..., None]  # or the module of `lab.cli` that holds it, named as the command's words
+    help: str  # the first paragraph of its docstring
     example: str
-    more: str = ""
+    more: str = ""  # what its help says below the example (see `lab.cli.families`)
 
 
 COMMANDS = {  # what is typed after `lab` -> the command
-    "run": Command(run.run, "lab run toast --toasts 3"),
-    "operate": Command(operate.operate, "lab operate toast --toasts 2"),
-    "teach": Command(teach.teach, "lab teach insert --advisor terminal", "{words of teaching}"),
-    "tune": Command(tune.tune, "lab tune world-1 --advisor moderate --trials 100 --workers 2"),
-    "replay": Command(replay.replay, "lab replay lesson"),
-    "sequence": Command(
-        sequence.sequence, "lab sequence toast --case II --toasts 4 --gantt order.svg", "{words of sequencing}"
+    "run": Command(
+        "run",
+        "Find or learn the skills, time them, find an order for them, and carry them out in physics.",
+        "lab run toast --toasts 3",
     ),
-    "export": Command(export.export, "lab export toast-run --format jbi", "{words of exporting}"),
-    "see": Command(see.see, "lab see overhead.png --task toast"),
-    "view": Command(view.view, "lab view toast"),
-    "new": Command(new.new, "lab new bakery --part box:0.12x0.015x0.12:2 --machine oven:60"),
-    "toolbox list": Command(toolbox.toolbox_list, "lab toolbox list --subtask insert --solved"),
-    "toolbox show": Command(toolbox.toolbox_show, "lab toolbox show 'insert at toaster 1a2b3c4d'"),
-    "toolbox log": Command(toolbox.toolbox_log, "lab toolbox log 'insert at toaster 1a2b3c4d'"),
-    "toolbox promote": Command(toolbox.toolbox_promote, "lab toolbox promote 'insert at toaster 1a2b3c4d' 2"),
-    "toolbox rollback": Command(toolbox.toolbox_rollback, "lab toolbox rollback 'insert at toaster 1a2b3c4d'"),
-    "toolbox verify": Command(toolbox.toolbox_verify, "lab toolbox verify"),
+    "operate": Command(
+        "operate",
+        "Run a task by hand: order, pause, stop, jog, grasp, learn, in a live console, on a page, or from a pipe.",
+        "lab operate toast --toasts 2",
+    ),
+    "teach": Command(
+        "teach",
+        "One teaching session: learn one sub-task, a world or a Gymnasium environment with an advisor, and keep the policy.",
+        "lab teach insert --advisor terminal",
+        more="{words of teaching}",
+    ),
+    "tune": Command(
+        "tune",
+        "Tune settings to a problem with Optuna, and say what that gains over its own on seeds that no trial had.",
+        "lab tune world-1 --advisor moderate --trials 100 --workers 2",
+    ),
+    "replay": Command(
+        "replay",
+        "Show a kept teaching session, or a run, again: what was asked, answered or done, and what came of it.",
+        "lab replay lesson",
+    ),
+    "sequence": Command(
+        "sequence",
+        "The high level alone: the order of the robot's transfers, beside the proven optimum or bound.",
+        "lab sequence toast --case II --toasts 4 --gantt order.svg",
+        more="{words of sequencing}",
+    ),
+    "export": Command(
+        "export",
+        "Write what the robot did in a run as job files or trajectories, read them back and play them in physics.",
+        "lab export toast-run --format jbi",
+        more="{words of exporting}",
+    ),
+    "see": Command(
+        "see",
+        "Picture to grid: find the gripper (magenta), the machine's marker (cyan) and the obstacles (green).",
+        "lab see overhead.png --task toast",
+    ),
+    "view": Command(
+        "view",
+        "Look at a task's scene, at a grid world in 3D or at a run's replay, on a page on 127.0.0.1, until Ctrl-C.",
+        "lab view toast",
+    ),
+    "new": Command(
+        "new",
+        "Write a task file that runs: parts go from an input through machines to an output, laid out around the arm.",
+        "lab new bakery --part box:0.12x0.015x0.12:2 --machine oven:60",
+    ),
+    "toolbox list": Command("toolbox", "The policies in the toolbox.", "lab toolbox list --subtask insert --solved"),
+    "toolbox show": Command(
+        "toolbox",
+        "All that is known of one policy: where it comes from, its versions, and what happened to it.",
+        "lab toolbox show 'insert at toaster 1a2b3c4d'",
+    ),
+    "toolbox log": Command(
+        "toolbox",
+        "What happened to the policies of a name: learned, put in use, evaluated, removed.",
+        "lab toolbox log 'insert at toaster 1a2b3c4d'",
+    ),
+    "toolbox promote": Command(
+        "toolbox", "Put a kept version of a policy in use.", "lab toolbox promote 'insert at toaster 1a2b3c4d' 2"
+    ),
+    "toolbox rollback": Command(
+        "toolbox",
+        "Put the version of a policy in use that was in use before; again for the one before that.",
+        "lab toolbox rollback 'insert at toaster 1a2b3c4d'",
+    ),
+    "toolbox verify": Command(
+        "toolbox",
+        "Check every file: whole, finite, of the right shape; versions by their hash. Exit 1 when one is not.",
+        "lab toolbox verify",
+    ),
     "toolbox evaluate": Command(
-        toolbox_evaluate.toolbox_evaluate, "lab toolbox evaluate 'insert at toaster 1a2b3c4d' --scenes 50"
+        "toolbox_evaluate",
+        "Carry a policy out in physics, in scenes drawn from the seed on: how often it does what it is for, for its log.",
+        "lab toolbox evaluate 'insert at toaster 1a2b3c4d' --scenes 50",
     ),
     "toolbox card": Command(
-        toolbox_archive.toolbox_card, "lab toolbox card 'insert at toaster 1a2b3c4d' --out insert-card"
+        "toolbox_archive",
+        "A policy's card: what it does, where and with whose advice it was learned, its curve and its values as pictures.",
+        "lab toolbox card 'insert at toaster 1a2b3c4d' --out insert-card",
     ),
-    "toolbox export": Command(toolbox_archive.toolbox_export, "lab toolbox export --out my-skills.zip"),
-    "toolbox import": Command(toolbox_archive.toolbox_import, "lab toolbox import my-skills.zip"),
+    "toolbox export": Command(
+        "toolbox_archive",
+        "Policies as one archive; the same policies give the same bytes.",
+        "lab toolbox export --out my-skills.zip",
+    ),
+    "toolbox import": Command(
+        "toolbox_archive",
+        "Bring in policies that somebody gave you: every one is checked before the first is kept, and all are kept or none.",
+        "lab toolbox import my-skills.zip",
+    ),
     "toolbox publish": Command(
-        toolbox_archive.toolbox_publish, "lab toolbox publish 'insert at toaster 1a2b3c4d' --out insert --license mit"
+        "toolbox_archive",
+        "A folder as the Hugging Face Hub has it: model card, safetensors, metadata, pictures. Nothing is sent anywhere.",
+        "lab toolbox publish 'insert at toaster 1a2b3c4d' --out insert --license mit",
     ),
-    "toolbox remove": Command(toolbox.toolbox_remove, "lab toolbox remove 'insert at toaster 1a2b3c4d'"),
-    "toolbox restore": Command(toolbox.toolbox_restore, "lab toolbox restore 'insert at toaster 1a2b3c4d'"),
-    "task list": Command(task.task_list, "lab task list"),
-    "task show": Command(task.task_show, "lab task show toast"),
+    "toolbox remove": Command(
+        "toolbox",
+        "Remove one policy; lab toolbox restore brings it back.",
+        "lab toolbox remove 'insert at toaster 1a2b3c4d'",
+    ),
+    "toolbox restore": Command(
+        "toolbox",
+        "Bring back the policy that was removed last under this name.",
+        "lab toolbox restore 'insert at toaster 1a2b3c4d'",
+    ),
+    "task list": Command(
+        "task", "The tasks, the cells for lab sequence and the grid worlds that ship.", "lab task list"
+    ),
+    "task show": Command(
+        "task",
+        "The text of a task file, of a task, a cell or a world: copy it, change it, use it.",
+        "lab task show toast",
+    ),
     "task convert": Command(
-        task.task_convert,
+        "task",
+        "Read an instance as the field writes it, and write it as the lab's own cell file (TOML), or as PyJobShop's JSON.",
         "lab task convert bilge-ulusoy-jobs.csv --layout bilge-ulusoy-layouts.csv --case 7:1 --robots 2 --out ex71.toml",
-        "{words of instances}",
+        more="{words of instances}",
     ),
-    "task random": Command(task.task_random, "lab task random 10x10x10 --density 0.06 --seed 7 --out my-world.toml"),
-    "task reconstruct": Command(task.task_reconstruct, "lab task reconstruct --seed 0 --out world-2.toml"),
-    "task check": Command(task.task_check, "lab task check my-toast.toml"),
-    "study list": Command(study.study_list, "lab study list"),
-    "study run": Command(study.study_run, "lab study run table-9.2 --workers 2"),
+    "task random": Command(
+        "task",
+        "Write a random grid world as a task file; a way always leads from its start to its goal.",
+        "lab task random 10x10x10 --density 0.06 --seed 7 --out my-world.toml",
+    ),
+    "task reconstruct": Command(
+        "task",
+        "Look for a world like the thesis's world II, of which only a picture is printed; takes a few minutes.",
+        "lab task reconstruct --seed 0 --out world-2.toml",
+    ),
+    "task check": Command(
+        "task",
+        "Check a task file: its text, its reach, and that a way exists for every sub-task, or through the world. Exit 2 if not.",
+        "lab task check my-toast.toml",
+    ),
+    "study list": Command("study", "The studies that can be run.", "lab study list"),
+    "study run": Command(
+        "study",
+        "Run a study and write its report; what its folder already holds (chapter 9, faults, transport) is not run again.",
+        "lab study run table-9.2 --workers 2",
+    ),
     "study compare": Command(
-        compare.study_compare,
+        "compare",
+        "Compare settings: every combination of the values that the options name, with commas between, in many sessions each.",
         "lab study compare maze.txt --gate ccrl,ia --advisor expert,novice --psi .05,.1 --workers 2",
     ),
 }
@@ -140,18 +229,32 @@ def _lab(
     """Teach a robot."""
 
 
-def made() -> typer.Typer:
-    """The command `lab` as the tables say."""
-    app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False)
-    groups = {name: typer.Typer(no_args_is_help=True, help=text) for name, text in GROUPS.items()}
+def made() -> CommandGroup:
+    """The command `lab` as the tables say; what a row names is loaded when it is typed."""
+    app = typer.Typer(cls=CommandGroup, no_args_is_help=True)
     app.callback()(_lab)
-    for words, command in COMMANDS.items():
+    top: Any = typer.main.get_command(app)
+    groups = {name: CommandGroup(name=name, help=text, no_args_is_help=True) for name, text in GROUPS.items()}
+    for words, row in COMMANDS.items():
         group, _, name = words.rpartition(" ")
-        epilog = "\n\n".join(filter(None, [f"Example: {command.example}", command.more]))
-        (groups[group] if group else app).command(name, cls=CommandOfFamilies, epilog=epilog)(guarded(command.function))
-    for name, group_app in groups.items():
-        app.add_typer(group_app, name=name)
-    return app
+        (groups[group] if group else top).add_command(UnloadedCommand(name, row.help, partial(loaded, words)))
+    for made_group in groups.values():
+        top.add_command(made_group)
+    return cast(CommandGroup, top)
+
+
+def loaded(words: str) -> Any:
+    """The command behind these words, with its parameters."""
+    from lab.cli.families import CommandOfFamilies
+
+    row = COMMANDS[words]
+    function = row.function
+    if isinstance(function, str):
+        function = getattr(import_module(f"lab.cli.{function}"), words.replace(" ", "_"))
+    app = typer.Typer(add_completion=False)
+    epilog = "\n\n".join(filter(None, [f"Example: {row.example}", row.more]))
+    app.command(words.rpartition(" ")[2], cls=CommandOfFamilies, epilog=epilog)(guarded(function))
+    return typer.main.get_command(app)
 
 
 def called() -> int:

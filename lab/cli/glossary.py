@@ -7,7 +7,7 @@ TERMS = {
     "guided episode": "an episode with at least one helped step",
     "mislead": "an episode in which it asked and that was no shorter than the mean of those before it: advice did not help",
     "Lambda": "the improvement that is enough: below it ccrl asks",
-    "Omega": "how many misleads are tolerated before an advisor is rejected",
+    "Omega": "how many misleads are tolerated before an advisor is rejected; a budget of helped steps may end advice before",
     "psi": "the distance between values with which ia, combined and importance compare",
     "trust": "the share of an advisor's answers that led nearer to the goal, as far as the learner can tell",
     "tau": "the skill of a simulated advisor, the smaller the better: .01 an expert, .1 moderate, .3 limited, 1 a novice",

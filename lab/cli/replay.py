@@ -8,7 +8,8 @@ import typer
 from lab.cli.families import from_files
 from lab.cli.lessons import lesson_seat, say_read, sequenced
 from lab.cli.options import Json, Plain, Port, ToolboxPlace, TrustModule
-from lab.cli.output import complain, end, show
+from lab.cli.output import complain, console, end, show
+from lab.errors import BadInput
 
 if TYPE_CHECKING:
     from lab.learning.requests import Request
@@ -43,6 +44,15 @@ def replay(
     tensorboard: Annotated[
         Path | None, typer.Option("--tensorboard", help="Write its learning curve for TensorBoard into this folder.")
     ] = None,
+    movie: Annotated[
+        Path | None,
+        typer.Option(
+            "--movie", help="Draw a run as a moving picture into this .gif or .webp file; no display is needed."
+        ),
+    ] = None,
+    seconds: Annotated[
+        float, typer.Option("--seconds", min=1.0, max=60.0, help="How long the moving picture lasts [s].")
+    ] = 15.0,
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
@@ -62,12 +72,15 @@ def replay(
     from lab.toolbox.registry import Toolbox
     from lab.view.summary import replay_summary, table_of
 
+    if movie is not None and (folder is None or not is_run(folder)):
+        where = "" if folder is None else f"'{folder}': "
+        raise BadInput(f"{where}--movie goes with the folder of a run (lab run --out)")
     if folder is None:
         rows = session_rows(Toolbox(toolbox))
         show({"sessions": rows}, as_json, lambda d: table_of(d["sessions"], ("session", "problem", "advisor", "state")))
         return
     if is_run(folder):
-        _replay_run(folder, page, port, as_json)
+        _replay_run(folder, page, port, as_json, movie, seconds)
         return
     from lab.teaching.subjects import subject_of
 
@@ -99,13 +112,21 @@ def replay(
         end("stopped by Ctrl-C", 130)
 
 
-def _replay_run(folder: Path, page: bool, port: int, as_json: bool) -> None:
-    """What was done in a run and what came of it, from its journal; on a page its film."""
-    from lab.cli.view import serve
+def _replay_run(
+    folder: Path, page: bool, port: int, as_json: bool, movie: Path | None = None, seconds: float = 15.0
+) -> None:
+    """What was done in a run and what came of it, from its journal; its film as a moving picture, or on a page."""
+    from lab.cli.view import replay_page, serve
     from lab.production.run_journal import replayed_run
     from lab.view.summary import run_replay_summary
 
     document = replayed_run(folder, "DIR")
+    if movie is not None:
+        from lab.view.movie import write_movie
+        from lab.view.progress import counting
+
+        with counting(console(), "pictures drawn") as progress:
+            document["movie"] = write_movie(replay_page(folder), movie, seconds, progress)
     show(document, as_json, run_replay_summary)
     if page:
         try:

@@ -43,6 +43,16 @@ def run(
         bool, typer.Option("--cyclic", help="Repeat the robot's shortest cycle, and measure its period.")
     ] = False,
     seed: Seed = 0,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers",
+            min=1,
+            max=256,
+            help="Processes that time moves and draw; the numbers are the same.",
+            show_default="all cores",
+        ),
+    ] = None,
     toolbox: ToolboxPlace = None,
     resume: Annotated[
         Path | None, typer.Option("--resume", help="Go on with the run in this folder, as it was begun.")
@@ -52,63 +62,66 @@ def run(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Find or learn the skills, time them, find their best order, and carry them out in physics."""
-    from dataclasses import replace
+    """Find or learn the skills, time them, find an order for them, and carry them out in physics."""
+    from lab.workers import Workers
 
-    from lab.files import check_out
-    from lab.production.conditions import Conditions
-    from lab.production.controls import Controls
-    from lab.production.operation.commands import pace
-    from lab.production.operation.run_desk import RunDesk
-    from lab.production.run import run as run_task
-    from lab.production.run_advice import RunAdvice
-    from lab.production.run_journal import RunJournal
-    from lab.production.run_options import RunOptions, begun, gone_on
-    from lab.skills.prepared_scene import prepare
-    from lab.tasks.task_file import load
-    from lab.teaching.lesson_options import DEFAULT_ADVISORS
-    from lab.view.summary import delivered_in_words, run_summary
+    with Workers(workers) as beside:  # the others load what they need while this process does
+        from dataclasses import replace
 
-    if cyclic and order is not None:
-        raise BadInput(f"--cyclic and --order {order}: an order is one or the other")
-    given = RunOptions(
-        task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order, cyclic
-    )
-    if resume is None:
-        options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
-        loaded = load(options.task)
-    else:
-        options, loaded = gone_on(given, resume, out)
-    folder = resume or out or Path(f"{loaded.name}-run")
-    check_out(folder)
-    watched = page or view or "web" in options.advisors
-    controls = Controls(pace(speed or ("4" if watched else "max")))
-    lessons = options.lessons()
-    lessons.advising()
-    prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed)
-    journal = begun(options, loaded, folder) if resume is None else RunJournal.resume(folder)
-    try:
-        with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
-            teacher = teacher_of(toolbox, lessons, seat)
-            advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "", cyclic=options.cyclic)
-            teacher = replace(teacher, keep=advice.keep)
-            share = options.override / 100
-            conditions = Conditions(share, seat.page, controls, journal, fault_seed=options.faults, advice=advice)
-            if seat.page is not None:
-                desk = RunDesk(loaded, prepared.order, controls, journal, seat.hear)
-                conditions = replace(conditions, on_floor=desk.on_floor)
-                seat.page.steer(desk)
-            with seat.progress:
-                report = run_task(prepared, teacher, folder, conditions)
-    except BadInput:
+        from lab.files import check_out
+        from lab.production.conditions import Conditions
+        from lab.production.controls import Controls
+        from lab.production.operation.commands import pace
+        from lab.production.operation.run_desk import RunDesk
+        from lab.production.run import run as run_task
+        from lab.production.run_advice import RunAdvice
+        from lab.production.run_journal import RunJournal
+        from lab.production.run_options import RunOptions, begun, gone_on
+        from lab.skills.prepared_scene import prepare
+        from lab.tasks.task_file import load
+        from lab.teaching.lesson_options import DEFAULT_ADVISORS
+        from lab.view.summary import delivered_in_words, run_summary
+
+        if cyclic and order is not None:
+            raise BadInput(f"--cyclic and --order {order}: an order is one or the other")
+        given = RunOptions(
+            task or "", toasts, parts, tuple(advisor or ()), asked, decide, override, seed, faults, order, cyclic
+        )
         if resume is None:
-            journal.forget()
-        raise
-    except KeyboardInterrupt as stopped:
-        why = str(stopped) or "stopped by Ctrl-C; what was learned is kept"
-        raise KeyboardInterrupt(f"{why}; go on with: lab run --resume {quote(str(folder))}") from None
-    finally:
-        journal.close()
+            options = replace(given, task=task or "toast", advisors=given.advisors or DEFAULT_ADVISORS)
+            loaded = load(options.task)
+        else:
+            options, loaded = gone_on(given, resume, out)
+        folder = resume or out or Path(f"{loaded.name}-run")
+        check_out(folder)
+        watched = page or view or "web" in options.advisors
+        controls = Controls(pace(speed or ("4" if watched else "max")))
+        lessons = options.lessons()
+        lessons.advising()
+        prepared = prepare(loaded, loaded.ordered(options.toasts, options.parts), options.seed, workers=beside)
+        journal = begun(options, loaded, folder) if resume is None else RunJournal.resume(folder)
+        try:
+            with lesson_seat(options.advisors, page=page or view, port=port, wait_s=wait) as seat:
+                teacher = teacher_of(toolbox, lessons, seat)
+                advice = RunAdvice(teacher.toolbox, lessons, journal, options.order or "", cyclic=options.cyclic)
+                teacher = replace(teacher, keep=advice.keep)
+                share = options.override / 100
+                conditions = Conditions(share, seat.page, controls, journal, fault_seed=options.faults, advice=advice)
+                if seat.page is not None:
+                    desk = RunDesk(loaded, prepared.order, controls, journal, seat.hear)
+                    conditions = replace(conditions, on_floor=desk.on_floor)
+                    seat.page.steer(desk)
+                with seat.progress:
+                    report = run_task(prepared, teacher, folder, conditions, beside)
+        except BadInput:
+            if resume is None:
+                journal.forget()
+            raise
+        except KeyboardInterrupt as stopped:
+            why = str(stopped) or "stopped by Ctrl-C; what was learned is kept"
+            raise KeyboardInterrupt(f"{why}; go on with: lab run --resume {quote(str(folder))}") from None
+        finally:
+            journal.close()
     document = report.to_json()
     show(document, as_json, run_summary)
     if report.outcome.interrupted:

@@ -105,7 +105,7 @@ def sequence(
     toolbox: ToolboxPlace = None,
     as_json: Json = False,
 ) -> None:
-    """The high level alone: the order of the robot's transfers, beside the proven optimum.
+    """The high level alone: the order of the robot's transfers, beside the proven optimum or bound.
 
     What a person advises is kept: --resume goes on with it, lab replay shows it again.
     """

@@ -123,7 +123,7 @@ def task_check(
     seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
-    """Check a task file: its text, its reach, and that a way exists for every sub-task, or through the world. Exit 2 when not.
+    """Check a task file: its text, its reach, and that a way exists for every sub-task, or through the world. Exit 2 if not.
 
     Of a cell: that its order can be made, with the line of what is wrong. With --json the document comes in both cases, and
     so does the picture of a task that can be read: what is wrong is marked in it.

@@ -59,12 +59,7 @@ def serve(what: str, asked: "Asked | None", port: int, tell: Tell) -> None:
     from lab.view.meshcat import LiveView
 
     if Path(what).is_dir():
-        replay = Path(what) / "replay.html"
-        if not replay.is_file():
-            raise BadInput(
-                f"'{what}' holds no replay.html: give the folder of a run (--out of lab run), a task or a world"
-            )
-        with LiveView(port, replay=replay) as page:
+        with LiveView(port, replay=replay_page(Path(what))) as page:
             tell(page.url, page.hint)
             _wait()
     with seen(what, asked or Asked()) as (title, recording), LiveView(port, title=title) as live:
@@ -72,6 +67,16 @@ def serve(what: str, asked: "Asked | None", port: int, tell: Tell) -> None:
         live.update(recording.frames[-1])
         tell(live.url, live.hint)
         _wait()
+
+
+def replay_page(folder: Path) -> Path:
+    """The page with a run's replay in its folder. Raises BadInput when there is none."""
+    page = folder / "replay.html"
+    if not page.is_file():
+        raise BadInput(
+            f"'{folder}' holds no replay.html: give the folder of a run (--out of lab run), a task or a world"
+        )
+    return page
 
 
 def write_page(what: str, asked: "Asked", out: Path) -> dict[str, str]:

@@ -1,12 +1,12 @@
-"""Functions compiled with numba and kept between runs, under a key of every source that is compiled in.
+"""Functions compiled with numba and kept between runs, under a hash of every source that may be compiled in.
 
-numba's own cache knows changes of the function's file only, and writes beside it. Here a function's folder, in the
-user's cache, is named by a hash of its module and of all modules of the same package that are imported at the top of
-it, and of those. Where that folder cannot be made or written, nothing is kept, each run compiles anew, and says so.
+numba's own cache knows changes of the function's file only, and writes beside it. Here compiled functions lie in the
+user's cache, in a folder that is named by a hash of the function's whole package. Where that folder cannot be made or
+written, nothing is kept: each run compiles anew, and says so.
 """
 
-import hashlib
 import os
+import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -22,9 +22,9 @@ from numba.core.caching import FunctionCache
 from platformdirs import user_cache_dir
 
 from lab.errors import Notice
-from lab.learning.sources import sources
+from lab.files import source_hash
 
-MOST_FOLDERS = 60  # of a few MB at the most each; a version of the lab has about ten
+MOST_FOLDERS = 6  # versions of packages whose compiled functions are kept, each of a few tens of MB
 _LEAN: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _CONFIG: Any = numba.config  # its types do not know what it holds
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -50,7 +50,7 @@ def compiled(function: Function, **options: Any) -> Function:
     """The function compiled, without the GIL, for each kind of arguments that it meets; options: those of `numba.njit`."""
     jit: Any = numba.njit  # its types do not know all options
     jitted: Any = jit(nogil=True, **options)(function)
-    folder = cache_folder() / key(function.__module__)
+    folder = cache_folder() / key(function.__module__.partition(".")[0])
     before, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(folder)  # read when the cache is made
     try:
         _make(folder)
@@ -115,12 +115,11 @@ def linked(function: Function, **called: Any) -> Function:
 
 
 @cache
-def key(module: str) -> str:
-    """The name of a loaded module and a hash of all sources that may be compiled into its functions."""
-    digest = hashlib.sha256()
-    for name, text in sources([module], inside=False).texts.items():
-        digest.update(f"{name} {len(text)} {text}".encode())
-    return f"{module}-{digest.hexdigest()[:16]}"
+def key(package: str) -> str:
+    """The name of a loaded package, or of a module that lies in none, with hashes of all of its source and of the lab's."""
+    file = Path(str(sys.modules[package].__file__))
+    own = source_hash(file.parent if file.name == "__init__.py" else file)
+    return f"{package}-{own[:16]}-{source_hash()[:16]}"
 
 
 def _make(folder: Path) -> None:

@@ -60,7 +60,7 @@ def allowed_words(request: Request) -> str:
 class AdviceRequest(Request):
     """A request about the next action in a state of a table.
 
-    q: its live action values, q[state][action], not to be changed; temperature and selection: how it chooses now;
+    q: its live action values, `q[state][action]`, not to be changed; temperature and selection: how it chooses now;
     environment: what can draw the state.
     """
 

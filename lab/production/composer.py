@@ -119,6 +119,8 @@ class Production:
         """After each physics step: tell of machines that are done, and show what they have done to their parts."""
         floor = self.floor
         for machine in floor.machines.values():
+            if not machine.part:
+                continue
             if not machine.told and machine.done(floor.now_s):
                 machine.told = True
                 at_most_s = self.work.at_most_s(machine.part, machine.station)
@@ -126,7 +128,7 @@ class Production:
                 self.tell(MachineDone(machine.station, machine.part, floor.now_s))
                 if machine.skill is None and floor.skillset.task.station(machine.station).finish is not None:
                     self._show(finish_name(machine.part, machine.station))
-            if machine.part and floor.now_s > machine.burns_s:
+            if floor.now_s > machine.burns_s:
                 machine.burns_s = NEVER
                 self._show(burnt_name(machine.part, machine.station))
             if machine.skill is not None and machine.moves:

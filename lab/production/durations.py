@@ -2,23 +2,22 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from importlib.metadata import packages_distributions, version
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from lab.errors import BadInput, WorkFailed, unknown
-from lab.files import assets_folder, read_limited
-from lab.learning.sources import sources
+from lab.files import assets_folder, read_limited, source_hash
 from lab.production.floor import Floor
 from lab.sequencing.cell.cell import Cell
 from lab.sequencing.cell.stations import one_robot
 from lab.sim import urdf_reader
 from lab.sim.scene.places import Layout
-from lab.sim.world import TIME_STEP, World
+from lab.sim.world import TIME_STEP, World, engine
 from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared
 from lab.skills.skill import Status
@@ -26,11 +25,10 @@ from lab.skills.skillset import Carried, Pair, SkillSet, products, stations
 from lab.tasks.task import Order, Task
 from lab.toolbox.policy import Policy
 from lab.toolbox.registry import Toolbox
+from lab.workers import Workers
 
 RECORDS = "durations"  # the kind of record in the toolbox
 LONGEST_S = 86_400.0  # of a move or a process
-MEASURED_BY = (__name__,)  # the modules that carry moves out, with all that they import
-DECIDED_BY_RESULT = ("lab.sequencing", "lab.learning", "lab.advice", "lab.view")  # moves and policies hold it
 
 Way = Pair | Carried
 
@@ -46,10 +44,10 @@ class TimedMove(NamedTuple):
 class Durations:
     """Measured times [s]: the robot's moves, empty and with what it carries; its services, and what machines take."""
 
-    empty_s: Mapping[Pair, float]
-    loaded_s: Mapping[Carried, float]
-    process_s: Mapping[str, float]
-    service_s: Mapping[Pair, float] = field(default_factory=dict)
+    empty_s: dict[Pair, float]
+    loaded_s: dict[Carried, float]
+    process_s: dict[str, float]
+    service_s: dict[Pair, float] = field(default_factory=dict)
     sim_s: float = 0.0
 
     def to_json(self) -> dict[str, dict[str, float]]:
@@ -74,6 +72,16 @@ class Durations:
             self,
             empty_s={pair: means.get(pair, seconds) for pair, seconds in self.empty_s.items()},
             loaded_s={way: means.get(way, seconds) for way, seconds in self.loaded_s.items()},
+        )
+
+    def joined(self, other: "Durations") -> "Durations":
+        """All times of both; where both have one, the other's."""
+        return Durations(
+            self.empty_s | other.empty_s,
+            self.loaded_s | other.loaded_s,
+            self.process_s | other.process_s,
+            self.service_s | other.service_s,
+            self.sim_s + other.sim_s,
         )
 
     @classmethod
@@ -123,48 +131,72 @@ def _times(record: Mapping[str, Any], table: str, wanted: set[str]) -> dict[str,
     return {name: float(seconds) for name, seconds in times.items()}
 
 
-def measure(prepared: Prepared, on_move: Callable[[str, float], None] | None = None) -> Durations:
-    """Carry every needed move out once in simulation and time it [s]; WorkFailed when one does not succeed."""
-    tell, skillset = on_move or (lambda name, seconds: None), prepared.skillset
-    loaded: dict[Carried, float] = {}
-    process: dict[str, float] = {}
-    steps = 0
-    for way, leg in skillset.legs.items():
-        with World() as world:
-            floor = Floor(world, skillset, prepared.surveys.layout)
+@dataclass(frozen=True)
+class Trial:
+    """What is timed in one world of its own: a way with a part and the process behind it, empty ways, or a service."""
+
+    loaded: Carried | None = None
+    process: bool = False
+    empty: tuple[Pair, ...] = ()
+    service: Pair | None = None
+
+
+def trials(skillset: SkillSet) -> list[Trial]:
+    """What times every move of these skills once; each trial can be made beside the others."""
+    timed = set[str]()
+    made = list[Trial]()
+    for way in skillset.legs:
+        made.append(Trial(loaded=way, process=bool(skillset.processes[way.target]) and way.target not in timed))
+        timed.add(way.target)
+    made += [Trial(service=own) for own, skills in skillset.services.items() if skills]
+    origins = dict.fromkeys(origin for origin, _ in skillset.travels)
+    return made + [Trial(empty=tuple(pair for pair in skillset.travels if pair[0] == origin)) for origin in origins]
+
+
+def measure(
+    prepared: Prepared, on_move: Callable[[str, float], None] | None = None, workers: Workers | None = None
+) -> Durations:
+    """Carry every needed move out once in simulation and time it [s]; WorkFailed when one does not succeed.
+
+    Each trial has a world of its own, so that the times do not depend on how many processes share the trials.
+    """
+    tell, skillset, timed = on_move or (lambda name, seconds: None), prepared.skillset, trials(prepared.skillset)
+    whole = Durations({}, {}, {})
+    for found in (workers or Workers()).each(partial(carried_out, prepared), timed):
+        for way, seconds in (found.loaded_s | found.empty_s).items():
+            tell(f"{_word(way)}, {'loaded' if isinstance(way, Carried) else 'empty'}", seconds)
+        for station, seconds in found.process_s.items():
+            tell(skillset.processes[station][-1].name, seconds)
+        for own, seconds in found.service_s.items():
+            tell(_service(own), seconds)
+        whole = whole.joined(found)
+    return whole
+
+
+def carried_out(prepared: Prepared, trial: Trial) -> Durations:
+    """What one trial times [s]; WorkFailed when a move does not succeed."""
+    skillset = prepared.skillset
+    with World() as world:
+        floor = Floor(world, skillset, prepared.surveys.layout)
+        found = Durations({}, {}, {})
+        if trial.loaded is not None:
+            leg = skillset.legs[trial.loaded]
             for skill in leg:
                 skill.furnish(floor.bench)
             leg[0].begin(floor.bench)
             part = leg[0].part
-            loaded[way] = _timed(floor, leg, part)
-            tell(f"{_word(way)}, loaded", loaded[way])
-            for skill in () if way.target in process else skillset.processes[way.target]:
-                process[way.target] = _timed(floor, [skill], part)
-                tell(skill.name, process[way.target])
-            steps += world.steps
-    empty, service, more = _measure_empty(prepared, tell)
-    return Durations(empty, loaded, process, service, (steps + more) * TIME_STEP)
-
-
-def _measure_empty(
-    prepared: Prepared, tell: Callable[[str, float], None]
-) -> tuple[dict[Pair, float], dict[Pair, float], int]:
-    """The times [s] of all ways of the empty gripper and of all services, and the physics steps that took."""
-    empty: dict[Pair, float] = {}
-    service: dict[Pair, float] = {}
-    skillset = prepared.skillset
-    with World() as world:
-        floor = Floor(world, skillset, prepared.surveys.layout)
-        for pair, way in skillset.travels.items():
+            found.loaded_s[trial.loaded] = _timed(floor, leg, part)
+            for skill in skillset.processes[trial.loaded.target] if trial.process else ():
+                found.process_s[trial.loaded.target] = _timed(floor, [skill], part)
+        for pair in trial.empty:
+            way = skillset.travels[pair]
             way[0].begin(floor.bench)
-            empty[pair] = _timed(floor, way)
-            tell(f"{_word(pair)}, empty", empty[pair])
-        for own, skills in skillset.services.items():
-            if skills:
-                skills[0].begin(floor.bench)
-                service[own] = _timed(floor, skills)
-                tell(_service(own), service[own])
-        return empty, service, world.steps
+            found.empty_s[pair] = _timed(floor, way)
+        if trial.service is not None:
+            skills = skillset.services[trial.service]
+            skills[0].begin(floor.bench)
+            found.service_s[trial.service] = _timed(floor, skills)
+        return replace(found, sim_s=world.steps * TIME_STEP)
 
 
 def _timed(floor: Floor, skills: Sequence[Skill], part: str = "") -> float:
@@ -218,22 +250,20 @@ def kept_durations(toolbox: Toolbox, key: str, skillset: SkillSet) -> Durations 
         raise BadInput(f"record '{key}' in toolbox {toolbox.address}: {error}") from None
 
 
-def durations_key(
-    task: Task, layout: Layout, skillset: SkillSet, policies: Mapping[str, Policy], modules: Sequence[str] = MEASURED_BY
-) -> str:
-    """A hash of all that the durations depend on: task and its files, layout, moves, policies, assets, source and libraries.
+def durations_key(task: Task, layout: Layout, skillset: SkillSet, policies: Mapping[str, Policy]) -> str:
+    """A hash (24 hex digits) of all that the durations depend on.
 
-    `modules` are the ones that measure. WorkFailed when a source or a library's version cannot be found.
+    These are the task and its files, the layout, the moves, the policies, the assets, all of the lab's own source, and
+    the physics engine. Raises WorkFailed when the engine's version is not known.
     """
-    code = sources(modules, DECIDED_BY_RESULT)
     decides = {
         "task": task.model_dump(mode="json", exclude={"name", "title", "sequencing", "subtasks", "faults"}),
         "obstacles": layout.obstacles,
         "moves": [asdict(skillset.moves), [*skillset.legs]],
         "policies": {name: [policy.signature, _hash(policy.q.tobytes())] for name, policy in policies.items()},
         "assets": {path.name: _hash(read_limited(path)) for path in files_of(task)},
-        "source": code.texts,
-        "libraries": _versions(code.libraries),
+        "source": source_hash(),
+        "engine": engine(),
     }
     return _hash(json.dumps(decides, sort_keys=True).encode())[:24]
 
@@ -249,11 +279,3 @@ def files_of(task: Task) -> list[Path]:
 
 def _hash(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-def _versions(libraries: Collection[str]) -> dict[str, str]:
-    distributions = packages_distributions()
-    for name in libraries:
-        if name not in distributions:
-            raise WorkFailed(f"the version of the library '{name}' cannot be found")
-    return {name: version(distributions[name][0]) for name in libraries}

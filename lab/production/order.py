@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 NOBODY = AdvisorName.of("none")
 KeepOrder = Callable[[Cell, str], Journal]  # given the cell and the objective
 SECOND_OPINION_S = 20.0  # how long CP-SAT may look where A* does not apply
-ADVISED, GIVEN, EXACT, CYCLIC = "advised", "given", "exact", "cyclic"  # by whom an order is, beside the methods' names
+ADVISED, UNADVISED, GIVEN, EXACT, CYCLIC = "advised", "unadvised", "given", "exact", "cyclic"  # by whom an order is
 
 
 def checked_order(cell: Cell, words: str, where: str = "--order") -> tuple[int, ...]:
@@ -123,8 +123,9 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
     """The order of a job, beside what cannot be beaten: the given one, or the best of those that were found.
 
     A cyclic order is used as a given one is. With advice, SRL looks for one with it, and the settings' method for one alone; the
-    exact search gives one, too. Of orders that cost the same the advised one is used, then the method's. Raises BadInput as
-    `checked_order`, `advised_srl` and `cyclic_order` do, WorkFailed and KeyboardInterrupt.
+    exact search gives one, too. Of orders that cost the same the advised one is used, then the method's; one of SRL that no
+    move was advised to is no advised one, and comes after them. Raises BadInput as `checked_order`, `advised_srl` and
+    `cyclic_order` do, WorkFailed and KeyboardInterrupt.
     """
     search, proven = search_for(settings), optimum(cell)
     is_timed = search.objective == MAKESPAN
@@ -140,14 +141,19 @@ def ordered(cell: Cell, settings: Sequencing, advice: OrderAdvice, seed: int, te
         own = cost(follow(cell, repeated.sequence), search.objective)
         orders[CYCLIC] = SequenceResult(repeated.sequence, own, (own,))
     said: dict[str, Any] = {}
+    asked: AdvisedResult | None = None
     if advice.advisor.row != "none" and not orders:
-        orders[ADVISED], said = _with_advice(cell, search, advice, seed, known, tell)
+        asked, said = _with_advice(cell, search, advice, seed, known, tell)
+    if asked is not None and asked.helped_steps:
+        orders[ADVISED] = asked
     orders[settings.method] = find_sequence(cell, settings.method, search, seed)
+    if asked is not None and not asked.helped_steps:
+        orders[UNADVISED] = asked
     if is_timed and len(orders) > 1 and proven.sequence:
         orders[EXACT] = SequenceResult(proven.sequence, proven.cost, (proven.cost,))
     used = next((name for name in (GIVEN, CYCLIC) if name in orders), None) or _cheapest(orders)
     costs = {name: order.cost for name, order in orders.items()}
-    tell(SequenceFound(orders[used], known, cell.parts))
+    tell(SequenceFound(orders[used], known, cell.parts, used))
     if len(orders) == 1:
         return Ordered(orders[used], proven, used, costs)
     tell(OrderChosen(used, costs, search.objective))

@@ -57,8 +57,7 @@ class Recorder:
 
     def take(self) -> None:
         """Take a frame now."""
-        frame = self.world.frame()
-        poses = dict(frame.poses)
+        poses = self.world.poses()
         for name, part in self._shown.items():
             poses[name] = poses[part]
         pending, self._pending = self._pending, {}

@@ -126,16 +126,10 @@ def _with(before: Durations, fresh: Prepared, ways: SkillSet, teacher: Teacher) 
     ways.skills, ways.policies = fresh.skillset.skills, fresh.skillset.policies
     ways.processes = {station.name: () for station in fresh.task.stations}
     try:
-        now = measure(replace(fresh, skillset=ways))
+        return before.joined(measure(replace(fresh, skillset=ways)))
     except LabError as error:
         teacher.tell(RecordSkipped(f"a way in the changed scene: {error}"))
         return before
-    return replace(
-        before,
-        empty_s={**before.empty_s, **now.empty_s},
-        loaded_s={**before.loaded_s, **now.loaded_s},
-        sim_s=before.sim_s + now.sim_s,
-    )
 
 
 def adopt(floor: Floor, prepared: Prepared, spot_of: MutableMapping[str, Spot]) -> None:

@@ -5,12 +5,14 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from lab.errors import LabError, WorkFailed
 from lab.export.program import PROGRAM, TRAJECTORY
-from lab.files import draft, write_whole
+from lab.files import draft, read_limited, write_whole
 from lab.operating_system import replace
 from lab.production.cyclic_order import measured_period
 from lab.production.outcome import Outcome
@@ -26,6 +28,7 @@ from lab.skills import Skill
 from lab.skills.prepared_scene import Prepared
 from lab.teaching.lesson_plan import Lesson
 from lab.toolbox.policy import Policy
+from lab.workers import Task, Workers
 
 if TYPE_CHECKING:
     from lab.sequencing.cyclic.cycle import Cycle
@@ -49,12 +52,14 @@ FILES = {
 class Report:
     """What a whole run came to; `began_s` is the clock's reading (`time.perf_counter`) when it began.
 
-    files: by name, those that are written; missing: why another one could not be.
+    method: by what the sequence was found (see `lab.sequencing.method_in_words`). files: by name, those that are written;
+    missing: why another one could not be.
     """
 
     prepared: Prepared
     taught: Taught
     sequenced: SequenceResult
+    method: str
     proven: Optimum
     outcome: Outcome
     recording: Recording
@@ -96,6 +101,7 @@ class Report:
             "retries": list(outcome.retries),
             "skills": list(self.taught.rows.values()),
             "sequence": list(self.sequenced.sequence),
+            "method": self.method,
             "predicted_makespan_s": self.sequenced.cost,
             "measured_makespan_s": outcome.schedule.makespan_s if self.success else None,
             "optimal_makespan_s": self.proven.optimal_s,
@@ -122,14 +128,46 @@ class Report:
         return measured_period(self.cycle, planned, self.outcome.schedule)
 
 
-def write_files(report: Report, out: Path) -> None:
+Drawn = dict[str, Task[bytes]]  # PNG files by their names in FILES, drawn or being drawn
+
+
+def begin_pictures(prepared: Prepared, taught: Taught, workers: Workers) -> Drawn:
+    """What can be drawn as soon as the skills are there: the learning curves, and the value map where there is a photo."""
+    from lab.view.plots import learning_curves, values_seen
+
+    drawn = {"learning_curves": workers.begin(_png, partial(learning_curves, _curves(prepared, taught.lessons)))}
+    skill = _photographed(prepared)
+    photo = None if skill is None else skill.photo()
+    if skill is not None and photo is not None:
+        q, mdp = taught.lessons[skill.name].policy.q, skill.problem.mdp
+        drawn["value_map"] = workers.begin(_png, partial(values_seen, q, mdp, photo.picture, photo.seen))
+    return drawn
+
+
+def _png(draw: Callable[[Path], None]) -> bytes:
+    """The PNG file that `draw` writes. Raises OSError and BadInput as it does."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "picture.png")
+        draw(path)
+        return read_limited(path)
+
+
+def write_files(report: Report, out: Path, drawn: Drawn | None = None, workers: Workers | None = None) -> None:
     """Write what there is of `FILES` to `out`, all at once at the end: none is ever half written, none is left of a run before.
+
+    drawn: what was begun by `begin_pictures`, None: it is drawn now. workers: who draws the rest, None: this process.
 
     The numbers come first; a picture, the replay or the program may fail alone, as on a full disk. Sets `report.files`, and
     `report.missing`. WorkFailed when the numbers cannot be written.
     """
     report.files, report.missing = {}, {}
     predicted = simulate(report.taught.cell, report.sequenced.sequence)
+    workers = workers or Workers()
+    drawn = begin_pictures(report.prepared, report.taught, workers) if drawn is None else drawn
+    if report.outcome.schedule.robot:
+        from lab.view.gantt import gantt
+
+        drawn = drawn | {"gantt": workers.begin(_png, partial(gantt, report.outcome.schedule, predicted=predicted))}
     try:
         out.mkdir(parents=True, exist_ok=True)
         with draft(out) as beside:
@@ -137,7 +175,7 @@ def write_files(report: Report, out: Path) -> None:
             written = _write_numbers(report, paths, predicted)
             report.files = {name: str(out / FILES[name]) for name in written}
             _write_json(paths["run"], _run_document(report))  # in case that there is no room for it any more
-            for names, write in _pictures(report, paths, predicted):
+            for names, write in _pictures(report, paths, predicted, drawn):
                 try:
                     write()
                 except (OSError, LabError) as error:
@@ -175,30 +213,29 @@ def _write_numbers(report: Report, paths: dict[str, Path], predicted: Schedule) 
 
 
 def _pictures(
-    report: Report, paths: dict[str, Path], predicted: Schedule
+    report: Report, paths: dict[str, Path], predicted: Schedule, drawn: Drawn
 ) -> Iterator[tuple[tuple[str, ...], Callable[[], object]]]:
-    """What else this run can have, and what writes it: a chart needs a move, the camera's pictures a skill that took one."""
-    from lab.view.gantt import gantt
+    """What else this run has, and what writes it; what other processes draw comes last."""
     from lab.view.meshcat import replay_html
-    from lab.view.plots import learning_curves, values_seen
     from lab.vision import write_picture
 
-    prepared, taught, outcome = report.prepared, report.taught, report.outcome
+    prepared, outcome = report.prepared, report.outcome
     program = outcome.program
     if program is not None:
         yield ("program", "trajectory"), lambda: program.save(paths["program"].parent)
-    if outcome.schedule.robot:
-        yield ("gantt",), lambda: gantt(outcome.schedule, paths["gantt"], predicted=predicted)
-    yield ("learning_curves",), lambda: learning_curves(_curves(prepared, taught.lessons), paths["learning_curves"])
     skill = _photographed(prepared)
     photo = None if skill is None else skill.photo()
-    if skill is not None and photo is not None:
-        q = taught.lessons[skill.name].policy.q
-        yield ("value_map",), lambda: values_seen(q, skill.problem.mdp, photo.picture, photo.seen, paths["value_map"])
+    if photo is not None:
         yield ("overhead",), lambda: write_picture(paths["overhead"], photo.picture)
     title = f"{prepared.task.title or prepared.task.name}: {prepared.words}"
     story = story_of(outcome, predicted)
     yield ("replay",), lambda: replay_html(report.recording, paths["replay"], title=title, story=story)
+    for name, picture in drawn.items():
+        yield (name,), partial(_write_picture, paths[name], picture)
+
+
+def _write_picture(path: Path, picture: Task[bytes]) -> None:
+    path.write_bytes(picture.result())
 
 
 def _run_document(report: Report) -> dict[str, Any]:

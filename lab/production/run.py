@@ -13,7 +13,7 @@ from lab.production.faults.draw import draw
 from lab.production.order import OrderAdvice, ordered
 from lab.production.recorder import show_scene
 from lab.production.relearning import Relearner
-from lab.production.report import Report, write_files
+from lab.production.report import Report, begin_pictures, write_files
 from lab.production.run_advice import RunAdvice
 from lab.production.run_journal import DurationsKept, RunEnded, RunJournal
 from lab.production.taught import Taught, skill_row
@@ -23,14 +23,20 @@ from lab.skills.trial import trial_of
 from lab.teaching.events import MoveTimed, PhaseBegan, PlanMade, RecordSkipped, ScenePrepared, SkillReady
 from lab.teaching.lesson_plan import Lesson, LessonPlan
 from lab.teaching.teacher import Teacher
+from lab.workers import Workers
 
 
 def teach_all(
-    prepared: Prepared, teacher: Teacher, journal: RunJournal | None = None, advice: RunAdvice | None = None
+    prepared: Prepared,
+    teacher: Teacher,
+    journal: RunJournal | None = None,
+    advice: RunAdvice | None = None,
+    workers: Workers | None = None,
 ) -> Taught:
     """Find or learn every skill, then find or measure the durations of every move; what the journal holds is taken from it.
 
-    advice: of a run that is gone on with, what was said in the lessons that are over counts in its receipts.
+    advice: of a run that is gone on with, what was said in the lessons that are over counts in its receipts. workers: who
+    shares in the timing; None: nobody.
     """
     task, skillset, journal = prepared.task, prepared.skillset, journal or RunJournal()
     teacher = replace(teacher, trial=trial_of(prepared))
@@ -66,11 +72,13 @@ def teach_all(
         skillset.policies[name] = lesson.policy
         lessons[name], rows[name] = lesson, row
         teacher.tell(SkillReady(name, lesson))
-    durations, key = _durations(prepared, teacher, journal)
+    durations, key = _durations(prepared, teacher, journal, workers)
     return Taught(lessons, rows, durations, cell_of(task, durations, prepared.order), key)
 
 
-def _durations(prepared: Prepared, teacher: Teacher, journal: RunJournal) -> tuple[Durations, str]:
+def _durations(
+    prepared: Prepared, teacher: Teacher, journal: RunJournal, workers: Workers | None
+) -> tuple[Durations, str]:
     """The durations measured earlier for exactly these policies in exactly this scene, or measured now and kept; their key.
 
     The key is "" where they cannot be kept.
@@ -87,7 +95,7 @@ def _durations(prepared: Prepared, teacher: Teacher, journal: RunJournal) -> tup
     if kept is None:
         works = sum(bool(skills) for skills in (*skillset.processes.values(), *skillset.services.values()))
         teacher.tell(PhaseBegan("measure", len(skillset.legs) + len(skillset.travels) + works))
-        kept = measure(prepared, lambda name, seconds: teacher.tell(MoveTimed(name, seconds)))
+        kept = measure(prepared, lambda name, seconds: teacher.tell(MoveTimed(name, seconds)), workers)
         if key:
             try:
                 teacher.toolbox.save_record(RECORDS, key, kept.to_json())
@@ -97,17 +105,24 @@ def _durations(prepared: Prepared, teacher: Teacher, journal: RunJournal) -> tup
     return kept, key
 
 
-def run(prepared: Prepared, teacher: Teacher, out: Path, conditions: Conditions | None = None) -> Report:
+def run(
+    prepared: Prepared,
+    teacher: Teacher,
+    out: Path,
+    conditions: Conditions | None = None,
+    workers: Workers | None = None,
+) -> Report:
     """The whole job on a prepared task; pictures, replay and JSON files go to `out` (see `lab.files.check_out`).
 
     How long moves took is kept, and the next run plans with it. Ctrl-C while it is carried out ends it with what came of it
-    until then; the journal goes on from there.
+    until then; the journal goes on from there. workers: who shares in the timing and draws, None: this process alone.
     """
-    conditions = conditions or Conditions()
+    conditions, workers = conditions or Conditions(), workers or Workers()
     began = time.perf_counter() - prepared.wall_s
     if conditions.viewer is not None:
         show_scene(prepared.task, prepared.order, prepared.layout, conditions.viewer)
-    taught = teach_all(prepared, teacher, conditions.journal, conditions.advice)
+    taught = teach_all(prepared, teacher, conditions.journal, conditions.advice, workers)
+    drawn = begin_pictures(prepared, taught, workers)
     teacher.tell(PhaseBegan("sequence", 1))
     advice, people = conditions.advice, teacher.advising.people
     whose = OrderAdvice() if advice is None else advice.order(people, taught.durations.to_json())
@@ -123,10 +138,12 @@ def run(prepared: Prepared, teacher: Teacher, out: Path, conditions: Conditions 
     outcome, recording = carry_out(prepared, taught.cell, order.found.sequence, conditions, teacher.tell, relearner)
     receipts = None if advice is None else advice.receipts(order)
     report = Report(
-        prepared, taught, order.found, order.proven, outcome, recording, began, receipts=receipts, cycle=order.cycle
+        *(prepared, taught, order.found, order.used, order.proven, outcome, recording, began),
+        receipts=receipts,
+        cycle=order.cycle,
     )
     teacher.tell(PhaseBegan("draw", 1))
-    write_files(report, out)
+    write_files(report, out, drawn, workers)
     if not outcome.interrupted:
         remember(report, teacher)
         conditions.journal.tell(RunEnded(len(outcome.delivered), outcome.failure or ""))

@@ -213,7 +213,7 @@ def _sessions(
             found += [] if heard.best is None else [heard.result()]
             break
         if journal is None or not journal.folding:
-            tell(SequenceFound(found[-1], shown, cell.parts))
+            tell(SequenceFound(found[-1], shown, cell.parts, method))
     document = _document(cell, method, search, found, known, wanted) | {"interrupted": interrupted}
     if wanted.stochastic and not interrupted:
         document["stochastic"] = stochastic(

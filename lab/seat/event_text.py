@@ -17,6 +17,7 @@ from lab.learning.session_events import (
 from lab.learning.session_events import Event as SessionEvent
 from lab.mdp import TabularMDP
 from lab.seat.request_text import percent, verdict
+from lab.sequencing import BESIDE_METHODS
 from lab.sequencing.cell.objectives import MAKESPAN
 from lab.sequencing.cell.routes import part_of
 from lab.teaching.events import (
@@ -171,14 +172,18 @@ def sequence_parts(event: SequenceFound) -> tuple[str, str]:
         shown, bound = beside(best.cost, known.bound, known.unit, 1)
         what = "proven optimum" if known.proven else "proven bound"
         reference = f"{what} {bound}" + ("" if gap is None else f", gap {gap_of(gap, 1)}")
-    found = f"{shown} found in episode {best.episode_costs.index(best.cost) + 1} of {len(best.episode_costs)}"
+    by = f" by {event.method}" if event.method else ""
+    episode, episodes = best.episode_costs.index(best.cost) + 1, len(best.episode_costs)
+    found = f"{shown} found{by} in episode {episode} of {episodes}"
+    if event.method in BESIDE_METHODS:
+        found = f"{shown}, {BESIDE_METHODS[event.method]}"
     return f"parts {order}{more}:", f"{found}, {reference}"
 
 
 def chosen_text(event: OrderChosen) -> str:
     """Which order is used, and what each that was found costs."""
     unit = " s" if event.objective == MAKESPAN else ""
-    whose = {"advised": "srl with advice", "given": "the given order", "exact": "the exact search"}
+    whose = BESIDE_METHODS | {"exact": "the exact search"}
     worth = [f"{whose.get(by, f'{by} alone')} {cost:.1f}{unit}" for by, cost in event.costs.items()]
     return f"orders: {', '.join(worth)}; used: {whose.get(event.used, f'{event.used} alone')}"
 

@@ -298,7 +298,8 @@ def _certainty(request: AdviceRequest, marks: Marks) -> str:
 def _verdict(now: Standing, guided: int) -> str:
     if not now.misleads:
         return f"It tolerates {counted(now.omega, 'episode')} with advice that are no shorter than those before."
-    return f"{misled(now.misleads, guided, 'It')}; the learner tolerates {now.omega}, and then asks no more."
+    spent = ", or when what it may use is spent" if now.budget < GateSettings.budget else ""
+    return f"{misled(now.misleads, guided, 'It')}; the learner tolerates {now.omega}, and then asks no more{spent}."
 
 
 VERDICTS = {"better": "better than before", "best": "as good as the best so far", "misled": "no better than before"}

@@ -180,7 +180,7 @@ _SHIPPED: dict[str, Sequencer] = {
     "srl": Sequencer(_srl, "the thesis's: learns from the reward of whole episodes, as printed", drawn=True),
     "srl-time": Sequencer(
         _srl_time,
-        "our own: learns step by step what time still to come costs, from a bound of the whole model on",
+        "Q-learning that begins at a lower bound of the full model; close to the heuristic search LRTA*",
         react=_learned_on,
     ),
     "srl-improved": Sequencer(
@@ -204,6 +204,21 @@ _SHIPPED: dict[str, Sequencer] = {
     "earliest-due": _rule("earliest-due", "the part that is due first"),
 }
 SEQUENCERS = Family("sequencers", _SHIPPED, _adopted)
+
+
+BESIDE_METHODS = {  # by what an order may be that no method found alone
+    "advised": "srl with advice",
+    "unadvised": "srl that was never advised",
+    "given": "the given order",
+    "cyclic": "one cycle, repeated",
+}
+
+
+def method_in_words(name: str) -> str:
+    """By what an order was found, such as "fifo (first in, first out: a queue of tasks)"."""
+    if name in BESIDE_METHODS:
+        return BESIDE_METHODS[name]
+    return f"{name} ({SEQUENCERS[name].help})" if name in SEQUENCERS else name
 
 
 def check_method(name: str) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from lab.sim.world import World
 from lab.vision import Image, Lens
 from lab.vision.calibration import Calibration
+from lab.vision.grid_view import Window
 from lab.vision.photo_effects import spoiled
 
 Array = NDArray[np.float64]
@@ -56,9 +57,24 @@ class Camera:
         x, y, w = clip[0], clip[1], clip[3]
         return np.stack([(x + w) / 2.0 * self.width, (w - y) / 2.0 * self.height - w, w])
 
-    def picture(self, world: World) -> NDArray[np.uint8]:
-        """What the camera sees: (height, width, 3) uint8 RGB."""
-        return world.render(self.view_matrix(), self.projection_matrix(), self.width, self.height)
+    def picture(self, world: World, window: Window | None = None) -> Image:
+        """What the camera sees: (height, width, 3) uint8 RGB, or (side, side, 3) of a window within it alone."""
+        view, projection = self.view_matrix(), self.projection_matrix()
+        if window is None:
+            return world.render(view, projection, self.width, self.height)
+        left, top, side = window
+        across, down = self.width / side, self.height / side
+        magnified = np.diag(
+            [across, down, 1.0, 1.0]
+        )  # clip coordinates of the window's middle become 0, of its edges 1
+        magnified[:2, 3] = across - 1.0 - 2.0 * left / side, 1.0 - down + 2.0 * top / side
+        return world.render(view, magnified @ projection, side, side)
+
+    def in_picture(self, window: Window) -> Window:
+        """The window, moved and shrunk as far as needed to lie within the picture."""
+        left, top, side = window
+        side = min(side, self.width, self.height)
+        return min(max(left, 0), self.width - side), min(max(top, 0), self.height - side), side
 
     # ---- as a lens in front of a sensor ----------------------------------------------------------------------------
 
@@ -111,10 +127,15 @@ class TableCamera(Camera):
         """(3, 4): homogeneous pixel of the straightened picture."""
         return super().pixel_from_world() if self.calibration is None else self.calibration.pixel_from_world
 
-    def picture(self, world: World) -> Image:
-        """What the camera saw in this physics step, straightened: (height, width, 3) uint8 RGB."""
+    def picture(self, world: World, window: Window | None = None) -> Image:
+        """What the camera saw in this physics step, straightened: (height, width, 3) uint8 RGB; of it the window, if given."""
         rng = np.random.default_rng([world.steps])
         if self.calibration is None:
-            return spoiled(super().picture(world), rng, self.strength)
-        lens = self.calibration.lens
-        return lens.straightened(spoiled(self.picture_through(lens, world), rng, self.strength))
+            picture = spoiled(super().picture(world), rng, self.strength)
+        else:
+            lens = self.calibration.lens
+            picture = lens.straightened(spoiled(self.picture_through(lens, world), rng, self.strength))
+        if window is None:
+            return picture
+        left, top, side = window
+        return picture[top : top + side, left : left + side]

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from math import isfinite
 from pathlib import Path
 from typing import Any, Self
 
@@ -22,6 +24,17 @@ PART_ROLLING = 0.0005  # [m] and its rolling, unless it is a box: without, a bal
 Array = NDArray[np.float64]
 Position = Sequence[float] | Array
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
+ENGINES = ("pybullet", "pybullet-arm64")  # the distributions that bring the module pybullet; one of them is installed
+
+
+def engine() -> str:
+    """The name and version of the installed physics engine, such as "pybullet 3.2.7"; raises WorkFailed when there is none."""
+    for name in ENGINES:
+        try:
+            return f"{name} {version(name)}"
+        except PackageNotFoundError:
+            continue
+    raise WorkFailed(f"no physics engine is installed ({' or '.join(ENGINES)}): install the lab again")
 
 
 @dataclass
@@ -267,16 +280,18 @@ class World:
         force: float | Sequence[float] = 2000.0,
     ) -> None:
         """Set the position motors' targets [rad or m], with velocities fed forward; `force` [Nm or N] is the most they use."""
-        if not (np.isfinite(positions).all() and (velocities is None or np.isfinite(velocities).all())):
-            raise WorkFailed(f"joint targets of '{name}' are not finite: {list(positions)}, moving {velocities}")
+        targets = [float(v) for v in positions]
+        speeds = [0.0] * len(names) if velocities is None else [float(v) for v in velocities]
+        if not all(map(isfinite, targets + speeds)):
+            raise WorkFailed(f"joint targets of '{name}' are not finite: {targets}, moving {speeds}")
         entry = self._bodies[name]
         self._call(
             "setJointMotorControlArray",
             entry.number,
             [entry.joints[joint] for joint in names],
             self._p.POSITION_CONTROL,
-            targetPositions=[float(v) for v in positions],
-            targetVelocities=[0.0] * len(names) if velocities is None else [float(v) for v in velocities],
+            targetPositions=targets,
+            targetVelocities=speeds,
             forces=[force] * len(names) if isinstance(force, float) else list(force),
             positionGains=[0.3] * len(names),
             velocityGains=[1.0] * len(names),
@@ -339,7 +354,9 @@ class World:
             renderer=self._p.ER_TINY_RENDERER,
             lightDirection=[0.3, -0.4, 1.0],
         )
-        return np.asarray(pixels, dtype=np.uint8).reshape(height, width, 4)[:, :, :3]
+        # An engine that was built without numpy gives a tuple of numbers from 0 to 255.
+        rgba = np.frombuffer(bytes(pixels), np.uint8) if isinstance(pixels, tuple) else np.asarray(pixels, np.uint8)
+        return rgba.reshape(height, width, 4)[:, :, :3]
 
     # ---- what a viewer sees -------------------------------------------------------------------------------------
 
@@ -354,13 +371,17 @@ class World:
 
     def frame(self) -> Frame:
         """Where everything is now."""
+        return Frame(self.time_s, self.poses())
+
+    def poses(self) -> dict[str, Pose]:
+        """Where each body of `bodies` is now, by its name."""
         poses: dict[str, Pose] = {}
         for name, entry in self._bodies.items():
             for link, shapes in entry.looks.items():
                 if shapes:
                     (x, y, z), (i, j, k, w) = self._pose(name, link)
                     poses[_label(name, link)] = (x, y, z, i, j, k, w)
-        return Frame(self.time_s, poses)
+        return poses
 
 
 def _label(name: str, link: str) -> str:

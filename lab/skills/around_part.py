@@ -12,7 +12,7 @@ from lab.mdp import NoPath, TabularMDP, grid
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.scene.blocked_cells import Survey
 from lab.skills.skill import Bench, Skill, learned_path, no_way
-from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, Surveys, near_pose
+from lab.skills.surveys import NEAR_SHAPE, NEAR_STEP_M, NEAR_YAW_STEP, NEAR_YAWS, SurveyName, Surveys, near_pose
 from lab.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -34,6 +34,11 @@ class AroundPart(Skill):
     def __init__(self, task: Task, kind: str, station: str) -> None:
         super().__init__(f"{self.subtask}{task.called(kind)} at {station}", kind)
         self.station = station
+
+    @property
+    def survey(self) -> SurveyName:
+        """Around the part."""
+        return ("around", self.station, self.kind, self.carries)
 
     def setup(self, surveys: Surveys) -> Problem:
         """The poses around a part with parts beside it; episodes begin anywhere above it."""

@@ -1,6 +1,5 @@
 """A grid that the overhead camera looks at, before one station and for one kind of part: its picture, view and survey."""
 
-from functools import cache
 from math import hypot
 
 import numpy as np
@@ -16,6 +15,7 @@ from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor
 from lab.sim.scene.places import Layout, Places
 from lab.sim.scene.scene import MARKER_ABOVE, Scene, in_grid
 from lab.sim.world import World
+from lab.skills.once import Made, once
 from lab.tasks.task import Task
 from lab.tasks.task_fields import CameraGrid, Station
 from lab.vision import View
@@ -42,8 +42,7 @@ class SurveyedGrid:
             parts,
         )
         self.settings = settings_of(task.station(station))
-        self.picture = cache(self._picture)
-        self.survey = cache(self._survey)
+        self.made: Made = {}
 
     def camera(self, pixels: int | None = None) -> Camera:
         """The overhead camera, with `pixels` a side if given."""
@@ -59,7 +58,8 @@ class SurveyedGrid:
         x, y = ((o + (i + 0.5) * grid.cell_m) for o, i in zip(grid.origin_m, cell, strict=True))
         return ToolPose(x, y, grid.height_m, 0.0)
 
-    def _picture(self) -> NDArray[np.uint8]:
+    @once
+    def picture(self) -> NDArray[np.uint8]:
         """The overhead picture with the arm at the grid's start, (pixels, pixels, 3) uint8 RGB."""
         x, y = self.settings.start_m
         start = ToolPose(x, y, self.settings.height_m, 0.0)
@@ -79,7 +79,8 @@ class SurveyedGrid:
             scene.robot.open_at_once(scene.kinds[self.kind].grip.width_m / 2)
             return self.camera().picture(world)
 
-    def _survey(self, seen: frozenset[str]) -> Survey:
+    @once
+    def survey(self, seen: frozenset[str]) -> Survey:
         """The cells that a carried part or the arm cannot be in, whatever the camera has `seen` left out."""
         with World() as world:
             scene = Scene(world, self.task, (), self.layout)

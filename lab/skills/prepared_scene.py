@@ -14,6 +14,7 @@ from lab.skills.surveys import Surveys
 from lab.tasks.grid_world import RANDOM, GridWorld
 from lab.tasks.task import Order, Task, check_number, in_words
 from lab.tasks.task_file import find, load_any
+from lab.workers import Workers
 
 
 @dataclass
@@ -40,10 +41,10 @@ def lay_out(task: Task, order: Order, seed: int) -> Layout:
     return places_of(task).draw(order, np.random.default_rng([seed, 1]))
 
 
-def prepare(task: Task, order: Order, seed: int, only: str | None = None) -> Prepared:
+def prepare(task: Task, order: Order, seed: int, only: str | None = None, workers: Workers | None = None) -> Prepared:
     """Lay the scene out as the seed says and survey every problem of it, or `only` one skill's.
 
-    BadInput for whatever cannot be; writes nothing.
+    workers: who shares in the surveys, None: nobody. BadInput for whatever cannot be; writes nothing.
     """
     began = time.perf_counter()
     with task.in_its_file():
@@ -53,10 +54,11 @@ def prepare(task: Task, order: Order, seed: int, only: str | None = None) -> Pre
         layout = lay_out(task, order, seed)
         surveys = Surveys(task, order, layout)
         scene = scene_in_words(task, order, layout)
+        chosen = {name: skill for name, skill in skillset.skills.items() if only in (None, name)}
+        if workers is not None:
+            surveys.make([skill.survey for skill in chosen.values()], workers)
         problems = {
-            name: replace(skill.setup(surveys), scene=scene, arm=task.robot.model)
-            for name, skill in skillset.skills.items()
-            if only in (None, name)
+            name: replace(skill.setup(surveys), scene=scene, arm=task.robot.model) for name, skill in chosen.items()
         }
     return Prepared(task, order, seed, layout, surveys, skillset, problems, time.perf_counter() - began)
 

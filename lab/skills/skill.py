@@ -24,7 +24,7 @@ from lab.tasks.task_fields import Stage
 from lab.vision import GridView
 
 if TYPE_CHECKING:
-    from lab.skills.surveys import Surveys
+    from lab.skills.surveys import SurveyName, Surveys
     from lab.toolbox.policy import Policy
 
 LOST_M = 0.03  # [m] a part farther than this from where the fingers hold it is not held
@@ -181,6 +181,11 @@ class Skill:
 
     # ---- survey and aim ------------------------------------------------------------------------------------------
 
+    @property
+    def survey(self) -> "SurveyName | None":
+        """The survey that its set-up takes longest for, which can be made beside others; None: there is none."""
+        return None
+
     def setup(self, surveys: "Surveys") -> Problem:
         """Survey the scene and state the problem to learn. BadInput when it has no solution, naming what is in the way."""
         raise NotImplementedError
@@ -317,13 +322,13 @@ class Skill:
         try:
             next(self._motion)
         except StopIteration:
-            self.status = Status.SUCCESS
+            self._motion, self.status = None, Status.SUCCESS
         except (SkillFailed, WorkFailed) as failure:
-            self.status, self.reason = Status.FAILURE, str(failure)
+            self.fail(str(failure))
         return self.status
 
     def fail(self, reason: str) -> None:
-        """Break off, because of something outside of the skill."""
+        """End without success."""
         self._motion, self.status, self.reason = None, Status.FAILURE, reason
 
     def stop(self) -> None:

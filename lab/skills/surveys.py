@@ -1,12 +1,12 @@
 """What the sub-tasks survey of one scene, each survey made once: the workspace, the surroundings of a station, the grids."""
 
-from collections.abc import Sequence
-from functools import cache
+from collections.abc import Hashable, Iterable, Sequence
+from functools import partial
 from math import hypot
 
 import numpy as np
 
-from lab.errors import BadInput
+from lab.errors import BadInput, LabError
 from lab.sim.arms.kinematics import ToolPose
 from lab.sim.parts.kinds import Spot, beside
 from lab.sim.scene.blocked_cells import OUT_OF_REACH, Survey, Surveyor
@@ -15,10 +15,13 @@ from lab.sim.scene.scene import Scene
 from lab.sim.scene.scene_check import places_of
 from lab.sim.world import World
 from lab.skills.camera_grids import RELEASE_ABOVE, TOUCH_CLEARANCE, SurveyedGrid
+from lab.skills.once import Made, once
 from lab.tasks.task import Order, Task
 from lab.tasks.task_fields import CameraGrid
+from lab.workers import Workers
 
 Cell = tuple[int, ...]
+SurveyName = tuple[Hashable, ...]  # a method of Surveys and its arguments
 
 NEAR_SHAPE = (5, 5, 6)  # x, y, z around a part; z from the grasp upwards
 NEAR_STEP_M = (0.012, 0.012, 0.030)
@@ -72,10 +75,13 @@ class Surveys:
         self.task, self.layout, self.parts = task, Layout(layout.obstacles, ()), len(order)
         self.places = places_of(task)
         self.kinds = self.places.kinds
-        self.workspace = cache(self._workspace)
-        self.dock = cache(self._dock)
-        self.around = cache(self._around)
-        self.camera_grid = cache(self._camera_grid)
+        self.made: Made = {}
+
+    def make(self, names: Iterable[SurveyName | None], workers: Workers) -> None:
+        """Make surveys, each once, side by side; one that cannot be made is left to whoever asks for it, who hears why."""
+        missing = [name for name in dict.fromkeys(names) if name is not None and name not in self.made]
+        self.made.update(zip(missing, workers.each(partial(_survey, self), missing), strict=True))
+        self.made = {name: found for name, found in self.made.items() if found is not None}
 
     # ---- transfer: the whole workspace --------------------------------------------------------------------------
 
@@ -85,7 +91,8 @@ class Surveys:
         x, y, z = (low + (i + 0.5) * size for low, i, size in zip(grid.lower_m, cell, grid.cell_m, strict=True))
         return ToolPose(x, y, z, 0.0)
 
-    def _workspace(self, carried: str) -> Survey:
+    @once
+    def workspace(self, carried: str) -> Survey:
         grid = self.task.workspace
         with World() as world:
             scene = Scene(world, self.task, (), self.layout)
@@ -97,7 +104,8 @@ class Surveys:
                 survey.causes[cell] = OUT_OF_REACH  # no arm turns through there, from one side of itself to the other
         return survey
 
-    def _dock(self, place: str, carried: str) -> Cell:
+    @once
+    def dock(self, place: str, carried: str) -> Cell:
         """The workspace cell from which the tool goes straight to the approach of `place`; BadInput names what blocks it."""
         near, approach = self.cells_near(place), self.approach(place)
         survey = self.workspace(carried)
@@ -156,7 +164,8 @@ class Surveys:
 
     # ---- grasp and place: around one part ------------------------------------------------------------------------
 
-    def _around(self, station_name: str, kind: str, loaded: bool) -> Survey:
+    @once
+    def around(self, station_name: str, kind: str, loaded: bool) -> Survey:
         """Around the part that stands (or, loaded, is to stand) on a station's first spot, with neighbours on all sides."""
         station, own = self.task.station(station_name), self.kinds[kind]
         spot = self.places.spots(station)[0]
@@ -192,9 +201,19 @@ class Surveys:
         scene.add(name, kind, spot)
         scene.solid += scene.bodies_of(name, kind)
 
-    def _camera_grid(self, station: str, kind: str) -> SurveyedGrid:
+    @once
+    def camera_grid(self, station: str, kind: str) -> SurveyedGrid:
         """The camera's grid before a station, for a part of a kind."""
         return SurveyedGrid(self.task, self.layout, self.places, station, kind, self.parts)
+
+
+def _survey(surveys: Surveys, name: SurveyName) -> Survey | None:
+    method, *arguments = name
+    try:
+        found: Survey = getattr(surveys, str(method))(*arguments)
+    except LabError:
+        return None
+    return found
 
 
 def _between(one: ToolPose, other: ToolPose) -> list[ToolPose]:

@@ -10,7 +10,7 @@ from lab.sim.arms.kinematics import ToolPose
 from lab.skills.sight import SkillFailed
 from lab.skills.skill import Bench, Skill, learned_path, no_way
 from lab.skills.state_words import plain
-from lab.skills.surveys import Surveys, grid_of, way_to
+from lab.skills.surveys import SurveyName, Surveys, grid_of, way_to
 from lab.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -43,6 +43,11 @@ class Transfer(Skill):
     def on_travel(cls, task: Task, origin: str, target: str) -> "Transfer":
         """All of it."""
         return cls(origin, target)
+
+    @property
+    def survey(self) -> SurveyName:
+        """The workspace."""
+        return ("workspace", self.kind)
 
     def setup(self, surveys: Surveys) -> Problem:
         """The workspace as a 3D grid: cells that are out of reach or too near to something are blocked."""

@@ -239,7 +239,7 @@ _SHIPPED: dict[str, Study] = {
         "Readings of chapter 7: what the thesis leaves open, and what comes nearest", _chapter_7("readings")
     ),
     "appendix-iii": Study("Appendix III: a flexible manufacturing system", _appendix_iii),
-    "srl-time": Study("SRL improved, beside every rival", _srl_time),
+    "srl-time": Study("srl-time, Q-learning from a bound of the full model on, beside every rival", _srl_time),
     "faults": Study("Runs of drawn faults: delivered, stopped with a true reason, or wrong", _faults, least=1),
     "flat": Study("One flat problem, or two levels: the toast task on a small grid", _flat),
     "changed-scenes": Study(

@@ -135,16 +135,20 @@ class SequencingBegan:
 
 @dataclass(frozen=True)
 class SequenceFound:
-    """The best order of a sequencer's session, beside what no order can beat; None: costs were drawn. parts: how many."""
+    """The best order of a sequencer's session, beside what no order can beat; None: costs were drawn. parts: how many.
+
+    method: by what it was found, a method's name or one of `lab.sequencing.BESIDE_METHODS`; "" where that is not said.
+    """
 
     result: SequenceResult
     reference: Reference | None = None
     parts: int = MAX_PARTS
+    method: str = ""
 
 
 @dataclass(frozen=True)
 class OrderChosen:
-    """Which of several orders is used, and what each of them costs, by whom it is: "advised", "given", "exact", or a method."""
+    """Which of several orders is used, and what each of them costs, by a method's name or one of `BESIDE_METHODS`."""
 
     used: str
     costs: dict[str, float]

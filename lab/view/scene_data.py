@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.errors import BadInput
+from lab.errors import BadInput, unknown
 from lab.sim.frames import Body, Shape, Viewpoint, unique_names
 
 CREASE_RAD = 0.6  # faces that meet at a larger angle keep a sharp edge
@@ -88,6 +88,22 @@ def read_mesh(path: Path, changed_ns: int) -> Json:
         "normals": pack(shaded.vertex_normals),
         "faces": pack(shaded.faces, "<u4"),
     }
+
+
+def corners_of(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Positions (n, 3) [m], normals (n, 3) and faces (m, 3) of a box, a cylinder or a sphere. Raises BadInput for another."""
+    from trimesh import creation, graph
+
+    if shape.kind == "box":
+        mesh = creation.box(shape.size)
+    elif shape.kind == "cylinder":
+        mesh = creation.cylinder(shape.size[0], shape.size[1], sections=48)
+    elif shape.kind == "sphere":
+        mesh = creation.icosphere(3, shape.size[0])
+    else:
+        raise unknown("shape kind", shape.kind, ("box", "cylinder", "sphere"), "corners_of")
+    shaded = graph.smooth_shade(mesh, angle=CREASE_RAD)
+    return np.array(shaded.vertices), np.array(shaded.vertex_normals), np.array(shaded.faces)
 
 
 def pack(array: NDArray[Any], kind: str = "<f4") -> str:

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from lab.errors import counted
+from lab.sequencing import BESIDE_METHODS, method_in_words
 from lab.view.cyclic_summary import period_in_words
 from lab.view.figures import SAME, beside, gap_of
 
@@ -45,6 +46,7 @@ def run_summary(report: Mapping[str, Any]) -> RenderableType:
     if any(saved):
         table.add_row("saved", f"{counted(saved[0], 'episode')}, {counted(saved[1], 'helped step')}")
     table.add_row("sequence", " ".join(map(str, report["sequence"])))
+    table.add_row("found by", Text(method_in_words(report["method"])))
     measured = report["measured_makespan_s"]
     predicted, bound = beside(report["predicted_makespan_s"], report["bound_s"], " s", 1)
     text = f"{predicted} predicted"
@@ -75,7 +77,10 @@ def _worth(receipts: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
         costs = ", ".join(f"{by} {cost:.1f}{unit}" for by, cost in order["costs"].items())
         guided = order.get("guided_best")
         own = "" if guided is None else f"; best episode with advice {guided:.1f}{unit}"
-        yield "advice on the order", [f"{costs}; used: {order['used']}{own}", *order.get("lines", [])]
+        yield (
+            "advice on the order",
+            [f"{costs}; used: {BESIDE_METHODS.get(order['used'], order['used'])}{own}", *order.get("lines", [])],
+        )
 
 
 def delivered_in_words(delivered: int, parts: Mapping[str, int]) -> str:
@@ -126,7 +131,10 @@ def run_replay_summary(replay: Mapping[str, Any]) -> RenderableType:
     if replay["over"]:
         over = replay["failure"] or f"all of {counted(replay['delivered'], 'part')} delivered"
     skills = counted(len(replay["skills"]), "skill")
-    return Group(Text(f"{replay['task']} in {replay['run']}: {skills} there"), table, Text(over))
+    lines = [Text(over)]
+    if movie := replay.get("movie"):
+        lines.append(Text(f"{movie['file']}: {movie['frames']} pictures, {movie['speed']:.3g} x real time"))
+    return Group(Text(f"{replay['task']} in {replay['run']}: {skills} there"), table, *lines)
 
 
 def _event_text(event: Mapping[str, Any]) -> str:
@@ -201,10 +209,12 @@ def sequence_summary(found: Mapping[str, Any]) -> RenderableType:
     proven = "proven optimum" if found["optimum_proven"] else "proven bound"
     best, bound = beside(found["best_cost"], found["bound_cost"], unit, 2)
     alone = beside(found["cost"], found["bound_cost"], unit, 2)[0]
+    advised = any(advice["helped_steps"] for advice in found["advice"] or [])
+    whose = "with advice" if advised else "alone"
     lines = [
         f"best order known: {what}{best} for {_ordered(found['order'])} (by {found['best_by']}; seed {found['seed']})",
         f"{proven} {bound}{_gap(found['best_cost'], found)} ({found['bound_by']})",
-        f"{found['method']} alone: {what}{alone}{_gap(found['cost'], found)}, "
+        f"{found['method']} {whose}: {what}{alone}{_gap(found['cost'], found)}, "
         f"in episode {found['found_at_episode']} of {found['episodes']}",
         *_order_of_transfers(found),
     ]

@@ -6,7 +6,7 @@ its place. Pixels are (x, y) from the centre of the top left pixel, to the right
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import floor
 from typing import Any
@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from lab.errors import BadInput
 
 Cell = tuple[int, int]
+Window = tuple[int, int, int]  # a square part of a picture: its left column, top row and side [pixels]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +55,21 @@ class View:
         projected = points @ self.pixel_from_world[:, :3].T + self.pixel_from_world[:, 3]
         pixels: NDArray[np.float64] = projected[..., :2] / projected[..., 2:]
         return pixels
+
+    def window(self, place_m: tuple[float, float], kind: str, reach_m: float) -> Window:
+        """The part of the picture that shows the marker of a thing which is at most `reach_m` off `place_m` along x and y."""
+        (x, y), (dx, dy) = place_m, self.offsets_m.get(kind, (0.0, 0.0))
+        at = np.array([x - dx, y - dy, self.heights_m.get(kind, 0.0)])
+        far = reach_m + self.radius_m
+        corners = self.pixel(at + np.array([[a, b, 0.0] for a in (-far, far) for b in (-far, far)]))
+        low = np.floor(corners.min(axis=0)).astype(int) - 1
+        side = int(np.ceil(corners.max(axis=0) - low).max()) + 2
+        return int(low[0]), int(low[1]), side
+
+    def within(self, window: Window) -> "View":
+        """The view of that part of the picture."""
+        shift = np.array([[1.0, 0.0, -window[0]], [0.0, 1.0, -window[1]], [0.0, 0.0, 1.0]])
+        return replace(self, pixel_from_world=shift @ self.pixel_from_world)
 
     def place(self, pixel: ArrayLike, kind: str) -> tuple[float, float]:
         """The world (x, y) [m] of the thing whose marker of `kind` is at `pixel`: its ray meets the marker's height."""

@@ -4,13 +4,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from inspect import getdoc
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from lab import __version__
-from lab.cli.app import COMMANDS, Command
+from lab.cli.app import COMMANDS, Command, loaded
 from lab.cli.families import members, offers
 from lab.cli.options import Json
 from lab.cli.output import show
@@ -29,6 +30,28 @@ def test_every_command_has_help_with_an_example(lab: Lab, words: str) -> None:
     assert COMMANDS[words].example.startswith(f"lab {words}")
     assert f"Example: {COMMANDS[words].example}" in " ".join(ran.out.split())
     assert "--json" in ran.out
+
+
+def test_the_help_of_a_group_says_of_a_command_what_its_own_help_begins_with() -> None:
+    for words, row in COMMANDS.items():
+        told = getdoc(loaded(words).callback) or ""
+        assert row.help == " ".join(told.partition("\n\n")[0].split()), words
+
+
+@pytest.mark.parametrize("group", ["", "toolbox"])
+def test_the_help_of_a_group_loads_no_command(root: Path, group: str) -> None:
+    code = f"""
+import sys
+from lab.cli import main
+sys.argv = ["lab", *{group.split()}, "--help"]
+try:
+    main()
+finally:
+    print([name for name in sys.modules if name in {["lab.cli.toolbox", "lab.cli.run", "rich.markdown"]}], file=sys.stderr)
+"""
+    ran = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, "[]\n")
+    assert "Usage: lab" in ran.stdout
 
 
 def test_help_names_all_members(lab: Lab) -> None:
@@ -55,7 +78,7 @@ def test_a_command_is_one_row(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None
             raise WorkFailed("nobody to greet")
         show({"greeted": name}, as_json, lambda document: f"hello {document['greeted']}")
 
-    monkeypatch.setitem(COMMANDS, "greet", Command(greet, "lab greet you"))
+    monkeypatch.setitem(COMMANDS, "greet", Command(greet, "Greets somebody.", "lab greet you"))
     assert "Greets somebody." in lab("--help").out
     assert "Example: lab greet you" in lab("greet", "--help").out
     assert lab("greet", "you").out == "hello you\n"

@@ -57,6 +57,8 @@ ADVISORS, LEARNERS, GATES = (
         ("sequence toast --episodes 99999999", "invalid value for '--episodes'"),
         ("sequence toast --plot no/x.png", "picture 'no/x.png': there is no folder 'no'"),
         ("sequence toast --plot x.pdf", "picture 'x.pdf': plots are written as .png or .svg"),
+        ("replay no --movie x.gif", "'no': --movie goes with the folder of a run (lab run --out)"),
+        ("replay --movie x.gif", "--movie goes with the folder of a run (lab run --out)"),
         ("sequence fms --gantt no/x.svg", "picture 'no/x.svg': there is no folder 'no'"),
         ("sequence fms --case RSR --toasts 3", "--case RSR and --toasts 3: an order is one or the other"),
         ("sequence toast --case IV", "unknown case 'IV' (--case): did you mean 'I'? known: I, II, III"),
@@ -161,9 +163,9 @@ PLATE, BUFFER = "pose = [0.0, 0.80, 0.0]", "pose = [0.42, 0.56, 0.0]"
         (
             'learner = "dyna-q"',
             'learner = "qq"',
-            "t.toml: line 141: unknown learner 'qq' (subtasks.transfer.learner): ",
+            "t.toml: line 142: unknown learner 'qq' (subtasks.transfer.learner): ",
         ),
-        ('gate = "ccrl"', 'gate = "cc"', "t.toml: line 142: unknown gate 'cc' (subtasks.transfer.gate): "),
+        ('gate = "ccrl"', 'gate = "cc"', "t.toml: line 143: unknown gate 'cc' (subtasks.transfer.gate): "),
         (
             'process = "butter" ',
             "processing_s = 9.0\nprocess = 'butter' #",

@@ -128,7 +128,7 @@ main()
 
 
 @pytest.mark.parametrize(
-    "module", ["lab.cli.interrupt", "lab.cli.app", "typer", "lab.errors", "lab.cli.task", "lab.cli.view"]
+    "module", ["lab.cli.interrupt", "lab.cli.app", "typer", "lab.errors", "lab.cli.task", "lab.cli.families"]
 )
 def test_ctrl_c_while_the_command_is_loaded(root: Path, module: str) -> None:
     env = {**os.environ, "PYTHONPATH": str(root)}

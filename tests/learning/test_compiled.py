@@ -11,7 +11,8 @@ from typing import Any
 import numba
 import pytest
 
-from lab.learning import compiled, sources
+from lab.files import source_hash
+from lab.learning import compiled
 
 DOUBLED = (
     "from lab.learning.compiled import inner, lean\nfrom kitchen import recipe\n\nslices = inner(recipe.slices)\n\n\n"
@@ -39,6 +40,7 @@ def _forget() -> None:
     for name in [name for name in sys.modules if name.partition(".")[0] == "kitchen"]:
         del sys.modules[name]
     compiled.key.cache_clear()
+    source_hash.cache_clear()
 
 
 def started() -> Any:
@@ -77,7 +79,7 @@ def test_a_changed_number_two_files_away_counts_at_once(kitchen: Path) -> None:
 def test_nothing_is_written_beside_the_sources(kitchen: Path) -> None:
     started().doubled(3)
     assert sorted(path.name for path in kitchen.iterdir()) == ["__init__.py", "bread.py", "kernel.py", "recipe.py"]
-    assert list(compiled.cache_folder().glob("kitchen.kernel-*/*/*.nbc"))
+    assert list(compiled.cache_folder().glob("kitchen-*/*/*.nbc"))
 
 
 @pytest.mark.parametrize("what", ["a file", "nothing can be written", "no file can be made"])
@@ -117,16 +119,19 @@ def test_what_was_not_used_for_longest_goes(kitchen: Path, monkeypatch: pytest.M
         os.utime(folder, (second, second))
     started().doubled(3)
     left = sorted(folder.name.partition("-")[0] for folder in compiled.cache_folder().iterdir())
-    assert left == ["kitchen.kernel", "old", "older"]
+    assert left == ["kitchen", "old", "older"]
 
 
-def test_the_kernels_know_all_that_they_are_made_of(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A change of a rule in any of these files is a change of the kernel."""
-    importlib.import_module("lab.learning.kernels.session_loop")
-    before, source = compiled.key("lab.learning.kernels.session_loop"), sources.source
-    for name in ("gates.gate_rules", "advice_memory", "selection", "updates.update"):
-        with monkeypatch.context() as patch:
-            patch.setattr(sources, "source", lambda module, name=name: "" if module.endswith(name) else source(module))
-            compiled.key.cache_clear()
-            assert compiled.key("lab.learning.kernels.session_loop") != before
+@pytest.mark.parametrize("package", ["kitchen", "mine"])
+def test_a_change_of_the_lab_compiles_the_functions_of_others_anew(
+    kitchen: Path, monkeypatch: pytest.MonkeyPatch, package: str
+) -> None:
+    """They may have functions of the lab compiled in; a module that lies in no package is kept by its own file."""
+    (kitchen.parent / "mine.py").write_text("import kitchen.kernel\n")
+    importlib.import_module("mine")
+    started()
+    before = compiled.key(package)
+    monkeypatch.setattr(compiled, "source_hash", lambda *own: source_hash(*own) if own else "0" * 64)
+    compiled.key.cache_clear()
+    assert compiled.key(package) != before
     compiled.key.cache_clear()

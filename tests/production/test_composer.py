@@ -36,6 +36,7 @@ from lab.teaching.lesson_plan import LessonPlan
 from lab.teaching.teacher import Teacher
 from lab.toolbox.index import KnownPolicies
 from lab.toolbox.registry import Toolbox
+from lab.workers import Workers
 
 
 @pytest.fixture(scope="module")
@@ -158,6 +159,11 @@ def test_measuring_again_gives_the_same_to_the_last_bit(task: Task, taught: Call
     one = measure(short)
     assert list(one.loaded_s) == [("plate", "finished_plate", "slice")]
     assert one == measure(short)
+
+
+def test_times_do_not_depend_on_how_many_processes_share_the_trials(prepared: Prepared, durations: Durations) -> None:
+    with Workers(3) as workers:
+        assert measure(prepared, workers=workers) == durations
 
 
 def test_a_move_that_cannot_be_measured_is_a_failure_that_says_so(

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 import lab.files
-from lab.errors import BadInput, WorkFailed
+from lab.errors import BadInput
+from lab.production import durations
 from lab.production.durations import Durations, TimedMove, durations_key
 from lab.sequencing.cell.routes import NeededMoves
 from lab.sim.scene.places import Layout
@@ -99,22 +100,6 @@ def own_assets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "assets"
 
 
-@pytest.fixture
-def motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package that moves an arm, with a library of a version of its own."""
-    package = tmp_path / f"motion_{tmp_path.name}"
-    package.mkdir()
-    (package / "__init__.py").touch()
-    (package / "arm.py").write_text(f"from {package.name} import physics\n")
-    (package / "physics.py").write_text("import springs\nSTEP = 0.01\n")
-    metadata = tmp_path / "springs-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: springs\nVersion: 1.0\n")
-    (metadata / "top_level.txt").write_text("springs\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    return package
-
-
 Change = Callable[[dict[str, Any]], None]
 
 
@@ -128,7 +113,7 @@ def edit(name: str, change: Callable[[Any], Any]) -> Change:
 
 
 def write(old: str, new: str, *where: str) -> Change:
-    """Another text in a file beside the package `motion`."""
+    """Another text in a file of the checkout."""
 
     def apply(given: dict[str, Any]) -> None:
         path = next(given["folder"].glob("/".join(where)))
@@ -161,24 +146,27 @@ CHANGES: dict[str, Change] = {
     "whose policy it is": edit("policies", lambda known: {"place": known["grasp"]}),
     "a URDF": write('name="robot"', 'name="arm"', "assets", "robot.urdf"),
     "a mesh": write("v ", "v  ", "assets", "robot_tool_0.obj"),
-    "a module that measures": write("physics", "physics  # changed", "motion_*", "arm.py"),
-    "a module that it imports": write("0.01", "0.02", "motion_*", "physics.py"),
-    "a library's version": write("Version: 1.0", "Version: 1.1", "springs-*", "METADATA"),
+    "the lab's own source": edit("source", lambda source: "another"),
+    "the physics engine": edit("engine", lambda engine: "pybullet 4.0"),
 }
 
 
 @pytest.mark.parametrize("what", CHANGES)
 def test_the_key_changes_with_whatever_decides(
-    make_policy: MakePolicy, task: Task, own_assets: Path, motion: Path, what: str
+    make_policy: MakePolicy, task: Task, own_assets: Path, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
     given: dict[str, Any] = {"task": task, "layout": LAYOUT, "skillset": SKILLS, "policies": {"grasp": make_policy()}}
-    given["modules"] = [f"{motion.name}.arm"]
-    before = durations_key(**given)
-    assert durations_key(**given) == before
-    changed = given | {"folder": own_assets.parent}
-    CHANGES[what](changed)
-    del changed["folder"]
-    assert durations_key(**changed) != before
+    given |= {"folder": own_assets.parent, "source": "the source", "engine": "pybullet 3.2.7"}
+
+    def key() -> str:
+        monkeypatch.setattr(durations, "source_hash", lambda: given["source"])
+        monkeypatch.setattr(durations, "engine", lambda: given["engine"])
+        return durations_key(given["task"], given["layout"], given["skillset"], given["policies"])
+
+    before = key()
+    assert key() == before
+    CHANGES[what](given)
+    assert key() != before
 
 
 def test_what_decides_nothing_leaves_the_key(make_policy: MakePolicy, task: Task) -> None:
@@ -188,33 +176,9 @@ def test_what_decides_nothing_leaves_the_key(make_policy: MakePolicy, task: Task
     assert durations_key(other, moved, SKILLS, {"grasp": make_policy()}) == key
 
 
-def test_a_key_that_cannot_be_made_is_an_error(task: Task, motion: Path) -> None:
-    shutil.rmtree(next(motion.parent.glob("springs-*")))
-    with pytest.raises(WorkFailed, match="the version of the library 'springs' cannot be found"):
-        durations_key(task, LAYOUT, SKILLS, {}, modules=[f"{motion.name}.arm"])
-    (motion / "physics.py").unlink()
-    with pytest.raises(WorkFailed, match="cannot be found"):
-        durations_key(task, LAYOUT, SKILLS, {}, modules=[f"{motion.name}.arm", f"{motion.name}.physics"])
-
-
-def test_all_that_moves_the_arm_is_in_the_key() -> None:
-    from lab.learning.sources import sources
-    from lab.production.durations import DECIDED_BY_RESULT, MEASURED_BY
-
-    package = Path(lab.__file__).parent
-    rooms = [*package.glob("sim/**/*.py"), *package.glob("skills/*.py")]
-    found = sources(MEASURED_BY, DECIDED_BY_RESULT)
-    look_on = {"__init__", "trial", "reach", "ground_plan", "cell_outline", "new_cell"}  # they draw and write files
-    look_on |= {"made_pictures", "scored_pictures"}
-    here = {
-        ".".join(path.relative_to(package.parent).with_suffix("").parts) for path in rooms if path.stem not in look_on
-    }
-    assert here <= found.texts.keys()
-    assert {
-        "lab.mdp",
-        "lab.vision.markers",
-        "lab.vision.grid_view",
-        "lab.skills.skillset",
-        "lab.production.floor",
-    } <= found.texts.keys()
-    assert {"pybullet", "numpy", "cv2"} <= found.libraries
+def test_the_key_looks_for_no_library_but_the_engine(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An optional library that is missing cannot change it."""
+    monkeypatch.setattr("importlib.metadata.version", lambda name: pytest.fail(f"{name} was looked for"))
+    monkeypatch.setattr("importlib.metadata.packages_distributions", lambda: pytest.fail("libraries were looked for"))
+    monkeypatch.setattr(durations, "engine", lambda: "pybullet 3.2.7")
+    durations_key(task, LAYOUT, SKILLS, {})

@@ -20,7 +20,7 @@ from lab.sequencing.request import SequenceRequest
 from lab.sequencing.simulate.run import Run, simulate
 from lab.tasks.sequencing import Sequencing, search_for
 from lab.tasks.task_file import load_cell
-from lab.teaching.events import ORDER, Event, OrderChosen
+from lab.teaching.events import ORDER, Event, OrderChosen, SequenceFound
 from lab.teaching.lesson_options import LessonOptions
 from lab.toolbox.registry import Toolbox
 
@@ -114,6 +114,18 @@ def test_the_cheapest_order_is_used_and_each_is_told(advisor: str, seed: int) ->
     assert found.receipt["guided_best"] >= found.costs["advised"]
     expert_is_better = ordered(THREE, SRL, by("expert"), seed).receipt["guided_best"]  # type: ignore[index]
     assert expert_is_better <= found.receipt["guided_best"]
+
+
+def test_an_order_that_no_move_was_advised_to_is_no_advised_one() -> None:
+    """Somebody was asked, and said nothing: what SRL found is called so, and the method's own order comes before it."""
+    heard, silent = list[Event](), OrderAdvice(advisor=AdvisorName.of("terminal"), people={"terminal": lambda _: None})
+    one = load_cell("toast-case-1").cell(1)
+    found = ordered(one, SRL, silent, 0, heard.append)
+    assert found.receipt is not None
+    assert (list(found.costs), found.used) == (["srl", "unadvised", "exact"], "srl")
+    assert (found.receipt["used"], found.receipt["guided_best"]) == ("srl", None)
+    (told,) = (event for event in heard if isinstance(event, SequenceFound))
+    assert told.method == "srl"
 
 
 def test_the_first_person_of_a_run_is_asked_about_the_order() -> None:

@@ -42,7 +42,7 @@ Lab = Callable[..., Any]
 
 RUN_FIELDS = (
     *("task", "seed", "toasts", "parts", "success", "delivered", "dropped", "failure", "retries", "skills", "sequence"),
-    *("predicted_makespan_s", "measured_makespan_s", "optimal_makespan_s", "bound_s"),
+    *("method", "predicted_makespan_s", "measured_makespan_s", "optimal_makespan_s", "bound_s"),
     *("optimality_gap", "optimum_proven"),
     *(
         "camera_deviation_m",
@@ -124,7 +124,7 @@ def test_the_toast_is_delivered_as_predicted(cold: Ran) -> None:
     assert (document["task"], document["seed"], document["toasts"]) == ("toast", 0, 1)
     assert (document["parts"], document["skipped_s"] > 50) == ({"slice": 1}, True)  # while the toaster toasts
     assert (document["success"], document["delivered"], document["dropped"]) == (True, 1, 0)
-    assert (document["failure"], document["sequence"]) == (None, [1, 1, 1])
+    assert (document["failure"], document["sequence"], document["method"]) == (None, [1, 1, 1], "srl-time")
     assert document["measured_makespan_s"] == pytest.approx(document["predicted_makespan_s"], rel=0.03)
     assert (document["optimality_gap"], document["optimum_proven"]) == (pytest.approx(0.0, abs=1e-9), True)
     assert document["camera_deviation_m"] < 0.008
@@ -445,7 +445,7 @@ def failed(prepared: Prepared, toolbox: Toolbox) -> Report:
     outcome = Outcome(Schedule.from_moves(taught.cell, []), (), (1,), ("try 1",), why, 30.0, ())
     settings = prepared.task.sequencing
     found = find_sequence(taught.cell, settings.method, search_for(settings), 0)
-    return Report(prepared, taught, found, optimum(taught.cell), outcome, Recording((), []), 0.0)
+    return Report(prepared, taught, found, "fifo", optimum(taught.cell), outcome, Recording((), []), 0.0)
 
 
 def test_what_a_run_measured_may_be_lost_but_not_the_run(failed: Report, toolbox: Toolbox) -> None:

@@ -71,7 +71,7 @@ def test_one_document_and_nothing_else_on_stdout(lab: Lab, folder: Path) -> None
     assert set(FIELDS) >= CONTRACT
     assert ran.err.splitlines() == [
         "Find the order of the transfers",
-        "  parts 1 1 2 2: 29.0 s found in episode 1 of 1, proven optimum 29.0 s, gap 0.0%",
+        "  parts 1 1 2 2: 29.0 s found by fifo in episode 1 of 1, proven optimum 29.0 s, gap 0.0%",
     ]
     assert listed(folder) == before
 

@@ -239,7 +239,7 @@ def test_why_it_asks_with_all_its_numbers() -> None:
         "What it thinks each move is worth here: ↑ up +0.50, ↓ down -1.00, ← left +0.00, → right +0.25; they span 1.50.",
         "Left to itself it would most likely go ↑ up (92%): chosen by softmax, temperature 0.1.",
         "Advice so far: 12 moves of 150 that it may use. It did not help in 3 of 4 episodes; the learner tolerates 7, and "
-        "then asks no more.",
+        "then asks no more, or when what it may use is spent.",
     ]
     bare = replace(asked, reason=None, improvement=None, selection="greedy", standing=Standing(1, omega=7))
     lines = facts.reasons(replace(bare, q=[[0.0] * 4] * 12), MARKS, 0)

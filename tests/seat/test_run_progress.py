@@ -165,7 +165,9 @@ def test_the_rest_of_a_run() -> None:
         progress.hear(PhaseBegan("measure", 1))
         progress.hear(MoveTimed("plate > toaster, loaded", 15.131))
         progress.hear(PhaseBegan("sequence", 1))
-        progress.hear(SequenceFound(SequenceResult((1, 2, 1), 110.0, (120.0, 110.0)), Reference(100.0, True, "A*")))
+        known = Reference(100.0, True, "A*")
+        progress.hear(SequenceFound(SequenceResult((1, 2, 1), 110.0, (120.0, 110.0)), known, method="ga"))
+        progress.hear(SequenceFound(SequenceResult((1, 1, 2), 110.0, (110.0,)), known, method="given"))
         progress.hear(PhaseBegan("carry out", 2))
         progress.hear(MoveMade(Move(1, "plate", "plate", "toaster", 0.0, 0.0, 0.0, 17.14), "slice 1"))
         progress.hear(MoveMade(Move(2, "toaster", "toaster", "oven [hot]", 20.0, 21.0, 81.0, 84.4), "cup 2"))
@@ -177,7 +179,8 @@ def test_the_rest_of_a_run() -> None:
         "Time every move in simulation",
         "  plate > toaster, loaded                               15.13 s",
         "Find the order of the transfers",
-        "  parts 1 2 1: 110.0 s found in episode 2 of 2, proven optimum 100.0 s, gap 10.0%",
+        "  parts 1 2 1: 110.0 s found by ga in episode 2 of 2, proven optimum 100.0 s, gap 10.0%",
+        "  parts 1 1 2: 110.0 s, the given order, proven optimum 100.0 s, gap 10.0%",
         "Carry the order out in physics",
         "     17.1 s  slice 1: plate to toaster",
         "     84.4 s  cup 2: toaster to oven [hot], waited 60.0 s",

@@ -61,6 +61,34 @@ def test_the_same_world_gives_the_same_picture(world: World) -> None:
     assert np.array_equal(first, camera.picture(world))
 
 
+@pytest.mark.parametrize("window", [(0, 0, 40), (53, 97, 60), (260, 200, 60)])
+def test_a_window_shows_what_the_whole_picture_shows_there(world: World, window: tuple[int, int, int]) -> None:
+    """Its edges and colours to the pixel; where surfaces are shaded, rounding may differ by a step or two."""
+    camera = Camera((0.2, -1.0, 1.5), (0.6, 0.1, 0.0), (0.0, 0.0, 1.0), 0.5, 320, 260)
+    world.box("table", (3, 3, 0.02), (0, 0, -0.01), (0.86, 0.85, 0.83, 1))
+    for x in np.linspace(0.2, 1.0, 9):
+        world.disc(f"marker {x:g}", MARKER_RADIUS, 0.004, (float(x), 0.1, -0.002), MARKER_GREEN)
+    left, top, side = window
+    part = camera.picture(world, window)
+    assert part.shape == (side, side, 3)
+    whole = camera.picture(world)[top : top + side, left : left + side]
+    assert np.abs(part.astype(int) - whole).max() <= 8
+    assert (part != whole).any(axis=2).mean() < 0.01
+
+
+def test_a_window_is_moved_into_the_picture() -> None:
+    camera = Camera.overhead((0.0, 0.0, 1.0), 0.5, 64)
+    assert camera.in_picture((10, 20, 30)) == (10, 20, 30)
+    assert camera.in_picture((-3, 60, 30)) == (0, 34, 30)
+    assert camera.in_picture((5, 5, 100)) == (0, 0, 64)
+
+
+def test_a_room_s_camera_cuts_the_window_out_of_its_picture(world: World) -> None:
+    camera = TableCamera(**vars(Camera.overhead((0.0, 0.0, 1.0), 0.5, 64)), strength=1.0)
+    world.box("cube", (0.1, 0.1, 0.1), (0.05, 0.02, 0.05), (0.7, 0.5, 0.3, 1))
+    assert np.array_equal(camera.picture(world, (10, 20, 30)), camera.picture(world)[20:50, 10:40])
+
+
 def calibration_of(camera: Camera, lens: Lens) -> Calibration:
     turn, shift = camera.turn_and_shift()
     return Calibration(lens, tuple(tuple(row) for row in turn.tolist()), tuple(shift.tolist()), 0.0, 0, "by hand")

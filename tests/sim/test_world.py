@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from lab.errors import BadInput, WorkFailed
 from lab.files import assets_folder
+from lab.sim import world as world_module
 from lab.sim.camera import Camera
 from lab.sim.frames import Frame
 from lab.sim.parts.part_shape import PartShape, shape_of
-from lab.sim.world import TIME_STEP, World
+from lab.sim.world import TIME_STEP, World, engine
 from lab.tasks.part_fields import PartFields
 
 SLICE = assets_folder() / "slice.urdf"
@@ -280,3 +281,12 @@ def test_a_covered_camera_sees_black_and_then_again(world: World) -> None:
     assert not camera.picture(world).any()
     world.dark = False
     assert (camera.picture(world) == seen).all()
+
+
+def test_the_engine_is_named_with_its_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    name, number = engine().split()
+    assert name in world_module.ENGINES
+    assert number[0].isdigit()
+    monkeypatch.setattr(world_module, "ENGINES", ("no-engine",))
+    with pytest.raises(WorkFailed, match="no-engine"):
+        engine()

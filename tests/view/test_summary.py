@@ -55,6 +55,7 @@ RUN: dict[str, Any] = {
     "retries": [],
     "skills": [skill("learned", 30), skill("continued", 12), skill("reused")],
     "sequence": [1, 2, 1, 2],
+    "method": "given",
     "predicted_makespan_s": 100.0,
     "measured_makespan_s": 101.0,
     "optimal_makespan_s": 80.0,
@@ -90,6 +91,7 @@ def test_a_run_that_went_well() -> None:
         "         skills  1 reused, 2 learned",
         "     learned in  400 episodes, 6000 moves, 42 of them advised",
         "       sequence  1 2 1 2",
+        "       found by  the given order",
         "       makespan  100.0 s predicted, 101.0 s measured (+1.00%)",
         " proven optimum  80.0 s, gap 25.00%",
         "           time  10.0 s for 300 simulated seconds (30 x real time)",
@@ -282,10 +284,13 @@ def test_sequences_that_went_otherwise(change: dict[str, Any], line: str) -> Non
 def test_a_sequence_with_advice() -> None:
     advice = {"requests": 12, "helped_steps": 40, "misleads": 1, "rejected_at_episode": None}
     lines = shown(sequence_summary(FOUND | {"advice": [advice, advice | {"rejected_at_episode": 95}]}))
+    assert lines[2].startswith("srl with advice: 110.00 s")
     assert lines[4:] == [
         "session 1: asked in 12 episodes, 40 moves advised",
         "session 2: asked in 12 episodes, 40 moves advised; rejected its advisor in episode 95",
     ]
+    unheard = shown(sequence_summary(FOUND | {"advice": [advice | {"helped_steps": 0}]}))
+    assert unheard[2].startswith("srl alone: 110.00 s")
 
 
 def test_a_sequence_in_drawn_times() -> None:

@@ -338,3 +338,18 @@ def test_a_grid_whose_machine_is_not_in_it_has_no_goal() -> None:
     image = paint(table(), matrix, [middle("gripper", 1, 7), middle("toaster", 9, 10)])
     with pytest.raises(BadInput, match="no toaster marker: wanted exactly one round cyan spot"):
         see(image, right, goal_near_m=(0.5, 0.5))
+
+
+def test_a_marker_is_found_in_the_window_where_it_must_be() -> None:
+    """In a picture of 100 pixels a metre, a thing that is 2 m off at the most, its marker 1 m beside it and 0.3 m in radius."""
+    matrix = np.array([[100.0, 0, 0, 0], [0, 100.0, 0, 0], [0, 0, 0, 1.0]])
+    view = View(matrix, (0.0, 0.0), 1.0, (8, 8), {}, {"gripper": (-1.0, 0.0)}, 0.3)
+    left, top, side = view.window((3.0, 4.0), "gripper", 2.0)
+    assert (left, top) == (169, 169)  # a pixel beyond 4 - 2.3 m and 4 - 2.3 m
+    assert 462 <= side <= 466
+    image = np.full((800, 800, 3), 255, np.uint8)
+    cv2.circle(image, (520, 310), 30, (255, 0, 255), -1)
+    whole = locate(image, view, "gripper")
+    part = locate(image[top : top + side, left : left + side], view.within((left, top, side)), "gripper")
+    assert part.world_m == pytest.approx(whole.world_m)
+    assert part.pixel == pytest.approx((whole.pixel[0] - left, whole.pixel[1] - top))

@@ -26,7 +26,7 @@ class Update:
     """What a session asks of a learner.
 
     lookahead: learning needs the next action chosen first; chained: a step is learned from together with those before
-    or after it in the episode, so that none of them may be left out; q: its action values now, q[state][action].
+    or after it in the episode, so that none of them may be left out; q: its action values now, `q[state][action]`.
     """
 
     lookahead = chained = False

@@ -15,7 +15,7 @@ from lab.production.floor import Floor
 from lab.production.operation.by_hand import ByHand
 from lab.production.operation.commands import Spoken
 from lab.production.operation.typed_order import checked
-from lab.production.order import OrderAdvice, ordered
+from lab.production.order import GIVEN, OrderAdvice, ordered
 from lab.production.relearning import Relearner
 from lab.production.run import teach_all
 from lab.production.run_status import RunStatus
@@ -48,6 +48,7 @@ class Plan:
 
     taught: Taught
     found: SequenceResult
+    method: str
     proven: Optimum
     production: Production
 
@@ -217,7 +218,7 @@ class OperatedScene:
                 )
             relearner = Relearner(self.prepared, taught, self.teacher)
             production = Production(self.floor, taught.cell, self.floor.tell, relearner)
-            self.plan = Plan(taught, found, proven, production)
+            self.plan = Plan(taught, found, chosen.used, proven, production)
             production.sequence = [*found.sequence]
             self._tell_plan("")
             return f"{len(found.sequence)} moves, {found.cost:.1f} s"
@@ -247,6 +248,7 @@ class OperatedScene:
             production.sequence = [*order.sequence]
             if not production.work.moves:
                 plan.found = replace(plan.found, sequence=order.sequence, cost=order.schedule.makespan_s)
+                plan.method = GIVEN
                 self._tell_plan(f"the operator's order: {order.words}")
             else:
                 schedule = order.schedule.later(self.floor.now_s - production.work.plan.now_s)

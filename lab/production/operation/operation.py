@@ -201,7 +201,8 @@ class Operation:
             program=scene.motions.program(scene.task, scene.seed, production.work.moves, production.cell.part_name),
         )
         recorder.take()
-        return Report(scene.prepared, plan.taught, plan.found, plan.proven, outcome, recorder.recording, self._began)
+        found = plan.found, plan.method, plan.proven
+        return Report(scene.prepared, plan.taught, *found, outcome, recorder.recording, self._began)
 
 
 def _is_deed(entry: Entry) -> TypeGuard[Commanded]:

@@ -18,8 +18,8 @@ class TableQuestion:
 
     introduction = (
         "The learner is stuck and asks you where to go. It does what you say, and learns from it as if the move were its "
-        "own. When episodes with your advice are no shorter than those before, it counts that, and after a few of them it "
-        "asks no more. You can type:"
+        "own. When episodes with your advice are no shorter than those before, it counts that, and after a few of them, or when "
+        "it has had all the help that it may have, it asks no more. You can type:"
     )
 
     def __init__(self, console: Console, plain: bool) -> None:

@@ -1,4 +1,4 @@
-"""SRL improved: what time costs is learned step by step, alike parts are one, and values begin at a lower bound."""
+"""Q-learning of what time still to come costs, from a lower bound of the full model on: close to heuristic search."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

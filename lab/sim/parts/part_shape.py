@@ -123,7 +123,9 @@ def _tilt(roll: float, pitch: float) -> Array:
 
 
 def _quaternion(turn: Array) -> Quaternion:
-    """Of a turn (3, 3), as xyzw; exactly (0, 0, 0, 1) for none."""
+    """Of a turn (3, 3), as xyzw; exactly (0, 0, 0, 1) for none, for which scipy is not loaded."""
+    if np.array_equal(turn, np.eye(3)):
+        return (0.0, 0.0, 0.0, 1.0)
     from scipy.spatial.transform import Rotation
 
     x, y, z, w = (float(one) + 0.0 for one in Rotation.from_matrix(turn).as_quat(canonical=True))

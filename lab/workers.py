@@ -1,0 +1,191 @@
+"""Processes that work beside this one, on the other cores. What they do comes out the same as if it was done here.
+
+They are new interpreters, so a script of a user's needs no guard around its own code, and threads do no harm. A
+worker ends when its standard input does, which is when its parent ends, however that happens.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
+from multiprocessing.connection import Client, Connection, Listener
+from multiprocessing.reduction import ForkingPickler
+from queue import SimpleQueue
+from secrets import token_hex
+from typing import Any, Generic, Self, TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def cores() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+Packed = tuple[bytes, bytes]  # a function and its arguments as they are sent: as they were when it was handed out
+
+
+class _Lost(Exception):
+    """What was handed to a worker did not come back: it could not be sent, or the worker is gone."""
+
+
+class Task(Generic[Result]):
+    """Work that was handed out. Whoever needs its result before a worker has begun, or when one is lost, does it here."""
+
+    def __init__(self, work: Callable[..., Result], arguments: Sequence[Any], packed: "Packed | None" = None) -> None:
+        self.work, self.arguments, self.packed = work, arguments, packed
+        self.future: Future[Result] = Future()
+
+    @property
+    def waits(self) -> bool:
+        """Whether a worker is at it."""
+        return self.future.running()
+
+    def result(self) -> Result:
+        """What the work comes to; raises what it raises."""
+        if self.future.cancel():
+            return self.work(*self.arguments)
+        try:
+            return self.future.result()
+        except _Lost:
+            return self.work(*self.arguments)
+
+
+class Workers:
+    """This process and `count` - 1 others, None: one a core; with 1, everything is done here. In the end of the block they end.
+
+    What is handed out are functions of modules with arguments that can be pickled, as they are at that moment; what cannot
+    be is done here.
+    """
+
+    def __init__(self, count: int | None = 1) -> None:
+        self._others = (count or cores()) - 1
+        self._handed_out: SimpleQueue[Task[Any] | None] = SimpleQueue()
+        self._processes: list[subprocess.Popen[bytes]] = []
+
+    def __enter__(self) -> Self:
+        if self._others > 0:
+            key = token_hex(32)
+            self._listener = Listener(authkey=key.encode())
+            told = {"address": self._listener.address, "key": key}
+            for _ in range(self._others):
+                self._processes.append(_started(json.dumps(told)))
+                threading.Thread(target=self._hand_out, daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for process in self._processes:
+            self._handed_out.put(None)
+            process.kill()
+        for process in self._processes:
+            process.communicate()
+        if self._processes:
+            self._processes.clear()
+            self._listener.close()
+
+    def begin(self, work: Callable[..., Result], *arguments: Any) -> Task[Result]:
+        """Hand work out; another process begins with it as soon as one is free."""
+        return self._handed(work, arguments, self._pack(work))
+
+    def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
+        """What the work makes of each item, in the order of the items; meanwhile this process works from the end on."""
+        packed = self._pack(work)
+        tasks = [self._handed(work, (item,), packed) for item in items]
+        own: dict[int, Result] = {}
+        first_own = len(tasks)
+        for number, task in enumerate(tasks):
+            while task.waits and number < first_own:
+                first_own -= 1
+                if tasks[first_own].future.cancel():
+                    own[first_own] = work(items[first_own])
+            yield own.pop(number) if number in own else task.result()
+
+    def _pack(self, thing: object) -> bytes | None:
+        """How it is sent; None where nothing is, or where it cannot be."""
+        if not self._processes:
+            return None
+        try:
+            return bytes(ForkingPickler.dumps(thing))
+        except Exception:  # pickle says in many ways that it cannot
+            return None
+
+    def _handed(self, work: Callable[..., Result], arguments: Sequence[Any], packed: bytes | None) -> Task[Result]:
+        sent = None if packed is None else self._pack(arguments)
+        task = Task(work, arguments, None if packed is None or sent is None else (packed, sent))
+        if task.packed is not None:
+            self._handed_out.put(task)
+        return task
+
+    def _hand_out(self) -> None:
+        """Give one worker task after task, as long as it takes them; the same function is sent once."""
+        try:
+            worker = self._listener.accept()
+        except Exception:  # it did not begin, or this process ends: whatever it is, nothing was handed out yet
+            return
+        known = b""
+        while (task := self._handed_out.get()) is not None:
+            if not task.future.set_running_or_notify_cancel():
+                continue
+            assert task.packed is not None
+            work, arguments = task.packed
+            try:
+                worker.send_bytes(b"" if work == known else work)
+                worker.send_bytes(arguments)
+                known = work
+                done, came = worker.recv()
+            except Exception:  # the worker is gone, or what came of it cannot be read here
+                task.future.set_exception(_Lost())
+                return
+            task.future.set_result(came) if done else task.future.set_exception(came)
+
+
+def _started(told: str) -> "subprocess.Popen[bytes]":
+    command = [sys.executable, "-c", "from lab.workers import serve; serve()"]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    process = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment
+    )
+    assert process.stdin is not None
+    process.stdin.write(told.encode() + b"\n")
+    process.stdin.flush()
+    return process
+
+
+def serve() -> None:
+    """Work for the process that has begun this one, until it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
+    told = json.loads(sys.stdin.readline())
+    threading.Thread(target=_end_with_input, daemon=True).start()
+    with Client(told["address"], authkey=told["key"].encode()) as parent:
+        _work_for(parent)
+
+
+def _end_with_input() -> None:
+    while sys.stdin.buffer.read(1):
+        pass
+    os._exit(1)
+
+
+def _work_for(parent: Connection) -> None:
+    """Answer each task with whether it was done, and with what came of it."""
+    work: Callable[..., object] | None = None
+    while True:
+        try:
+            packed, arguments = parent.recv_bytes(), parent.recv_bytes()
+        except EOFError:
+            return
+        try:
+            work = ForkingPickler.loads(packed) if packed else work
+            assert work is not None
+            answer = (True, work(*ForkingPickler.loads(arguments)))
+        except Exception as error:
+            answer = (False, error)
+        try:
+            parent.send(answer)
+        except Exception:  # what came of it, or its error, cannot be pickled
+            parent.send((False, _Lost()))
