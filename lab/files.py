@@ -1,6 +1,5 @@
 """Files: where the shipped ones are; read within bounds; written whole or not at all; folders looked at before use."""
 
-import fcntl
 import hashlib
 import json
 import os
@@ -15,10 +14,10 @@ from math import isfinite
 from pathlib import Path
 from secrets import token_hex
 from shutil import rmtree
-from tempfile import mkdtemp
 from typing import Any
 
 from lab.errors import BadInput, WorkFailed
+from lab.operating_system import lock, lock_file, opened, replace
 
 PACKAGE = Path(__file__).resolve().parent
 MOST_BYTES = 256 << 20  # of any file that is read; most kinds have a lower limit of their own
@@ -102,7 +101,8 @@ def _finite(text: str) -> float:
     return number
 
 
-_DRAFT = ".run-"  # and eight characters: the folder of a draft
+_DRAFT = re.compile(r"\.run-\w{8}")  # the folder of a draft
+_LOCK = ".lock"  # the ending of the file beside it that is locked while somebody writes in it
 
 
 def write_whole(path: Path, content: bytes, drafts: Path | None = None) -> None:
@@ -118,18 +118,21 @@ def write_whole(path: Path, content: bytes, drafts: Path | None = None) -> None:
         try:
             with beside.open("xb") as file:
                 with suppress(OSError):  # where nothing can be locked, nothing is taken for one that was left
-                    fcntl.flock(file, fcntl.LOCK_EX)
-                if not beside.exists():  # another process has taken it for one that was left
-                    continue
+                    lock(file.fileno())
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-                os.replace(beside, path)
+            try:
+                replace(beside, path)
+                return
+            except FileNotFoundError:
+                if beside.exists():
+                    raise
+                # another process has taken it for one that was left: once more
         except BaseException:
             with suppress(OSError):
                 beside.unlink(missing_ok=True)
             raise
-        return
 
 
 def _clear_drafts(folder: Path, name: str) -> None:
@@ -139,8 +142,12 @@ def _clear_drafts(folder: Path, name: str) -> None:
         for left in [Path(entry) for entry in entries if draft_of.fullmatch(entry.name)]:
             with suppress(OSError):
                 if stat.S_ISREG(left.lstat().st_mode):
-                    with _locked(left, fcntl.LOCK_NB):
-                        left.unlink(missing_ok=True)
+                    file = opened(left, os.O_RDWR, follow=False)
+                    try:
+                        lock(file, wait=False)
+                    finally:
+                        os.close(file)
+                    left.unlink()
 
 
 def nearest(folder: Path) -> Path:
@@ -170,33 +177,19 @@ def check_out(out: Path) -> None:
 def draft(folder: Path) -> Iterator[Path]:
     """A hidden folder in `folder` for files that are not finished, gone in the end; those that killed ones left go, too.
 
-    One that another process still writes in stays: its writer has locked it. Raises OSError.
+    One that another process still writes in stays: its writer has locked the file beside it. Raises OSError.
     """
-    for left in folder.iterdir():
-        if re.fullmatch(rf"{re.escape(_DRAFT)}\w{{8}}", left.name) and left.is_dir():
-            with suppress(OSError), _locked(left, fcntl.LOCK_NB):
+    for left in {folder / path.name.removesuffix(_LOCK) for path in folder.iterdir()}:
+        if _DRAFT.fullmatch(left.name):
+            with suppress(OSError), lock_file(left.with_name(left.name + _LOCK), wait=False):
                 rmtree(left)
-    while True:
-        made = Path(mkdtemp(prefix=_DRAFT, dir=folder))
-        with _locked(made):
-            if not made.exists():  # another process has taken it for one that was left
-                continue
-            try:
-                yield made
-            finally:
-                rmtree(made, ignore_errors=True)
-            return
-
-
-@contextmanager
-def _locked(path: Path, how: int = 0) -> Iterator[None]:
-    """The lock of a folder or a file, which ends with its holder. Raises BlockingIOError with LOCK_NB when another holds it."""
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | how)
-        yield
-    finally:
-        os.close(handle)
+    made = folder / f".run-{token_hex(4)}"
+    with lock_file(made.with_name(made.name + _LOCK)):
+        made.mkdir(0o700)
+        try:
+            yield made
+        finally:
+            rmtree(made, ignore_errors=True)
 
 
 def is_file(path: Path | str) -> bool:

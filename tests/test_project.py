@@ -9,6 +9,7 @@ from runpy import run_path
 from typing import Any
 
 import pytest
+from packaging.requirements import Requirement
 
 import lab
 
@@ -37,8 +38,26 @@ def test_dependencies_have_lower_bounds_and_no_upper_ones(project: dict[str, Any
             assert name == own, line
             assert {*others.split(",")} < extras.keys(), line
         else:
-            assert line.count(">=") == 1, line
-            assert not set(line) & set("<!~,"), line
+            bounds = line.partition(";")[0]
+            assert bounds.count(">=") == 1, line
+            assert not set(bounds) & set("<!~,"), line
+
+
+@pytest.mark.parametrize("machine", ["x86_64", "AMD64", "arm64", "aarch64"])
+@pytest.mark.parametrize("system", ["linux", "darwin", "win32"])
+@pytest.mark.parametrize("version", ["3.11", "3.12", "3.13"])
+def test_one_engine_is_installed_on_every_system_and_never_both(
+    project: dict[str, Any], version: str, system: str, machine: str
+) -> None:
+    """Both are the same files, so that two would overwrite each other."""
+    here = {"python_version": version, "sys_platform": system, "platform_machine": machine}
+    engines = [
+        wanted.name
+        for wanted in map(Requirement, project["project"]["dependencies"])
+        if wanted.name.startswith("pybullet") and wanted.marker is not None and wanted.marker.evaluate(here)
+    ]
+    plain = system == "linux" and (machine != "x86_64" or version == "3.11")
+    assert engines == ["pybullet" if plain else "pybullet-arm64"]
 
 
 def test_one_version_stands_everywhere(project: dict[str, Any], root: Path) -> None:

@@ -15,7 +15,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("lab.errors",),
+    ("lab.errors", "lab.operating_system"),
     ("lab.files", "lab.mdp", "lab.optional", "lab.plugins", "lab.statistics", "lab.workers"),
     ("lab.learning", "lab.vision"),
     ("lab.sequencing", "lab.toolbox"),
@@ -29,33 +29,42 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("lab.api", "lab.testing"),
     ("lab.cli",),
 )
-ALONE: dict[str, set[str]] = {  # library -> the only modules that may import it
-    "pybullet": {"lab.sim.world"},
-    "pybullet_data": {"lab.sim.world"},
-    "pybullet_utils": {"lab.sim.world"},
-    "meshcat": {"lab.view.meshcat"},
-    "cv2": {
-        *(f"lab.vision.{name}" for name in ("markers", "hidden_discs", "part_outline", "picture_files")),
-        *(f"lab.vision.{name}" for name in ("lens", "calibration", "photo_effects")),
-    },
-    "PIL": {"lab.view.movie"},
-    "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
-    "ortools": {
-        *(
-            f"lab.sequencing.methods.cp_sat{part}"
-            for part in ("", "_free", "_model", "_tasks", "_rooms", "_solver", "_track", "_transport")
-        ),
-        "lab.sequencing.cyclic.model",
-    },
-    "starlette": {"lab.view.server", "lab.view.server_page"},
-    "uvicorn": {"lab.view.server", "lab.view.server_limits"},
-    "websockets": set(),  # uvicorn's
-    "jinja2": {"lab.studies.report"},
-    "fsspec": {"lab.toolbox.remote_place"},
-    "s3fs": set(),  # fsspec's
-    "optuna": {"lab.studies.tuning_search"},
-    "joblib": {"lab.studies.runner"},  # to work in several processes; its files are pickles, and nobody reads those
-} | {library: set() for library in ("random", "pickle", "dill", "cloudpickle", "shelve", "marshal")}
+ALONE: dict[str, set[str]] = (
+    {  # library -> the only modules that may import it
+        "pybullet": {"lab.sim.world"},
+        "pybullet_data": {"lab.sim.world"},
+        "pybullet_utils": {"lab.sim.world"},
+        "meshcat": {"lab.view.meshcat"},
+        "cv2": {
+            *(f"lab.vision.{name}" for name in ("markers", "hidden_discs", "part_outline", "picture_files")),
+            *(f"lab.vision.{name}" for name in ("lens", "calibration", "photo_effects")),
+        },
+        "PIL": {"lab.view.movie"},
+        "numba": {"lab.learning.compiled"},  # what is kept of it is kept in one place
+        "ortools": {
+            *(
+                f"lab.sequencing.methods.cp_sat{part}"
+                for part in ("", "_free", "_model", "_tasks", "_rooms", "_solver", "_track", "_transport")
+            ),
+            "lab.sequencing.cyclic.model",
+        },
+        "starlette": {"lab.view.server", "lab.view.server_page"},
+        "uvicorn": {"lab.view.server", "lab.view.server_limits"},
+        "websockets": set(),  # uvicorn's
+        "jinja2": {"lab.studies.report"},
+        "fsspec": {"lab.toolbox.remote_place"},
+        "s3fs": set(),  # fsspec's
+        "optuna": {"lab.studies.tuning_search"},
+        "joblib": {"lab.studies.runner"},  # to work in several processes; its files are pickles, and nobody reads those
+        "psutil": {"lab.studies.runner"},
+    }
+    | {library: {"lab.operating_system"} for library in ("fcntl", "resource", "msvcrt")}
+    | {
+        library: set()  # which one system or another lacks, or which are no use there
+        for library in ("termios", "tty", "pty", "pwd", "grp", "select", "posix", "readline", "winreg", "_winapi")
+    }
+    | {library: set() for library in ("random", "pickle", "dill", "cloudpickle", "shelve", "marshal")}
+)
 NEVER = {  # room -> rooms that it never imports, whatever the layers say
     **dict.fromkeys(
         ("lab.mdp", "lab.learning", "lab.advice", "lab.sequencing"), ("lab.sim", "lab.view", "lab.seat", "lab.cli")
@@ -231,7 +240,7 @@ def test_the_architecture_is_the_one_that_is_told() -> None:
         parents[len(indent) // 2 :] = [name]
         told.add("/".join(parents))
     assert told == {path.parent.relative_to(ROOT).as_posix() for path in (ROOT / "lab").rglob("__init__.py")}
-    floors = re.findall(r"^    \d+ +([a-z, ]+)$", text, re.MULTILINE)
+    floors = re.findall(r"^    \d+ +([a-z_, ]+)$", text, re.MULTILINE)
     assert [tuple(f"lab.{room}" for room in floor.split(", ")) for floor in floors] == list(LAYERS)
 
 
@@ -279,6 +288,7 @@ def faults(module: str, source: str) -> list[str]:
         ),
         ("lab.sequencing.methods.fifo", "def f():\n    import jinja2", "allowed in ['lab.studies.report']"),
         ("lab.mdp", "import random", "allowed in no module"),
+        ("lab.files", "def f():\n    import fcntl", "allowed in ['lab.operating_system']"),
         ("lab.toolbox.registry", "import pickle", "allowed in no module"),
         ("lab.mdp", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import lab.sim.world", "never does"),
         ("lab.mdp", "from lab.sim import world", "imports lab.sim.world: lab.mdp never does"),

@@ -1,6 +1,5 @@
 """Files to which lines of JSON are appended, one entry a line: how they are written by one command at a time, and read."""
 
-import fcntl
 import json
 import os
 import stat
@@ -12,6 +11,7 @@ from typing import Any, Self
 
 from lab.errors import BadInput, WorkFailed
 from lab.files import json_of
+from lab.operating_system import lock, opened, replace_and_close
 
 MAX_LINE_BYTES = 1 << 22
 _SHOWN = 40  # characters of each of two lines that differ
@@ -85,9 +85,9 @@ class AppendedFile:
     def __init__(self, path: Path, flags: int) -> None:
         """Open it with flags beside O_APPEND. Raises OSError, and BadInput when another command is writing it."""
         self.path = path
-        self._file: int | None = os.open(path, flags | os.O_APPEND, 0o644)
+        self._file: int | None = opened(path, flags | os.O_APPEND)
         try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(self._file, wait=False)
             there = os.stat(path)
         except BlockingIOError:
             self.close()
@@ -111,8 +111,9 @@ class AppendedFile:
 
     def put_aside(self, to: Path) -> None:
         """Give it another name, while nobody else can write it, and close it. Raises OSError."""
-        os.replace(self.path, to)
-        self.close()
+        file, self._file = self._file, None
+        assert file is not None
+        replace_and_close(file, self.path, to)
 
     def cut(self, size: int) -> None:
         """Take away all but the first `size` bytes. Raises OSError."""

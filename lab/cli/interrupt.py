@@ -21,9 +21,12 @@ def ctrl_c_is_heard() -> Iterator[None]:
 
     It is raised where the lab's own code runs, or where nothing has moved since the last look, as in a wait; in a library
     that is busy for a second, or when it is pressed once more, there. Never while something is being imported. It is raised
-    again when Python has ignored it (in a callback).
+    again when Python has ignored it (in a callback). Windows has no interval timer: there it is raised where Python hears it.
     """
-    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:  # somebody else's, or not wanted
+    has_timer = hasattr(signal, "setitimer")
+    if (
+        not has_timer or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    ):  # somebody else's, or not wanted
         yield
         return
     main_frame = sys._getframe(2)

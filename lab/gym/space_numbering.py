@@ -92,7 +92,7 @@ def _digits(space: spaces.Space[Any]) -> Iterator[Digit]:
             raise Unsupported
 
 
-def _parts(space: spaces.Tuple[Any] | spaces.Dict) -> list[spaces.Space[Any]]:
+def _parts(space: "spaces.Tuple[Any] | spaces.Dict") -> list[spaces.Space[Any]]:  # no generic before Gymnasium 1.4
     return list(space.spaces.values() if isinstance(space, spaces.Dict) else space.spaces)
 
 

@@ -1,12 +1,12 @@
 """A policy shown to others: its card with pictures in a folder, or the whole folder that the Hugging Face Hub takes."""
 
-import os
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
 from lab.errors import WorkFailed
 from lab.files import check_out, draft
+from lab.operating_system import replace
 from lab.skills import SKILLS
 from lab.toolbox.card import Event, Telling, card
 from lab.toolbox.hub_folder import MODEL, README, check_license, header, hub_files, sha256
@@ -68,7 +68,7 @@ def _write(policy: Policy, contents: dict[str, bytes], out: Path) -> Files:
             if "value map" in pictures:
                 value_levels(policy, beside / pictures["value map"])
             for name in (*contents, *pictures.values()):
-                os.replace(beside / name, out / name)
+                replace(beside / name, out / name)
         for file in set(PICTURES.values()) - set(pictures.values()):
             (out / file).unlink(missing_ok=True)
     except OSError as error:

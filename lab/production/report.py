@@ -1,7 +1,6 @@
 """What a run is made of and what it leaves behind: its records, its pictures, its replay and its numbers as JSON."""
 
 import json
-import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from lab.errors import LabError, WorkFailed
 from lab.export.program import PROGRAM, TRAJECTORY
 from lab.files import draft, read_limited, write_whole
+from lab.operating_system import replace
 from lab.production.cyclic_order import measured_period
 from lab.production.outcome import Outcome
 from lab.production.run_story import story_of
@@ -191,7 +191,7 @@ def write_files(report: Report, out: Path, drawn: Drawn | None = None, workers: 
                 write_whole(paths["run"], _json(_run_document(report)))
             for name, file in FILES.items():
                 if name in report.files:
-                    os.replace(paths[name], out / file)
+                    replace(paths[name], out / file)
                 else:
                     (out / file).unlink(missing_ok=True)
     except OSError as error:

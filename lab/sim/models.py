@@ -173,6 +173,6 @@ def write(folder: Path) -> list[Path]:
         model = make()
         text, meshes = urdf(model)
         for name, content in {f"{model.name}.urdf": text, **meshes}.items():
-            (folder / name).write_text(content)
+            (folder / name).write_text(content, encoding="utf-8")
             written.append(folder / name)
     return written

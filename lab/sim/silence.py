@@ -1,24 +1,24 @@
 """What a library writes to the file descriptors themselves is kept off the terminal."""
 
-import ctypes
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+from lab.operating_system import flush_c_streams
 
 
 @contextmanager
 def silence() -> Iterator[None]:
     """Keep PyBullet's banner and warnings, which go straight to the file descriptors, off the terminal."""
-    libc = ctypes.CDLL(None)
     kept = [os.dup(number) for number in (1, 2)]
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
-        libc.fflush(None)
+        flush_c_streams()
         for number in (1, 2):
             os.dup2(nowhere, number)
         yield
     finally:
-        libc.fflush(None)
+        flush_c_streams()
         for number, copy in zip((1, 2), kept, strict=True):
             os.dup2(copy, number)
             os.close(copy)

@@ -10,6 +10,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from io import BytesIO
@@ -158,9 +159,13 @@ def said(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def _end_with_parent(parent: int) -> None:
     """Ends this process soon after its parent's end, which may be a kill -9 that leaves no time to say so."""
 
+    from psutil import STATUS_ZOMBIE, NoSuchProcess, Process
+
     def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(PARENT_LOOK_S)
+        with suppress(NoSuchProcess):
+            process = Process(parent)
+            while process.is_running() and process.status() != STATUS_ZOMBIE:
+                time.sleep(PARENT_LOOK_S)
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

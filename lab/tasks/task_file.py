@@ -1,5 +1,6 @@
 """Task files: tasks/*.toml -> validated frozen models. The only place where raw text is checked."""
 
+import os
 import re
 from functools import partial
 from os.path import isfile
@@ -48,7 +49,7 @@ def names_file(word: str) -> bool:
 
 def is_path(task: str) -> bool:
     """Whether a word for a task, a cell or a world is the path of a file, which may not be there."""
-    return Path(task).suffix in (".toml", ".txt", *SUFFIXES) or "/" in task
+    return Path(task).suffix in (".toml", ".txt", *SUFFIXES) or not {"/", os.sep}.isdisjoint(task)
 
 
 def find(task: str) -> Path:

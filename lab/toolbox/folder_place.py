@@ -1,7 +1,6 @@
 """A toolbox in a local folder."""
 
 import errno
-import fcntl
 import json
 import os
 import re
@@ -13,6 +12,7 @@ from pathlib import Path
 
 from lab import files
 from lab.errors import BadInput, WorkFailed
+from lab.operating_system import lock, opened, replace
 from lab.toolbox.names import BEGUN, JOURNAL, SESSIONS
 from lab.toolbox.place import FileState, read_file
 
@@ -106,13 +106,14 @@ class FolderPlace:
         try:
             self._inside(path.parent)
             self._made(target.parent)
-            os.replace(path, target)
+            replace(path, target)
         except OSError as error:
             raise _refused("move", path, error) from error
 
     def sweep(self, under: str) -> None:
         for left in (self.folder / under).glob(".*.tmp"):
-            left.unlink(missing_ok=True)
+            with suppress(PermissionError):  # Windows removes nothing that somebody has open
+                left.unlink(missing_ok=True)
 
     def tidy(self, older_s: float) -> list[str]:
         """Half-written files, also of sessions that are linked here, and folders of sessions that were never begun."""
@@ -142,10 +143,11 @@ class FolderPlace:
         path = self.folder / name
         try:
             self._made(path.parent)
-            handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+            handle = opened(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, follow=False)
             try:
                 size = os.fstat(handle).st_size
-                cut = _cut_line(os.pread(handle, _LONGEST_LINE, max(0, size - _LONGEST_LINE)))
+                os.lseek(handle, max(0, size - _LONGEST_LINE), os.SEEK_SET)
+                cut = _cut_line(os.read(handle, _LONGEST_LINE))
                 if cut and not _is_whole(cut):  # by a crash: it never was said
                     os.ftruncate(handle, size - len(cut))
                 _write_all(handle, b"\n" * _is_whole(cut) + line + b"\n")
@@ -166,11 +168,11 @@ class FolderPlace:
         path = self.folder / name
         try:
             self._made(path.parent)
-            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+            handle = opened(path, os.O_RDWR | os.O_CREAT, follow=False)
         except OSError as error:
             raise _refused("write", path, error) from error
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX)
+            lock(handle)
             yield
         finally:
             os.close(handle)

@@ -12,6 +12,7 @@ HASH_DIGITS = 12
 SESSIONS = "sessions"  # the folder for the journals of lessons, on this machine
 JOURNAL, BEGUN = "events.jsonl", "begun"  # in the folder of a session: its journal, the policy that it went on from
 VERSIONS, LOG, TRASH = "versions", "log", "trash"  # the folders in a toolbox
+_DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)\d")  # no name of a file on Windows
 _ADDRESS = re.compile(r"[a-z][a-z0-9+.-]*://")
 
 
@@ -38,7 +39,7 @@ def is_address(text: str) -> bool:
 def slug(name: str) -> str:
     """A file stem for any name: plain lower-case ones stay, others are cleaned and get a hash that keeps them apart."""
     plain = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:MAX_SLUG_LENGTH]
-    if plain and plain == name:
+    if plain and plain == name and not _DEVICE.fullmatch(plain):
         return plain
     return f"{plain or 'policy'}-{hashlib.sha256(name.encode('utf-8', 'replace')).hexdigest()[:10]}"
 

@@ -107,7 +107,7 @@ class LiveView:
         """The command that makes `url` work on another computer, one line."""
         try:
             user = getuser()
-        except (KeyError, OSError):  # an account without a name, as in some containers
+        except (ImportError, KeyError, OSError):  # an account without a name, as in some containers
             user = "user"
         return f"ssh -L {self.port}:127.0.0.1:{self.port} {user}@{gethostname()}"
 

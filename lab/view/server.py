@@ -25,6 +25,7 @@ from uvicorn import Config
 from uvicorn import Server as Uvicorn
 
 from lab.errors import BadInput, WorkFailed
+from lab.operating_system import keep_port
 from lab.view.server_limits import BACKLOG, LimitedConnection, LimitedSocket, quiet_when_full
 from lab.view.server_page import PAUSE_S, News, Page, Panel
 
@@ -234,7 +235,7 @@ def _from_here(asked: HTTPConnection) -> bool:
 def _listen(port: int) -> socket.socket:
     own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
-        own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        keep_port(own)
         own.setblocking(False)
         own.bind((ADDRESS, port))
         own.listen(16)

@@ -5,13 +5,14 @@ that has not asked for anything makes room for a new one, and none waits for eve
 """
 
 import asyncio
-import resource
 from errno import EMFILE, ENFILE, ENOBUFS, ENOMEM
 from itertools import count
 from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+
+from lab.operating_system import most_descriptors
 
 MOST = 128  # connections; a quarter of the descriptors at the most
 IDLE_S = 10.0  # for a request to come
@@ -22,8 +23,8 @@ _NUMBERS = count()
 
 def most_connections() -> int:
     """How many connections there may be."""
-    soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    return MOST if soft == resource.RLIM_INFINITY else max(4, min(MOST, soft // 4))
+    descriptors = most_descriptors()
+    return MOST if descriptors is None else max(4, min(MOST, descriptors // 4))
 
 
 class LimitedConnection(H11Protocol):

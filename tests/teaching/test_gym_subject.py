@@ -493,11 +493,11 @@ def test_the_options_of_a_command_change_the_settings() -> None:
         ("gym:Pendulum-v1", "supported are Discrete, MultiDiscrete, MultiBinary, and Tuple or Dict of these"),
         ("gym:CartPole-v1?sutton_barto_reward=true", "its observation space is Box("),  # its speeds have no bounds
         ("gym:CartPole-v1?sutton_barto_reward=true", "wanted 1 to 4 axes with finite bounds"),
-        ("gym:MountainCar-v0?max_episode_steps=0", "it cannot be made with max_episode_steps: ValueError: "),
+        ("gym:MountainCar-v0?max_episode_steps=0", "it cannot be made with max_episode_steps: "),
         ("gym:FrozenLake-v1?slippery=true", "unknown keyword 'slippery'"),
         ("gym:FrozenLake-v1?slippery=true", "did you mean 'is_slippery'? known: desc, is_slippery, map_name, max_ep"),
         ("gym:FrozenLake-v1?map_name=9x9", "it cannot be made with map_name: KeyError: '9x9'"),
-        ("gym:CliffWalking-v1?max_episode_steps=0", "it cannot be made with max_episode_steps: ValueError: "),
+        ("gym:CliffWalking-v1?max_episode_steps=0", "it cannot be made with max_episode_steps: "),
         ("gym:two words", "it cannot be made: Error: Malformed environment ID: two words"),
         ("gym:TeachingLab/World-v0?world=nowhere", "unknown task 'nowhere'"),
         ("gym:Corridor-v0?cells=600000", "600000 states x 2 actions: a table of at most 1000000 entries is allowed"),

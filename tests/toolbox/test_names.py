@@ -41,3 +41,9 @@ def test_the_default_may_be_an_address(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_addresses_and_folders() -> None:
     assert all(map(is_address, ("s3://bucket/lab", "memory://", "gs://b")))
     assert not any(map(is_address, ("box", "/a/b", "./s3:/b", "C:\\box", "simplecache::s3://b/c")))
+
+
+@pytest.mark.parametrize("name", ["con", "nul", "aux", "prn", "com1", "lpt9"])
+def test_a_device_of_windows_is_no_files_name(name: str) -> None:
+    assert slug(name).startswith(f"{name}-")
+    assert slug(f"{name}-1") == f"{name}-1"

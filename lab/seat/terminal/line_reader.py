@@ -1,12 +1,13 @@
 """How a line is read from a person: at a terminal with arrow keys, from plain lines, or from outside while one waits."""
 
 import os
-import select
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from threading import Lock
+from queue import Empty, SimpleQueue
+from threading import Lock, Thread
 from typing import TYPE_CHECKING, Protocol, TextIO, cast
+from weakref import WeakKeyDictionary
 
 from rich.console import Console
 from rich.text import Text
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from prompt_toolkit.output import Output
 
 ReadLine = Callable[[str], str]
+LOOK_S = 0.5  # for how long Ctrl-C may go unheard on Windows, where nothing interrupts a wait
 OTHER_KEYS = ("tab", "pageup", "pagedown", "insert", *(f"f{n}" for n in range(1, 13)))
 
 
@@ -110,12 +112,13 @@ class PlainReader:
     def __init__(self, console: Console, stream: TextIO, outside: Outside | None = None) -> None:
         self.outside = outside or Outside()
         self._console = console
-        self._stream, self._left = stream, b""
+        self._stream = stream
         self._typed = stream.isatty()
+        self._bytes: _Stream | None
         try:
-            self._fd = stream.fileno()
+            self._bytes = _STREAMS.setdefault(stream, _Stream(stream.fileno()))
         except OSError:  # text in memory
-            self._fd = -1
+            self._bytes = None
 
     def __call__(self, prompt: str) -> str:
         """One line with its end."""
@@ -133,34 +136,59 @@ class PlainReader:
 
     def _next(self) -> tuple[str, bool]:
         """A line, and whether it stands on the screen already."""
-        if self._fd < 0:
+        if self._bytes is None:
             return self.outside.taken() or self._stream.readline(), False
+        with self.outside.waking(self._bytes.wake):
+            while (line := self._bytes.line()) is None:
+                if (word := self.outside.taken()) is not None:
+                    return f"{word}\n", False
+        text = line.decode(self._stream.encoding, "replace")
+        return text, self._typed and text.endswith("\n")
+
+
+class _Stream:
+    """The lines of a descriptor, read by a thread, because on Windows nothing else can wait for them and for a word besides.
+
+    It reads when a line is asked for. What it has read when a word comes first is there for whoever asks next.
+    """
+
+    def __init__(self, file: int) -> None:
+        self._file, self._left, self._reads = file, b"", False
+        self._arrived: SimpleQueue[bytes | None] = SimpleQueue()  # None: somebody has woken it
+
+    def wake(self) -> None:
+        """Have `line` return; from any thread."""
+        self._arrived.put(None)
+
+    def line(self) -> bytes | None:
+        """The next line with its end, the last one without, b"" after that; None when it was woken."""
         while b"\n" not in self._left:
-            word = self._wait()
-            if word is not None:
-                return f"{word}\n", False
-            more = os.read(self._fd, 65536)
+            if not self._reads:
+                self._reads = True
+                Thread(target=self._read, daemon=True).start()
+            try:
+                more = self._arrived.get(timeout=LOOK_S)
+            except Empty:
+                continue
+            if more is None:
+                return None
+            self._reads = False
             self._left += more
             if not more:
                 line, self._left = self._left, b""
-                return line.decode(self._stream.encoding, "replace"), False
-        line, _, self._left = self._left.partition(b"\n")
-        return f"{line.decode(self._stream.encoding, 'replace')}\n", self._typed
+                return line
+        line, end, self._left = self._left.partition(b"\n")
+        return line + end
 
-    def _wait(self) -> str | None:
-        """Until there is something to read, or a word from outside, which is returned."""
-        hears, tells = os.pipe()
+    def _read(self) -> None:
         try:
-            with self.outside.waking(lambda: _poke(tells)):
-                select.select([self._fd, hears], [], [])
-                return self.outside.taken()
-        finally:
-            os.close(hears)
-            os.close(tells)
+            more = os.read(self._file, 65536)
+        except OSError:  # it was closed
+            more = b""
+        self._arrived.put(more)
 
 
-def _poke(fd: int) -> None:
-    os.write(fd, b".")
+_STREAMS: "WeakKeyDictionary[TextIO, _Stream]" = WeakKeyDictionary()
 
 
 class TerminalReader:

@@ -1,7 +1,5 @@
 """The keys of a replay at the terminal: space pauses and goes on, n makes a step, + and - change the speed, q ends it."""
 
-import os
-import select
 import signal
 import sys
 import threading
@@ -11,7 +9,8 @@ from contextlib import contextmanager
 from lab.seat.replay_pace import KEYS, ReplayPace
 
 HELP = "space: pause and go on, n: one step, + and -: faster and slower, q: end"
-LOOK_S = 0.1  # how often it is looked whether the replay is over
+LOOK_S = 0.05  # between two looks for keys
+ENDS = ("q", "c-c")  # and Ctrl-C, which is a key here
 
 
 @contextmanager
@@ -20,28 +19,24 @@ def replay_keys(pace: ReplayPace) -> Iterator[bool]:
     if not sys.stdin.isatty():
         yield False
         return
-    import termios
-    import tty
+    from prompt_toolkit.input import create_input
 
-    file, over = sys.stdin.fileno(), threading.Event()
-    before = termios.tcgetattr(file)
+    keys, over = create_input(sys.stdin), threading.Event()
 
     def read() -> None:
-        while not over.is_set():
-            if not select.select([file], [], [], LOOK_S)[0]:
-                continue
-            key = os.read(file, 1).decode("ascii", "replace").lower()
-            if key in ("q", ""):
-                signal.raise_signal(signal.SIGINT) if key else over.set()
-            elif key in KEYS:
-                pace.do(KEYS[key])
+        while not over.wait(LOOK_S) and not keys.closed:
+            for pressed in keys.read_keys():
+                key = pressed.key.lower()
+                if key in ENDS:
+                    signal.raise_signal(signal.SIGINT)
+                elif key in KEYS:
+                    pace.do(KEYS[key])
 
     reader = threading.Thread(target=read, daemon=True)
-    tty.setcbreak(file)
-    reader.start()
-    try:
-        yield True
-    finally:
-        over.set()
-        reader.join(2 * LOOK_S)
-        termios.tcsetattr(file, termios.TCSADRAIN, before)
+    with keys.raw_mode():
+        reader.start()
+        try:
+            yield True
+        finally:
+            over.set()
+            reader.join()

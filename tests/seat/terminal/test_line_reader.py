@@ -175,6 +175,16 @@ def test_a_word_from_another_thread_ends_a_read_of_a_pipe() -> None:
     assert said(shown) == "? right\n? left\n"
 
 
+def test_what_comes_after_a_word_from_outside_is_there_for_the_next_reader_of_the_stream() -> None:
+    shown = console()
+    with piped(console=shown) as (read, other):
+        assert _answered(read, lambda: read("? "), "right") == "right\n"
+        os.write(other, b"left\nup\n")
+        assert read("? ") == "left\n"
+        assert PlainReader(shown, read._stream)("? ") == "up\n"
+        os.close(other)
+
+
 def _answered(read: TerminalReader | PlainReader, ask: Callable[[], str], word: str) -> str:
     """What a question returns that another thread answers as soon as somebody reads."""
     listens = threading.Event()

@@ -25,6 +25,20 @@ def lesson(tmp_path: Path, lab: Callable[..., Any]) -> Path:
     return folder
 
 
+def test_ctrl_c_ends_a_replay(lesson: Path) -> None:
+    child = pexpect.spawn(
+        sys.executable, ["-c", LAB, "replay", str(lesson), "--pause", "60"], encoding="utf-8", timeout=60
+    )
+    try:
+        child.expect("Answer: ")
+        child.sendcontrol("c")
+        child.expect("stopped by Ctrl-C")
+        child.expect(pexpect.EOF)
+    finally:
+        child.close()
+    assert child.exitstatus == 130
+
+
 def test_keys_pause_step_and_end_a_replay(lesson: Path) -> None:
     child = pexpect.spawn(
         sys.executable,
