@@ -59,12 +59,12 @@ class Task(Generic[Result]):
 class Workers:
     """This process and `count` - 1 others, None: one a core; with 1, everything is done here. In the end of the block they end.
 
-    What is handed out are functions of modules with arguments that can be pickled, as they are at that moment; what cannot
-    be is done here.
+    first: what each of the others does as soon as it has begun, such as loading what it will need. What is handed out are
+    functions of modules with arguments that can be pickled, as they are at that moment; what cannot be is done here.
     """
 
-    def __init__(self, count: int | None = 1) -> None:
-        self._others = (count or cores()) - 1
+    def __init__(self, count: int | None = 1, first: Callable[[], object] | None = None) -> None:
+        self._others, self._first = (count or cores()) - 1, first
         self._handed_out: SimpleQueue[Task[Any] | None] = SimpleQueue()
         self._processes: list[subprocess.Popen[bytes]] = []
 
@@ -125,6 +125,10 @@ class Workers:
         """Give one worker task after task, as long as it takes them; the same function is sent once."""
         try:
             worker = self._listener.accept()
+            if self._first is not None:
+                worker.send_bytes(bytes(ForkingPickler.dumps(self._first)))
+                worker.send_bytes(bytes(ForkingPickler.dumps(())))
+                worker.recv()
         except Exception:  # it did not begin, or this process ends: whatever it is, nothing was handed out yet
             return
         known = b""

@@ -12,6 +12,11 @@ from lab.cli.output import end, show
 from lab.errors import BadInput
 
 
+def load_run() -> None:
+    """Loads what carries a run out: other processes do so while this one does."""
+    import lab.production.run  # noqa: F401
+
+
 def run(
     task: Annotated[
         str | None, typer.Argument(help="A task that ships, or a .toml file.", show_default="toast")
@@ -65,7 +70,7 @@ def run(
     """Find or learn the skills, time them, find an order for them, and carry them out in physics."""
     from lab.workers import Workers
 
-    with Workers(workers) as beside:  # the others load what they need while this process does
+    with Workers(workers, first=load_run) as beside:
         from dataclasses import replace
 
         from lab.files import check_out

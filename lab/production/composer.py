@@ -117,18 +117,18 @@ class Production:
 
     def watch(self) -> None:
         """After each physics step: tell of machines that are done, and show what they have done to their parts."""
-        floor = self.floor
+        floor, now_s = self.floor, self.floor.now_s
         for machine in floor.machines.values():
             if not machine.part:
                 continue
-            if not machine.told and machine.done(floor.now_s):
+            if not machine.told and machine.done(now_s):
                 machine.told = True
                 at_most_s = self.work.at_most_s(machine.part, machine.station)
-                machine.burns_s = NEVER if at_most_s is None else floor.now_s + at_most_s
-                self.tell(MachineDone(machine.station, machine.part, floor.now_s))
+                machine.burns_s = NEVER if at_most_s is None else now_s + at_most_s
+                self.tell(MachineDone(machine.station, machine.part, now_s))
                 if machine.skill is None and floor.skillset.task.station(machine.station).finish is not None:
                     self._show(finish_name(machine.part, machine.station))
-            if floor.now_s > machine.burns_s:
+            if now_s > machine.burns_s:
                 machine.burns_s = NEVER
                 self._show(burnt_name(machine.part, machine.station))
             if machine.skill is not None and machine.moves:

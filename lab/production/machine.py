@@ -52,6 +52,8 @@ class Machine:
 
     def step(self) -> None:
         """Set what the next physics step needs; a slow machine's process stands still in some of them."""
+        if self.skill is None and self.share == 1.0:
+            return
         self._due += 1.0 / self.share
         if self.skill is not None and not self.fails and self._due >= 1.0:
             self.skill.step()

@@ -75,15 +75,18 @@ def _parts(floor: Floor, task: Task, spot_of: Mapping[str, Spot], delivered: Con
     for body, spot in spot_of.items():
         if body in held:
             continue
-        at, where = seen_at(floor, body), station_of(floor, task, spot)
+        at = seen_at(floor, body)
+        far, upright = hypot(at.x - spot.x, at.y - spot.y), floor.bench.upright(body) >= UPRIGHT
+        strayed = far > (DELIVERED_M if body in delivered else PART_M) or at.z < spot.z - FELL_M
+        if at.z >= BELOW_M and upright and not strayed:
+            continue
+        where, seen = station_of(floor, task, spot), f"({at.x:.2f}, {at.y:.2f}) m"
         station = f"'{where}'" if where else f"({spot.x:.2f}, {spot.y:.2f}) m"
-        far = hypot(at.x - spot.x, at.y - spot.y)
-        seen = f"({at.x:.2f}, {at.y:.2f}) m"
         if at.z < BELOW_M:
             yield Deviation("part gone", body, f"{body} is nowhere on the table", where)
-        elif floor.bench.upright(body) < UPRIGHT:
+        elif not upright:
             yield Deviation("part fallen", body, f"{body} lies on its side at {seen}", where, at, far)
-        elif far > (DELIVERED_M if body in delivered else PART_M) or at.z < spot.z - FELL_M:
+        else:
             words = f"{body} is not at {station}: seen {far:.2f} m away at {seen}"
             if floor.scene.robot.arm.inverse(floor.bench.part_pose(body)) is None:
                 yield Deviation("part out of reach", body, f"{words}, out of reach", where, at, far)

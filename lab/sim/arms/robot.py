@@ -193,7 +193,7 @@ class Robot:
         heard = self.listener
         if heard is not None:
             heard.began(poses, blend, way, before)
-        for row, (position, velocity) in enumerate(zip(way.positions, way.velocities, strict=True)):
+        for row, (position, velocity) in enumerate(zip(way.positions.tolist(), way.velocities.tolist(), strict=True)):
             self.world.drive(NAME, self.arm.joints, position, velocity)
             if heard is not None:
                 heard.drives(row)
