@@ -75,8 +75,11 @@ def verdict(kind: Kind, path: Path) -> tuple[str, str]:
 
 def _where() -> str:
     """The last line of the lab's own code that an exception came through."""
-    frames = [one for one in traceback.extract_tb(sys.exc_info()[2]) if "/lab/" in one.filename]
-    return f"{frames[-1].filename.rpartition('/lab/')[2]}:{frames[-1].lineno}" if frames else "outside the lab"
+    from lab.files import PACKAGE
+
+    frames = [(Path(one.filename), one.lineno) for one in traceback.extract_tb(sys.exc_info()[2])]
+    own = [(path.relative_to(PACKAGE), line) for path, line in frames if path.is_relative_to(PACKAGE)]
+    return "{}:{}".format(*own[-1]) if own else "outside the lab"
 
 
 def batch(room: Path, name: str, seed: int, numbers: range, say: Any, folder: Path) -> Told:

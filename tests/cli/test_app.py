@@ -170,7 +170,7 @@ finally:
 
 
 def test_a_failed_piece_of_work_ends_with_1(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise WorkFailed("the arm is stuck\nat the table")
 
     monkeypatch.setattr("lab.skills.prepared_scene.prepare", fail)
@@ -201,7 +201,7 @@ def test_ctrl_c_ends_with_130(lab: Lab, monkeypatch: pytest.MonkeyPatch, words: 
 
 
 def test_what_the_system_refuses_is_one_line(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> None:
+    def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device", "x")
 
     monkeypatch.setattr("lab.skills.prepared_scene.prepare", full)
