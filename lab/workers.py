@@ -12,6 +12,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from multiprocessing.connection import Client, Connection, Listener
 from multiprocessing.reduction import ForkingPickler
 from queue import SimpleQueue
@@ -67,15 +68,17 @@ class Workers:
         self._others, self._first = (count or cores()) - 1, first
         self._handed_out: SimpleQueue[Task[Any] | None] = SimpleQueue()
         self._processes: list[subprocess.Popen[bytes]] = []
+        self._listener: Listener | None = None
 
     def __enter__(self) -> Self:
         if self._others > 0:
             key = token_hex(32)
-            self._listener = Listener(authkey=key.encode())
-            told = {"address": self._listener.address, "key": key}
-            for _ in range(self._others):
-                self._processes.append(_started(json.dumps(told)))
-                threading.Thread(target=self._hand_out, daemon=True).start()
+            with suppress(OSError):  # where there is no room for another process, those that are there do the work
+                self._listener = Listener(authkey=key.encode(), backlog=self._others)
+                told = {"address": self._listener.address, "key": key}
+                for _ in range(self._others):
+                    self._processes.append(_started(json.dumps(told)))
+                    threading.Thread(target=self._hand_out, args=[self._listener], daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -84,9 +87,10 @@ class Workers:
             process.kill()
         for process in self._processes:
             process.communicate()
-        if self._processes:
-            self._processes.clear()
+        self._processes.clear()
+        if self._listener is not None:
             self._listener.close()
+            self._listener = None
 
     def begin(self, work: Callable[..., Result], *arguments: Any) -> Task[Result]:
         """Hand work out; another process begins with it as soon as one is free."""
@@ -121,10 +125,10 @@ class Workers:
             self._handed_out.put(task)
         return task
 
-    def _hand_out(self) -> None:
+    def _hand_out(self, listener: Listener) -> None:
         """Give one worker task after task, as long as it takes them; the same function is sent once."""
         try:
-            worker = self._listener.accept()
+            worker = listener.accept()
             if self._first is not None:
                 worker.send_bytes(bytes(ForkingPickler.dumps(self._first)))
                 worker.send_bytes(bytes(ForkingPickler.dumps(())))

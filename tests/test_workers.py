@@ -85,3 +85,14 @@ with Workers(2) as workers:
 """
     with subprocess.Popen([sys.executable, "-c", script]), pipe.open("rb") as reading:
         assert reading.read() == b""
+
+
+@pytest.mark.parametrize("what", ["lab.workers.Listener", "lab.workers.subprocess.Popen"])
+def test_where_no_process_can_be_started_everything_is_done_here(monkeypatch: pytest.MonkeyPatch, what: str) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise OSError(24, "Too many open files")
+
+    monkeypatch.setattr(what, refused)
+    with Workers(2) as workers:
+        assert workers.begin(os.getpid).result() == HERE
+        assert list(workers.each(factorial, range(3))) == [1, 1, 2]
