@@ -78,8 +78,8 @@ def said(desk: Desk) -> list[str]:
 def test_keys_act_and_letters_begin_a_command(desk: Desk) -> None:
     def typed(pipe: PipeInput, console: OperatorConsole) -> None:
         for key in ("\x1b[A", "\x1b[6~", "]", "o", "g"):
-            pipe.send_text(key)
             count = len(said(desk))
+            pipe.send_text(key)
             until(lambda count=count: len(said(desk)) > count)  # type: ignore[misc]
         pipe.send_text("open\r")  # its first letter is a key
         until(lambda: len(said(desk)) > 5)
